@@ -1,0 +1,1 @@
+"""What is said: published formulas, as printed, and what becomes of them."""

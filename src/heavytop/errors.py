@@ -1,0 +1,24 @@
+"""The program's own errors.  The text of each is the cause, with the offending value, then the remedy."""
+
+
+class HeavyTopError(Exception):
+    """A request that cannot be carried out: ``cause`` says what was wrong, ``remedy`` what to do about it."""
+
+    exit_code = 2
+
+    def __init__(self, cause: str, remedy: str = "") -> None:
+        super().__init__(f"{cause}\n  {remedy}" if remedy else cause)
+        self.cause = cause
+        self.remedy = remedy
+
+
+class InputError(HeavyTopError):
+    """Bad input: a number, a top, a start, a plan, a file."""
+
+
+class NotInClass(InputError):
+    """A start outside the class of motions that a closed form covers; says which exact test failed and by how much."""
+
+
+class OutOfReach(HeavyTopError):
+    """A reference that cannot be proven to the digits asked for; says how many could be reached."""

@@ -1,0 +1,90 @@
+"""The gyrostat motion behind the paper's partial case (4.1)-(4.6): I1 = I2 > I3, homoclinic.
+
+With ρ = I1/I3, k = α (ρ − 1), s = k t/2 and I1, I3, α > 0 (MATH: the smooth branch, all t):
+
+    Ω = α ( −tanh s sech s,  tanh² s,  ρ sech s ),   γ = ( −tanh s sech s,  tanh² s,  sech s )
+
+It solves M' = M × ω, γ' = γ × ω with ω = Ω + λ e2, λ = k/2 = P b/(M·γ), and tends to the permanent rotation
+Ω = (0, α, 0), γ = (0, 1, 0), a saddle with exponents ±k/2.  Attitude: θ = −gd(s), φ = π/2 + gd(s),
+ψ = α t (I1 + I3)/(2 I3), continued through the pole at t = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from flint import arb
+
+from heavytop.errors import NotInClass
+from heavytop.exact.balls import FUNCTIONS, ball, to_bits
+from heavytop.top.angles import attitude_from_angles
+from heavytop.top.equations import GYROSTAT, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+
+@dataclass(frozen=True, slots=True)
+class ErshkovPartial:
+    """The homoclinic gyrostat motion from Ω = (0, 0, ρ α), γ = (0, 0, 1) at t = 0.
+
+    alpha: α > 0, 1/time.  i1, i3: I1 = I2 > I3 > 0.  Raises NotInClass outside.
+    """
+
+    alpha: Fraction
+    i1: Fraction
+    i3: Fraction
+    method: str = "closed form: gyrostat, hyperbolic (4.2)-(4.6)"
+    system: System = GYROSTAT
+
+    def __post_init__(self) -> None:
+        if self.alpha <= 0:
+            raise NotInClass(f"alpha = {self.alpha} is not positive.", "The partial case needs alpha > 0.")
+        if not self.i1 > self.i3 > 0:
+            raise NotInClass(f"I1 = {self.i1}, I3 = {self.i3}.", "The partial case (4.1) needs I1 = I2 > I3 > 0.")
+
+    @property
+    def rate(self) -> Fraction:
+        """k = α (I1 − I3)/I3; the motion approaches the saddle like e^(−k|t|/2)."""
+        return self.alpha * (self.i1 - self.i3) / self.i3
+
+    @property
+    def top(self) -> HeavyTop:
+        """The top of (4.1), with P = 1: P b = α² I1 (I1 − I3)/(2 I3)."""
+        b = self.alpha**2 * self.i1 * (self.i1 - self.i3) / (2 * self.i3)
+        return HeavyTop((self.i1, self.i1, self.i3), 1, (0, b, 0))
+
+    @property
+    def start(self) -> State:
+        """The state at t = 0."""
+        return State((0, 0, self.alpha * self.i1 / self.i3), (0, 0, 1))
+
+    def state(self, time: Fraction, bits: int) -> list[arb]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+
+        def evaluate(_working: int) -> list[arb]:
+            s = ball(self.rate * time / 2)
+            alpha, ratio = ball(self.alpha), ball(self.i1 / self.i3)
+            tanh, sech = s.tanh(), s.sech()
+            gamma = [-tanh * sech, tanh * tanh, sech]
+            return [alpha * gamma[0], alpha * gamma[1], alpha * ratio * gamma[2], *gamma]
+
+        return to_bits(evaluate, bits)
+
+    def angles(self, time: Fraction, bits: int) -> list[arb]:
+        """(φ, θ, ψ), continuous for all t; θ takes the sign of −t."""
+
+        def evaluate(_working: int) -> list[arb]:
+            s = ball(self.rate * time / 2)
+            gudermann = 2 * (s / 2).tanh().atan()
+            psi = ball(self.alpha * time * (self.i1 + self.i3) / (2 * self.i3))
+            return [arb.pi() / 2 + gudermann, -gudermann, psi]
+
+        return to_bits(evaluate, bits)
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, the space axis ⟂ γ in body components."""
+
+        def evaluate(working: int) -> list[arb]:
+            return list(attitude_from_angles(*self.angles(time, working), FUNCTIONS))
+
+        return to_bits(evaluate, bits)

@@ -1,0 +1,1 @@
+"""What is computed: integrators behind one call."""

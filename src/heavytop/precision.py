@@ -1,0 +1,219 @@
+"""Number formats, and the wall where exact numbers are rounded into them.
+
+Everything inside the program is a :class:`fractions.Fraction`.  Rounding to a format happens here and only here
+(:func:`number`), and what was rounded can be had back exactly (:func:`exact`).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal
+from fractions import Fraction
+from typing import Any
+
+from heavytop.errors import InputError
+
+REAL_BITS = range(24, 20001)
+_MAX_TEXT = 100_000
+_DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,6})?")
+_REMEDY = "Write an integer, a decimal such as 0.25 or 1e-3, or a fraction such as -2/5."
+
+
+@dataclass(frozen=True, slots=True)
+class Precision:
+    """A binary floating-point format: its name on the command line and the bits of its significand."""
+
+    name: str
+    bits: int
+
+    @property
+    def eps(self) -> Fraction:
+        """Distance from 1 to the next larger number, 2^(1 - bits)."""
+        return Fraction(2) ** (1 - self.bits)
+
+    @property
+    def digits(self) -> int:
+        """Significant decimal digits that name a number of this format uniquely."""
+        return 1 + math.ceil(self.bits * math.log10(2))
+
+    @property
+    def family(self) -> str:
+        """``double``, ``extended``, ``quad`` or ``real``."""
+        return self.name.partition(":")[0]
+
+
+DOUBLE = Precision("double", 53)
+EXTENDED = Precision("extended", 64)
+QUAD = Precision("quad", 113)
+
+
+def real(bits: int) -> Precision:
+    """The arbitrary-precision format with ``bits`` (24 to 20000) significant bits; raises InputError outside."""
+    if bits not in REAL_BITS:
+        raise InputError(f"real:{bits} is not a format.", "The bits of real:BITS go from 24 to 20000.")
+    return Precision(f"real:{bits}", bits)
+
+
+def parse(name: str) -> Precision:
+    """The format of that name (``double``, ``extended``, ``quad``, ``real:BITS``); raises InputError for any other."""
+    for precision in (DOUBLE, EXTENDED, QUAD):
+        if name == precision.name:
+            return precision
+    if re.fullmatch(r"real:\d{1,9}", name):
+        return real(int(name[5:]))
+    raise InputError(f"Unknown precision {name[:60]!r}.", "Use double, extended, quad or real:BITS, such as real:237.")
+
+
+def available() -> dict[str, str | None]:
+    """For each family of formats: None if this platform has it, else the reason why not."""
+    import heyoka
+    import numpy
+
+    mantissa = int(numpy.finfo(numpy.longdouble).nmant) + 1
+    return {
+        "double": None,
+        "extended": None if mantissa == EXTENDED.bits else f"long double has {mantissa} bits here, not 64",
+        "quad": None if hasattr(heyoka, "real128") else "this build of heyoka has no quadruple precision (real128)",
+        "real": None if hasattr(heyoka, "real") else "this build of heyoka has no arbitrary precision (MPFR)",
+    }
+
+
+def require(precision: Precision) -> Precision:
+    """``precision`` itself; raises InputError if this platform lacks it."""
+    reason = available()[precision.family]
+    if reason:
+        raise InputError(
+            f"Precision {precision.name} is not available: {reason}.", "`heavytop list` shows what is there."
+        )
+    return precision
+
+
+def exact(value: Any) -> Fraction:
+    """The exact value of an int, Fraction, decimal or fraction string, or binary float of any format.
+
+    A float is the exact binary number it is, not the decimal that it prints as.  Raises InputError for text that is
+    no number, for NaN and infinities, and for text beyond 100,000 characters or an exponent beyond that size.
+    """
+    if isinstance(value, Fraction):
+        return value
+    if isinstance(value, bool):
+        raise InputError(f"{value!r} is not a number.", _REMEDY)
+    if isinstance(value, int):
+        return Fraction(value)
+    if isinstance(value, str):
+        return _from_text(value)
+    if hasattr(value, "as_integer_ratio"):
+        try:
+            return Fraction(*value.as_integer_ratio())
+        except (ValueError, OverflowError):
+            raise InputError(f"{value} is not a finite number.", _REMEDY) from None
+    kind = type(value).__name__
+    if kind in ("real", "real128"):
+        bits = QUAD.bits if kind == "real128" else int(value.prec)
+        return round_to(_from_text(str(value)), bits)
+    if hasattr(value, "__index__"):
+        return Fraction(value.__index__())
+    raise InputError(f"A {kind} is not a number: {str(value)[:60]!r}.", _REMEDY)
+
+
+def _from_text(text: str) -> Fraction:
+    numerator, slash, denominator = text.strip().partition("/")
+    top = _from_decimal(numerator, text)
+    if not slash:
+        return top
+    bottom = _from_decimal(denominator, text)
+    if bottom == 0:
+        raise InputError(f"{text!r} divides by zero.", _REMEDY)
+    return top / bottom
+
+
+def _from_decimal(text: str, whole: str) -> Fraction:
+    text = text.strip()
+    if len(text) > _MAX_TEXT:
+        raise InputError(f"A number of {len(text)} characters is too long.", f"At most {_MAX_TEXT} are read.")
+    match = _DECIMAL.fullmatch(text)
+    if not match or not text.isascii():
+        raise InputError(f"{whole[:60]!r} is not a finite number.", _REMEDY)
+    if match[3] and abs(int(match[3][1:])) > _MAX_TEXT:
+        raise InputError(f"The exponent of {whole[:60]!r} is too large.", f"Exponents go up to {_MAX_TEXT}.")
+    return Fraction(*Decimal(text).as_integer_ratio())
+
+
+def round_to(value: Fraction, bits: int) -> Fraction:
+    """``value`` rounded to ``bits`` significant bits, to nearest, ties to even; no limit on the exponent."""
+    if value == 0:
+        return value
+    significand, exponent = _significand(value, bits)
+    return significand * Fraction(2) ** exponent
+
+
+def _significand(value: Fraction, bits: int) -> tuple[int, int]:
+    """Integers (m, e) with m 2^e the nearest to ``value`` that has ``bits`` bits."""
+    exponent = value.numerator.bit_length() - value.denominator.bit_length() - bits
+    significand = round(value / Fraction(2) ** exponent)
+    if abs(significand) >= 1 << bits:
+        exponent += 1
+        significand = round(value / Fraction(2) ** exponent)
+    return significand, exponent
+
+
+def number(value: Fraction, precision: Precision) -> Any:
+    """``value`` rounded to nearest in ``precision``, as that format's own number type.
+
+    double: numpy.float64; extended: numpy.longdouble; quad: heyoka.real128; real: heyoka.real.
+    Raises InputError where the value lies outside the format's exponent range.
+    """
+    import numpy
+
+    significand, exponent = _significand(value, precision.bits) if value else (0, 0)
+    result: Any
+    if precision.family == "double":
+        try:
+            result = numpy.float64(float(value))
+        except OverflowError:
+            result = numpy.float64(math.inf)
+    elif precision.family == "extended":
+        high, low = divmod(significand, 1 << 32)
+        with numpy.errstate(over="ignore"):
+            result = numpy.ldexp(numpy.longdouble(high) * numpy.longdouble(1 << 32) + numpy.longdouble(low), exponent)
+    else:
+        import heyoka
+
+        text = _integer_and_exponent(significand, exponent)
+        result = heyoka.real128(text) if precision.family == "quad" else heyoka.real(text, precision.bits)
+    if not numpy.isfinite(result) or (value != 0 and result == 0):
+        raise InputError(
+            f"{decimal_text(value, 6)} is outside the exponent range of {precision.name}.",
+            "Choose other units, or a format with a wider range such as real:237.",
+        )
+    return result
+
+
+def _integer_and_exponent(significand: int, exponent: int) -> str:
+    """m 2^e as decimal text without a decimal point, which the locale could change the meaning of."""
+    if exponent >= 0:
+        return str(Decimal(significand << exponent))
+    return f"{Decimal(significand * 5**-exponent)}e{exponent}"
+
+
+def rounded(value: Fraction, precision: Precision) -> Fraction:
+    """The exact value of ``value`` rounded to ``precision``."""
+    return exact(number(value, precision))
+
+
+def decimal_text(value: Fraction, digits: int) -> str:
+    """``value`` as decimal text with ``digits`` significant digits, rounded to nearest."""
+    context = Context(prec=digits, Emax=MAX_EMAX, Emin=MIN_EMIN)
+    quotient = context.divide(Decimal(value.numerator), Decimal(value.denominator))
+    return str(quotient) if quotient else "0"
+
+
+def native_text(value: Any, precision: Precision) -> str:
+    """A number of ``precision`` as decimal text that names it uniquely; ``nan``, ``inf`` or ``-inf`` where it is."""
+    import numpy
+
+    if not numpy.isfinite(value):
+        return str(value)
+    return decimal_text(exact(value), precision.digits)

@@ -1,0 +1,133 @@
+"""The heavy top and its start, as exact rationals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from math import isqrt
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.precision import exact
+
+Vector = tuple[Fraction, Fraction, Fraction]
+
+
+def vector(values: Iterable[Any], what: str) -> Vector:
+    """Three exact rationals out of anything :func:`heavytop.precision.exact` reads; raises InputError otherwise."""
+    parts = tuple(values)
+    if len(parts) != 3:
+        raise InputError(f"{what} has {len(parts)} numbers.", "Give three, one for each principal axis: x,y,z.")
+    try:
+        first, second, third = (exact(part) for part in parts)
+    except InputError as error:
+        raise InputError(f"{what}: {error.cause}", error.remedy) from None
+    return first, second, third
+
+
+def dot(a: Any, b: Any) -> Any:
+    """a · b over any ring."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Any, b: Any) -> tuple[Any, Any, Any]:
+    """a × b over any ring."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@dataclass(frozen=True, slots=True, init=False)
+class HeavyTop:
+    """A rigid body with a fixed point under gravity.
+
+    inertia: principal moments (I1, I2, I3) at the fixed point, all positive.
+    weight: P.
+    centre: r = (a, b, c), the centre of mass on the principal axes.
+
+    Each is read by :func:`heavytop.precision.exact`; raises InputError for a moment that is not positive.
+    """
+
+    inertia: Vector
+    weight: Fraction
+    centre: Vector
+
+    def __init__(self, inertia: Iterable[Any], weight: Any, centre: Iterable[Any]) -> None:
+        moments = vector(inertia, "inertia")
+        for axis, value in enumerate(moments, 1):
+            if value <= 0:
+                raise InputError(
+                    f"The principal moment I{axis} = {value} is not positive.",
+                    "Moments of inertia are positive numbers.",
+                )
+        try:
+            load = exact(weight)
+        except InputError as error:
+            raise InputError(f"weight: {error.cause}", error.remedy) from None
+        object.__setattr__(self, "inertia", moments)
+        object.__setattr__(self, "weight", load)
+        object.__setattr__(self, "centre", vector(centre, "centre"))
+
+    @property
+    def moment(self) -> Vector:
+        """P r, the only way in which weight and centre of mass enter the equations."""
+        a, b, c = self.centre
+        return self.weight * a, self.weight * b, self.weight * c
+
+    def angular_momentum(self, omega: Any) -> tuple[Any, Any, Any]:
+        """M = (I1 Ω1, I2 Ω2, I3 Ω3) over any ring that rationals act on."""
+        return self.inertia[0] * omega[0], self.inertia[1] * omega[1], self.inertia[2] * omega[2]
+
+    def warnings(self) -> list[str]:
+        """What no rigid body can have, though the equations do not mind: a moment larger than the sum of the others."""
+        found = []
+        for axis, value in enumerate(self.inertia):
+            others = sum(self.inertia) - value
+            if value > others:
+                found.append(
+                    f"I{axis + 1} = {value} exceeds the sum {others} of the other two: no rigid body has such moments."
+                )
+        return found
+
+
+@dataclass(frozen=True, slots=True, init=False)
+class State:
+    """Angular velocity Ω and unit vector of weight γ on the principal axes, as exact rationals."""
+
+    omega: Vector
+    gamma: Vector
+
+    def __init__(self, omega: Iterable[Any], gamma: Iterable[Any]) -> None:
+        object.__setattr__(self, "omega", vector(omega, "omega"))
+        object.__setattr__(self, "gamma", vector(gamma, "gamma"))
+
+    @property
+    def flat(self) -> tuple[Fraction, ...]:
+        """(Ω1, Ω2, Ω3, γ1, γ2, γ3)."""
+        return (*self.omega, *self.gamma)
+
+    def require_unit_gamma(self) -> State:
+        """This state; raises InputError unless |γ| = 1 exactly."""
+        square = dot(self.gamma, self.gamma)
+        if square != 1:
+            off = float(abs(square - 1)) if abs(square - 1) < 10**300 else float("inf")
+            raise InputError(
+                f"gamma is not a unit vector: |gamma|^2 - 1 = {'-' if square < 1 else ''}{off:.6g}.",
+                "Give rational components such as 3/5,0,4/5, or --normalize to move gamma onto the sphere.",
+            )
+        return self
+
+    def normalized(self, bits: int = 128) -> State:
+        """The state with γ at a rational point of the unit sphere within 2^(2-bits) of γ/|γ| (stereographic)."""
+        square = dot(self.gamma, self.gamma)
+        if square == 0:
+            raise InputError("gamma is the zero vector, which has no direction.", "Give the direction of the weight.")
+        if square == 1:
+            return self
+        largest = max(abs(g) for g in self.gamma)
+        g1, g2, g3 = (g / largest for g in self.gamma)
+        scale = 1 << bits
+        root = Fraction(isqrt(int((g1 * g1 + g2 * g2 + g3 * g3) * scale**4)), scale**2)
+        u, v = (Fraction(round(g / (root + abs(g3)) * scale), scale) for g in (g1, g2))
+        norm = 1 + u * u + v * v
+        sign = 1 if g3 >= 0 else -1
+        return State(self.omega, (2 * u / norm, 2 * v / norm, sign * (2 / norm - 1)))

@@ -1,0 +1,144 @@
+"""First integrals and invariant relations, written once over any ring, each with the tops and starts it holds for.
+
+Every integral takes (Parameters, y) with y in the order of the state.  Cases count up to a renaming of the axes:
+a renaming of odd sign turns Ω into -Ω, which changes no integral here but for its own sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import permutations
+from typing import Any
+
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
+from heavytop.top.heavy_top import HeavyTop, State, dot
+
+Axes = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Integral:
+    """A function that stays constant along the motions of ``system`` it is offered for.
+
+    name: as it appears in reports.
+    value: the function, over any ring.
+    condition: where it holds, in words.
+    """
+
+    name: str
+    value: Callable[[Parameters, Any], Any]
+    condition: str
+
+
+def momentum(p: Parameters, y: Any) -> tuple[Any, Any, Any]:
+    """M = I Ω."""
+    return p.inertia[0] * y[0], p.inertia[1] * y[1], p.inertia[2] * y[2]
+
+
+def gamma_squared(p: Parameters, y: Any) -> Any:
+    """|γ|² = 1, the first of (1.3)."""
+    return dot(y[3:6], y[3:6])
+
+
+def area(p: Parameters, y: Any) -> Any:
+    """C0 = M·γ, the second of (1.3)."""
+    return dot(momentum(p, y), y[3:6])
+
+
+def energy(p: Parameters, y: Any) -> Any:
+    """C1 = ½ Ω·M + P r·γ, the third of (1.3)."""
+    return dot(momentum(p, y), y[:3]) / 2 + dot(p.moment, y[3:6])
+
+
+def momentum_squared(p: Parameters, y: Any) -> Any:
+    """|M|²: Euler's top (P r = 0), and the gyrostat."""
+    m = momentum(p, y)
+    return dot(m, m)
+
+
+def gyrostat_energy(p: Parameters, y: Any) -> Any:
+    """½ M·I⁻¹M + λ M2, the gyrostat's energy."""
+    m = momentum(p, y)
+    return dot(m, y[:3]) / 2 + p.rotor * m[1]
+
+
+def spin(p: Parameters, y: Any, axes: Axes) -> Any:
+    """Lagrange's integral: Ω along the axis of symmetry ``axes[2]``."""
+    return y[axes[2]]
+
+
+def kovalevskaya(p: Parameters, y: Any, axes: Axes) -> Any:
+    """|ξ|² with ξ = (Ω1 + iΩ2)² − (n1 + i n2)(γ1 + iγ2), n = P r/I3, the small moment on axis ``axes[2]``."""
+    i, j, k = axes
+    a, b = p.moment[i], p.moment[j]
+    real = y[i] * y[i] - y[j] * y[j] - (a * y[3 + i] - b * y[3 + j]) / p.inertia[k]
+    imaginary = y[i] * y[j] + y[i] * y[j] - (a * y[3 + j] + b * y[3 + i]) / p.inertia[k]
+    return real * real + imaginary * imaginary
+
+
+def goryachev_chaplygin(p: Parameters, y: Any, axes: Axes) -> Any:
+    """Ω3 (Ω1² + Ω2²) − (P a/I3) Ω1 γ3, conserved on C0 = 0; centre of mass on axis ``axes[0]``."""
+    i, j, k = axes
+    return y[k] * (y[i] * y[i] + y[j] * y[j]) - p.moment[i] * y[i] * y[3 + k] / p.inertia[k]
+
+
+def hess(p: Parameters, y: Any, axes: Axes) -> Any:
+    """I1 a Ω1 + I3 c Ω3 (times P), an invariant relation: conserved where it is 0."""
+    i, _, k = axes
+    return p.moment[i] * p.inertia[i] * y[i] + p.moment[k] * p.inertia[k] * y[k]
+
+
+def moment_along_centre(p: Parameters, y: Any) -> Any:
+    """M·r (times P) of a top with I1 = I2 = I3."""
+    return dot(momentum(p, y), p.moment)
+
+
+def holding(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> tuple[Integral, ...]:
+    """Every integral that holds for this top and start, found by exact rational tests on the exact data.
+
+    Invariant relations (Goryachev-Chaplygin, Hess) are offered only for starts on them.
+    """
+    common = (
+        Integral("gamma_squared", gamma_squared, "every motion"),
+        Integral("area", area, "every motion"),
+    )
+    if system is GYROSTAT:
+        return (*common, *_of_gyrostat(top))
+    p = system.parameters(top, start)
+    return (*common, Integral("energy", energy, "every motion"), *_of_heavy_top(p, start.flat))
+
+
+def _of_gyrostat(top: HeavyTop) -> Iterator[Integral]:
+    yield Integral("momentum_squared", momentum_squared, "every motion of the gyrostat")
+    yield Integral("gyrostat_energy", gyrostat_energy, "every motion of the gyrostat")
+    if top.inertia[0] == top.inertia[2]:
+        yield Integral("spin2", partial(spin, axes=(2, 0, 1)), "I1 = I3: the rotor lies on the axis of symmetry")
+
+
+def _of_heavy_top(p: Parameters, y: tuple[Any, ...]) -> Iterator[Integral]:
+    n = p.moment
+    if not any(n):
+        yield Integral("momentum_squared", momentum_squared, "Euler: P r = 0")
+    if p.inertia[0] == p.inertia[1] == p.inertia[2] and any(n):
+        yield Integral("moment_along_centre", moment_along_centre, "I1 = I2 = I3")
+    on_zero_area = area(p, y) == 0
+    for axes in permutations(range(3)):
+        i, j, k = axes
+        i1, i2, i3 = (p.inertia[axis] for axis in axes)
+        if i < j and i1 == i2:
+            if n[i] == n[j] == 0:
+                yield Integral(f"spin{k + 1}", partial(spin, axes=axes), f"Lagrange about axis {k + 1}")
+            if i1 == 2 * i3 and n[k] == 0:
+                yield Integral("kovalevskaya", partial(kovalevskaya, axes=axes), f"Kovalevskaya about axis {k + 1}")
+        if i1 == i2 == 4 * i3 and n[j] == n[k] == 0 and any(n) and on_zero_area:
+            yield Integral(
+                "goryachev_chaplygin",
+                partial(goryachev_chaplygin, axes=axes),
+                f"Goryachev-Chaplygin about axis {k + 1}, on M·gamma = 0",
+            )
+        if i < k and n[j] == 0 and n[i] != 0 and n[k] != 0 and i1 * (i2 - i3) * n[i] ** 2 == i3 * (i1 - i2) * n[k] ** 2:
+            relation = partial(hess, axes=axes)
+            if relation(p, y) == 0:
+                yield Integral("hess", relation, "Hess, on its invariant relation")
