@@ -86,6 +86,7 @@ class DeloneHomoclinic:
         """ξ, the space axis ⟂ γ in body components; at t = 0 φ + ψ = π, so ξ = (−1, 0, 0)."""
 
         def evaluate(working: int) -> list[arb]:
-            return list(attitude_from_angles(*self.angles(time, working), FUNCTIONS))
+            phi, theta, psi = self.angles(time, working)
+            return list(attitude_from_angles(phi, theta, psi, FUNCTIONS))
 
         return to_bits(evaluate, bits)

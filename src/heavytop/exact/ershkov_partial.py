@@ -85,6 +85,7 @@ class ErshkovPartial:
         """ξ, the space axis ⟂ γ in body components."""
 
         def evaluate(working: int) -> list[arb]:
-            return list(attitude_from_angles(*self.angles(time, working), FUNCTIONS))
+            phi, theta, psi = self.angles(time, working)
+            return list(attitude_from_angles(phi, theta, psi, FUNCTIONS))
 
         return to_bits(evaluate, bits)

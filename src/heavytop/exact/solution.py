@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Protocol
 
-from flint import arb
+from flint import arb, arb_series
 
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -34,5 +34,13 @@ class ExactSolution(Protocol):
 
         Each has at least ``bits`` correct bits, relative to a value above 1 and absolute below it.
         Raises OutOfReach where that cannot be proven.
+        """
+        ...
+
+    def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
+        """Six power series in ε, the motion at ``time`` + ε up to ε^(length − 1).
+
+        Evaluated from the closed form (or the enclosure) itself, with t + ε in the place of t: substituted into the
+        field they give the residual.  Bits as for :meth:`state`, for the coefficient of ε^0.
         """
         ...

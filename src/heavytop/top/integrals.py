@@ -15,7 +15,7 @@ from typing import Any
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
 
-Axes = tuple[int, int, int]
+Axes = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
