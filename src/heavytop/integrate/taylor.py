@@ -261,7 +261,7 @@ def check_times(times: Sequence[Any]) -> list[Fraction]:
     for earlier, later in zip([Fraction(0), *values], values, strict=False):
         if earlier * later < 0:
             raise InputError(f"The times {earlier} and {later} have different signs.", "Run each direction by itself.")
-        if abs(later) <= abs(earlier) and (later, earlier) != (0, 0):
+        if abs(later) <= abs(earlier) and (later or earlier):
             raise InputError(
                 f"The time {later} does not come after {earlier}.", "Times go strictly away from 0, each once."
             )

@@ -92,10 +92,13 @@ def model_error(case: PartialCase, time: Fraction, truth: Truth, branch: Branch 
         gamma = tuple(state[3:6])
         claimed = euler_angles(claim.gamma, claimed_xi, FUNCTIONS)
         true = euler_angles(gamma, tuple(xi), FUNCTIONS)
+        phi, theta, psi = (_modulo_turn(a - b) for a, b in zip(claimed, true, strict=True))
         return ModelError(
-            largest(a - b for a, b in zip(claim.omega, state, strict=False)),
+            largest(a - b for a, b in zip(claim.omega, state[:3], strict=True)),
             largest(a - b for a, b in zip(claim.gamma, gamma, strict=True)),
-            *(_modulo_turn(a - b) for a, b in zip(claimed, true, strict=True)),
+            phi,
+            theta,
+            psi,
             rotation_angle((claim.gamma, claimed_xi), (gamma, tuple(xi)), FUNCTIONS),
         )
 
@@ -115,26 +118,25 @@ class EvaluationError:
     psi: arb
 
 
-def evaluation_error(
-    case: PartialCase, time: Fraction, precision: Precision, form: str, branch: Branch = "smooth"
-) -> EvaluationError:
-    """The formulas evaluated in ``precision`` against themselves evaluated exactly, from the same rounded I1, I3, C1, t.
+def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, form: str) -> EvaluationError:
+    """The formulas evaluated in ``precision`` against themselves evaluated exactly, from the same rounded data.
 
-    form: ``printed`` for (4.2)-(4.6), ``stable`` for the hyperbolic forms of the same motion.
+    form: ``printed`` for (4.2)-(4.6) to the letter, with the positive roots also for t > 0; ``stable`` for the
+    hyperbolic forms.
     """
     given = [number(value, precision) for value in (case.i1, case.i3, case.c1, time)]
     i1, i3, c1, t = (exact(value) for value in given)
     alpha = number(case.alpha, precision)
     with numpy.errstate(all="ignore"):
         if form == "printed":
-            computed = partial_case(given[0], given[1], given[2], given[3], NATIVE_FUNCTIONS, branch)
+            computed = partial_case(given[0], given[1], given[2], given[3], NATIVE_FUNCTIONS, "printed")
         else:
             computed = stable_case(alpha, given[0], given[1], given[3], NATIVE_FUNCTIONS)
     bits = precision.bits + 64
 
     def evaluate(_working: int) -> list[arb]:
         if form == "printed":
-            v = partial_case(ball(i1), ball(i3), ball(c1), ball(t), FUNCTIONS, branch if t else "smooth")
+            v = partial_case(ball(i1), ball(i3), ball(c1), ball(t), FUNCTIONS, "printed" if t else "smooth")
         else:
             v = stable_case(ball(exact(alpha)), ball(i1), ball(i3), ball(t), FUNCTIONS)
         return [*v.omega, v.theta, v.psi, *([v.phi] if t or form == "stable" else [])]

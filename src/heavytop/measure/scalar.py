@@ -8,8 +8,9 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.exact.balls import ball, midpoint, radius, radius_text, working_precision
-from heavytop.precision import decimal_text, exact
+from heavytop.errors import InputError
+from heavytop.exact.balls import ball, midpoint, radius, radius_text
+from heavytop.precision import decimal_text, exact, log10
 from heavytop.records import Kind, Metric
 
 DIGITS = 8
@@ -24,7 +25,7 @@ def to_ball(value: Any) -> arb:
         return arb(float(value))
     try:
         return ball(exact(value))
-    except ValueError:
+    except InputError:
         return arb("nan")
 
 
@@ -53,14 +54,6 @@ def metric(value: arb, kind: Kind = "error", digits: int = DIGITS) -> Metric:
 def of_fraction(value: Fraction, kind: Kind = "error", words: str | None = None) -> Metric:
     """An exact number as a metric; log10 to six decimals."""
     return Metric(words or decimal_text(value, DIGITS), log10(value), kind)
-
-
-def log10(value: Fraction) -> float | None:
-    """log10 |value| to six decimals, None for 0; any exponent."""
-    if value == 0:
-        return None
-    with working_precision(64):
-        return round(float(abs(ball(value)).log() / arb(10).log()), 6)
 
 
 def largest(values: Iterable[arb]) -> arb:
