@@ -43,7 +43,7 @@ _compiled: dict[tuple[Any, ...], Compiled] = {}
 
 
 def expressions(system: System, attitude: bool) -> list[tuple[Any, Any]]:
-    """The field as heyoka expressions with par[0..2] = I, par[3..5] = P r, par[6] = λ (gyrostat)."""
+    """The field as heyoka expressions with par[0..2] = I and par[3..5] = P r, or par[3] = λ for the gyrostat."""
     names = VARIABLES + (_XI if attitude else ())
     y = heyoka.make_vars(*names)
     p = Parameters(
@@ -84,7 +84,11 @@ def compiled(
             options["prec"] = precision.bits
         before = perf_counter()
         engine = heyoka.taylor_adaptive(
-            expressions(system, attitude), [zero] * size, pars=[one] * 6, fp_type=type(one), **options
+            expressions(system, attitude),
+            [zero] * size,
+            pars=[one] * (4 if system is GYROSTAT else 6),
+            fp_type=type(one),
+            **options,
         )
         _compiled[key] = Compiled(engine, perf_counter() - before, _flags(engine))
     return _compiled[key]
@@ -247,7 +251,7 @@ def propagate(
 
 def _load(engine: Any, problem: Problem) -> None:
     p = problem.parameters
-    numbers = [*p.inertia, p.rotor, 0, 0] if problem.system is GYROSTAT else [*p.inertia, *p.moment]
+    numbers = [*p.inertia, p.rotor] if problem.system is GYROSTAT else [*p.inertia, *p.moment]
     engine.pars[:] = numpy.array(problem.native(numbers))
     engine.state[:] = numpy.array(problem.native([*problem.start.flat, *(problem.xi or ())]))
     engine.time = number(Fraction(0), problem.precision)
