@@ -58,6 +58,12 @@ def sign(value: Fraction) -> int:
     return -1 if value < 0 else 1
 
 
+def half_angle(tangent: Fraction) -> tuple[Fraction, Fraction]:
+    """(cos, sin) of the angle with this tangent of its half: a rational point of the circle."""
+    square = Fraction(tangent) ** 2
+    return (1 - square) / (1 + square), 2 * Fraction(tangent) / (1 + square)
+
+
 def turned(vector: Sequence[Any], omega: Sequence[arb], rate: arb, time: arb_series) -> list[Any]:
     """The solution of v' = v × Ω for a constant Ω of length ``rate`` > 0, at ``time``."""
     sine, cosine = arb_series.sin_cos(rate * time)

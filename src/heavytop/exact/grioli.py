@@ -23,7 +23,7 @@ from flint import arb_series
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball
-from heavytop.exact.closed_form import Carry, WithAttitude, balls
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, half_angle
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
@@ -101,7 +101,7 @@ def grioli_motion(
     u = e2 cos + (r̂ × e2) sin.  rate: ν.  size: √(D² + κ²), a moment of inertia.
     Raises InputError where a moment would not be positive, or I1 = I3, or ν = 0.
     """
-    (a, c), (p1, p3), (u2, uz) = _circle(direction), _circle(shape), _circle(phase)
+    (a, c), (p1, p3), (u2, uz) = half_angle(direction), half_angle(shape), half_angle(phase)
     if rate == 0 or size <= 0 or p1 * a <= 0 or p3 * c <= 0 or p1 * c == p3 * a:
         raise InputError(
             f"No Grioli top has direction {direction}, shape {shape}, rate {rate} and size {size}.",
@@ -113,8 +113,3 @@ def grioli_motion(
     omega = (rate * (a - uz * c), rate * u2, rate * (c + uz * a))
     gamma = _gamma(top, State(omega, (0, 0, 0)).omega)
     return Grioli(top, State(omega, gamma))
-
-
-def _circle(half_tangent: Fraction) -> tuple[Fraction, Fraction]:
-    square = Fraction(half_tangent) ** 2
-    return (1 - square) / (1 + square), 2 * Fraction(half_tangent) / (1 + square)
