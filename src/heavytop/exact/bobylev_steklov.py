@@ -24,7 +24,7 @@ from flint import arb, arb_series, ctx
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball
-from heavytop.exact.closed_form import ClosedForm, balls, half_angle, sign
+from heavytop.exact.closed_form import ClosedForm, balls, half_angle, instant, sign
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.top.equations import HEAVY_TOP, System, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
@@ -53,12 +53,12 @@ class BobylevSteklov(ClosedForm):
         if off != 0:
             raise NotInClass(f"P a gamma3 - I3 Omega1 Omega3 = {off}, not 0.", remedy)
 
-    def evaluate(self, time: arb_series) -> list[arb_series]:
+    def evaluate(self, time: Fraction) -> list[arb_series]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         field = heavy_top(self.system.parameters(self.top, self.start), self.start.flat)
         if not any(field):
             return [arb_series([value], prec=ctx.cap) for value in balls(self.start.flat)]
-        x, slope = _lattice(self, ctx.prec).motion(time)
+        x, slope = _lattice(self, ctx.prec).motion(instant(time))
         p, n1, i3 = ball(self.start.omega[0]), ball(self.top.moment[0]), ball(self.top.inertia[2])
         constant = arb_series([p], prec=ctx.cap)
         gamma1 = (ball(_height(self)) - i3 / 2 * (x * x)) / n1

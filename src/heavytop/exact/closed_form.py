@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flint import acb_series, arb, arb_series, ctx
 
@@ -91,23 +91,29 @@ class ClosedForm:
     """
 
     __slots__ = ()
-    top: HeavyTop
-    start: State
     system: System = HEAVY_TOP
 
+    if TYPE_CHECKING:  # a property here would become the default of the dataclass fields
+
+        @property
+        def top(self) -> HeavyTop: ...
+
+        @property
+        def start(self) -> State: ...
+
     def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
-        """Ω at ``time``, and what carries vectors fixed in space there, at FLINT's working precision."""
+        """Ω at the series ``time``, and what carries vectors fixed in space there, at FLINT's working precision."""
         raise NotImplementedError
 
-    def evaluate(self, time: arb_series) -> list[arb_series]:
-        """The six components at ``time``, at FLINT's working precision."""
-        omega, carry = self.motion(time)
+    def evaluate(self, time: Fraction) -> list[arb_series]:
+        """The six components at ``time`` + ε, at FLINT's working precision and length of series."""
+        omega, carry = self.motion(instant(time))
         return [*omega, *carry(balls(self.start.gamma))]
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         with series_length(1):
-            values = to_bits(lambda _working: [constant(part) for part in self.evaluate(instant(time))], bits)
+            values = to_bits(lambda _working: [constant(part) for part in self.evaluate(time)], bits)
         return [_with_plain_exponent(value, bits) for value in values]
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
@@ -115,7 +121,7 @@ class ClosedForm:
         found: list[arb_series] = []
 
         def evaluate(_working: int) -> list[arb]:
-            found[:] = [arb_series(part, prec=length) for part in self.evaluate(instant(time))]
+            found[:] = [arb_series(part, prec=length) for part in self.evaluate(time)]
             return [part[0] for part in found]
 
         with series_length(length):

@@ -17,7 +17,7 @@ from fractions import Fraction
 from math import gcd, isqrt
 from typing import Any
 
-from flint import arb, arb_series
+from flint import arb, arb_series, ctx
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball, to_bits
@@ -52,9 +52,9 @@ class Staude(WithAttitude):
         omega, rate = balls(exact), ball(dot(exact, exact)).sqrt()
         return balls(self.start.omega), lambda fixed: turned(fixed, omega, rate, time)
 
-    def evaluate(self, time: arb_series) -> list[arb_series]:
+    def evaluate(self, _time: Fraction) -> list[arb_series]:
         """The start, at every time."""
-        return [arb_series([value], prec=time.prec) for value in balls(self.start.flat)]
+        return [arb_series([value], prec=ctx.cap) for value in balls(self.start.flat)]
 
 
 def staude_rate_squared(top: HeavyTop, gamma: Vector) -> Fraction | None:
