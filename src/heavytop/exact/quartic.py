@@ -124,14 +124,18 @@ class PreparedMotion:
         above, square = point.above(self.centre), point.scale * point.scale
         return above * above * 2 - square * square * self.offset
 
-    def position(self, point: Point, denominator: Any) -> Any:
-        """x at the point."""
+    def numerator(self, point: Point) -> Any:
+        """(x − x0) D T⁴: beside :meth:`denominator`, what is left of x where it is infinite."""
         if self.at_rest:
-            return point.scale * 0 + self.start
+            return point.scale * 0
         constant, even, odd = self.numerators
         square = point.scale * point.scale
         inner = (square * constant + point.above(self.centre) * even) * point.scale + point.slope * odd
-        return inner * point.scale / denominator + self.start
+        return inner * point.scale
+
+    def position(self, point: Point, denominator: Any) -> Any:
+        """x at the point."""
+        return self.numerator(point) / denominator + self.start
 
     def companion(self, winding: Winding, taylor: Sequence[Pair]) -> Companion:
         """F of the second theorem; taylor: f0..f3, each as (real, imaginary/√square)."""
