@@ -3,7 +3,7 @@
 All norms are maximum norms, and time is scaled so that a step goes over 0 ≤ τ ≤ 1: y' = h f(y).
 
 *The polynomial* p(τ) = Σ b_n τⁿ has whole numbers in units of 2^-p ("ulps") as coefficients, exactly:
-b_{n+1} is h f_n/(n + 1) rounded to nearest, f_n the coefficient of τⁿ in f(p).  No rounding error is estimated anywhere:
+b_{n+1} is h f_n/(n + 1) rounded to nearest, f_n the coefficient of τⁿ in f(p).  No rounding error is estimated here:
 what p lacks to be a motion is its defect p' − h f(p) = Σ E_n τⁿ, and that is known.  For n < N, |E_n| ≤ (n + 1)/2 ulp;
 for n ≥ N, E_n = −h f_n with |f_n| ≤ q Σ_{j+k=n} β_j β_k + l β_n, β_j = |b_j|.  Hence the integral of |defect|
 from 0 to τ is at most
@@ -23,8 +23,6 @@ first step.  The form with the defect uses the coefficients that are there and a
 factorisation of V̂ Q diag(r) with its columns ordered by length (Lohner), and Q'^T Q' = 1 + F is paid for with |F|.
 binary64 is used here with round to nearest; every bound carries the rounding of its own evaluation (``_UP``).
 
-Measured on the generic top of the tests, bits lost by t = 100 (80 bits is a factor 1.2e24):
-FIGURES
 """
 
 from __future__ import annotations
@@ -32,13 +30,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from math import exp, inf, isfinite
-from operator import mul
 
 import numpy as np
 from flint import arb, fmpz
 from gmpy2 import mpz
 
 from heavytop.exact.quadratic import Matrix, Quadratic
+from heavytop.exact.recurrence import coefficients
 
 _UNIT = 2.0**-53
 # relative room for the rounding of every bound below: each is a sum or product of a few hundred terms of one sign
@@ -59,7 +57,7 @@ class Errors:
     exponent: int
 
     def sizes(self, matrix: Matrix | None = None, slack: float = 0.0) -> Matrix:
-        """An upper bound of each component of (matrix + anything of norm ``slack``) times the set, before 2^exponent."""
+        """Upper bounds of the components of (matrix + anything of norm ``slack``) times the set, without 2^exponent."""
         across = self.frame if matrix is None else matrix
         return np.asarray((np.abs(across) @ self.radii + slack * self.radii.max()) * _UP + _TINY)
 
@@ -191,76 +189,57 @@ def step(field: Quadratic, node: Node, precision: int) -> Step | None:
     halvings = node.halvings
     while halvings < node.halvings + 64:
         trial = Node(node.time, node.centre, node.errors, halvings)
-        coefficients = _coefficients(field, trial, precision)
-        found = None if coefficients is None else _prove(field, trial, coefficients, precision)
+        series = coefficients(field, trial.centre, precision, halvings)
+        found = None if series is None else _prove(field, trial, series, precision)
         if found is not None and isfinite(found.widest) and found.variation_error < CAP:
             return found if found.widest < CAP else None
         halvings += 1
     return None
 
 
-def _coefficients(field: Quadratic, node: Node, precision: int) -> list[list[mpz]] | None:
-    """b_0, b_1, ... of each component up to two that vanish within 2 ulp; None where they do not come to that."""
-    y = [[value] for value in node.centre]
-    shift = precision + node.halvings
-    size = max(abs(value) for value in node.centre).bit_length()
-    for n in range(size // 2 + 32):
-        reverse = {k: y[k][::-1] for k in {k for _, k in field.pairs}}
-        sums = [sum(map(mul, y[j], reverse[k])) for j, k in field.pairs]
-        last = [component[n] for component in y]
-        for component, row in zip(y, field.rows, strict=True):
-            linear = sum((c * last[j] for c, j in row.linear), mpz(0))
-            whole = sum((c * sums[pair] for c, pair in row.products), linear << precision)
-            divisor = mpz(row.denominator * (n + 1)) << shift
-            component.append((2 * whole + divisor) // (2 * divisor))
-        if n > 2 and all(-2 <= component[i] <= 2 for component in y for i in (-1, -2)):
-            return y
-    return None
-
-
-def _prove(field: Quadratic, node: Node, coefficients: list[list[mpz]], precision: int) -> Step | None:
+def _prove(field: Quadratic, node: Node, series: list[list[mpz]], precision: int) -> Step | None:
     """The step with its bounds from the theorem; None where they are not finite."""
     h, q, slope = 2.0**-node.halvings, float(field.q) * _UP, float(field.l) * _UP
-    sizes = _absolute_sizes(coefficients, precision)
+    sizes = _absolute_sizes(series, precision)
     growth = h * (2 * q * float(sizes.sum()) + slope + q * CAP) * _UP
     if not growth < 4 * _LARGEST_SLOPE:
         return None
     factor = exp(growth) * _UP
     scale = node.errors.exponent
-    defect = np.ldexp(_defect(coefficients, precision, h * q, h * slope), -scale) + _TINY
-    variation, variation_error = _variation(field, coefficients, precision, h, h * 2 * q * sizes)
+    defect = np.ldexp(_defect(series, precision, h * q, h * slope), -scale) + _TINY
+    variation, variation_error = _variation(field, series, precision, h, h * 2 * q * sizes)
     bound = (float(node.errors.sizes().max()) + defect) * factor * _UP
     square = np.ldexp(h * q * bound * bound, max(scale - precision, -2000)) + _TINY
     local = float(factor * (defect + square) * _UP)
     widest = float(np.ldexp(bound, min(scale - precision, 900)))
-    return Step(node, precision, coefficients, variation, factor * variation_error * _UP, local, widest)
+    return Step(node, precision, series, variation, factor * variation_error * _UP, local, widest)
 
 
-def _absolute_sizes(coefficients: list[list[mpz]], precision: int) -> Matrix:
+def _absolute_sizes(series: list[list[mpz]], precision: int) -> Matrix:
     """Upper bounds of β_n."""
-    columns = list(zip(*coefficients, strict=True))
+    columns = list(zip(*series, strict=True))
     lengths = [max(abs(value) for value in column).bit_length() - precision for column in columns]
     bounds = np.ldexp(1.0, np.maximum(lengths, -200))
-    exact = np.abs(_floats(coefficients, precision)).max(axis=0)
+    exact = np.abs(_floats(series, precision)).max(axis=0)
     bounds[: exact.size] = exact * _UP + _TINY
     return bounds
 
 
-def _floats(coefficients: list[list[mpz]], precision: int) -> Matrix:
-    """The first coefficients in binary64, within 2^-52 of themselves plus 2^-200."""
+def _floats(series: list[list[mpz]], precision: int) -> Matrix:
+    """The first series in binary64, within 2^-52 of themselves plus 2^-200."""
     shift = max(0, precision - 200)
-    short = [[float(value >> shift) for value in component[: _VARIATIONAL_ORDER + 1]] for component in coefficients]
-    return np.ldexp(np.array(short), shift - precision)
+    short = [[float(value >> shift) for value in component[: _VARIATIONAL_ORDER + 1]] for component in series]
+    return np.asarray(np.ldexp(np.array(short), shift - precision))
 
 
-def _defect(coefficients: list[list[mpz]], precision: int, quadratic: float, linear: float) -> float:
+def _defect(series: list[list[mpz]], precision: int, quadratic: float, linear: float) -> float:
     """D of (a) in ulps; ``quadratic`` and ``linear`` are h q and h l.
 
     β_n is bounded by 2^length and multiplied by 2^(rate n), so that binary64 holds it at any precision.
     """
-    order = len(coefficients[0]) - 1
+    order = len(series[0]) - 1
     rate = precision // order
-    columns = zip(*coefficients, strict=True)
+    columns = zip(*series, strict=True)
     lengths = np.array([max(abs(value) for value in column).bit_length() for column in columns])
     scaled = np.ldexp(1.0, np.maximum(lengths - precision + rate * np.arange(order + 1), -900))
     products = np.convolve(scaled, scaled)[order:]
@@ -271,7 +250,7 @@ def _defect(coefficients: list[list[mpz]], precision: int, quadratic: float, lin
 
 
 def _variation(
-    field: Quadratic, coefficients: list[list[mpz]], precision: int, h: float, slopes: Matrix
+    field: Quadratic, series: list[list[mpz]], precision: int, h: float, slopes: Matrix
 ) -> tuple[Matrix, float]:
     """V̂ by powers of τ, and a bound of the integral of its own defect over the step.
 
@@ -279,7 +258,7 @@ def _variation(
     units in the last place of the sum of the absolute values.  ``slopes``: upper bounds of |J_n| without l.
     """
     size, top = field.dimension, _VARIATIONAL_ORDER
-    values = _floats(coefficients, precision)
+    values = _floats(series, precision)
     order = values.shape[1] - 1
     jacobians = np.tensordot(values, field.jacobian, axes=(0, 2))
     jacobians[0] += field.slope
