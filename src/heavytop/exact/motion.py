@@ -52,7 +52,7 @@ def taylor(
     exact = Parameters([_rational(i) for i in inertia], [_rational(n) for n in moment], _rational(rotor))
     rows = [[_rational(value)] for value in start]
     for order in range(1, length):
-        y = [fmpq_series(row, length) for row in rows]
+        y = [fmpq_series(row, prec=length) for row in rows]
         for row, slope in zip(rows, field(exact, y), strict=True):
             row.append(fmpq_series(slope)[order - 1] / order)
     return [[Fraction(int(c.p), int(c.q)) * factorial(n) for n, c in enumerate(row)] for row in rows]

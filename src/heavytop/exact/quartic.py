@@ -24,10 +24,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
-from flint import acb, acb_series, arb, ctx
+from flint import acb, acb_series, arb
 
 from heavytop.exact.balls import ball, midpoint
 from heavytop.exact.weierstrass import AnyLattice, Lattice, Point, Scalar, as_ball, from_invariants
@@ -142,7 +141,7 @@ class PreparedMotion:
         root = ball(winding.square).sqrt()
         f0, f1, f2, f3 = (acb(ball(a), ball(b) * root) for a, b in taylor)
         centre, value = as_ball(self.centre), ball(winding.value)
-        wave = second_kind(self.lattice, winding, ctx.prec)
+        wave = second_kind(self.lattice, winding)
         return Companion(
             wave,
             (f3 / 3 - 4 * centre * f1 + value * f1, 2 * f1, -2 * f0 / 3),
@@ -194,9 +193,8 @@ def _exponential(time: Any, rate: acb) -> Any:
     return (acb_series(time) * rate).exp() if not isinstance(time, arb) else (time * rate).exp()
 
 
-@lru_cache(maxsize=64)
-def second_kind(lattice: AnyLattice, winding: Winding, bits: int) -> SecondKind:
-    """:class:`SecondKind` at the working precision ``bits``."""
+def second_kind(lattice: AnyLattice, winding: Winding) -> SecondKind:
+    """:class:`SecondKind` at the working precision."""
     root = ball(winding.square).sqrt()
     slope, turning = acb(0, ball(winding.slope) * root), acb(0, ball(winding.rate) * root)
     if not isinstance(lattice, Lattice):
@@ -225,7 +223,7 @@ def _imaginary_argument(lattice: Lattice, winding: Winding) -> acb:
     beside = e2.imag == 0 and (value - e3).real > 0
     if beside:
         value = e1 + (e1 - e2) * (e1 - e3) / (value - e1)
-    height = (e1 - value).elliptic_rf(e2 - value, e3 - value).real
+    height = acb.elliptic_rf(e1 - value, e2 - value, e3 - value).real
     if (winding.slope > 0) != beside:
         height = -height
     return acb(lattice.half_period if beside else 0, height)
