@@ -47,6 +47,7 @@ def test_the_attitude_starts_at_the_usual_place_and_turns_with_the_renamed_body(
 
 def test_an_odd_renaming_that_keeps_the_rotor_solves_the_gyrostat():
     renamed = Renamed(partial_case(), (2, 1, 0))
+    assert_solves(renamed, Fraction(4, 3))
     rotor = GYROSTAT.parameters(renamed.top, renamed.start).rotor
     assert rotor == -GYROSTAT.parameters(renamed.solution.top, renamed.solution.start).rotor
 

@@ -22,7 +22,7 @@ from flint import arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.closed_form import initial_attitude
+from heavytop.exact.motion import initial_xi
 from heavytop.exact.solution import ExactSolution
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
@@ -98,7 +98,7 @@ class Renamed:
         return self._renamed(self.solution.series(time, length, bits))
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, starting where :func:`heavytop.exact.closed_form.initial_attitude` says in the new names.
+        """ξ, starting where :func:`heavytop.exact.motion.initial_xi` says in the new names.
 
         Raises NotInClass where the solution has no attitude.
         """
@@ -111,7 +111,7 @@ class Renamed:
             length = ball(dot(gamma, gamma)).sqrt()
             began = permuted(attitude(Fraction(0), working), self.axes)
             across = cross([ball(g) / length for g in gamma], began)
-            wanted = initial_attitude(gamma)
+            wanted = initial_xi(gamma)
             cosine, sine = dot(wanted, began), dot(wanted, across)
             xi = permuted(attitude(time, working), self.axes)
             eta = cross([g / length for g in self.state(time, working)[3:]], xi)

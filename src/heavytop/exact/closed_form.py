@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 from flint import acb_series, arb, arb_series, ctx
 
-from heavytop.exact.balls import ball, to_bits
-from heavytop.top.angles import perpendicular
+from heavytop.exact.balls import ball, to_bits, working_precision
+from heavytop.exact.motion import enough_bits, initial_xi
 from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
+from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
 Carry = Callable[[Sequence[Any]], list[Any]]
 """Takes the body components at t = 0 of a vector fixed in space to those at the time in question."""
@@ -73,15 +73,12 @@ def turned(vector: Sequence[Any], omega: Sequence[arb], rate: arb, time: arb_ser
     return [along * n + cosine * (v - along * n) + sine * w for n, v, w in zip(axis, vector, across, strict=True)]
 
 
-def initial_attitude(gamma: Vector) -> list[arb]:
-    """The unit vector ξ ⟂ γ at t = 0: :func:`heavytop.top.angles.perpendicular` of γ/|γ|, for any γ that is not 0."""
-    if dot(gamma, gamma) == 1:
-        return balls(perpendicular(gamma))
-    if gamma[0] == gamma[1] == 0:
-        return balls((Fraction(1), Fraction(0), Fraction(0)))
-    length = ball(dot(gamma, gamma)).sqrt()
-    first, second, third = (component / length for component in balls(gamma))
-    return [1 - first * first / (1 - third), -first * second / (1 - third), first]
+def tanh_sech(argument: arb_series) -> tuple[arb_series, arb_series]:
+    """(tanh, sech) of a series; nothing grows, whatever the sign and size of its first coefficient."""
+    side = -1 if argument[0] < 0 else 1
+    decay = (-side * argument).exp()
+    total = 1 + decay * decay
+    return side * (1 - decay * decay) / total, 2 * decay / total
 
 
 class ClosedForm:
@@ -110,18 +107,22 @@ class ClosedForm:
         omega, carry = self.motion(instant(time))
         return [*omega, *carry(balls(self.start.gamma))]
 
+    def _at(self, time: Fraction, working: int) -> list[arb_series]:
+        with working_precision(enough_bits(working, time)):
+            return self.evaluate(time)
+
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         with series_length(1):
-            values = to_bits(lambda _working: [constant(part) for part in self.evaluate(time)], bits)
+            values = to_bits(lambda working: [constant(part) for part in self._at(time, working)], bits)
         return [_with_plain_exponent(value, bits) for value in values]
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         found: list[arb_series] = []
 
-        def evaluate(_working: int) -> list[arb]:
-            found[:] = [arb_series(part, prec=length) for part in self.evaluate(time)]
+        def evaluate(working: int) -> list[arb]:
+            found[:] = [arb_series(part, prec=length) for part in self._at(time, working)]
             return [part[0] for part in found]
 
         with series_length(length):
@@ -137,13 +138,14 @@ class WithAttitude(ClosedForm):
     def attitude(self, time: Fraction, bits: int, initial: Sequence[Fraction] | None = None) -> list[arb]:
         """ξ, a unit vector fixed in space and ⟂ γ, in body components.
 
-        ``initial``: ξ at t = 0; :func:`initial_attitude` of γ if not given.
+        ``initial``: ξ at t = 0; :func:`heavytop.exact.motion.initial_xi` of γ if not given.
         """
 
-        def evaluate(_working: int) -> list[arb]:
-            xi = initial_attitude(self.start.gamma) if initial is None else balls(initial)
-            _, carry = self.motion(instant(time))
-            return [constant(part) for part in carry(xi)]
+        def evaluate(working: int) -> list[arb]:
+            with working_precision(enough_bits(working, time)):
+                xi = initial_xi(self.start.gamma) if initial is None else balls(initial)
+                _, carry = self.motion(instant(time))
+                return [constant(part) for part in carry(xi)]
 
         with series_length(1):
             return to_bits(evaluate, bits)

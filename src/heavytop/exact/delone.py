@@ -37,7 +37,7 @@ from flint import arb, arb_series, ctx
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
-from heavytop.exact.closed_form import ClosedForm, balls, instant, series_length
+from heavytop.exact.closed_form import ClosedForm, balls, instant, series_length, tanh_sech
 from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, System
@@ -152,9 +152,7 @@ class DeloneHomoclinic(ClosedForm):
 
     def _sines(self, time: Fraction) -> tuple[Any, Any, Any, Any]:
         """(sinφ, cosφ, sinθ, cosθ) as power series."""
-        side = -1 if time < 0 else 1
-        decay = (-side * (ball(self.alpha) / arb(2).sqrt()) * instant(time)).exp()
-        tanh, sech = side * (1 - decay * decay) / (1 + decay * decay), 2 * decay / (1 + decay * decay)
+        tanh, sech = tanh_sech(ball(self.alpha) / arb(2).sqrt() * instant(time))
         d = 1 + sech * sech
         sin_theta, cos_theta = tanh * tanh / d, 2 * sech / d
         # 1 - sinθ = 2 S²/d, so the root is exact and odd in t
