@@ -45,9 +45,7 @@ def test_the_attitude_turns_with_the_body(seed):
     assert_attitude(random_case(rng, seed), rational(rng))
 
 
-# I = (3, 2, 1): the separatrix L² = 2E I2 is 3 Ω1² = Ω3²... with rational starts where 3·1·Ω1² = 1·1·Ω3² is replaced
-# by moments for which it has rational points: I1 (I1 − I2) Ω1² = I3 (I2 − I3) Ω3², I = (4, 3, 1): 4 Ω1² = 2 Ω3² has
-# none, I = (9, 5, 1): 36 Ω1² = 4 Ω3² has Ω3 = 3 Ω1
+# the separatrix L² = 2E I2 is I1 (I1 − I2) Ω1² = I3 (I2 − I3) Ω3²: for these moments 36 Ω1² = 4 Ω3², rational
 SEPARATRIX_INERTIA = (9, 5, 1)
 
 

@@ -88,7 +88,7 @@ def test_every_direction_found_lies_on_the_cone(centre):
 
 
 def test_the_search_finds_rotations_that_are_exact_equilibria():
-    # r = (0, 1/2, 0): γ = (±3/5, 4/5, 0) turns at ω² = P b/((I2 − I1) γ2), here 1/2·5/4/(1·(5/8))...
+    # γ × (P r − ω² I γ) = 0 for γ = (3/5, 4/5, 0), ω = 1: (0, 4/5, 0) − (3/5, 8/5, 0) = −γ
     top = HeavyTop((1, 2, 4), 1, (0, Fraction(4, 5), 0))
     found = staude_rotations(top, 5)
     assert State((Fraction(3, 5), Fraction(4, 5), 0), (Fraction(3, 5), Fraction(4, 5), 0)) in found

@@ -38,8 +38,7 @@ def test_the_attitude_turns_with_the_body(seed):
     )
 
 
-# ½ I Ω² + n·γ = |n||γ| with n = 2 r: r = (0, 1), γ = (3/5, -4/5) or so, I = 5/2: ½ (5/2) Ω² = 2 (1 + 4/5), Ω² = 72/25;
-# a rational one: I = 4/5, Ω = 3
+# the separatrix is ½ I Ω² + n·γ = |n||γ|: n = (0, 2), γ = (3/5, −4/5) and I = 4/5 ask Ω² = 9
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("rate", [3, -3])
 @pytest.mark.parametrize("off", [0, TINY, -TINY])

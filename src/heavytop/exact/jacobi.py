@@ -94,13 +94,12 @@ class Jacobi:
             theta = self.thetas(arb_series([0, 1], prec=2) + _I * shift)[0]
             return (theta[1] / theta[0]).imag
 
-    def argument(self, sn2: arb, cn2: arb, dn2: arb) -> arb:
-        """The u in [0, K] with these squares of sn, cn, dn: F(φ|m) = sn R_F(cn², dn², 1), DLMF 19.25.5."""
-        return legendre_f(sn2, cn2, dn2)
-
 
 def legendre_f(sine2: arb, cosine2: arb, delta2: arb) -> arb:
-    """F(φ|m) for 0 ≤ φ ≤ π/2 from sin²φ, cos²φ and 1 − m sin²φ; no two of the last may be 0."""
+    """F(φ|m) for 0 ≤ φ ≤ π/2 from sin²φ, cos²φ and 1 − m sin²φ; at most one of the last two may be 0.
+
+    The u in [0, K] with these squares of sn, cn, dn: F = sinφ R_F(cos²φ, 1 − m sin²φ, 1), DLMF 19.25.5.
+    """
     return sine2.sqrt() * acb.elliptic_rf(cosine2, delta2, 1).real
 
 
