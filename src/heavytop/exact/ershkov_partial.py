@@ -13,11 +13,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
-from flint import arb
+from flint import arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
+from heavytop.exact.motion import series_at
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -63,12 +65,25 @@ class ErshkovPartial:
 
         def evaluate(_working: int) -> list[arb]:
             s = ball(self.rate * time / 2)
-            alpha, ratio = ball(self.alpha), ball(self.i1 / self.i3)
-            tanh, sech = s.tanh(), s.sech()
-            gamma = [-tanh * sech, tanh * tanh, sech]
-            return [alpha * gamma[0], alpha * gamma[1], alpha * ratio * gamma[2], *gamma]
+            return self._along(s.tanh(), s.sech())
 
         return to_bits(evaluate, bits)
+
+    def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+
+        def evaluate(_working: int, count: int) -> list[Any]:
+            s = arb_series([ball(self.rate * time / 2), ball(self.rate / 2)], count)
+            up, down = s.exp(), (s * -1).exp()
+            total = up + down
+            return self._along((up - down) / total, arb_series([2], count) / total)
+
+        return series_at(evaluate, length, bits)
+
+    def _along(self, tanh: Any, sech: Any) -> list[Any]:
+        alpha, ratio = ball(self.alpha), ball(self.i1 / self.i3)
+        gamma = [tanh * sech * -1, tanh * tanh, sech]
+        return [gamma[0] * alpha, gamma[1] * alpha, gamma[2] * (alpha * ratio), *gamma]
 
     def angles(self, time: Fraction, bits: int) -> list[arb]:
         """(φ, θ, ψ), continuous for all t; θ takes the sign of −t."""

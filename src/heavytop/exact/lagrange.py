@@ -58,7 +58,8 @@ class Lagrange:
         if any(self.top.moment[:2]):
             n1, n2, _ = self.top.moment
             raise NotInClass(
-                f"P a = {n1}, P b = {n2}, not 0.", "Lagrange's top has its centre of mass on the axis of symmetry, axis 3."
+                f"P a = {n1}, P b = {n2}, not 0.",
+                "Lagrange's top has its centre of mass on the axis of symmetry, axis 3.",
             )
 
     @property
@@ -194,9 +195,7 @@ class _Prepared:
 def _prepared(motion: Lagrange, bits: int) -> _Prepared:
     prepared, winding = motion.quartic().prepared(), motion.winding()
     rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)
-    gamma, omega = (
-        prepared.companion(winding, turned(rows[axis], rows[axis + 1], winding)) for axis in (3, 0)
-    )
+    gamma, omega = (prepared.companion(winding, turned(rows[axis], rows[axis + 1], winding)) for axis in (3, 0))
     return _Prepared(prepared, gamma, omega)
 
 
