@@ -114,8 +114,7 @@ class ClosedForm:
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         with series_length(1):
-            values = to_bits(lambda working: [constant(part) for part in self._at(time, working)], bits)
-        return [_with_plain_exponent(value, bits) for value in values]
+            return to_bits(lambda working: [constant(part) for part in self._at(time, working)], bits)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
@@ -154,9 +153,3 @@ class WithAttitude(ClosedForm):
 def constant(value: Any) -> arb:
     """The coefficient of ε^0 of a series, or the ball itself."""
     return value[0] if isinstance(value, arb_series) else arb(value)
-
-
-def _with_plain_exponent(value: arb, bits: int) -> arb:
-    """The ball, or one around 0 of radius 2^(-4 bits) that holds it: what decays like e^(-10^9) has no use for more."""
-    limit = arb(2) ** (-4 * bits)
-    return arb(0, limit) if abs(value) < limit and not value.is_zero() else value

@@ -191,7 +191,8 @@ def _companions(motion: Gyrostat, vector: Vector, bits: int) -> tuple[Companion,
     share = dot(vector, m) / winding.square
     across = tuple(v - share * c for v, c in zip(vector, m, strict=True))
     products = [
-        taylor(gyrostat, motion.parameters, (*motion.start.omega, *fixed), 4)[3:] for fixed in (cross(m, across), across)
+        taylor(gyrostat, motion.parameters, (*motion.start.omega, *fixed), 4)[3:]
+        for fixed in (cross(m, across), across)
     ]
     first, third = (
         prepared.companion(winding, turned(products[0][axis], [-c for c in products[1][axis]], winding))

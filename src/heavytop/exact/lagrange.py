@@ -5,7 +5,7 @@ Dynamics, 71; Klein & Sommerfeld, Theorie des Kreisels, IV.3; Hermite, Applicati
 
     x'² = (2/I1)(E − n x)(s² − x²) − ((C0 − L x)/I1)²,    x' = Ω2 γ1 − Ω1 γ2
 
-The horizontal parts g = γ1 + iγ2 and w = Ω1 + iΩ2 satisfy g' = −iΩ3 g + i x w, I1 w' = i (I1 − I3)Ω3 w·(…) + i n g and share one
+The horizontal parts g = γ1 + iγ2 and w = Ω1 + iΩ2 satisfy g' = −iΩ3 g + i x w, I1 w' = i (L − I1 Ω3) w − i n g, and share one
 function of the second kind:
 
     ℘(V) = (4 I1 E − L²)/(12 I1²),    ℘'(V) = i (C0 n − E L)/(2 I1²),    κ = L/(2 I1) − Ω3
@@ -26,7 +26,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
-from flint import acb, acb_series, arb, arb_series
+from flint import acb, arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits, working_precision
@@ -58,7 +58,8 @@ class Lagrange:
         if any(self.top.moment[:2]):
             n1, n2, _ = self.top.moment
             raise NotInClass(
-                f"P a = {n1}, P b = {n2}, not 0.", "Lagrange's top has its centre of mass on the axis of symmetry, axis 3."
+                f"P a = {n1}, P b = {n2}, not 0.",
+                "Lagrange's top has its centre of mass on the axis of symmetry, axis 3.",
             )
 
     @property
@@ -169,10 +170,12 @@ def _sides(h: acb, slope: acb, g: acb, w: acb, x: arb, size: arb) -> tuple[acb, 
     """(Z₊, Z₋) from the three equations, without dividing by what vanishes at a pole."""
     weight = abs(g) ** 2 + abs(w) ** 2
     if x > 0:
-        plus = -h * g / (x + size)
-        return plus, (-h * (x + size) * g.conjugate() + (acb(0, 2) * slope + plus * w.conjugate()) * w.conjugate()) / weight
-    minus = -h * g.conjugate() / (x - size)
-    return (-h * (x - size) * g + (minus * w - acb(0, 2) * slope) * w) / weight, minus
+        plus = h * g / (x + size)
+        twist = acb(0, 2) * slope + plus * w.conjugate()
+        return plus, (twist * w.conjugate() - h * (x + size) * g.conjugate()) / weight
+    minus = h * g.conjugate() / (x - size)
+    twist = minus * w - acb(0, 2) * slope
+    return (twist * w - h * (x - size) * g) / weight, minus
 
 
 def _across(gamma: Vector) -> Vector:
@@ -192,9 +195,7 @@ class _Prepared:
 def _prepared(motion: Lagrange, bits: int) -> _Prepared:
     prepared, winding = motion.quartic().prepared(), motion.winding()
     rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)
-    gamma, omega = (
-        prepared.companion(winding, turned(rows[axis], rows[axis + 1], winding)) for axis in (3, 0)
-    )
+    gamma, omega = (prepared.companion(winding, turned(rows[axis], rows[axis + 1], winding)) for axis in (3, 0))
     return _Prepared(prepared, gamma, omega)
 
 

@@ -25,9 +25,7 @@ def enough_bits(working: int, time: Fraction) -> int:
     return -(-(working + _GUARD + 2 * int(abs(time)).bit_length()) // _STEP) * _STEP
 
 
-def series_at(
-    evaluate: Callable[[int, int], list[arb_series]], length: int, bits: int
-) -> list[arb_series]:
+def series_at(evaluate: Callable[[int, int], list[arb_series]], length: int, bits: int) -> list[arb_series]:
     """``evaluate(working bits, length)`` with the ε^0 coefficients certain to ``bits`` bits (:func:`to_bits`)."""
     found: list[list[arb_series]] = []
     before = ctx.cap

@@ -75,9 +75,7 @@ class QuarticMotion:
     def invariants(self) -> tuple[Scalar, Scalar]:
         """(g2, g3) of f."""
         a4, a3, a2, a1, a0 = (
-            coefficient * Fraction(1, weight)
-            if not isinstance(coefficient, arb)
-            else coefficient / weight
+            coefficient * Fraction(1, weight) if not isinstance(coefficient, arb) else coefficient / weight
             for coefficient, weight in zip((*self.coefficients, 0, 0, 0, 0, 0)[:5], (1, 4, 6, 4, 1), strict=True)
         )
         g2 = a0 * a4 - 4 * a1 * a3 + 3 * a2 * a2
