@@ -76,10 +76,8 @@ def relative_bits(value: arb) -> int:
     """Bits that a ball of size about 1 or larger has right; absolute below 1; -1 if it is not finite."""
     if not value.is_finite():
         return -1
-    rad = radius(value)
-    scale = max(Fraction(1), abs(midpoint(value)))
-    ratio = scale / rad if rad else None
-    return _MAX_BITS if ratio is None else max(0, ratio.numerator.bit_length() - ratio.denominator.bit_length() - 1)
+    # not through Fractions: a value on a separatrix may be 2^(-10^9)
+    return max(0, min(_MAX_BITS, value.rel_one_accuracy_bits()))
 
 
 def to_bits(evaluate: Callable[[int], list[arb]], bits: int) -> list[arb]:

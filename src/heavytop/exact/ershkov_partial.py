@@ -14,17 +14,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from flint import arb
+from flint import arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
+from heavytop.exact.closed_form import ClosedForm, instant, tanh_sech
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 
 @dataclass(frozen=True, slots=True)
-class ErshkovPartial:
+class ErshkovPartial(ClosedForm):
     """The homoclinic gyrostat motion from Ω = (0, 0, ρ α), γ = (0, 0, 1) at t = 0.
 
     alpha: α > 0, 1/time.  i1, i3: I1 = I2 > I3 > 0.  Raises NotInClass outside.
@@ -58,17 +59,12 @@ class ErshkovPartial:
         """The state at t = 0."""
         return State((0, 0, self.alpha * self.i1 / self.i3), (0, 0, 1))
 
-    def state(self, time: Fraction, bits: int) -> list[arb]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
-
-        def evaluate(_working: int) -> list[arb]:
-            s = ball(self.rate * time / 2)
-            alpha, ratio = ball(self.alpha), ball(self.i1 / self.i3)
-            tanh, sech = s.tanh(), s.sech()
-            gamma = [-tanh * sech, tanh * tanh, sech]
-            return [alpha * gamma[0], alpha * gamma[1], alpha * ratio * gamma[2], *gamma]
-
-        return to_bits(evaluate, bits)
+    def evaluate(self, time: Fraction) -> list[arb_series]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        tanh, sech = tanh_sech(ball(self.rate / 2) * instant(time))
+        alpha, ratio = ball(self.alpha), ball(self.i1 / self.i3)
+        gamma = [-tanh * sech, tanh * tanh, sech]
+        return [alpha * gamma[0], alpha * gamma[1], alpha * ratio * gamma[2], *gamma]
 
     def angles(self, time: Fraction, bits: int) -> list[arb]:
         """(φ, θ, ψ), continuous for all t; θ takes the sign of −t."""
