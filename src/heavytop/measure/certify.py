@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, log2
-from typing import Any
 
 from flint import arb
 
@@ -22,13 +21,17 @@ from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.validated import Validated
+from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import State
+from heavytop.top.integrals import holding
 
 SecondSource = Callable[[Fraction, int], Sequence[arb]]
 """Six balls at (time, bits), computed elsewhere."""
 
 _EARLY = Fraction(4)
 _LAST = Fraction(1)
+# a second source may cost this many seconds of the model of the cost
+_EFFORT = 20.0
 _BITS_A_DIGIT = log2(10)
 
 
@@ -109,16 +112,34 @@ def _early_and_last(solution: ExactSolution, time: Fraction, values: Sequence[ar
     _require_overlap(solution, early, known, enclosed)
     before = [midpoint(value) for value in solution.state(time - sign * _LAST, bits + 64)]
     last = _enclosure(solution, State(before[:3], before[3:])).state(sign * _LAST, bits + 16)
-    agreed = min(agreed_digits(known, enclosed), agreed_digits(values, last))
+    agreed = min(agreed_digits(known, enclosed), agreed_digits(values, last), _integral_digits(solution, values, bits))
     source = f"validated integration from 0 to {early} and from t - {sign * _LAST} to t".replace("- -", "+ ")
+    source += "; first integrals at t"
     return Certificate(solution.method, source, agreed, "proven")
 
 
+def _integral_digits(solution: ExactSolution, values: Sequence[arb], bits: int) -> int:
+    """The digits to which the first integrals at ``values`` are those of the exact start."""
+    exact = _parameters(solution)
+    digits = []
+    with working_precision(bits + 64):
+        p = Parameters([ball(i) for i in exact.inertia], [ball(n) for n in exact.moment], ball(Fraction(exact.rotor)))
+        for integral in holding(solution.top, solution.start, solution.system):
+            known = Fraction(integral.value(exact, solution.start.flat))
+            drift = integral.value(p, values) - ball(known)
+            digits.append(_digits((abs(midpoint(drift)) + radius(drift)) / max(Fraction(1), abs(known))))
+    return min(digits)
+
+
+def _parameters(solution: ExactSolution) -> Parameters:
+    """The motion's own parameters: the rotor of a gyrostat from rounded data is not that of its start."""
+    own: Parameters | None = getattr(solution, "parameters", None)
+    return own or solution.system.parameters(solution.top, solution.start)
+
+
 def _enclosure(solution: ExactSolution, start: State) -> Validated:
-    parameters: Any = getattr(solution, "parameters", None)
-    if parameters is None:
-        parameters = solution.system.parameters(solution.top, solution.start)
-    return Validated(solution.top, start, solution.system, rotor=Fraction(parameters.rotor), effort=20.0)
+    rotor = Fraction(_parameters(solution).rotor)
+    return Validated(solution.top, start, solution.system, rotor=rotor, effort=_EFFORT)
 
 
 def _require_overlap(solution: ExactSolution, time: Fraction, first: Sequence[arb], second: Sequence[arb]) -> None:

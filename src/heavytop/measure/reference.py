@@ -10,8 +10,8 @@ import msgspec
 
 from heavytop.errors import InputError
 from heavytop.exact.balls import value_text
+from heavytop.exact.catalogue import find
 from heavytop.exact.solution import ExactSolution
-from heavytop.exact.validated import Validated
 from heavytop.measure.certify import bits_of
 from heavytop.precision import exact
 from heavytop.top.equations import HEAVY_TOP, System
@@ -48,7 +48,7 @@ def reference(
     times: Sequence[Any],
     digits: int,
     system: System = HEAVY_TOP,
-    find: Finder = Validated,
+    finder: Finder = find,
 ) -> Reference:
     """The states at ``times`` to ``digits`` digits (relative above 1, absolute below).
 
@@ -59,7 +59,7 @@ def reference(
     if digits not in DIGITS:
         raise InputError(f"{digits} digits are not available.", "References have 1 to 20000 digits.")
     instants = [exact(time) for time in times]
-    solution = find(top, start, system)
+    solution = finder(top, start, system)
     return Reference(
         method=solution.method,
         digits=digits,
