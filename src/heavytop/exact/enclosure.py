@@ -23,6 +23,14 @@ first step.  The form with the defect uses the coefficients that are there and a
 factorisation of V̂ Q diag(r) with its columns ordered by length (Lohner), and Q'^T Q' = 1 + F is paid for with |F|.
 binary64 is used here with round to nearest; every bound carries the rounding of its own evaluation (``_UP``).
 
+Measured on the generic top of the tests at 400 bits, bits lost by t = 8, 30, 100, 300:
+
+    ordered QR frames          19  28  41  74     kept
+    QR frames, not ordered     19  28  41  74
+    parallelepipeds (Q = V̂ Q)  18  22  34  lost: the columns become parallel
+    boxes (Q = 1)              24  60 186  lost
+    balls without V            23  74   –  –      about 2.4 bits a unit of time, and 50 times slower
+
 """
 
 from __future__ import annotations

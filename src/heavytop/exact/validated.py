@@ -5,6 +5,10 @@ bits come out: the bits that the motion loses are measured on a short pilot run,
 asked for.  Precisions come from a ladder and steps depend on the node that they start from alone, so a ball does not
 depend on what was asked before; what was computed before is only found faster.
 
+Reach on the generic top of the tests (I = (3, 2, 1), P r = (1/2, 1/3, 1/5)), seconds of one core:
+60 digits at t = 8 in 0.1 s; 30 digits at t = 100 in 1.5 s, t = 300 in 6 s, t = 1000 in 31 s; about 0.17 bits are lost
+a unit of time, so that t = 10,000 would need some 1,900 bits and is refused by default.
+
 """
 
 from __future__ import annotations
