@@ -6,12 +6,13 @@ Dynamics of Multibody Systems, 3.2).  Integrals m² = |M|² and h = ½ M·Ω + �
 
     q1 = 2h − m²/I3 − 2λ x − (1/I2 − 1/I3) x²,    q3 = −[2h − m²/I1 − 2λ x − (1/I2 − 1/I1) x²],    x' = k M1 M3
 
-No root is taken: M1 and M3 are σ1(t)/σ(t)-like functions of the second kind (V = the half-period ω_e of the root
-e = (2 q11 q31 − q10 q32 − q12 q30)/12, q = q0 + q1 x + q2 x², that goes with the factors q1, q3), so signs follow the flow.
+No root is taken: M1 and M3 are functions of the second kind, V = the half-period ω_e of the root that goes with the
+factors, e = (½ a1 b1 − a0 b2 − a2 b0)/6 for q1 = a0 + a1 x + a2 x², q3 = b0 + b1 x + b2 x², so signs follow the flow.
 
-γ, or any vector fixed in space, has a constant part along M; the part Γ across it makes Z = M × Γ − i m Γ, M × Z = −i m Z.
-Z1, Z3 are of the second kind too.  M2's azimuth about M moves at m (2h − m²/I2 − 2λx)/(m² − x²) + m/I2, which gives V
-with ℘(V) = F(m, −m)/(8 m²) − ..., and after adding ω_e everything collapses to
+γ, or any vector fixed in space, has a constant part along M; the part Γ across it makes Z = M × Γ − i m Γ, with
+M × Z = −i m Z.
+Z1, Z3 are of the second kind too.  M2's azimuth about M moves at m (2h − m²/I2 − 2λx)/(m² − x²) + m/I2, which
+is what Z2 turns by; adding ω_e to its V gives that of Z1, Z3:
 
     ℘(V) = e − k² m²/4,    ℘'(V) = ½ i k² m³ ν,    κ = ½ m (1/I1 + 1/I3),    ν = 1/(2I2) − ½ (1/I1 + 1/I3) + h/m²
 

@@ -1,12 +1,13 @@
 """Lagrange's top: I1 = I2, a = b = 0, for every start.
 
-Data: n = P c, L = I3 Ω3, C0 = M·γ, E = ½ I1 (Ω1² + Ω2²) + n γ3, s = |γ|.  x = γ3 moves on a cubic (Whittaker, Analytical
-Dynamics, 71; Klein & Sommerfeld, Theorie des Kreisels, IV.3; Hermite, Applications des fonctions elliptiques, XXX-XXXVII):
+Data: n = P c, L = I3 Ω3, C0 = M·γ, E = ½ I1 (Ω1² + Ω2²) + n γ3, s = |γ|.  x = γ3 moves on a cubic
+(Whittaker, Analytical Dynamics, 71; Klein & Sommerfeld, Theorie des Kreisels; Hermite, Sur quelques applications des
+fonctions elliptiques):
 
     x'² = (2/I1)(E − n x)(s² − x²) − ((C0 − L x)/I1)²,    x' = Ω2 γ1 − Ω1 γ2
 
-The horizontal parts g = γ1 + iγ2 and w = Ω1 + iΩ2 satisfy g' = −iΩ3 g + i x w, I1 w' = i (L − I1 Ω3) w − i n g, and share one
-function of the second kind:
+The horizontal parts g = γ1 + iγ2 and w = Ω1 + iΩ2 satisfy g' = −iΩ3 g + i x w, I1 w' = i (L − I1 Ω3) w − i n g, and
+share one function of the second kind:
 
     ℘(V) = (4 I1 E − L²)/(12 I1²),    ℘'(V) = i (C0 n − E L)/(2 I1²),    κ = L/(2 I1) − Ω3
 
@@ -15,8 +16,8 @@ All of it rational, whatever s is.  The axis of symmetry in space, e3·(ξ + iη
     ℘(V) = (4 I1 E s² + 2 L² s² − 3 C0²)/(12 I1² s²),    κ = C0/(2 I1 s)
     ℘'(V) = −i (C0³ − 2 C0 E I1 s² − C0 L² s² + 2 I1 L n s⁴)/(4 I1³ s³)
 
-and gives the attitude.  Sleeping tops, steady and regular precession, cusps, loops, passages through the poles, the spherical pendulum (L = 0)
-and the motions asymptotic to a sleeping top are starts like any other.
+and gives the attitude.  Sleeping tops, steady and regular precession, cusps, loops, passages through the poles, the
+spherical pendulum (L = 0) and the motions asymptotic to a sleeping top are starts like any other.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ class Lagrange:
             n1, n2, _ = self.top.moment
             raise NotInClass(
                 f"P a = {n1}, P b = {n2}, not 0.",
-                "Lagrange's top has its centre of mass on the axis of symmetry, axis 3.",
+                "Lagrange's top has its centre of mass on axis 3, that of symmetry.",
             )
 
     @property
@@ -152,7 +153,8 @@ class Lagrange:
     def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[arb]:
         """A vector ⟂ γ, fixed in space, at ``time``.
 
-        Z = ξ + iη, h = Z3 and Z∓ = Z1 ∓ iZ2 obey Z₊ ḡ = −h (x − s), Z₋ g = −h (x + s) and Z₋ w − Z₊ w̄ = 2i h', h' = (Z × Ω)3.
+        Z = ξ + iη, h = Z3 and Z± = Z1 ± iZ2 obey Z₊ ḡ = −h (x − s), Z₋ g = −h (x + s) and, as h' = (Z × Ω)3,
+        Z₋ w − Z₊ w̄ = 2i h'.
         """
         if not any((*self.start.omega[:2], *self.start.gamma[:2])):
             return rotate(vector, self.start.omega, ball(time))
