@@ -65,13 +65,14 @@ class Euler(WithAttitude):
 
     def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        if self.steady:
-            omega = balls(self.start.omega)
-            if not any(self.start.omega):
-                return omega, list
-            rate = ball(dot(self.start.omega, self.start.omega)).sqrt()
-            return omega, lambda vector: turned(vector, omega, rate, time)
-        return _lattice(self, ctx.prec).motion(time)
+        lattice = _lattice(self, ctx.prec)
+        if lattice is not None:
+            return lattice.motion(time)
+        omega = balls(self.start.omega)
+        if not any(self.start.omega):
+            return omega, list
+        rate = ball(dot(self.start.omega, self.start.omega)).sqrt()
+        return omega, lambda vector: turned(vector, omega, rate, time)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ class _Lattice:
 
     axes: (a, b, c).  amplitudes: A by axis.  rate: p.  origin: u0.  pole: y.  drift: μ, per unit of time.
     momentum: L.  frame: M/L, the projection of e_b and their cross product at t = 0.  phase: e^{iψ} at t = 0 but for
-    its constant.
+    its constant.  period: its factor over 2K.
     """
 
     axes: tuple[int, int, int]
@@ -94,6 +95,7 @@ class _Lattice:
     momentum: arb
     frame: tuple[Sequence[Any], ...]
     phase: acb
+    period: acb
 
     def motion(self, time: arb_series) -> tuple[list[arb_series], Carry]:
         a, b, c = self.axes
@@ -104,7 +106,7 @@ class _Lattice:
         along, projection, across = _frame([i * w for i, w in zip(self.inertia, omega, strict=True)], self.momentum, b)
         sine, cosine = arb_series.sin_cos(self.drift * time)
         turn = (acb_series(cosine, prec=ctx.cap) + acb(0, 1) * acb_series(sine, prec=ctx.cap)) * (
-            self.functions.phase(u, self.pole) / self.phase
+            self.functions.phase(u, self.pole, self.period) / self.phase
         )
         cosine, sine = real_part(turn), imaginary_part(turn)
         space = (
@@ -121,7 +123,10 @@ class _Lattice:
 
 
 @lru_cache(maxsize=64)
-def _lattice(case: Euler, _bits: int) -> _Lattice:
+def _lattice(case: Euler, _bits: int) -> _Lattice | None:
+    """None for a steady rotation."""
+    if case.steady:
+        return None
     inertia, omega = case.top.inertia, case.start.omega
     momentum = case.top.angular_momentum(omega)
     square, energy = dot(momentum, momentum), dot(omega, momentum)
@@ -141,6 +146,7 @@ def _lattice(case: Euler, _bits: int) -> _Lattice:
     complement = (roots[a] - roots[b]) / rate2
     # y is measured in u: the pole of ψ' nearest to the real line
     pole = sign(ia - ic) * legendre_f(*balls((sine2, ib * ib * ab / square, 1 - complement * sine2)))
+    period = functions.phase_period(pole)
     length, rate = ball(square).sqrt(), ball(rate2).sqrt()
     drift = length * ball((energy - ib * ab) / (square - ib * ib * ab)) - rate * functions.phase_rate(pole)
     return _Lattice(
@@ -154,7 +160,8 @@ def _lattice(case: Euler, _bits: int) -> _Lattice:
         drift=drift,
         momentum=length,
         frame=_frame(balls(momentum), length, b),
-        phase=functions.phase(origin, pole)[0],
+        phase=functions.phase(origin, pole, period)[0],
+        period=period,
     )
 
 

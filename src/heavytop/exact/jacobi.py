@@ -69,19 +69,22 @@ class Jacobi:
         flip = -1 if turns % 2 else 1
         return flip * real_part(sn), flip * real_part(cn), real_part(dn)
 
-    def phase(self, u: Any, shift: arb) -> acb_series:
+    def phase(self, u: Any, shift: arb, period: acb) -> acb_series:
         """θ1/|θ1| at u + i·shift for real u: a function of modulus 1, without poles on the real line.
 
         Its logarithm has the derivative of an elliptic function with simple poles of residue ± 1/2 at ∓ i·shift,
-        up to a constant.
+        up to a constant.  period: :meth:`phase_period`.
         """
         rest, turns = self.reduced(u)
         value = self._phase(rest, shift)
-        if turns == 0 or self.quarter is None:
-            return value
-        # θ1 is multiplied over a period by a factor whose direction does not depend on u
-        period = self._phase(self.quarter, shift)[0] / self._phase(-self.quarter, shift)[0]
-        return period**turns * value
+        return period**turns * value if turns else value
+
+    def phase_period(self, shift: arb) -> acb:
+        """What :meth:`phase` is multiplied by over 2K: the direction of a factor of θ1 that does not depend on u."""
+        if self.quarter is None:
+            return acb(1)
+        with series_length(1):
+            return (self._phase(self.quarter, shift) / self._phase(-self.quarter, shift))[0]
 
     def _phase(self, u: Any, shift: arb) -> acb_series:
         theta = self.thetas(acb_series(u, prec=ctx.cap) + _I * shift)[0]
