@@ -89,8 +89,8 @@ EDGES = {
     "inside the separatrix": Lagrange(HeavyTop((1, 1, 1), 1, POLE), State((2 - TINY, 0, 0), BELOW)),
     "outside the separatrix": Lagrange(HeavyTop((1, 1, 1), 1, POLE), State((2 + TINY, 0, 0), BELOW)),
     "asymptotic to sleeping": lagrange((0, 0, 2), POLE),
-    # I1 x Ω3 ψ' relation: (I3 Ω3 − I1 ψ' γ3) ψ' + n = 0 with ψ' = 1, Ω = ψ' γ + φ' e3
-    "steady precession": lagrange((F(3, 5), 0, F(3, 5)), SIDE, centre=1),
+    # I3 Ω3 ψ' = n + I1 ψ'² γ3 with ψ' = 1: a double root of the cubic
+    "steady precession": lagrange((F(3, 5), 0, F(13, 5)), SIDE),
     "no weight": lagrange((1, 0, 1), SIDE, centre=0),
     "sphere": lagrange((1, F(1, 2), 1), SIDE, i3=2, centre=0),
     "gamma is 0": lagrange((1, 0, 1), (0, 0, 0)),

@@ -8,15 +8,17 @@ f' = f'(x0) and so on, y0 = x'(0), ℘ with the invariants of f, and D(t) = 2 (�
     x(t) = x0 + [ −y0 ℘' + ½ f' (℘ − c) + f f'''/24 ] / D,    g2 = a0a4 − 4a1a3 + 3a2²,
     g3 = a0a2a4 + 2a1a2a3 − a2³ − a0a3² − a1²a4
 
-2. Let F be meromorphic with poles only where x has them and of no higher order, and let e^(−iκt) F take the same factors over the
-periods as Φ(t) = σ(V − t) e^(ζ(V) t)/(σ(V) σ(t)) does.  Then e^(−iκt) F D has no pole but one of order four at t = 0, so it
-is a combination of Φ, Φ', Φ'', Φ''' (Hermite's theorem on functions of the second kind, Whittaker & Watson 20.54).
+2. Let F be meromorphic with poles only where x has them and of no higher order, and let e^(−iκt) F take the same
+factors over the periods as Φ(t) = σ(V − t) e^(ζ(V) t)/(σ(V) σ(t)) does.  Then e^(−iκt) F D has no pole but one of order
+four at t = 0, so it is a combination of Φ, Φ', Φ'', Φ''' (Hermite's theorem on functions of the second kind;
+Halphen, Traité des fonctions elliptiques, I).
 Φ = 1/t − P t/2 + P' t²/6 + ..., P = ℘(V), and so the combination is known from f_k, the derivatives of e^(−iκt) F at 0:
 
     F = e^(iκt) [ (f3/3 − 4c f1) Φ + (4c f0 − f2) Φ' + f1 Φ'' − f0 Φ'''/3 ] / D
     Φ'/Φ = ½ (℘' + P')/(℘ − P),    Φ'' = (2℘ + P) Φ    (Lamé's equation)
 
-Nothing is divided by anything that depends on the start, so turning points, double roots and rest are starts like any other.
+Nothing is divided by anything that depends on the start, so turning points, double roots and rest are starts like any
+other.
 """
 
 from __future__ import annotations
@@ -60,24 +62,28 @@ class QuarticMotion:
     start: Scalar
     speed: Scalar
 
-    def derivatives(self) -> tuple[Scalar, ...]:
-        """f, f', f'', f''', f'''' at the start."""
-        row: list[Scalar] = list(self.coefficients)
-        found: list[Scalar] = []
+    def _numbers(self, *values: Scalar) -> list[Any]:
+        """The values in one ring: Fractions, or balls as soon as one of the motion's own numbers is a ball."""
+        balls = any(isinstance(own, arb) for own in (*self.coefficients, self.start))
+        return [value if isinstance(value, arb) else ball(value) if balls else Fraction(value) for value in values]
+
+    def derivatives(self) -> tuple[Any, ...]:
+        """f and its first four derivatives at the start."""
+        row = self._numbers(*self.coefficients)
+        start, zero = self._numbers(self.start, 0)
+        found = []
         for _ in range(5):
-            value: Scalar = 0
+            value = zero
             for coefficient in reversed(row):
-                value = value * self.start + coefficient
+                value = value * start + coefficient
             found.append(value)
-            row = [index * coefficient for index, coefficient in enumerate(row)][1:]
+            row = [coefficient * index for index, coefficient in enumerate(row)][1:]
         return tuple(found)
 
-    def invariants(self) -> tuple[Scalar, Scalar]:
+    def invariants(self) -> tuple[Any, Any]:
         """(g2, g3) of f."""
-        a4, a3, a2, a1, a0 = (
-            coefficient * Fraction(1, weight) if not isinstance(coefficient, arb) else coefficient / weight
-            for coefficient, weight in zip((*self.coefficients, 0, 0, 0, 0, 0)[:5], (1, 4, 6, 4, 1), strict=True)
-        )
+        row = self._numbers(*self.coefficients, 0, 0, 0, 0, 0)[:5]
+        a4, a3, a2, a1, a0 = (coefficient / weight for coefficient, weight in zip(row, (1, 4, 6, 4, 1), strict=True))
         g2 = a0 * a4 - 4 * a1 * a3 + 3 * a2 * a2
         g3 = a0 * a2 * a4 + 2 * a1 * a2 * a3 - a2 * a2 * a2 - a0 * a3 * a3 - a1 * a1 * a4
         return g2, g3
@@ -89,12 +95,12 @@ class QuarticMotion:
     @property
     def at_rest(self) -> bool:
         """Whether x is constant: start on a double root."""
-        return self.speed == 0 and self.derivatives()[1] == 0
+        return bool(self.speed == 0 and self.derivatives()[1] == 0)
 
     def prepared(self) -> PreparedMotion:
         """Everything that does not depend on time, at the working precision."""
         value, first, second, third, fourth = self.derivatives()
-        centre = second / 24 if isinstance(second, arb) else Fraction(second) / 24
+        centre = second / 24
         return PreparedMotion(
             self.lattice(),
             centre,
@@ -173,7 +179,8 @@ class SecondKind:
             sign, *thetas = point.thetas
             phi = thetas.pop(self.index) * (sign if self.index else 1)
             return factor * phi, factor * (thetas[0] * thetas[1] * (-sign if self.index else -1))
-        theta = (self.shift - point.z).modular_theta(self.lattice.ratio)[0]
+        argument: Any = self.shift - point.z
+        theta = argument.modular_theta(self.lattice.ratio)[0]
         phi = theta * (1 / self.unit) * factor
         slope = (point.scale * point.scale * point.scale) * self.slope + point.slope
         return phi, phi * slope / (point.above(self.value) * 2)

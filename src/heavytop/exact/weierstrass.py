@@ -6,8 +6,8 @@ two are complex, z = u/(2ω) and T(u) = 2ω θ1(z)/θ1'(0), everything is a thet
 
     ℘ = e1 + (θ2(z)/(θ2(0) T))²,   ℘' = −2 θ2(z)θ3(z)θ4(z)/(θ2(0)θ3(0)θ4(0) T³),   σ = T exp(η u²/(2ω))
 
-:class:`Point` holds T, ℘ T² and ℘' T³, which stay finite at the poles of ℘, so that no formula built on it breaks down at
-t = 0 or at a whole period.  On discriminant 0 (a double root d) T is sinh(κu)/κ with κ² = 3d, or its trigonometric or
+:class:`Point` holds T, ℘ T² and ℘' T³, which stay finite at the poles of ℘, so that no formula built on it breaks down
+at t = 0 or at a whole period.  On discriminant 0 (a double root d) T is sinh(κu)/κ with κ² = 3d, or its trigonometric or
 rational form, and nothing is left of theta functions.  Near it they converge all the faster, after the modular
 transformation that FLINT makes, and only the roots' difference costs working precision.
 """
@@ -35,7 +35,8 @@ class Point:
     """A lattice's functions at a real time, without poles; numbers or power series in the time.
 
     scale: T, odd, ~ u.  raised: √((℘ − e) T²) for the root e = ``root`` of the lattice.  slope: ℘' T³.
-    thetas: (−1)^(whole periods) and θ_j(z)/θ_j(0), j = 2, 3, 4 (none on discriminant 0).  time, z: u and u/(2ω) reduced.
+    thetas: (−1)^(whole periods) and θ_j(z)/θ_j(0), j = 2, 3, 4 (none on discriminant 0).
+    time, z: u and u/(2ω) reduced.
     """
 
     scale: Any
