@@ -40,7 +40,8 @@ class Certificate:
     """Two sources and how far they agree.
 
     method, second_source: in words.  agreed_digits: digits that both give, relative above 1 and absolute below.
-    kind: ``proven`` if both are balls that hold the motion, ``computed`` if the second is not.
+    kind: ``proven`` if both are balls that hold the motion at the time itself, ``proven at both ends`` if the second is
+    one near 0 and over the last unit of time only, ``computed`` if the second is no ball.
     """
 
     method: str
@@ -129,7 +130,7 @@ def _early_and_last(
     agreed = min(agreed_digits(known, enclosed), agreed_digits(values, last), _integral_digits(solution, values, bits))
     source = f"validated integration from 0 to {early} and from t - {sign * _LAST} to t".replace("- -", "+ ")
     source += "; first integrals at t"
-    return Certificate(solution.method, source, agreed, "proven")
+    return Certificate(solution.method, source, agreed, "proven at both ends")
 
 
 def _integral_digits(solution: ExactSolution, values: Sequence[arb], bits: int) -> int:

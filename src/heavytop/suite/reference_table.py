@@ -80,7 +80,7 @@ def cases() -> Iterator[Case]:
     free = (0, 0, 0)
     yield Case("euler", HeavyTop((1, 2, 3), 1, free), State(("1/10", 1, "1/5"), tilted))
     yield Case("euler, about the largest moment", HeavyTop((3, 2, 1), 1, free), State((1, "1/10", "1/5"), tilted))
-    yield Case("euler, separatrix", HeavyTop((1, 2, 3), 0, free), State(("3/2", "1/2", "1/2"), tilted))
+    yield Case("euler, separatrix", HeavyTop((4, 5, 9), 0, free), State(("3/2", "1/2", "1/2"), tilted))
     yield Case("euler, symmetric", HeavyTop((2, 2, 1), 0, free), State((1, "1/2", "1/3"), tilted))
     yield Case("lagrange", HeavyTop(("3/2", "3/2", 1), 2, (0, 0, "3/4")), State(("1/5", "-1/3", 2), tilted))
     yield Case("lagrange, sleeping", HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), upright))
