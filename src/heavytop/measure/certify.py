@@ -40,7 +40,8 @@ class Certificate:
     """Two sources and how far they agree.
 
     method, second_source: in words.  agreed_digits: digits that both give, relative above 1 and absolute below.
-    kind: ``proven`` if both are balls that hold the motion, ``computed`` if the second is not.
+    kind: ``proven`` if both are balls that hold the motion at the time itself, ``proven at both ends`` if the second is
+    one near 0 and over the last unit of time only, ``computed`` if the second is no ball.
     """
 
     method: str
@@ -64,11 +65,16 @@ def agreed_digits(first: Sequence[arb], second: Sequence[arb]) -> int:
 
 
 def certify(
-    solution: ExactSolution, time: Fraction, digits: int, second: tuple[str, SecondSource] | None = None
+    solution: ExactSolution,
+    time: Fraction,
+    digits: int,
+    second: tuple[str, SecondSource] | None = None,
+    enclosure: Validated | None = None,
 ) -> Certificate:
     """The certificate of ``solution`` at ``time`` for ``digits`` digits.
 
     second: name and values of a computed source, taken where validated integration does not reach.
+    enclosure: :func:`enclosure_of` the solution, to be used again for many times; None for a new one.
     Raises OutOfReach where two proven sources exclude each other: one of them is wrong.
     """
     bits = bits_of(digits)
@@ -77,12 +83,13 @@ def certify(
         if second is None:
             return Certificate(solution.method, "its own proven tail", agreed_digits(values, values), "proven")
         return Certificate(solution.method, second[0], agreed_digits(values, second[1](time, bits)), "computed")
+    enclosure = enclosure or enclosure_of(solution)
     try:
-        other = _enclosure(solution, solution.start).state(time, bits)
+        other = enclosure.state(time, bits)
     except OutOfReach:
         if second is not None:
             return Certificate(solution.method, second[0], agreed_digits(values, second[1](time, bits)), "computed")
-        return _early_and_last(solution, time, values, bits)
+        return _early_and_last(solution, enclosure, time, values, bits)
     _require_overlap(solution, time, values, other)
     return Certificate(solution.method, "validated integration", agreed_digits(values, other), "proven")
 
@@ -104,18 +111,26 @@ def certified_state(
     return widened, certificate
 
 
-def _early_and_last(solution: ExactSolution, time: Fraction, values: Sequence[arb], bits: int) -> Certificate:
+def enclosure_of(solution: ExactSolution, start: State | None = None, effort: float = _EFFORT) -> Validated:
+    """The validated integration of the same motion, or from another start with the same parameters."""
+    rotor = Fraction(_parameters(solution).rotor)
+    return Validated(solution.top, start or solution.start, solution.system, rotor=rotor, effort=effort)
+
+
+def _early_and_last(
+    solution: ExactSolution, enclosure: Validated, time: Fraction, values: Sequence[arb], bits: int
+) -> Certificate:
     sign = 1 if time > 0 else -1
     early = sign * _EARLY
     known = solution.state(early, bits)
-    enclosed = _enclosure(solution, solution.start).state(early, bits)
+    enclosed = enclosure.state(early, bits)
     _require_overlap(solution, early, known, enclosed)
     before = [midpoint(value) for value in solution.state(time - sign * _LAST, bits + 64)]
-    last = _enclosure(solution, State(before[:3], before[3:])).state(sign * _LAST, bits + 16)
+    last = enclosure_of(solution, State(before[:3], before[3:])).state(sign * _LAST, bits + 16)
     agreed = min(agreed_digits(known, enclosed), agreed_digits(values, last), _integral_digits(solution, values, bits))
     source = f"validated integration from 0 to {early} and from t - {sign * _LAST} to t".replace("- -", "+ ")
     source += "; first integrals at t"
-    return Certificate(solution.method, source, agreed, "proven")
+    return Certificate(solution.method, source, agreed, "proven at both ends")
 
 
 def _integral_digits(solution: ExactSolution, values: Sequence[arb], bits: int) -> int:
@@ -135,11 +150,6 @@ def _parameters(solution: ExactSolution) -> Parameters:
     """The motion's own parameters: the rotor of a gyrostat from rounded data is not that of its start."""
     own: Parameters | None = getattr(solution, "parameters", None)
     return own or solution.system.parameters(solution.top, solution.start)
-
-
-def _enclosure(solution: ExactSolution, start: State) -> Validated:
-    rotor = Fraction(_parameters(solution).rotor)
-    return Validated(solution.top, start, solution.system, rotor=rotor, effort=_EFFORT)
 
 
 def _require_overlap(solution: ExactSolution, time: Fraction, first: Sequence[arb], second: Sequence[arb]) -> None:
