@@ -31,7 +31,7 @@ from typing import Any
 from flint import acb, acb_series, arb
 
 from heavytop.exact.balls import ball, midpoint
-from heavytop.exact.weierstrass import AnyLattice, Lattice, Point, Scalar, as_ball, from_invariants
+from heavytop.exact.weierstrass import AnyLattice, Lattice, Point, Scalar, as_ball, from_invariants, thetas
 
 Pair = tuple[Fraction, Fraction]
 
@@ -172,11 +172,10 @@ class SecondKind:
         if not isinstance(self.lattice, Lattice):
             return self._degenerate(point, factor)
         if self.index is not None:
-            sign, *thetas = point.thetas
-            phi = thetas.pop(self.index) * (sign if self.index else 1)
-            return factor * phi, factor * (thetas[0] * thetas[1] * (-sign if self.index else -1))
-        argument: Any = self.shift - point.z
-        theta = argument.modular_theta(self.lattice.ratio)[0]
+            sign, *others = point.thetas
+            phi = others.pop(self.index) * (sign if self.index else 1)
+            return factor * phi, factor * (others[0] * others[1] * (-sign if self.index else -1))
+        theta = thetas(self.shift - point.z, self.lattice.ratio)[0]
         phi = theta * (1 / self.unit) * factor
         slope = (point.scale * point.scale * point.scale) * self.slope + point.slope
         return phi, phi * slope / (point.above(self.value) * 2)
@@ -209,8 +208,8 @@ def second_kind(lattice: AnyLattice, winding: Winding) -> SecondKind:
         index = min(range(3), key=lambda j: midpoint(abs(lattice.roots[j] - value).upper()))
         return SecondKind(lattice, winding.value, slope, acb(0), acb(1), turning, index)
     shift = _imaginary_argument(lattice, winding) / (2 * lattice.half_period)
-    unit = shift.modular_theta(lattice.ratio)[0]
-    log_slope = shift.modular_theta(lattice.ratio, 1)[0] / unit / (2 * lattice.half_period)
+    unit = thetas(shift, lattice.ratio)[0]
+    log_slope = thetas(shift, lattice.ratio, 1)[0] / unit / (2 * lattice.half_period)
     # θ1'/θ1 is imaginary there
     return SecondKind(lattice, winding.value, slope, shift, unit, acb(0, log_slope.imag) + turning, None)
 
