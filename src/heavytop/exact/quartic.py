@@ -38,6 +38,7 @@ from heavytop.exact.weierstrass import (
     Point,
     Scalar,
     as_ball,
+    difference,
     from_invariants,
     thetas,
 )
