@@ -7,7 +7,6 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.suite.reference_table import Motion, cases, motion, write
 
 TABLE = Path(__file__).parents[2] / "results" / "reference" / "states.json"
@@ -45,7 +44,8 @@ def test_values_are_narrow_certified_and_keep_the_integrals_of_the_start(entry):
         assert state["certificate"]["agreed_digits"] >= 100
         y = [Fraction(ball["value"]) for ball in state["state"]]
         for ball in state["state"]:
-            assert Fraction(ball["radius"]) <= Fraction(2, 10**100) * max(1, abs(Fraction(ball["value"])))
+            # half a unit of the hundredth digit is up to 5e-100 of the value
+            assert Fraction(ball["radius"]) <= Fraction(6, 10**100) * max(1, abs(Fraction(ball["value"])))
         for integral in (area, energy, length):
             assert abs(integral(y) - integral(start)) < Fraction(1, 10**96)
 
@@ -56,9 +56,7 @@ def test_closed_forms_reach_a_million():
 
 def test_the_homoclinic_motion_of_the_table_has_come_back_to_its_saddle():
     far = next(s for s in of("delone, homoclinic")["states"] if Fraction(s["time"]) == FAR)
-    for ball, saddle in zip(
-        far["state"], (0, DeloneHomoclinic(Fraction(1), Fraction(1)).alpha, 0, 0, 1, 0), strict=True
-    ):
+    for ball, saddle in zip(far["state"], (0, 1, 0, 0, 1, 0), strict=True):
         assert abs(Fraction(ball["value"]) - saddle) <= Fraction(ball["radius"])
 
 

@@ -106,14 +106,24 @@ class Step:
         """N."""
         return len(self.coefficients[0]) - 1
 
+    @property
+    def _powers(self) -> float:
+        """An upper bound of Σ |V̂_n|."""
+        return float(np.abs(self.variation).sum(axis=2).max(axis=1).sum()) * _UP
+
+    @property
+    def _summed_error(self) -> float:
+        """|V − V̂| with the rounding of the sum that V̂ is evaluated by."""
+        return self.variation_error + 8 * _VARIATIONAL_ORDER * _UNIT * self._powers
+
     def at(self, tau: Fraction) -> list[arb]:
         """The state at 0 ≤ τ ≤ 1, as balls."""
-        powers = np.abs(self.variation).sum(axis=2).max(axis=1).sum()
-        slack = self.variation_error + 8 * _VARIATIONAL_ORDER * _UNIT * float(powers)
+        slack = self._summed_error
         variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(self.variation))
         errors = self.node.errors
-        spread = slack * float(np.abs(errors.frame).sum(axis=1).max()) * _UP
-        radii = errors.sizes(variation @ errors.frame, spread + 64 * _UNIT * float(powers)) + self.local
+        # the second term: the rounding of the product below
+        spread = (slack + 64 * _UNIT * self._powers) * float(np.abs(errors.frame).sum(axis=1).max()) * _UP
+        radii = errors.sizes(variation @ errors.frame, spread) + self.local
         # each of the N roundings of Horner's scheme is at most half an ulp
         rounding = arb(self.order) / 2
         unit = arb(2) ** -self.precision
@@ -127,7 +137,7 @@ class Step:
         """The node at τ = 1: Σ b_n exactly, and the set of errors in a new frame."""
         errors = self.node.errors
         variation = self.variation.sum(axis=0)
-        frame, turned, slack = _new_frame(variation, self.variation_error, errors)
+        frame, turned, slack = _new_frame(variation, self._summed_error, errors)
         radii = Errors(turned, errors.radii, 0).sizes(slack=slack)
         reach = np.abs(frame.T).sum(axis=1) + slack
         radii = (radii + reach * self.local) * _UP
