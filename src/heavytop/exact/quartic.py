@@ -142,10 +142,10 @@ class PreparedMotion:
         above = point.above(self.centre)
         return above * above * 2 - square * square * as_ball(self.offset)
 
-    def position(self, point: Point, denominator: Any) -> Any:
-        """x at the point."""
+    def numerator(self, point: Point) -> Any:
+        """(x − x0) D T⁴: beside :meth:`denominator`, what is left of x where it is infinite."""
         if self.at_rest:
-            return point.scale * 0 + self.start
+            return point.scale * 0
         constant, even, odd = self.numerators
         square = point.scale * point.scale
         lead: Any = constant
@@ -154,7 +154,11 @@ class PreparedMotion:
             even_part: Any = even
             lead, above = constant + even_part * difference(self.lattice.double, self.centre), point.raised
         inner = (square * as_ball(lead) + above * as_ball(even)) * point.scale + point.slope * as_ball(odd)
-        return inner * point.scale / denominator + self.start
+        return inner * point.scale
+
+    def position(self, point: Point, denominator: Any) -> Any:
+        """x at the point."""
+        return self.numerator(point) / denominator + self.start
 
     def companion(self, winding: Winding, taylor: Sequence[Pair]) -> Companion:
         """F of the second theorem; taylor: f0..f3, each as (real, imaginary/√square)."""
