@@ -103,7 +103,7 @@ EDGES = {
     "I2 = I3": gyrostat((3, 1, 1), (1, 2, 3)),
     "gyrostat sphere": gyrostat((2, 2, 2), (1, 2, 3)),
     "no rotor": gyrostat((3, 2, 1), (1, 2, 3), rotor=0),
-    "free separatrix": gyrostat((3, 2, 1), (1, 3, 3), rotor=0),
+    "free separatrix": gyrostat((9, 8, 4), (4, 3, 3), rotor=0),
     "no rotor, symmetric": gyrostat((2, 2, 1), (1, 2, 3), rotor=0),
     "permanent": gyrostat((3, 2, 1), (0, 2, 0)),
     "permanent off the axis": gyrostat((3, 2, 1), (1, F(-2, 1), 0), rotor=-1),

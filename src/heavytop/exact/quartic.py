@@ -31,7 +31,16 @@ from typing import Any
 from flint import acb, acb_series, arb
 
 from heavytop.exact.balls import ball, midpoint
-from heavytop.exact.weierstrass import AnyLattice, Lattice, Point, Scalar, as_ball, from_invariants
+from heavytop.exact.weierstrass import (
+    AnyLattice,
+    DegenerateLattice,
+    Lattice,
+    Point,
+    Scalar,
+    as_ball,
+    from_invariants,
+    thetas,
+)
 
 Pair = tuple[Fraction, Fraction]
 
@@ -104,9 +113,9 @@ class QuarticMotion:
         return PreparedMotion(
             self.lattice(),
             centre,
-            as_ball(value) * as_ball(fourth) / 48,
+            value * fourth / 48,
             as_ball(self.start),
-            (as_ball(value) * as_ball(third) / 24, as_ball(first) / 2, -as_ball(self.speed)),
+            (value * third / 24, first / 2, -self.speed),
             self.at_rest,
         )
 
@@ -117,15 +126,20 @@ class PreparedMotion:
 
     lattice: AnyLattice
     centre: Scalar
-    offset: arb
+    offset: Scalar
     start: arb
-    numerators: tuple[arb, arb, arb]
+    numerators: tuple[Scalar, Scalar, Scalar]
     at_rest: bool
 
     def denominator(self, point: Point) -> Any:
-        """D T⁴."""
-        above, square = point.above(self.centre), point.scale * point.scale
-        return above * above * 2 - square * square * self.offset
+        """D T⁴; on discriminant 0 by its exact coefficients, of which the first vanishes where f is a square."""
+        square = point.scale * point.scale
+        if isinstance(self.lattice, DegenerateLattice):
+            off: Any = self.lattice.double - self.centre
+            lead = 2 * off * off - self.offset
+            return square * square * as_ball(lead) + square * as_ball(4 * off) + 2
+        above = point.above(self.centre)
+        return above * above * 2 - square * square * as_ball(self.offset)
 
     def numerator(self, point: Point) -> Any:
         """(x − x0) D T⁴: beside :meth:`denominator`, what is left of x where it is infinite."""
@@ -133,7 +147,12 @@ class PreparedMotion:
             return point.scale * 0
         constant, even, odd = self.numerators
         square = point.scale * point.scale
-        inner = (square * constant + point.above(self.centre) * even) * point.scale + point.slope * odd
+        lead: Any = constant
+        above = point.above(self.centre)
+        if isinstance(self.lattice, DegenerateLattice):
+            difference: Any = self.lattice.double - self.centre
+            lead, above = constant + even * difference, point.raised
+        inner = (square * as_ball(lead) + above * as_ball(even)) * point.scale + point.slope * as_ball(odd)
         return inner * point.scale
 
     def position(self, point: Point, denominator: Any) -> Any:
@@ -142,6 +161,8 @@ class PreparedMotion:
 
     def companion(self, winding: Winding, taylor: Sequence[Pair]) -> Companion:
         """F of the second theorem; taylor: f0..f3, each as (real, imaginary/√square)."""
+        if isinstance(self.lattice, DegenerateLattice):
+            return self._elementary(self.lattice, winding, taylor)
         root = ball(winding.square).sqrt()
         f0, f1, f2, f3 = (acb(ball(a), ball(b) * root) for a, b in taylor)
         centre, value = as_ball(self.centre), ball(winding.value)
@@ -152,6 +173,24 @@ class PreparedMotion:
             (4 * centre * f0 - f2 - value * f0 / 3, -2 * f0 / 3),
             not any(part for pair in taylor for part in pair),
         )
+
+    def _elementary(self, lattice: DegenerateLattice, winding: Winding, taylor: Sequence[Pair]) -> Companion:
+        """The same on discriminant 0, in powers of T; what cancels at large T cancels here, exactly."""
+        double: Any = lattice.double
+        centre: Any = self.centre
+        value, root = winding.value, ball(winding.square).sqrt()
+        rate = Fraction(0) if value == double else -winding.slope / (2 * (value - double))  # K/(i √square)
+        phi, slope = (
+            tuple(sum((w * f[part] for w, f in zip(weights, taylor, strict=True)), Fraction(0)) for part in (0, 1))
+            for weights in (
+                (0, value - 4 * centre + 2 * double, 0, Fraction(1, 3)),
+                (4 * centre - value / 3 - Fraction(2, 3) * double, 0, -1, 0),
+            )
+        )
+        cubic = (phi[0] - winding.square * rate * slope[1], phi[1] + rate * slope[0])
+        f0, f1, cube, second = (acb(ball(a), ball(b) * root) for a, b in (*taylor[:2], cubic, slope))
+        nothing = not any(part for pair in taylor for part in pair)
+        return Companion(second_kind(lattice, winding), (cube, 2 * f1, -2 * f0 / 3), (second, -2 * f0 / 3), nothing)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,11 +215,10 @@ class SecondKind:
         if not isinstance(self.lattice, Lattice):
             return self._degenerate(point, factor)
         if self.index is not None:
-            sign, *thetas = point.thetas
-            phi = thetas.pop(self.index) * (sign if self.index else 1)
-            return factor * phi, factor * (thetas[0] * thetas[1] * (-sign if self.index else -1))
-        argument: Any = self.shift - point.z
-        theta = argument.modular_theta(self.lattice.ratio)[0]
+            sign, *others = point.thetas
+            phi = others.pop(self.index) * (sign if self.index else 1)
+            return factor * phi, factor * (others[0] * others[1] * (-sign if self.index else -1))
+        theta = thetas(self.shift - point.z, self.lattice.ratio)[0]
         phi = theta * (1 / self.unit) * factor
         slope = (point.scale * point.scale * point.scale) * self.slope + point.slope
         return phi, phi * slope / (point.above(self.value) * 2)
@@ -213,8 +251,8 @@ def second_kind(lattice: AnyLattice, winding: Winding) -> SecondKind:
         index = min(range(3), key=lambda j: midpoint(abs(lattice.roots[j] - value).upper()))
         return SecondKind(lattice, winding.value, slope, acb(0), acb(1), turning, index)
     shift = _imaginary_argument(lattice, winding) / (2 * lattice.half_period)
-    unit = shift.modular_theta(lattice.ratio)[0]
-    log_slope = shift.modular_theta(lattice.ratio, 1)[0] / unit / (2 * lattice.half_period)
+    unit = thetas(shift, lattice.ratio)[0]
+    log_slope = thetas(shift, lattice.ratio, 1)[0] / unit / (2 * lattice.half_period)
     # θ1'/θ1 is imaginary there
     return SecondKind(lattice, winding.value, slope, shift, unit, acb(0, log_slope.imag) + turning, None)
 
@@ -249,10 +287,19 @@ class Companion:
         if self.zero:
             return acb_series(scale) * 0 if not isinstance(scale, arb) else acb(0)
         phi, slope = self.wave.at(point)
-        square, p = lift(scale * scale), lift(point.above(0))
         first, second, third = self.of_phi
+        square = lift(scale * scale)
+        if isinstance(self.wave.lattice, DegenerateLattice):
+            # Φ' T² = K T ΦT − e: its K T ΦT stands in the cubic coefficient
+            inner = (square * first + second) * lift(scale) * phi + lift(point.slope) * third * phi
+            return (inner + self._rest(point, slope, square)) / lift(denominator)
+        p = lift(point.above(0))
         inner = (square * first + p * second) * lift(scale) + lift(point.slope) * third
         return (inner * phi + (square * self.of_slope[0] + p * self.of_slope[1]) * slope) / lift(denominator)
+
+    def _rest(self, point: Point, slope: Any, square: Any) -> Any:
+        rest = slope if self.wave.index is not None else -_exponential(point.time, self.wave.rate)
+        return square * self.of_slope[0] * rest + slope * self.of_slope[1]
 
 
 def lift(value: Any) -> Any:

@@ -7,8 +7,8 @@ two are complex, z = u/(2ω) and T(u) = 2ω θ1(z)/θ1'(0), everything is a thet
     ℘ = e1 + (θ2(z)/(θ2(0) T))²,   ℘' = −2 θ2(z)θ3(z)θ4(z)/(θ2(0)θ3(0)θ4(0) T³),   σ = T exp(η u²/(2ω))
 
 :class:`Point` holds T, ℘ T² and ℘' T³, which stay finite at the poles of ℘, so that no formula built on it breaks down
-at t = 0 or at a whole period.  On discriminant 0 (a double root d) T is sinh(κu)/κ with κ² = 3d, or its trigonometric or
-rational form, and nothing is left of theta functions.  Near it they converge all the faster, after the modular
+at t = 0 or at a whole period.  On discriminant 0 (a double root d) T is sinh(κu)/κ with κ² = 3d, or its trigonometric
+or rational form, and nothing is left of theta functions.  Near it they converge all the faster, after the modular
 transformation that FLINT makes, and only the roots' difference costs working precision.
 """
 
@@ -80,7 +80,7 @@ class Lattice:
         if length:
             argument = acb_series([z, 1 / (2 * self.half_period)], length)
             u = arb_series([u, 1], length)
-        theta = argument.modular_theta(self.ratio)
+        theta = thetas(argument, self.ratio)
         theta1, *others = theta
         scale = real(theta1 * (2 * self.half_period / self.zero[0]))
         ratios = tuple(value * (1 / start) for value, start in zip(others, self.zero[1:], strict=True))
@@ -96,9 +96,9 @@ class Lattice:
     def p_prime(self, u: acb) -> acb:
         """℘'(u), from −2 θ2 θ3 θ4/(θ2(0) θ3(0) θ4(0) T³)."""
         z, _ = self.reduced(u)
-        one, two, three, four = z.modular_theta(self.ratio)
+        one, two, three, four = thetas(z, self.ratio)
         scale = 2 * self.half_period * one / self.zero[0]
-        return -2 * (two * three * four) / (self.zero[1] * self.zero[2] * self.zero[3] * scale**3)
+        return acb(-2 * (two * three * four) / (self.zero[1] * self.zero[2] * self.zero[3] * scale**3))
 
     def zeta(self, u: acb) -> acb:
         """ζ(u), with ζ(u + 2ω) = ζ(u) + 2η."""
@@ -108,8 +108,8 @@ class Lattice:
     def sigma(self, u: acb) -> acb:
         """σ(u) = T exp(η u²/(2ω)); entire."""
         z, turns = self.reduced(u)
-        scale = 2 * self.half_period * z.modular_theta(self.ratio)[0] / self.zero[0]
-        return (-scale if turns % 2 else scale) * (self.quasi_period * u * u / (2 * self.half_period)).exp()
+        scale = 2 * self.half_period * thetas(z, self.ratio)[0] / self.zero[0]
+        return acb((-scale if turns % 2 else scale) * (self.quasi_period * u * u / (2 * self.half_period)).exp())
 
     @property
     def other_half_period(self) -> acb:
@@ -150,24 +150,29 @@ class DegenerateLattice:
 
     def p(self, u: acb) -> acb:
         """℘(u)."""
-        return as_ball(self.double) + self.functions(u)[0] ** -2
+        return acb(as_ball(self.double) + self.functions(u)[0] ** -2)
 
     def p_prime(self, u: acb) -> acb:
         """℘'(u)."""
         scale, cosine = self.functions(u)
-        return -2 * cosine / scale**3
+        return acb(-2 * cosine / scale**3)
 
     def zeta(self, u: acb) -> acb:
         """ζ(u) = κ coth(κu) − d u."""
         scale, cosine = self.functions(u)
-        return cosine / scale - as_ball(self.double) * u
+        return acb(cosine / scale - as_ball(self.double) * u)
 
     def sigma(self, u: acb) -> acb:
         """σ(u) = exp(−d u²/2) sinh(κu)/κ."""
-        return (-as_ball(self.double) * u * u / 2).exp() * self.functions(u)[0]
+        return acb((-as_ball(self.double) * u * u / 2).exp() * self.functions(u)[0])
 
 
 AnyLattice = Lattice | DegenerateLattice
+
+
+def thetas(z: Any, ratio: acb, order: int = 0) -> Any:
+    """(θ1, θ2, θ3, θ4) at z of a number or a power series, or their derivatives in z of a number."""
+    return z.modular_theta(ratio, order) if order else z.modular_theta(ratio)
 
 
 def as_ball(value: Scalar) -> arb:
@@ -241,7 +246,8 @@ def _cubic_roots(g2: Fraction, g3: Fraction) -> list[acb]:
     """The roots of 4x³ − g2 x − g3, each to the working precision however close they are."""
     common = lcm(g2.denominator, g3.denominator)
     cubic = fmpz_poly([int(-g3 * common), int(-g2 * common), 0, 4 * common])
-    return [root for root, _ in cubic.complex_roots()]
+    found: Any = cubic.complex_roots()
+    return [root for root, _ in found]
 
 
 def _enclose(near: acb, g2: arb, g3: arb) -> acb:
@@ -277,6 +283,6 @@ def _from_roots(roots: list[acb]) -> Lattice:
 
 
 def _with_thetas(roots: tuple[acb, acb, acb], half: arb, ratio: acb) -> Lattice:
-    _, two, three, four = acb(0).modular_theta(ratio)
-    first, third = (acb(0).modular_theta(ratio, order)[0] for order in (1, 3))
+    _, two, three, four = thetas(acb(0), ratio)
+    first, third = (thetas(acb(0), ratio, order)[0] for order in (1, 3))
     return Lattice(roots, half, ratio, (first, two, three, four), (-third / (12 * half * first)).real)
