@@ -4,11 +4,12 @@ from fractions import Fraction
 
 import mpmath
 import pytest
+from flint import acb
 
 from heavytop.exact.balls import radius, radius_text, working_precision
 from heavytop.exact.gyrostat import Gyrostat
 from heavytop.exact.lagrange import Lagrange
-from heavytop.exact.weierstrass import _exact_lattice
+from heavytop.exact.weierstrass import _exact_lattice, thetas
 from heavytop.top.heavy_top import HeavyTop, State
 
 START = State((Fraction(1, 3), 1, 2), (Fraction(3, 5), 0, Fraction(4, 5)))
@@ -40,8 +41,20 @@ def test_making_the_lattice(benchmark, name):
     benchmark.extra_info["radius"] = radius_text(radius(lattice.half_period))
 
 
-def test_the_same_theta_quotients_in_mpmath(benchmark):
-    """One real and one complex set of theta functions at 50 digits, which is what a state takes."""
+def test_the_theta_values_alone_in_balls(benchmark):
+    """The same five values at the same digits: what the arithmetic itself gains."""
+    ratio = MOTIONS["lagrange"].quartic().lattice().ratio
+
+    def both():
+        with working_precision(200):
+            return *thetas(acb(1) / 3, ratio), thetas(acb("0.3", "0.4"), ratio)[0]
+
+    values = benchmark(both)
+    benchmark.extra_info["radius"] = radius_text(max(radius(value.real) for value in values))
+
+
+def test_the_theta_values_alone_in_mpmath(benchmark):
+    """The five theta values of one Lagrange state at 60 digits, alone: less than the whole formula costs in mpmath."""
     lattice = MOTIONS["lagrange"].quartic().lattice()
     with mpmath.workdps(60):
         nome = mpmath.exp(mpmath.pi * 1j * mpmath.mpc(str(lattice.ratio.real.mid()), float(lattice.ratio.imag)))

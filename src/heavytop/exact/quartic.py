@@ -38,6 +38,7 @@ from heavytop.exact.weierstrass import (
     Point,
     Scalar,
     as_ball,
+    difference,
     from_invariants,
     thetas,
 )
@@ -135,7 +136,7 @@ class PreparedMotion:
         """D T⁴; on discriminant 0 by its exact coefficients, of which the first vanishes where f is a square."""
         square = point.scale * point.scale
         if isinstance(self.lattice, DegenerateLattice):
-            off: Any = self.lattice.double - self.centre
+            off: Any = difference(self.lattice.double, self.centre)
             lead = 2 * off * off - self.offset
             return square * square * as_ball(lead) + square * as_ball(4 * off) + 2
         above = point.above(self.centre)
@@ -150,8 +151,8 @@ class PreparedMotion:
         lead: Any = constant
         above = point.above(self.centre)
         if isinstance(self.lattice, DegenerateLattice):
-            difference: Any = self.lattice.double - self.centre
-            lead, above = constant + even * difference, point.raised
+            even_part: Any = even
+            lead, above = constant + even_part * difference(self.lattice.double, self.centre), point.raised
         inner = (square * as_ball(lead) + above * as_ball(even)) * point.scale + point.slope * as_ball(odd)
         return inner * point.scale
 

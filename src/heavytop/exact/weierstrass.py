@@ -49,7 +49,7 @@ class Point:
 
     def above(self, value: Scalar) -> Any:
         """(℘ − value) T²; the difference of exact roots and values is exact."""
-        return self.raised * self.raised + as_ball(_difference(self.root, value)) * (self.scale * self.scale)
+        return self.raised * self.raised + as_ball(difference(self.root, value)) * (self.scale * self.scale)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +180,8 @@ def as_ball(value: Scalar) -> arb:
     return value if isinstance(value, arb) else ball(value)
 
 
-def _difference(a: Scalar, b: Scalar) -> Scalar:
+def difference(a: Scalar, b: Scalar) -> Scalar:
+    """a − b, exact where both are."""
     return as_ball(a) - as_ball(b) if isinstance(a, arb) or isinstance(b, arb) else a - b
 
 
