@@ -14,6 +14,7 @@ from typing import Any
 
 import sympy
 
+from heavytop.claims.ideal import forces_zero
 from heavytop.claims.rational import Quotient, Tower, Unprovable, used
 
 _MAX_MULTIPLE = 64
@@ -27,12 +28,14 @@ class Assumptions:
 
     positive: symbols > 0.  greater: pairs (symbol, expression) with symbol > expression.
     variable: the symbol that moves.  variable_sign: its sign on the domain, 0 for both.
+    relations: expressions that are 0.
     """
 
     variable: sympy.Symbol
     positive: tuple[sympy.Symbol, ...] = ()
     greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...] = ()
     variable_sign: int = 0
+    relations: tuple[sympy.Expr, ...] = ()
 
 
 class _Refine(Exception):
@@ -88,9 +91,17 @@ class Field:
     def is_zero(self, expression: sympy.Expr) -> bool:
         """True only where the expression is proven to be 0 wherever it is defined on the domain."""
         try:
-            return not self.enter(expression).numerator
+            numerator = self.enter(expression).numerator
+            relations = [self.enter(relation).numerator for relation in self._assumptions.relations]
         except (_Refine, Unprovable):
             return False
+        return not numerator or (bool(relations) and self._forced(relations, numerator))
+
+    def _forced(self, relations: list[Any], numerator: Any) -> bool:
+        """The relations and those of the roots force it to be 0, by itself or times what is positive."""
+        for symbol in self._assumptions.positive:
+            numerator = self.tower.times(numerator, self.enter(symbol).numerator)
+        return forces_zero([*relations, *self.tower.relations()], numerator)
 
     def is_constant(self, value: Quotient) -> bool:
         """True where only generators that are constant in time are left."""
@@ -257,20 +268,28 @@ class Field:
 
     def expression(self, value: Quotient) -> sympy.Expr:
         """The quotient as an expression, in factors."""
-        return sympy.factor(self._polynomial(value.numerator) / self._polynomial(value.denominator))
-
-    def _polynomial(self, p: Any) -> sympy.Expr:
-        terms = []
-        for monomial, coefficient in p.to_dict().items():
-            powers = (self._meaning(index) ** int(power) for index, power in enumerate(monomial) if power)
-            terms.append(sympy.Mul(sympy.Rational(int(coefficient.p), int(coefficient.q)), *powers))
-        return sympy.Add(*terms)
+        fraction = sympy.factor(_polynomial(value.numerator) / _polynomial(value.denominator))
+        occurring = used(value.numerator) | used(value.denominator)
+        return fraction.xreplace({_placeholder(index): self._meaning(index) for index in occurring})
 
     def _meaning(self, index: int) -> sympy.Expr:
         if index not in self._expressions:
             _, square = self.tower.generators[index].meaning
-            self._expressions[index] = sympy.sqrt(sympy.factor(self._polynomial(square)))
+            self._expressions[index] = sympy.sqrt(self.expression(self.tower.polynomial(square)))
         return self._expressions[index]
+
+
+def _placeholder(index: int) -> sympy.Symbol:
+    return sympy.Symbol(f"x{index}", real=True)
+
+
+def _polynomial(p: Any) -> sympy.Expr:
+    """A polynomial over placeholders, so that nothing is expanded into what they stand for."""
+    terms = []
+    for monomial, coefficient in p.to_dict().items():
+        powers = (_placeholder(index) ** int(power) for index, power in enumerate(monomial) if power)
+        terms.append(sympy.Mul(sympy.Rational(int(coefficient.p), int(coefficient.q)), *powers))
+    return sympy.Add(*terms)
 
 
 def _multiplicity(p: Any, generator: Any) -> int:

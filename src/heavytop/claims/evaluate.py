@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -12,7 +12,7 @@ from flint import arb
 from heavytop.claims.rational import Unprovable
 from heavytop.exact.balls import ball, working_precision
 
-_FUNCTIONS = {
+_FUNCTIONS: dict[str, Callable[..., arb]] = {
     "exp": arb.exp,
     "log": arb.log,
     "sin": arb.sin,

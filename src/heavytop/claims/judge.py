@@ -6,6 +6,7 @@ excludes 0; anything else is ``undecided`` with a bound at the sample points.  B
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -66,7 +67,7 @@ class Setting:
 
     variable: the symbol that moves (t, or Ω2 in the general case).
     samples: exact parameter sets.  parts: names with expressions through which a residual may be written, such as γ3.
-    constants: the same for constant factors, such as k/2.
+    constants: the same for constant factors, such as k/2.  relations: what is 0 wherever the claim is made.
     """
 
     variable: sympy.Symbol
@@ -75,10 +76,11 @@ class Setting:
     greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...] = ()
     parts: Mapping[str, tuple[tuple[str, sympy.Expr], ...]] = field(default_factory=dict)
     constants: tuple[tuple[str, sympy.Expr], ...] = ()
+    relations: tuple[sympy.Expr, ...] = ()
 
     def assumptions(self, sign: int) -> Assumptions:
         """What the algebra may use on a domain where the variable has this sign."""
-        return Assumptions(self.variable, self.positive, self.greater, sign)
+        return Assumptions(self.variable, self.positive, self.greater, sign, self.relations)
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,9 +288,9 @@ def _constant_text(factor: Quotient, setting: Setting, field_: Field) -> str:
 
 
 def _product_text(factor: str, name: str) -> str:
+    simple = factor.startswith(("(", "-(")) and factor.endswith(")") and factor.count("(") == 1
     if not name:
-        return factor.replace("(", "", 1)[:-1] if factor.startswith(("(", "-(")) and factor.count("(") == 1 else factor
+        return factor.replace("(", "", 1)[:-1] if simple else factor
     if factor in ("1", "-1"):
         return factor.removesuffix("1") + name
-    simple = factor.startswith(("(", "-(")) and factor.endswith(")") and factor.count("(") == 1
-    return f"{factor}*{name}" if simple else f"({factor})*{name}"
+    return f"{factor}*{name}" if simple or re.fullmatch(r"-?\d+(/\d+)?", factor) else f"({factor})*{name}"

@@ -71,6 +71,10 @@ class Tower:
         self._radicands[index] = square
         return index
 
+    def relations(self) -> list[Any]:
+        """R² − q for every root R = √q."""
+        return [self.gens[index] ** 2 - square for index, square in self._radicands.items()]
+
     def declare_form(self, index: int, form: Any) -> None:
         """In sign tests generator ``index`` is ``form``, a polynomial in generators of known sign."""
         self._positive_forms[index] = form
@@ -187,7 +191,7 @@ class Tower:
         """The product of the signs of its factors."""
         constant, factors = p.factor()
         signs = (self._sign_of_factor(factor) ** int(power) for factor, power in factors)
-        return prod(signs, start=1 if constant > 0 else -1)
+        return int(prod(signs, start=1 if constant > 0 else -1))
 
     def _sign_of_factor(self, p: Any) -> int:
         """By coefficients of one sign, after each generator is written through positive ones."""
