@@ -22,3 +22,5 @@ class NotInClass(InputError):
 
 class OutOfReach(HeavyTopError):
     """A reference that cannot be proven to the digits asked for; says how many could be reached."""
+
+    exit_code = 3

@@ -210,6 +210,14 @@ def decimal_text(value: Fraction, digits: int) -> str:
     return str(quotient) if quotient else "0"
 
 
+def log10(value: Fraction) -> float | None:
+    """log10 |value| to six decimals, None for 0; no exponent is too large or too small."""
+    if value == 0:
+        return None
+    shift = value.numerator.bit_length() - value.denominator.bit_length()
+    return round(shift * math.log10(2) + math.log10(abs(value) / Fraction(2) ** shift), 6)
+
+
 def native_text(value: Any, precision: Precision) -> str:
     """A number of ``precision`` as decimal text that names it uniquely; ``nan``, ``inf`` or ``-inf`` where it is."""
     import numpy

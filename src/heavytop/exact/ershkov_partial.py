@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from flint import arb
 
@@ -21,6 +22,18 @@ from heavytop.exact.balls import FUNCTIONS, ball, to_bits
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
+
+
+def hyperbolic(alpha: Any, ratio: Any, s: Any, lib: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any]]:
+    """(Ω, γ) at s = k t/2, over any ring; ``lib`` offers tanh and cosh."""
+    tanh, sech = lib.tanh(s), 1 / lib.cosh(s)
+    gamma = (-tanh * sech, tanh * tanh, sech)
+    return (alpha * gamma[0], alpha * gamma[1], alpha * ratio * gamma[2]), gamma
+
+
+def hyperbolic_angles(s: Any, lib: Any) -> tuple[Any, Any]:
+    """(φ, θ) at s = k t/2: φ = π/2 + gd(s) = 2 arctan e^s, θ = −gd(s); no digits are lost at either end."""
+    return 2 * lib.arctan(lib.exp(s)), -2 * lib.arctan(lib.tanh(s / 2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +77,8 @@ class ErshkovPartial:
         def evaluate(_working: int) -> list[arb]:
             s = ball(self.rate * time / 2)
             alpha, ratio = ball(self.alpha), ball(self.i1 / self.i3)
-            tanh, sech = s.tanh(), s.sech()
-            gamma = [-tanh * sech, tanh * tanh, sech]
-            return [alpha * gamma[0], alpha * gamma[1], alpha * ratio * gamma[2], *gamma]
+            omega, gamma = hyperbolic(alpha, ratio, s, FUNCTIONS)
+            return [*omega, *gamma]
 
         return to_bits(evaluate, bits)
 
@@ -75,9 +87,8 @@ class ErshkovPartial:
 
         def evaluate(_working: int) -> list[arb]:
             s = ball(self.rate * time / 2)
-            gudermann = 2 * (s / 2).tanh().atan()
             psi = ball(self.alpha * time * (self.i1 + self.i3) / (2 * self.i3))
-            return [arb.pi() / 2 + gudermann, -gudermann, psi]
+            return [*hyperbolic_angles(s, FUNCTIONS), psi]
 
         return to_bits(evaluate, bits)
 

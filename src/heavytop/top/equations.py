@@ -41,7 +41,7 @@ def heavy_top(p: Parameters, y: Any) -> tuple[Any, ...]:
 def gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
     """M' = M × ω and γ' = γ × ω with ω = Ω + λ e2: the free gyrostat with a constant rotor along axis 2.
 
-    This is the system that the paper's formulas solve exactly, with λ = P b / (M·γ); see docs in `rotor`.
+    This is the system that the paper's formulas solve exactly, with λ = P b / (M·γ) from :func:`rotor`.
     """
     (i1, i2, i3), rotor = p.inertia, p.rotor
     w1, w2, w3 = y[:3]
@@ -68,6 +68,10 @@ class System:
     name: str
     field: Callable[[Parameters, Any], tuple[Any, ...]]
     angular_velocity: Callable[[Parameters, Any], tuple[Any, ...]]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A system that comes back from another process is the same object."""
+        return system, (self.name,)
 
     def parameters(self, top: HeavyTop, start: State) -> Parameters:
         """Exact parameters of the field for this top and start; raises InputError if the system does not admit them."""

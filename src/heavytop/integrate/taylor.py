@@ -1,0 +1,274 @@
+"""heyoka's Taylor integrators: the only file that imports heyoka for propagation.
+
+Runs are cut by steps, never by times: a sample is taken from the Taylor polynomial of the step that covers it, so the
+steps and all later bits do not depend on which samples were asked for, nor on how often the run gave way to Ctrl-C.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+import heyoka
+import numpy
+
+from heavytop.errors import InputError
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.precision import Precision, exact, number, require
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, VARIABLES, Parameters, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+# A machine-code cache on disk is not protected against corruption: a flipped bit there gives wrong numbers silently.
+heyoka.llvm_state.set_diskcache_enabled(False)
+
+Observer = Callable[[Fraction, Any], None]
+
+_CHUNK_SECONDS = 0.25
+_XI = ("xi1", "xi2", "xi3")
+
+
+@dataclass(slots=True)
+class Compiled:
+    """A compiled integrator of one system and format, used again for every top."""
+
+    engine: Any
+    seconds: float
+    flags: dict[str, str]
+
+
+_compiled: dict[tuple[Any, ...], Compiled] = {}
+
+
+def expressions(system: System, attitude: bool) -> list[tuple[Any, Any]]:
+    """The field as heyoka expressions with par[0..2] = I and par[3..5] = P r, or par[3] = λ for the gyrostat."""
+    names = VARIABLES + (_XI if attitude else ())
+    y = heyoka.make_vars(*names)
+    p = Parameters(
+        [heyoka.par[i] for i in range(3)],
+        [heyoka.par[i] for i in range(3, 6)],
+        heyoka.par[3] if system is GYROSTAT else None,
+    )
+    rates = system.field(p, y[:6])
+    if attitude:
+        rates = (*rates, *system.attitude(p, y[:6], y[6:]))
+    return list(zip(y, rates, strict=True))
+
+
+def compiled(
+    system: System,
+    precision: Precision,
+    *,
+    attitude: bool = False,
+    tolerance: Fraction | None = None,
+    high_accuracy: bool = False,
+    compact_mode: bool | None = None,
+) -> Compiled:
+    """The integrator for this system and format, compiled at its first use.
+
+    tolerance: None for the format's eps.  compact_mode: None for off in double and extended (faster to run) and on in
+    quad and real (else they take minutes to compile).
+    """
+    require(precision)
+    compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
+    key = (system.name, precision, attitude, tolerance, high_accuracy, compact)
+    if key not in _compiled:
+        one, zero = number(Fraction(1), precision), number(Fraction(0), precision)
+        size = 9 if attitude else 6
+        options: dict[str, Any] = {"compact_mode": compact, "high_accuracy": high_accuracy}
+        if tolerance is not None:
+            options["tol"] = number(tolerance, precision)
+        if precision.family == "real":
+            options["prec"] = precision.bits
+        before = perf_counter()
+        engine = heyoka.taylor_adaptive(
+            expressions(system, attitude),
+            [zero] * size,
+            pars=[one] * (4 if system is GYROSTAT else 6),
+            fp_type=type(one),
+            **options,
+        )
+        _compiled[key] = Compiled(engine, perf_counter() - before, _flags(engine))
+    return _compiled[key]
+
+
+def _flags(engine: Any) -> dict[str, str]:
+    """Everything that can change bits."""
+    code = engine.llvm_state
+    values = {
+        "tolerance": engine.tol,
+        "order": engine.order,
+        "compact_mode": engine.compact_mode,
+        "high_accuracy": engine.high_accuracy,
+        "opt_level": code.opt_level,
+        "fast_math": code.fast_math,
+        "force_avx512": code.force_avx512,
+        "slp_vectorize": code.slp_vectorize,
+        "code_cache": "none",
+        "coefficients": "par",
+    }
+    return {name: str(value).lower() for name, value in values.items()}
+
+
+@dataclass(slots=True)
+class Stepper:
+    """One run of a compiled integrator, advanced step by step to wherever the next sample lies."""
+
+    engine: Any
+    forwards: bool
+    step_limit: int | None
+    far: Any
+    steps: int = 0
+    time: Any = 0
+    _covers: bool = False
+    _largest_step: float = 0.0
+    _seconds_per_step: float = field(default=_CHUNK_SECONDS)
+    _one_by_one: bool = False
+
+    def reach(self, target: Any) -> Outcome:
+        """Step until the polynomial of the last step covers ``target``."""
+        while not (self._covers and self._beyond(target)):
+            if self.step_limit is not None and self.steps >= self.step_limit:
+                return Outcome.STEP_LIMIT
+            count = self._steps_short_of(target)
+            outcome = self._single() if count < 2 else self._several(count, target)
+            if outcome is not Outcome.SUCCESS:
+                return outcome
+        return Outcome.SUCCESS
+
+    def _beyond(self, target: Any) -> bool:
+        return bool(self.engine.time >= target if self.forwards else self.engine.time <= target)
+
+    def _steps_short_of(self, target: Any) -> int:
+        """How many steps can be taken at once, short of the target, the step limit and a quarter of a second."""
+        if self._one_by_one or not self._largest_step or self._beyond(target):
+            return 1
+        distance = abs(float(target - self.engine.time))
+        count = min(distance / self._largest_step, _CHUNK_SECONDS / self._seconds_per_step)
+        if self.step_limit is not None:
+            count = min(count, self.step_limit - self.steps)
+        return int(count)
+
+    def _single(self) -> Outcome:
+        before, began = self.engine.time, perf_counter()
+        outcome, _ = (self.engine.step if self.forwards else self.engine.step_backward)(write_tc=True)
+        self._seconds_per_step = perf_counter() - began
+        self._covers = True
+        if outcome == heyoka.taylor_outcome.err_nf_state or not numpy.isfinite(self.engine.time):
+            return Outcome.NON_FINITE
+        if self.engine.time == before:
+            return Outcome.STEP_TOO_SMALL
+        self.steps += 1
+        self.time = self.engine.time
+        self._largest_step = max(self._largest_step, abs(float(self.engine.last_h)))
+        return Outcome.SUCCESS
+
+    def _several(self, count: int, target: Any) -> Outcome:
+        state, time = self.engine.state.copy(), self.engine.dtime
+        began = perf_counter()
+        outcome, _, largest, done, *_ = self.engine.propagate_until(self.far, max_steps=count)
+        self._seconds_per_step = (perf_counter() - began) / max(done, 1)
+        if outcome == heyoka.taylor_outcome.err_nf_state or self._beyond(target):
+            # step over the same ground again, one by one, to find where
+            self.engine.state[:] = state
+            self.engine.dtime = time
+            self._one_by_one = True
+            return Outcome.SUCCESS
+        self.steps += done
+        self.time = self.engine.time
+        self._largest_step = abs(float(largest))
+        self._covers = False
+        return Outcome.SUCCESS
+
+    def sample(self, target: Any) -> Any:
+        """The state at ``target``, inside the last step; a copy, shape (6,) or (9,)."""
+        self._one_by_one = False
+        return self.engine.update_d_output(target).copy()
+
+
+def propagate(
+    top: HeavyTop,
+    start: State,
+    times: Sequence[Any],
+    precision: Precision,
+    *,
+    system: System = HEAVY_TOP,
+    xi: tuple[Fraction, ...] | None = None,
+    step_limit: int | None = None,
+    observer: Observer | None = None,
+    **options: Any,
+) -> Trajectory:
+    """The motion from ``start`` at t = 0, at ``times``, computed by heyoka in ``precision``.
+
+    times: exact numbers of one sign, strictly monotone away from 0 (0 itself may come first).
+    xi: exact initial attitude vector, to ride along.
+    step_limit: stop after that many steps; the times reached until then are returned.
+    observer: called with (exact time, native state) at each sample in place of keeping the states.
+    options: tolerance, high_accuracy, compact_mode as in :func:`compiled`.
+
+    Raises InputError for times out of order, a format that the platform lacks, data outside its exponent range, and a
+    start that the system does not admit.  A failed run is an outcome, not an exception.
+    """
+    problem = Problem.of(top, start, precision, system, xi)
+    targets = [number(time, precision) for time in check_times(times)]
+    tool = compiled(system, precision, attitude=xi is not None, **options)
+    _load(tool.engine, problem)
+    forwards = not targets or targets[-1] >= 0
+    far = number(Fraction(2) ** 1000 * (1 if forwards else -1), precision)
+    stepper = Stepper(tool.engine, forwards, step_limit, far)
+    kept_times: list[Fraction] = []
+    kept_states: list[Any] = []
+    outcome = Outcome.SUCCESS
+    began = perf_counter()
+    for target in targets:
+        if target == 0:
+            state = tool.engine.state.copy()
+        else:
+            outcome = stepper.reach(target)
+            if outcome is not Outcome.SUCCESS:
+                break
+            state = stepper.sample(target)
+        kept_times.append(exact(target))
+        if observer is None:
+            kept_states.append(state)
+        else:
+            observer(kept_times[-1], state)
+    return Trajectory(
+        problem,
+        "heyoka",
+        tuple(kept_times),
+        tuple(kept_states),
+        outcome,
+        kept_times[-1] if outcome is Outcome.SUCCESS and kept_times else exact(stepper.time),
+        stepper.steps,
+        tool.engine.order,
+        {"compile": tool.seconds, "run": perf_counter() - began},
+        tool.flags,
+    )
+
+
+def _load(engine: Any, problem: Problem) -> None:
+    p = problem.parameters
+    numbers = [*p.inertia, p.rotor] if problem.system is GYROSTAT else [*p.inertia, *p.moment]
+    engine.pars[:] = numpy.array(problem.native(numbers))
+    engine.state[:] = numpy.array(problem.native([*problem.start.flat, *(problem.xi or ())]))
+    engine.time = number(Fraction(0), problem.precision)
+
+
+def check_times(times: Sequence[Any]) -> list[Fraction]:
+    """Exact times; raises InputError unless they are of one sign and strictly monotone away from 0."""
+    values = [exact(time) for time in times]
+    if not values:
+        raise InputError("No times were given.", "Give at least one, such as --times 1,2,5.")
+    for earlier, later in zip([Fraction(0), *values], values, strict=False):
+        if earlier * later < 0:
+            raise InputError(f"The times {earlier} and {later} have different signs.", "Run each direction by itself.")
+        if abs(later) <= abs(earlier) and (later or earlier):
+            raise InputError(
+                f"The time {later} does not come after {earlier}.", "Times go strictly away from 0, each once."
+            )
+    if values.count(Fraction(0)) > 1:
+        raise InputError("The time 0 is given more than once.", "Times go strictly away from 0, each once.")
+    return values

@@ -1,0 +1,106 @@
+"""What an integrator returns, whichever it was.  Knows no engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from fractions import Fraction
+from typing import Any
+
+from heavytop.precision import Precision, native_text, number, rounded
+from heavytop.top.equations import HEAVY_TOP, Parameters, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+
+class Outcome(Enum):
+    """How a run ended; the value is the word in reports."""
+
+    SUCCESS = "success"
+    STEP_LIMIT = "step_limit"
+    NON_FINITE = "non_finite"
+    STEP_TOO_SMALL = "step_too_small"
+
+    @property
+    def message(self) -> str:
+        """The outcome in a sentence for people."""
+        return {
+            Outcome.SUCCESS: "reached every time asked for",
+            Outcome.STEP_LIMIT: "stopped at the step limit before the last time",
+            Outcome.NON_FINITE: "stopped: the state was no longer finite",
+            Outcome.STEP_TOO_SMALL: "stopped: the step no longer moves the time",
+        }[self]
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A top, a start and a system, rounded to a format: exactly what an integrator of that format is given.
+
+    parameters: inertia, moment of the weight n = P r and rotor λ, each component rounded once.
+    start: rounded state; γ is in general off the unit sphere by a rounding.
+    """
+
+    system: System
+    precision: Precision
+    parameters: Parameters
+    start: State
+    xi: tuple[Fraction, ...] | None
+
+    @property
+    def top(self) -> HeavyTop:
+        """The rounded top; its weight is 1 and its centre n."""
+        return HeavyTop(self.parameters.inertia, 1, self.parameters.moment)
+
+    @classmethod
+    def of(
+        cls,
+        top: HeavyTop,
+        start: State,
+        precision: Precision,
+        system: System = HEAVY_TOP,
+        xi: tuple[Fraction, ...] | None = None,
+    ) -> Problem:
+        """The problem rounded to ``precision``; the rotor is computed from the exact data first."""
+        given = system.parameters(top, start)
+
+        def both(values: Any) -> tuple[Fraction, ...]:
+            return tuple(rounded(value, precision) for value in values)
+
+        parameters = Parameters(both(given.inertia), both(given.moment), rounded(Fraction(given.rotor), precision))
+        return cls(
+            system,
+            precision,
+            parameters,
+            State(both(start.omega), both(start.gamma)),
+            None if xi is None else both(xi),
+        )
+
+    def native(self, values: Any) -> list[Any]:
+        """Exact numbers as numbers of the format."""
+        return [number(Fraction(value), self.precision) for value in values]
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """A computed motion at the times that were reached.
+
+    times: exact values of the rounded times, shape (n,).
+    states: native numbers, shape (n, 6), order Ω1 Ω2 Ω3 γ1 γ2 γ3; or (n, 9) with the attitude vector ξ behind.
+    time_reached: exact time of the last finite step end, or the last time asked for.
+    seconds: ``compile`` and ``run`` apart.
+    flags: everything that can change bits, as text.
+    """
+
+    problem: Problem
+    integrator: str
+    times: tuple[Fraction, ...]
+    states: tuple[Any, ...]
+    outcome: Outcome
+    time_reached: Fraction
+    steps: int
+    order: int
+    seconds: dict[str, float] = field(default_factory=dict)
+    flags: dict[str, str] = field(default_factory=dict)
+
+    def texts(self) -> list[list[str]]:
+        """The states as full-precision decimal strings."""
+        return [[native_text(value, self.problem.precision) for value in state] for state in self.states]

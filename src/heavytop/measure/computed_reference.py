@@ -1,0 +1,59 @@
+"""A reference where no proof is at hand: two runs at different precisions, trusted as far as they agree.
+
+Labelled computed, not proven: the radius is the difference of the two runs, which no theorem bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from flint import arb
+
+from heavytop.errors import OutOfReach
+from heavytop.exact.balls import ball, working_precision
+from heavytop.integrate.taylor import propagate
+from heavytop.integrate.trajectory import Outcome
+from heavytop.precision import exact, real
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+
+class ComputedReference:
+    """States, and on request attitude vectors, at given times, from runs with ``bits`` and with 64 bits more.
+
+    Raises OutOfReach if either run does not reach the last time.
+    """
+
+    def __init__(
+        self,
+        top: HeavyTop,
+        start: State,
+        times: Sequence[Fraction],
+        bits: int = 256,
+        system: System = HEAVY_TOP,
+        xi: tuple[Fraction, ...] | None = None,
+    ) -> None:
+        runs = [propagate(top, start, times, real(b), system=system, xi=xi) for b in (bits, bits + 64)]
+        for run in runs:
+            if run.outcome is not Outcome.SUCCESS:
+                raise OutOfReach(
+                    f"A reference run with {run.problem.precision.bits} bits {run.outcome.message}.",
+                    "Ask for an earlier time.",
+                )
+        self.balls: dict[Fraction, list[arb]] = {}
+        with working_precision(bits + 128):
+            for time, coarse, fine in zip(times, *(run.states for run in runs), strict=True):
+                self.balls[time] = [_around(exact(a), exact(b), bits) for a, b in zip(coarse, fine, strict=True)]
+        worst = max(float(value.rad()) for values in self.balls.values() for value in values)
+        self.method = f"computed, not proven: heyoka at {bits} and {bits + 64} bits agree within {worst:.1e}"
+
+    def state(self, time: Fraction) -> list[arb]:
+        """Six balls, or nine with the attitude vector, at one of the times."""
+        return self.balls[time]
+
+
+def _around(coarse: Fraction, fine: Fraction, bits: int) -> arb:
+    """The finer value, with the difference (at least a rounding of the coarser) as its radius."""
+    spread = abs(fine - coarse) + Fraction(2) ** -bits
+    return ball(fine) + arb(0, ball(spread).abs_upper())

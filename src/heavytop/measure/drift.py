@@ -1,0 +1,103 @@
+"""Drift of first integrals along a computed motion, in one pass and constant memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any
+
+from flint import arb
+
+from heavytop.exact.balls import ball, working_precision
+from heavytop.integrate.trajectory import Problem
+from heavytop.measure.scalar import GUARD_BITS, metric, text, to_ball
+from heavytop.records import Metric, Series
+from heavytop.top.equations import Parameters
+from heavytop.top.heavy_top import dot
+from heavytop.top.integrals import Integral
+
+
+class Running:
+    """Maximum, mean square and last of a stream of balls, and its values at chosen times."""
+
+    def __init__(self) -> None:
+        self.maximum = arb(0)
+        self.squares = arb(0)
+        self.final = arb(0)
+        self.count = 0
+        self.kept: dict[Fraction, arb] = {}
+
+    def add(self, time: Fraction, value: arb, keep: bool) -> None:
+        """Take in |value| at ``time``; remember it for the series if ``keep``."""
+        size = abs(value)
+        self.maximum = self.maximum.max(size)
+        self.squares += size * size
+        self.final = size
+        self.count += 1
+        if keep:
+            self.kept[time] = size
+
+    def metrics(self, name: str) -> dict[str, Metric]:
+        """``name_max``, ``name_rms``, ``name_final``; ``missing`` without a sample."""
+        if not self.count:
+            return {f"{name}_{part}": Metric("missing", None) for part in ("max", "rms", "final")}
+        rms = (self.squares / self.count).sqrt()
+        return {
+            f"{name}_max": metric(self.maximum),
+            f"{name}_rms": metric(rms),
+            f"{name}_final": metric(self.final),
+        }
+
+    def series(self, time_text: Callable[[Fraction], str]) -> Series:
+        """The kept values."""
+        return Series([time_text(t) for t in self.kept], [text(v) for v in self.kept.values()])
+
+
+class Drift:
+    """|I(t) − I(0)| of each integral, absolute, from the rounded start; evaluated with 64 guard bits.
+
+    problem: what the integrator was given.  integrals: those that hold for the exact top and start.
+    keep: the times whose values go into the series.
+    With an attitude riding along, |ξ|² and ξ·γ are watched as well.
+    """
+
+    def __init__(self, problem: Problem, integrals: Sequence[Integral], keep: Sequence[Fraction] = ()) -> None:
+        self.bits = problem.precision.bits + GUARD_BITS
+        self.keep = frozenset(keep)
+        with working_precision(self.bits):
+            exact = problem.parameters
+            self.parameters = Parameters(
+                [ball(value) for value in exact.inertia], [ball(value) for value in exact.moment], ball(exact.rotor)
+            )
+            self.functions: dict[str, Callable[[Parameters, Any], Any]] = {i.name: i.value for i in integrals}
+            start = [ball(value) for value in problem.start.flat]
+            if problem.xi is not None:
+                start += [ball(value) for value in problem.xi]
+                self.functions |= {"xi_squared": _xi_squared, "xi_dot_gamma": _xi_dot_gamma}
+            self.initial = {name: value(self.parameters, start) for name, value in self.functions.items()}
+        self.running = {name: Running() for name in self.functions}
+
+    def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
+        """Take in one native state."""
+        with working_precision(self.bits):
+            y = [to_ball(value) for value in state]
+            keep = time in self.keep
+            for name, value in self.functions.items():
+                self.running[name].add(time, value(self.parameters, y) - self.initial[name], keep)
+
+    def metrics(self) -> dict[str, Metric]:
+        """``drift_NAME_max``, ``_rms``, ``_final`` for every integral."""
+        with working_precision(self.bits):
+            return {k: m for name, run in self.running.items() for k, m in run.metrics(f"drift_{name}").items()}
+
+    def series(self, time_text: Callable[[Fraction], str]) -> dict[str, Series]:
+        """``drift_NAME`` over the kept times."""
+        return {f"drift_{name}": run.series(time_text) for name, run in self.running.items()}
+
+
+def _xi_squared(_: Parameters, y: Any) -> Any:
+    return dot(y[6:9], y[6:9])
+
+
+def _xi_dot_gamma(_: Parameters, y: Any) -> Any:
+    return dot(y[6:9], y[3:6])

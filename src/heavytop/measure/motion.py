@@ -1,0 +1,142 @@
+"""One computed motion with what a user wants beside it: attitude, Euler angles, drift."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from flint import arb
+
+from heavytop.exact.balls import FUNCTIONS, working_precision
+from heavytop.integrate.taylor import propagate
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.measure.drift import Drift
+from heavytop.measure.scalar import GUARD_BITS, text, to_ball
+from heavytop.precision import Precision, decimal_text, exact, number
+from heavytop.records import Metric
+from heavytop.top.angles import euler_angles, perpendicular, unwrap
+from heavytop.top.equations import System
+from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.top.integrals import Integral, holding
+
+_DENSE = 32
+_MOST_DENSE = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A trajectory at the times asked for, with drift, and on request ξ and continuous Euler angles as text."""
+
+    trajectory: Trajectory
+    states: list[list[str]]
+    drift: dict[str, Metric]
+    attitude: list[list[str]] | None
+    angles: list[list[str]] | None
+
+    @property
+    def complete(self) -> bool:
+        """Whether every time asked for was reached."""
+        return self.trajectory.outcome is Outcome.SUCCESS
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of `propagate --json`."""
+        run, precision = self.trajectory, self.trajectory.problem.precision
+        document: dict[str, Any] = {
+            "precision": precision.name,
+            "bits": precision.bits,
+            "system": run.problem.system.name,
+            "outcome": run.outcome.value,
+            "steps": run.steps,
+            "times": [decimal_text(time, precision.digits) for time in run.times],
+            "states": self.states,
+            "time_reached": decimal_text(run.time_reached, precision.digits),
+            "order": run.order,
+            "integrator": run.integrator,
+            "flags": run.flags,
+            "seconds": run.seconds,
+            "metrics": {name: {"value": m.value, "log10": m.log10} for name, m in self.drift.items()},
+        }
+        if self.attitude is not None:
+            document["attitude"] = self.attitude
+            document["angles"] = self.angles
+        return document
+
+
+class _Watcher:
+    """Keeps the states at the times asked for, their drift, and the angles followed from sample to sample."""
+
+    def __init__(self, problem: Problem, integrals: Sequence[Integral], wanted: frozenset[Fraction]) -> None:
+        self.drift = Drift(problem, integrals)
+        self.wanted = wanted
+        self.kept: list[tuple[Fraction, Any, list[float]]] = []
+        self.followed: list[float] = []
+        self.attitude = problem.xi is not None
+
+    def __call__(self, time: Fraction, state: Any) -> None:
+        if self.attitude:
+            values = [float(value) for value in state]
+            now = euler_angles(values[3:6], values[6:9], math)
+            pairs = zip(self.followed or now, now, strict=True)
+            self.followed = [unwrap(pair, math.tau)[1] for pair in pairs]
+        if time in self.wanted:
+            self.kept.append((time, state, self.followed))
+            self.drift(time, state)
+
+
+def compute(
+    top: HeavyTop,
+    start: State,
+    times: Sequence[Fraction],
+    precision: Precision,
+    system: System,
+    attitude: bool = False,
+    step_limit: int | None = None,
+) -> Motion:
+    """The motion at ``times`` (exact, checked), with the drift of every integral that holds.
+
+    attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
+    samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
+    """
+    xi = perpendicular(start.gamma) if attitude else None
+    problem = Problem.of(top, start, precision, system, xi)
+    wanted = frozenset(exact(number(time, precision)) for time in times)
+    watcher = _Watcher(problem, holding(top, start, system), wanted)
+    samples = _dense(problem, times) if attitude else times
+    run = propagate(top, start, samples, precision, system=system, xi=xi, step_limit=step_limit, observer=watcher)
+    run = replace(
+        run, times=tuple(time for time, *_ in watcher.kept), states=tuple(state for _, state, _ in watcher.kept)
+    )
+    texts = run.texts()
+    angles = [_angles(state, followed, precision) for _, state, followed in watcher.kept] if attitude else None
+    attitudes = [line[6:] for line in texts] if attitude else None
+    return Motion(run, [line[:6] for line in texts], watcher.drift.metrics(), attitudes, angles)
+
+
+def _dense(problem: Problem, times: Sequence[Fraction]) -> list[Fraction]:
+    """The times with others between them, so close that the body turns by less than 1/32 radian from one to the next.
+
+    From energy (heavy top) or |M| (gyrostat): |Ω|² <= (Ω·M + 4 |P r|)/min I at all times, and |ω| <= |Ω| + |λ|.
+    Where that would be more than 200,000 samples they stay as they are, and angles jump by whole turns.
+    """
+    top, omega = problem.top, problem.start.omega
+    energy = float(dot(omega, top.angular_momentum(omega))) + 4 * math.sqrt(float(dot(top.moment, top.moment)))
+    least, most = float(min(top.inertia)), float(max(top.inertia))
+    rate = math.sqrt(energy * most) / least + abs(float(problem.parameters.rotor))
+    count = math.ceil(_DENSE * rate * abs(float(times[-1])))
+    if count > _MOST_DENSE or count == 0:
+        return list(times)
+    step = times[-1] / count
+    between = {step * i for i in range(1, count)}
+    return sorted(between | set(times), key=abs)
+
+
+def _angles(state: Any, followed: Sequence[float], precision: Precision) -> list[str]:
+    """(φ, θ, ψ) of one state, shifted by the whole turns that were followed; ``nan`` at a pole."""
+    with working_precision(precision.bits + GUARD_BITS):
+        values = [to_ball(value) for value in state]
+        angles = euler_angles(values[3:6], values[6:9], FUNCTIONS)
+        shifted = [a + 2 * arb.pi() * round((f - float(a)) / math.tau) for a, f in zip(angles, followed, strict=True)]
+        return [text(angle, precision.digits) for angle in shifted]

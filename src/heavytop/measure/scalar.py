@@ -1,0 +1,64 @@
+"""From balls to the numbers of a report, and from native numbers to balls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+from typing import Any
+
+from flint import arb
+
+from heavytop.errors import InputError
+from heavytop.exact.balls import ball, midpoint, radius, radius_text
+from heavytop.precision import decimal_text, exact, log10
+from heavytop.records import Kind, Metric
+
+DIGITS = 8
+UNRESOLVED = "unresolved"
+GUARD_BITS = 64
+RESOLVED_RADII = 10
+
+
+def to_ball(value: Any) -> arb:
+    """A native number as a ball of radius 0 (working precision permitting); NaN and infinities stay what they are."""
+    if isinstance(value, float):
+        return arb(float(value))
+    try:
+        return ball(exact(value))
+    except InputError:
+        return arb("nan")
+
+
+def resolved(value: arb) -> bool:
+    """Whether |value| is at least ten times its radius, or exactly 0."""
+    return bool(value.is_finite()) and abs(midpoint(value)) >= RESOLVED_RADII * radius(value)
+
+
+def text(value: arb, digits: int = DIGITS) -> str:
+    """A ball as report text: decimal, ``nan`` or ``unresolved``."""
+    if not value.is_finite():
+        return "nan"
+    return decimal_text(midpoint(value), digits) if resolved(value) else UNRESOLVED
+
+
+def metric(value: arb, kind: Kind = "error", digits: int = DIGITS) -> Metric:
+    """A ball as a metric."""
+    words = text(value, digits)
+    if words == "nan":
+        return Metric(words, None, kind)
+    if words == UNRESOLVED:
+        return Metric(words, None, kind, radius_text(abs(midpoint(value)) + radius(value)))
+    return of_fraction(Fraction(words), kind, words)
+
+
+def of_fraction(value: Fraction, kind: Kind = "error", words: str | None = None) -> Metric:
+    """An exact number as a metric; log10 to six decimals."""
+    return Metric(words or decimal_text(value, DIGITS), log10(value), kind)
+
+
+def largest(values: Iterable[arb]) -> arb:
+    """The ball around max |value|."""
+    result = arb(0)
+    for value in values:
+        result = result.max(abs(value))
+    return result

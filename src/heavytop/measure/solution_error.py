@@ -1,0 +1,89 @@
+"""Distance of a computed motion from a known one that starts from the same rounded data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any
+
+from flint import arb
+
+from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.solution import ExactSolution
+from heavytop.integrate.trajectory import Problem
+from heavytop.measure.drift import Running
+from heavytop.measure.scalar import GUARD_BITS, largest, resolved, to_ball
+from heavytop.records import Metric, Series
+from heavytop.top.equations import Parameters
+
+
+class SolutionError:
+    """Error of Ω and of γ (largest component), and of the state along the flow (phase) and across it (Euclidean).
+
+    known: the exact motion; its start and top are those of ``problem``, rounded, so no input rounding is charged.
+    threshold: the error of Ω, in units of Ω, whose first crossing is the break-away time.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        known: ExactSolution,
+        keep: Sequence[Fraction] = (),
+        threshold: Fraction | None = None,
+    ) -> None:
+        self.known = known
+        self.bits = problem.precision.bits + GUARD_BITS
+        self.keep = frozenset(keep)
+        self.threshold = threshold
+        self.break_away: Fraction | None = None
+        self.running = {name: Running() for name in ("omega", "gamma", "along", "across")}
+        self.system = problem.system
+        with working_precision(self.bits):
+            exact = problem.parameters
+            self.parameters = Parameters(
+                [ball(value) for value in exact.inertia], [ball(value) for value in exact.moment], ball(exact.rotor)
+            )
+
+    def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
+        """Take in one native state."""
+        truth = self.known.state(time, self.bits)
+        with working_precision(self.bits + GUARD_BITS):
+            delta = [to_ball(value) - true for value, true in zip(state[:6], truth, strict=True)]
+            flow = self.system.field(self.parameters, truth)
+            along, across = split(delta, flow)
+            keep = time in self.keep
+            omega = largest(delta[:3])
+            for name, value in (
+                ("omega", omega),
+                ("gamma", largest(delta[3:])),
+                ("along", along),
+                ("across", across),
+            ):
+                self.running[name].add(time, value, keep)
+            if self.break_away is None and self.threshold is not None and omega > ball(self.threshold):
+                self.break_away = time
+
+    def metrics(self, prefix: str = "solution_error") -> dict[str, Metric]:
+        """``PREFIX_omega_max``, ... for omega, gamma, along and across."""
+        with working_precision(self.bits):
+            return {k: m for name, run in self.running.items() for k, m in run.metrics(f"{prefix}_{name}").items()}
+
+    def series(self, time_text: Callable[[Fraction], str], prefix: str = "solution_error") -> dict[str, Series]:
+        """The same over the kept times."""
+        return {f"{prefix}_{name}": run.series(time_text) for name, run in self.running.items()}
+
+
+def split(delta: Sequence[arb], flow: Sequence[arb]) -> tuple[arb, arb]:
+    """|δ| along the unit vector of the flow, and the Euclidean rest across it; the whole across at an equilibrium."""
+    total = sum((x * x for x in delta), arb(0))
+    speed = sum((x * x for x in flow), arb(0))
+    if not resolved(speed) or speed == 0:
+        return arb(0), root(total)
+    projection = sum((x * f for x, f in zip(delta, flow, strict=True)), arb(0))
+    along = projection * projection / speed
+    return root(along), root(total - along)
+
+
+def root(value: arb) -> arb:
+    """√value of a ball around a number that is not negative, though the ball may reach below 0."""
+    return value.sqrt() if value >= 0 else value.abs_upper().sqrt().union(arb(0))

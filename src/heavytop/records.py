@@ -1,0 +1,78 @@
+"""Plain records with a schema: what the suite writes and the report reads.
+
+Numbers that measure something are decimal text with their log10 beside them, so that 1e-997 survives.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import msgspec
+
+SCHEMA = "heavytop-report/1"
+
+Kind = Literal["error", "duration", "value"]
+"""How two values of a metric compare: a smaller error is better, a longer duration is better, a value must agree."""
+
+
+class Metric(msgspec.Struct, omit_defaults=True):
+    """One measured number.
+
+    value: decimal text; or a word that is no number: "nan", "missing", "never", "unresolved" (smaller than ten radii
+    of the reference, see ``bound``).
+    log10: its decimal logarithm; null for 0 and for the words.
+    """
+
+    value: str
+    log10: float | None
+    kind: Kind = "error"
+    bound: str | None = None
+
+
+class Series(msgspec.Struct, omit_defaults=True):
+    """A measured quantity over time.  values: decimal text or the words of :class:`Metric`, one for each time."""
+
+    times: list[str]
+    values: list[str]
+
+
+class Row(msgspec.Struct, omit_defaults=True):
+    """One measurement, of one motion held against one reference.
+
+    measured: what is held (known, claimed or computed); against: what it is held against, with method and radius.
+    outcome, time_reached, steps, finite travel with every number.  seconds: timings, not compared.
+    """
+
+    case: str
+    system: str
+    integrator: str
+    precision: str
+    bits: int
+    outcome: str
+    horizon: str
+    time_reached: str
+    steps: int
+    finite: bool
+    metrics: dict[str, Metric]
+    measure: str = ""
+    measured: str = ""
+    against: str = ""
+    order: int | None = None
+    flags: dict[str, str] = {}
+    input_rounding: str | None = None
+    series: dict[str, Series] = {}
+    seconds: dict[str, float] = {}
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What makes a row the same row in another report."""
+        return self.measure, self.case, self.system, self.integrator, self.precision
+
+
+class Report(msgspec.Struct):
+    """A run of a plan: schema, plan (name and content hash), environment, rows in the plan's order."""
+
+    schema: str
+    plan: dict[str, str]
+    environment: dict[str, Any]
+    rows: list[Row]

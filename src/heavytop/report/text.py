@@ -1,0 +1,211 @@
+"""A report in words and tables, for people.  Works on records alone; returns what rich can print."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from heavytop.errors import InputError
+from heavytop.precision import decimal_text, exact
+from heavytop.records import Report, Row
+from heavytop.report.compare import Comparison, Verdict
+
+
+def short(value: str, digits: int = 3) -> str:
+    """A metric's text with few digits; words stay as they are."""
+    try:
+        number = exact(value)
+    except InputError:
+        return value
+    if number == 0:
+        return "0"
+    if Fraction(1, 1000) <= abs(number) < 10**6:
+        return f"{float(number):.{digits + 2}g}"
+    mantissa, _, exponent = f"{Decimal(decimal_text(number, digits)):.{digits - 1}E}".partition("E")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def summary(report: Report) -> RenderableType:
+    """What is known, what the claim gets wrong and from when on, digits kept and drift per format."""
+    by_measure: dict[str, list[Row]] = {}
+    for row in report.rows:
+        by_measure.setdefault(row.measure, []).append(row)
+    parts: list[RenderableType] = [_head(report)]
+    for name, section in (
+        ("claim_model", _claim_model),
+        ("claim_evaluation", _claim_evaluation),
+        ("homoclinic", _homoclinic),
+        ("break_away_law", _laws),
+        ("drift", _drift),
+    ):
+        if name in by_measure:
+            parts += [Text(), *section(by_measure[name])]
+    failed = [row for row in report.rows if row.outcome != "success"]
+    if failed:
+        parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
+        parts += [
+            Text(f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}")
+            for row in failed
+        ]
+    return Group(*parts)
+
+
+def _head(report: Report) -> Text:
+    packages = report.environment.get("packages", {})
+    versions = ", ".join(f"{n} {packages[n]}" for n in ("heavytop", "heyoka", "numpy", "python-flint") if n in packages)
+    return Text(f"Plan {report.plan.get('name', '?')}: {len(report.rows)} measurements ({versions})")
+
+
+def _title(text: str) -> Text:
+    return Text(text, style="bold")
+
+
+def _table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    table = Table(box=None, pad_edge=True, header_style="dim")
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    return table
+
+
+def _claim_model(rows: Sequence[Row]) -> list[RenderableType]:
+    parts: list[RenderableType] = [
+        _title("Claim against truth: the paper's (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0"),
+        Text("  Error of Ω, largest component; the same for γ. Exactly evaluated: no rounding is in these numbers."),
+    ]
+    times = [time for time in ("0.1", "1", "2", "5") if any(_at(row, "omega", time) for row in rows)]
+    columns = [
+        "case",
+        "branch",
+        *(f"Ω at |t|={t}" for t in times),
+        *(f"γ at |t|={t}" for t in times[:2]),
+        "Ω off 1% from |t|",
+    ]
+    lines = [
+        [
+            row.case,
+            row.integrator.partition(":")[2],
+            *(short(_at(row, "omega", t) or "-") for t in times),
+            *(short(_at(row, "gamma", t) or "-") for t in times[:2]),
+            short(row.metrics["claim_parts_by_1_percent_at"].value),
+        ]
+        for row in rows
+    ]
+    parts.append(_table(columns, lines))
+    parts += [Text(f"  {case}: {against}", style="dim") for case, against in dict(_truths(rows)).items()]
+    return parts
+
+
+def _truths(rows: Sequence[Row]) -> Iterable[tuple[str, str]]:
+    for row in rows:
+        yield row.case.partition("/")[0], f"truth is {row.against}"
+
+
+def _at(row: Row, quantity: str, time: str) -> str | None:
+    series = row.series.get(f"claim_model_error_{quantity}")
+    if series is None:
+        return None
+    pairs = {abs(exact(t)): value for t, value in zip(series.times, series.values, strict=True)}
+    return pairs.get(exact(time))
+
+
+def _claim_evaluation(rows: Sequence[Row]) -> list[RenderableType]:
+    lines = [
+        [
+            row.case,
+            row.precision,
+            row.integrator.partition(":")[2],
+            *(short(row.metrics[f"claim_evaluation_error_{q}_max_finite"].value) for q in ("omega", "theta", "psi")),
+            *(short(row.metrics[f"claim_evaluation_{q}_not_finite_from"].value) for q in ("psi", "omega")),
+        ]
+        for row in rows
+    ]
+    return [
+        _title("Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated"),
+        _table(["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω from |t|"], lines),
+    ]
+
+
+def _homoclinic(rows: Sequence[Row]) -> list[RenderableType]:
+    lines = []
+    for row in rows:
+        prefix = "integration_error" if "integration_error_omega_max" in row.metrics else "solution_error"
+        error = row.metrics[f"{prefix}_omega_max"].value
+        lines.append([row.case, row.precision, short(error), short(row.metrics["break_away_time"].value), row.outcome])
+    return [
+        _title("Integrators on a homoclinic motion, against its closed form"),
+        Text("  Ω error while rate·|t| <= 10; break-away: Ω wrong by 1e-3 α, where the saddle has eaten every digit."),
+        _table(["case", "format", "Ω error", "break-away |t|", "outcome"], lines),
+    ]
+
+
+def _laws(rows: Sequence[Row]) -> list[RenderableType]:
+    lines = [
+        [
+            row.case,
+            short(row.metrics["break_away_slope"].value),
+            short(row.metrics["break_away_slope_expected"].value),
+            f"{float(exact(row.metrics['break_away_slope_off_by'].value)):.1%}",
+        ]
+        for row in rows
+    ]
+    return [
+        _title("Break-away time gained per bit of the format"),
+        _table(["case", "measured", "ln 2 / rate", "off by"], lines),
+    ]
+
+
+def _drift(rows: Sequence[Row]) -> list[RenderableType]:
+    lines = []
+    for row in rows:
+        worst = [
+            (name[6:-4], metric.value)
+            for name, metric in row.metrics.items()
+            if name.startswith("drift_") and name.endswith("_max")
+        ]
+        cells = "  ".join(f"{name} {short(value, 2)}" for name, value in worst)
+        lines.append([row.case, row.precision, row.horizon, str(row.steps), row.outcome, cells])
+    table = _table(["case", "format", "T", "steps", "outcome", "largest drift of each first integral"], lines)
+    table.columns[5].justify = "left"
+    return [
+        _title("Drift of first integrals (absolute); an invariant that holds is no proof that the motion is right"),
+        table,
+    ]
+
+
+_STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}
+
+
+def comparison(result: Comparison) -> RenderableType:
+    """Verdict first, then what changed, then the differences of the environments."""
+    counts: dict[Verdict, int] = {}
+    for finding in result.findings:
+        counts[finding.verdict] = counts.get(finding.verdict, 0) + 1
+    tally = ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in Verdict if verdict in counts)
+    parts: list[Any] = [Text(f"Verdict: {result.verdict} ({tally})", style="bold")]
+    changed = [finding for finding in result.findings if finding.verdict is not Verdict.SAME]
+    if changed:
+        table = Table(box=None, header_style="dim")
+        for column in ("verdict", "row", "metric", "baseline", "candidate", "why"):
+            table.add_column(column, overflow="fold")
+        for finding in changed:
+            table.add_row(
+                Text(finding.verdict.value, style=_STYLE.get(finding.verdict, "")),
+                Text(" ".join(part for part in (finding.key[1], finding.key[3], finding.key[4]) if part)),
+                Text(finding.metric),
+                Text(short(finding.baseline or "-")),
+                Text(short(finding.candidate or "-")),
+                Text(finding.reason),
+            )
+        parts.append(table)
+    if result.environment:
+        parts.append(Text("Environments differ:", style="bold"))
+        parts += [Text(f"  {name}: {old} -> {new}") for name, old, new in result.environment]
+    return Group(*parts)

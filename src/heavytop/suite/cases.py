@@ -1,0 +1,117 @@
+"""The built-in cases: a top, a start, and what is known or claimed about the motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from heavytop.claims.ershkov import PartialCase
+from heavytop.errors import InputError
+from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A top with a start.
+
+    claim: the data of the paper's partial case where the case is one.
+    homoclinic: the closed form where the motion is homoclinic to a saddle; its data are dyadic, so that every format
+    takes them exactly.
+    """
+
+    name: str
+    about: str
+    system: System
+    top: HeavyTop
+    start: State
+    claim: PartialCase | None = None
+    homoclinic: ErshkovPartial | DeloneHomoclinic | None = None
+
+    @property
+    def alpha(self) -> Fraction:
+        """The angular velocity α of the permanent rotation that a homoclinic case tends to."""
+        if self.homoclinic is None:
+            raise InputError(f"The case {self.name} is not homoclinic.", "Use a case such as ershkov-partial-2.")
+        return self.homoclinic.alpha
+
+    @property
+    def rate(self) -> float:
+        """The exponent at which a homoclinic case approaches its saddle, and errors leave it."""
+        if isinstance(self.homoclinic, ErshkovPartial):
+            return float(self.homoclinic.rate) / 2
+        return float(self.alpha) / 2**0.5
+
+
+def _partial(ratio: int) -> Case:
+    claim = PartialCase(Fraction(1), Fraction(ratio), Fraction(1))
+    known = claim.solves
+    about = f"the paper's partial case (4.1)-(4.6), alpha = 1, I1/I3 = {ratio}"
+    return Case(f"ershkov-partial-{ratio}", about, GYROSTAT, known.top, known.start, claim, known)
+
+
+def _delone() -> Case:
+    known = DeloneHomoclinic(Fraction(5, 4), Fraction(3))
+    return Case(
+        "delone",
+        "homoclinic Delone motion of the Kovalevskaya top, alpha = 5/4",
+        HEAVY_TOP,
+        known.top,
+        known.start,
+        homoclinic=known,
+    )
+
+
+CASES: dict[str, Case] = {
+    case.name: case
+    for case in (
+        _partial(2),
+        _partial(6),
+        _delone(),
+        Case(
+            "euler",
+            "torque-free asymmetric top",
+            HEAVY_TOP,
+            HeavyTop((2, 3, "9/2"), "3/2", (0, 0, 0)),
+            State(("2/5", "7/10", "-3/10"), ("2/7", "3/7", "6/7")),
+        ),
+        Case(
+            "lagrange",
+            "symmetric top, centre of mass on its axis",
+            HEAVY_TOP,
+            HeavyTop(("5/2", "5/2", "3/2"), 2, (0, 0, "3/4")),
+            State(("1/5", "-1/3", "7/4"), ("2/7", "3/7", "6/7")),
+        ),
+        Case(
+            "kovalevskaya",
+            "I1 = I2 = 2 I3, centre of mass across the axis",
+            HEAVY_TOP,
+            HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0)),
+            State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5")),
+        ),
+        Case(
+            "generic",
+            "asymmetric top without a further integral",
+            HEAVY_TOP,
+            HeavyTop((3, "5/2", "3/2"), "3/2", ("1/2", "1/3", "1/5")),
+            State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5")),
+        ),
+        Case(
+            "gyrostat",
+            "asymmetric gyrostat of (2.1)-(2.4), gamma = M/|M|",
+            GYROSTAT,
+            HeavyTop((2, 3, "5/2"), "3/2", (0, "2/3", 0)),
+            State(("3/10", "4/15", "24/25"), ("3/13", "4/13", "12/13")),
+        ),
+    )
+}
+
+
+def case(name: str, more: dict[str, Case] | None = None) -> Case:
+    """The built-in case of that name, or one of ``more``; raises InputError for any other."""
+    known = CASES | (more or {})
+    if name not in known:
+        raise InputError(f"Unknown case {name[:60]!r}.", f"Known cases: {', '.join(known)}.")
+    return known[name]

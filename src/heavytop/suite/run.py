@@ -1,0 +1,38 @@
+"""Runs a plan and gathers its rows in the plan's order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from heavytop.records import Row
+from heavytop.suite.checkpoint import Checkpoint
+from heavytop.suite.plan import Task
+from heavytop.suite.workers import rows
+
+Progress = Callable[[Task], None]
+
+
+def run(
+    tasks: Sequence[Task],
+    checkpoint: Checkpoint,
+    progress: Progress,
+    workers: int = 1,
+    scheduler: str | None = None,
+) -> list[Row]:
+    """The rows of all tasks, in order, then the laws drawn from them.
+
+    Rows that the checkpoint holds are not measured again.  ``progress`` hears of each task as it is done.
+    """
+    for index in checkpoint.done:
+        progress(tasks[index])
+    missing = [index for index in range(len(tasks)) if index not in checkpoint.done]
+    for position, row in rows([tasks[index] for index in missing], workers, scheduler):
+        checkpoint.add(missing[position], row)
+        progress(tasks[missing[position]])
+    measured = [checkpoint.done[index] for index in range(len(tasks))]
+    if any(row.measure == "homoclinic" for row in measured):
+        from heavytop.suite.measurements import break_away_law
+
+        rates = {task.name: task.case.rate for task in tasks if task.kind == "homoclinic"}
+        measured += break_away_law(measured, rates)
+    return measured

@@ -1,0 +1,40 @@
+"""Random exact tops and starts for tests, and the reference states that no code of this project made."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+from random import Random
+
+from heavytop.top.heavy_top import HeavyTop, State
+
+VECTORS = json.loads((Path(__file__).parent / "data" / "vectors.json").read_text("utf-8"))
+
+
+def fraction(random: Random, low: int = -30, high: int = 30) -> Fraction:
+    """A rational that is not 0, with a small denominator."""
+    return Fraction(random.choice([n for n in range(low, high + 1) if n]), random.randint(1, 13))
+
+
+def positive(random: Random) -> Fraction:
+    return fraction(random, 1, 30)
+
+
+def vector(random: Random) -> tuple[Fraction, Fraction, Fraction]:
+    return fraction(random), fraction(random), fraction(random)
+
+
+def unit_vector(random: Random) -> tuple[Fraction, Fraction, Fraction]:
+    """A rational point of the unit sphere, by stereographic projection."""
+    u, v = fraction(random), fraction(random)
+    norm = 1 + u * u + v * v
+    return 2 * u / norm, 2 * v / norm, (1 - u * u - v * v) / norm
+
+
+def top_of(given: dict) -> HeavyTop:
+    return HeavyTop(given["inertia"], given["weight"], given["centre"])
+
+
+def start_of(given: dict) -> State:
+    return State(given["omega"], given["gamma"])

@@ -1,0 +1,160 @@
+"""heyoka behind one call: right in every format, the same bits however it is cut, and honest about failure."""
+
+from fractions import Fraction
+
+import numpy
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.integrate.taylor import Stepper, check_times, compiled, propagate
+from heavytop.integrate.trajectory import Outcome, Problem
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
+from heavytop.top.angles import perpendicular
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State, dot
+from helpers import VECTORS, start_of, top_of
+
+TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
+START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
+
+
+@pytest.mark.parametrize(
+    ("precision", "limit"),
+    [(DOUBLE, "1e-14"), (EXTENDED, "1e-17"), (QUAD, "1e-31"), (real(237), "1e-58")],
+    ids=lambda value: getattr(value, "name", value),
+)
+@pytest.mark.parametrize("given", VECTORS, ids=lambda given: given["name"])
+def test_every_reference_state_is_met_in_every_format(given, precision, limit: str) -> None:
+    run = propagate(top_of(given), start_of(given), [given["time"]], precision)
+    assert run.outcome is Outcome.SUCCESS
+    off = max(abs(exact(value) - Fraction(text)) for value, text in zip(run.states[0], given["state"], strict=True))
+    assert off <= Fraction(limit)
+
+
+def bits(run) -> list[list[Fraction]]:
+    return [[exact(value) for value in state] for state in run.states]
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD], ids=lambda p: p.name)
+def test_samples_in_between_change_no_bit(precision) -> None:
+    few = propagate(TOP, START, [10, 20], precision)
+    many = propagate(TOP, START, [Fraction(i, 8) for i in range(1, 161)], precision)
+    assert bits(many)[79] == bits(few)[0]
+    assert bits(many)[-1] == bits(few)[1]
+    assert many.steps == few.steps
+
+
+def test_chunks_of_any_length_change_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = propagate(TOP, START, [200], DOUBLE)
+    monkeypatch.setattr(Stepper, "_steps_short_of", lambda self, target: 1)
+    single = propagate(TOP, START, [200], DOUBLE)
+    assert bits(single) == bits(whole)
+    assert single.steps == whole.steps
+
+
+def test_a_chunk_that_goes_too_far_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = propagate(TOP, START, [50, 100], DOUBLE)
+    original = Stepper._steps_short_of
+
+    def too_many(self: Stepper, target: object) -> int:
+        count = original(self, target)
+        return count if count == 1 else 2 * count
+
+    monkeypatch.setattr(Stepper, "_steps_short_of", too_many)
+    rash = propagate(TOP, START, [50, 100], DOUBLE)
+    assert bits(rash) == bits(whole)
+    assert rash.steps == whole.steps
+
+
+def test_a_compiled_integrator_is_used_again_and_gives_the_same_bits_as_a_fresh_one() -> None:
+    first = propagate(TOP, START, [5], DOUBLE)
+    propagate(HeavyTop((5, 4, 2), 1, (1, 2, 3)), State((1, 2, 3), (0, 0, 1)), [7], DOUBLE)
+    again = propagate(TOP, START, [5], DOUBLE)
+    assert bits(again) == bits(first)
+    assert compiled(HEAVY_TOP, DOUBLE) is compiled(HEAVY_TOP, DOUBLE)
+    assert compiled(HEAVY_TOP, DOUBLE) is not compiled(GYROSTAT, DOUBLE)
+
+
+def test_there_and_back_again() -> None:
+    there = propagate(TOP, START, [6], QUAD)
+    end = [exact(value) for value in there.states[0]]
+    back = propagate(TOP, State(end[:3], end[3:]), [-6], QUAD)
+    assert max(abs(exact(v) - s) for v, s in zip(back.states[0], START.flat, strict=True)) < Fraction(1, 10**31)
+
+
+def test_the_error_shrinks_along_the_precision_ladder() -> None:
+    truth = [exact(v) for v in propagate(TOP, START, [20], real(400)).states[0]]
+    errors = []
+    for precision in (real(30), DOUBLE, EXTENDED, real(90), QUAD, real(237)):
+        values = propagate(TOP, START, [20], precision).states[0]
+        errors.append(max(abs(exact(v) - t) for v, t in zip(values, truth, strict=True)) / precision.eps)
+    # each error is a few hundred eps of its own format at the most
+    assert all(error < 2000 for error in errors)
+
+
+def test_the_attitude_rides_along_and_stays_orthonormal() -> None:
+    run = propagate(TOP, START, [3], QUAD, xi=perpendicular(START.gamma))
+    values = [exact(v) for v in run.states[0]]
+    gamma, xi = values[3:6], values[6:9]
+    assert abs(dot(xi, xi) - 1) < Fraction(1, 10**32)
+    assert abs(dot(xi, gamma)) < Fraction(1, 10**32)
+
+
+def test_an_overflow_is_an_outcome_and_not_numbers() -> None:
+    run = propagate(TOP, State((10**160, 10**160, 1), (0, 0, 1)), [1], DOUBLE)
+    assert run.outcome is Outcome.NON_FINITE
+    assert run.states == ()
+    assert run.time_reached == 0
+
+
+def test_a_step_limit_is_an_outcome_and_keeps_the_times_reached() -> None:
+    run = propagate(TOP, START, [1, 2, 100], DOUBLE, step_limit=30)
+    assert run.outcome is Outcome.STEP_LIMIT
+    assert run.times == (1, 2)
+    assert run.steps == 30
+    assert 2 < run.time_reached < 100
+    assert numpy.isfinite(numpy.array(run.states)).all()
+
+
+def test_everything_that_changes_bits_is_in_the_flags() -> None:
+    flags = propagate(TOP, START, [1], DOUBLE, high_accuracy=True).flags
+    assert flags["high_accuracy"] == "true"
+    assert flags["compact_mode"] == "false"
+    assert {"tolerance", "order", "opt_level", "fast_math", "force_avx512", "slp_vectorize", "code_cache"} <= set(flags)
+
+
+def test_a_looser_tolerance_takes_fewer_steps_of_lower_order() -> None:
+    tight, loose = (
+        propagate(TOP, START, [50], DOUBLE),
+        propagate(TOP, START, [50], DOUBLE, tolerance=Fraction(1, 10**9)),
+    )
+    assert loose.order < tight.order
+    assert loose.flags["tolerance"] == "1e-09"
+
+
+def test_the_problem_is_rounded_once_and_the_rotor_comes_from_the_exact_data() -> None:
+    top = HeavyTop((3, 5, 7), "1/3", (0, "1/7", 0))
+    start = State([Fraction(2, 7) * 11 / 3, Fraction(3, 7) * 11 / 5, Fraction(6, 7) * 11 / 7], ("2/7", "3/7", "6/7"))
+    problem = Problem.of(top, start, DOUBLE, GYROSTAT)
+    assert problem.parameters.rotor == exact(number(Fraction(1, 21 * 11), DOUBLE))
+    assert problem.parameters.moment == (0, exact(number(Fraction(1, 21), DOUBLE)), 0)
+    assert problem.top.moment == problem.parameters.moment
+
+
+def test_parameters_are_not_demoted_to_double() -> None:
+    """heyoka takes literals to binary64 without a word; 1/3 in quad shows whether ours were."""
+    top = HeavyTop(("7/3", "5/3", "4/3"), "1/3", ("1/7", "1/11", "1/13"))
+    coarse, fine = (propagate(top, START, [2], p).states[0] for p in (QUAD, real(300)))
+    assert max(abs(exact(a) - exact(b)) for a, b in zip(coarse, fine, strict=True)) < Fraction(1, 10**32)
+
+
+@pytest.mark.parametrize("times", [[], [1, 1], [2, 1], [-1, 1], [1, -2], [0, 0], [-1, "-1/2"]])
+def test_times_out_of_order_are_refused(times) -> None:
+    with pytest.raises(InputError):
+        check_times(times)
+
+
+def test_the_start_may_be_asked_for() -> None:
+    run = propagate(TOP, START, [0, 1], real(100))
+    assert bits(run)[0] == [exact(number(v, real(100))) for v in START.flat]
+    assert run.times == (0, 1)

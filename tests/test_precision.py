@@ -1,0 +1,143 @@
+"""Rounding at the wall: exact in, exact out, and no false number."""
+
+from fractions import Fraction
+from random import Random
+
+import numpy
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.precision import (
+    DOUBLE,
+    EXTENDED,
+    QUAD,
+    available,
+    decimal_text,
+    exact,
+    log10,
+    native_text,
+    number,
+    parse,
+    real,
+    round_to,
+    rounded,
+)
+
+FORMATS = [DOUBLE, EXTENDED, QUAD, real(24), real(237), real(1024)]
+
+
+@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
+def test_a_number_is_the_nearest_of_its_format_and_comes_back_exactly(precision) -> None:
+    random = Random(1)
+    for _ in range(50):
+        value = Fraction(random.getrandbits(3000) - 2**2999, random.getrandbits(2900) + 1) / 10 ** random.randint(0, 60)
+        native = number(value, precision)
+        back = exact(native)
+        ulp = abs(back) * precision.eps
+        assert abs(back - value) <= ulp / 2
+        assert back == round_to(value, precision.bits)
+        assert rounded(back, precision) == back
+        assert rounded(exact(native_text(native, precision)), precision) == back
+
+
+def test_twenty_thousand_bits_come_back_exactly() -> None:
+    precision = real(20000)
+    value = round_to(Fraction(1, 3), precision.bits)
+    assert rounded(Fraction(1, 3), precision) == value
+    assert abs(value - Fraction(1, 3)) <= Fraction(1, 2**20001)
+    assert rounded(exact(native_text(number(value, precision), precision)), precision) == value
+
+
+def test_ties_go_to_even() -> None:
+    assert round_to(Fraction(2**24 + 1), 24) == 2**24
+    assert round_to(Fraction(2**24 + 3), 24) == 2**24 + 4
+
+
+def test_double_agrees_with_python_s_own_rounding() -> None:
+    random = Random(2)
+    for _ in range(200):
+        value = Fraction(random.getrandbits(200) + 1, random.getrandbits(200) + 1)
+        assert float(number(value, DOUBLE)) == float(value)
+
+
+def test_extended_and_quad_agree_with_decimal_parsing_of_their_libraries() -> None:
+    heyoka = pytest.importorskip("heyoka")
+    assert number(Fraction(1, 10), EXTENDED) == numpy.longdouble("0.1")
+    assert number(Fraction(1, 10), QUAD) == heyoka.real128("0.1")
+    assert number(Fraction(1, 10), real(237)) == heyoka.real("0.1", 237)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("3", Fraction(3)),
+        (" -2/5 ", Fraction(-2, 5)),
+        ("0.1", Fraction(1, 10)),
+        ("1e-3", Fraction(1, 1000)),
+        ("-.5e2", Fraction(-50)),
+        ("0.5/0.25", Fraction(2)),
+        ("7.", Fraction(7)),
+    ],
+)
+def test_text_is_read_exactly(text: str, value: Fraction) -> None:
+    assert exact(text) == value
+
+
+def test_a_float_is_the_binary_number_that_it_is() -> None:
+    assert exact(0.1) == Fraction(3602879701896397, 36028797018963968)
+    assert exact(numpy.float32(0.1)) == Fraction(13421773, 134217728)
+    assert exact(numpy.int64(-4)) == -4
+
+
+@pytest.mark.parametrize(
+    "bad", ["nan", "inf", "-Infinity", "", "1/0", "abc", "1_000", "١", "1e9999999", "0x10", "1/2/3", "--1", "1 2"]
+)
+def test_text_that_is_no_number_is_refused_with_the_offending_text(bad: str) -> None:
+    with pytest.raises(InputError) as error:
+        exact(bad)
+    assert bad[:5] in str(error.value)
+    assert error.value.remedy
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), numpy.longdouble("nan"), None, True, [1], 1j])
+def test_what_is_no_finite_number_is_refused(bad: object) -> None:
+    with pytest.raises(InputError):
+        exact(bad)
+
+
+@pytest.mark.parametrize(
+    ("power", "precision"), [(400, DOUBLE), (-400, DOUBLE), (5000, EXTENDED), (-5000, EXTENDED), (5000, QUAD)]
+)
+def test_a_number_outside_the_exponent_range_is_refused(power: int, precision) -> None:
+    with pytest.raises(InputError, match="exponent range"):
+        number(Fraction(10) ** power, precision)
+
+
+@pytest.mark.parametrize("name", ["double", "extended", "quad", "real:24", "real:20000"])
+def test_formats_are_found_by_name(name: str) -> None:
+    assert parse(name).name == name
+
+
+@pytest.mark.parametrize("name", ["single", "real", "real:23", "real:20001", "real:1e3", "real:-5", "Double", ""])
+def test_unknown_formats_are_refused(name: str) -> None:
+    with pytest.raises(InputError):
+        parse(name)
+
+
+def test_every_family_is_available_or_says_why_not() -> None:
+    answer = available()
+    assert set(answer) == {"double", "extended", "quad", "real"}
+    assert all(reason is None or len(reason) > 10 for reason in answer.values())
+    assert answer["double"] is None
+
+
+def test_a_logarithm_does_not_underflow() -> None:
+    assert log10(Fraction(1, 10**997)) == -997
+    assert log10(Fraction(-250)) == round(float(numpy.log10(250)), 6)
+    assert log10(Fraction(0)) is None
+
+
+def test_decimal_text_rounds_to_nearest() -> None:
+    assert decimal_text(Fraction(2, 3), 5) == "0.66667"
+    assert decimal_text(Fraction(1, 3 * 10**1000), 3) == "3.33E-1001"
+    assert decimal_text(Fraction(0), 9) == "0"

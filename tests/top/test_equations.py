@@ -1,0 +1,116 @@
+"""One field for every ring: what it gives does not depend on the numbers it is given."""
+
+from fractions import Fraction
+from random import Random
+
+import mpmath
+import pytest
+import sympy
+from flint import arb, fmpq
+
+from heavytop.exact.balls import ball, working_precision
+from heavytop.integrate.taylor import expressions
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.top.heavy_top import HeavyTop, State, cross
+from helpers import fraction, positive, unit_vector, vector
+
+
+def random_problem(random: Random):
+    top = HeavyTop((positive(random), positive(random), positive(random)), positive(random), vector(random))
+    p = Parameters(top.inertia, top.moment, fraction(random))
+    return p, (*vector(random), *vector(random))
+
+
+def converted(p: Parameters, y, to):
+    return Parameters([to(v) for v in p.inertia], [to(v) for v in p.moment], to(p.rotor)), [to(v) for v in y]
+
+
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda s: s.name)
+def test_the_field_is_the_vector_equation_of_the_paper(system) -> None:
+    random = Random(1)
+    for _ in range(30):
+        p, y = random_problem(random)
+        omega, gamma = y[:3], y[3:]
+        momentum = [i * w for i, w in zip(p.inertia, omega, strict=True)]
+        turning = system.angular_velocity(p, y)
+        torque = cross(gamma, p.moment) if system is HEAVY_TOP else (0, 0, 0)
+        rates = system.field(p, y)
+        momentum_rate = [i * rate for i, rate in zip(p.inertia, rates, strict=False)]
+        assert momentum_rate == [a + b for a, b in zip(cross(momentum, turning), torque, strict=True)]
+        assert rates[3:] == cross(gamma, turning)
+        if system is HEAVY_TOP:
+            assert turning == omega
+        else:
+            assert turning == (omega[0], omega[1] + p.rotor, omega[2])
+
+
+def printed_1_1(p: Parameters, y):
+    """(1.1) and (1.2) letter by letter, component by component."""
+    (i1, i2, i3), (pa, pb, pc) = p.inertia, p.moment
+    w1, w2, w3, g1, g2, g3 = y
+    return (
+        (g2 * pc - g3 * pb - (i3 - i2) * w2 * w3) / i1,
+        (g3 * pa - g1 * pc - (i1 - i3) * w3 * w1) / i2,
+        (g1 * pb - g2 * pa - (i2 - i1) * w1 * w2) / i3,
+        w3 * g2 - w2 * g3,
+        w1 * g3 - w3 * g1,
+        w2 * g1 - w1 * g2,
+    )
+
+
+def test_the_heavy_top_is_1_1_and_1_2_as_printed() -> None:
+    random = Random(2)
+    for _ in range(30):
+        p, y = random_problem(random)
+        assert HEAVY_TOP.field(p, y) == printed_1_1(p, y)
+
+
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda s: s.name)
+def test_fractions_balls_mpf_sympy_and_heyoka_give_the_same_field(system) -> None:
+    import heyoka
+
+    random = Random(3)
+    p, y = random_problem(random)
+    truth = system.field(p, y)
+
+    with working_precision(200):
+        assert all(ball(t).overlaps(v) for t, v in zip(truth, system.field(*converted(p, y, ball)), strict=True))
+    with mpmath.workdps(60):
+        values = system.field(*converted(p, y, lambda v: mpmath.mpf(v.numerator) / v.denominator))
+        assert all(abs(v - mpmath.mpf(t.numerator) / t.denominator) < 1e-50 for v, t in zip(values, truth, strict=True))
+    names = sympy.symbols("i1:4 n1:4 lam w1:4 g1:4")
+    symbolic = system.field(Parameters(names[:3], names[3:6], names[6]), names[7:])
+    at = dict(zip(names, [sympy.Rational(v.numerator, v.denominator) for v in (*p.inertia, *p.moment, p.rotor, *y)],
+                  strict=True))  # fmt: skip
+    assert [Fraction(int(e.subs(at).p), int(e.subs(at).q)) for e in symbolic] == list(truth)
+
+    pairs = expressions(system, attitude=False)
+    compiled = heyoka.cfunc([rate for _, rate in pairs], vars=[name for name, _ in pairs])
+    coefficients = (*p.inertia, p.rotor) if system is GYROSTAT else (*p.inertia, *p.moment)
+    values = compiled([float(v) for v in y], pars=[float(v) for v in coefficients])
+    assert values == pytest.approx([float(t) for t in truth], rel=1e-12)
+
+
+def test_the_attitude_vector_turns_with_the_body_s_own_angular_velocity() -> None:
+    random = Random(4)
+    p, y = random_problem(random)
+    xi = unit_vector(random)
+    assert HEAVY_TOP.attitude(p, y, xi) == cross(xi, y[:3])
+    assert GYROSTAT.attitude(p, y, xi) == cross(xi, (y[0], y[1] + p.rotor, y[2]))
+
+
+def test_a_rational_ball_contains_its_number() -> None:
+    with working_precision(64):
+        third = ball(Fraction(1, 3))
+        assert arb(fmpq(1, 3)).overlaps(third)
+        assert not third.is_exact()
+        assert ball(Fraction(3, 8)).is_exact()
+
+
+def test_a_system_from_another_process_is_the_same_object() -> None:
+    import pickle
+
+    for system in (HEAVY_TOP, GYROSTAT):
+        assert pickle.loads(pickle.dumps(system)) is system
+    state = State((1, 2, 3), (0, 0, 1))
+    assert pickle.loads(pickle.dumps(state)) == state

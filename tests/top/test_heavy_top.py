@@ -1,0 +1,84 @@
+"""Tops and starts: exact, validated, and clear about what is wrong."""
+
+from fractions import Fraction
+from random import Random
+
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
+from heavytop.top.heavy_top import HeavyTop, State, dot
+from helpers import unit_vector, vector
+
+
+def test_numbers_of_every_kind_are_taken_exactly() -> None:
+    top = HeavyTop(("1/3", 2, "0.5"), 0.1, (0, Fraction(1, 7), "1e-2"))
+    assert top.inertia == (Fraction(1, 3), 2, Fraction(1, 2))
+    assert top.weight == Fraction(3602879701896397, 36028797018963968)
+    assert top.moment[1] == top.weight / 7
+
+
+@pytest.mark.parametrize("inertia", [(1, 0, 2), (1, 2, -3), ("1", "2", "-1/9")])
+def test_moments_that_are_not_positive_are_refused(inertia) -> None:
+    with pytest.raises(InputError, match=r"I\d = .* is not positive"):
+        HeavyTop(inertia, 1, (0, 0, 1))
+
+
+@pytest.mark.parametrize("values", [(1, 2), (1, 2, 3, 4), ()])
+def test_a_vector_has_three_numbers(values) -> None:
+    with pytest.raises(InputError, match="numbers"):
+        HeavyTop(values, 1, (0, 0, 1))
+    with pytest.raises(InputError, match="omega has"):
+        State(values, (0, 0, 1))
+
+
+def test_moments_that_no_body_has_are_a_warning_only() -> None:
+    assert HeavyTop((1, 1, 3), 1, (0, 0, 1)).warnings() == [
+        "I3 = 3 exceeds the sum 2 of the other two: no rigid body has such moments."
+    ]
+    assert HeavyTop((1, 1, 2), 1, (0, 0, 1)).warnings() == []
+
+
+def test_gamma_off_the_sphere_is_refused_and_says_by_how_much() -> None:
+    with pytest.raises(InputError, match=r"\|gamma\|\^2 - 1 = -0.01") as error:
+        State((0, 0, 1), ("0.3", "0.3", "0.9")).require_unit_gamma()
+    assert "--normalize" in error.value.remedy
+    with pytest.raises(InputError, match=r"= 3\."):
+        State((0, 0, 1), (0, 0, 2)).require_unit_gamma()
+
+
+def test_normalized_gamma_is_exactly_of_unit_length_and_within_1e_30() -> None:
+    random = Random(5)
+    for scale in (Fraction(1), Fraction(10) ** 200, Fraction(1, 10**200)):
+        for _ in range(20):
+            given = tuple(scale * g for g in vector(random))
+            moved = State((0, 0, 0), given).normalized().require_unit_gamma().gamma
+            # the distance from the true direction: |g × m|² <= |g|² 1e-60
+            square = dot(given, given)
+            along = dot(given, moved)
+            assert along > 0
+            assert square - along**2 <= square * Fraction(1, 10**60)
+    assert State((0, 0, 0), (0, 0, -5)).normalized().gamma == (0, 0, -1)
+    with pytest.raises(InputError, match="zero vector"):
+        State((0, 0, 0), (0, 0, 0)).normalized()
+
+
+def test_the_gyrostat_says_why_it_refuses_a_start() -> None:
+    top = HeavyTop((2, 3, 4), 1, (0, 1, 0))
+    with pytest.raises(InputError, match=r"M·gamma != 0"):
+        GYROSTAT.parameters(top, State((1, 0, 0), (0, 1, 0)))
+    with pytest.raises(InputError, match="parallel to M"):
+        GYROSTAT.parameters(top, State((1, 1, 1), (0, 1, 0)))
+    with pytest.raises(InputError, match="a = 1"):
+        GYROSTAT.parameters(HeavyTop((2, 3, 4), 1, (1, 1, 0)), State((0, 1, 0), (0, 1, 0)))
+    random = Random(6)
+    gamma = unit_vector(random)
+    start = State([7 * g / i for g, i in zip(gamma, top.inertia, strict=True)], gamma)
+    assert GYROSTAT.parameters(top, start).rotor == Fraction(1, 7)
+
+
+def test_systems_are_found_by_name() -> None:
+    assert system("heavy_top") is HEAVY_TOP
+    assert system("gyrostat") is GYROSTAT
+    with pytest.raises(InputError, match="Unknown system 'top'"):
+        system("top")
