@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
+from heavytop.claims.guard import in_time
 from heavytop.claims.judge import AuditReport, Finding, Setting, Statement, judge
 from heavytop.errors import InputError
 from heavytop.top.equations import HEAVY_TOP, System, system
@@ -53,7 +54,12 @@ def audit(name: str, system_name: str = HEAVY_TOP.name) -> AuditReport:
 
     Raises InputError for an unknown claim or system and for a file that cannot be read.
     """
-    return audit_claim(find_claim(name), system(system_name))
+    about = system(system_name)
+    claim = find_claim(name)
+    if name in PAPER:
+        return audit_claim(claim, about)
+    claim.statements(about)  # what cannot be stated is said at once
+    return in_time(name, about.name)
 
 
 def audit_claim(claim: Auditable, about: System) -> AuditReport:
@@ -64,5 +70,7 @@ def audit_claim(claim: Auditable, about: System) -> AuditReport:
 
 
 def only_branch(report: AuditReport, branch: str) -> AuditReport:
-    """The same report with the rows of one branch, and its verdict on them."""
+    """The same report with the rows of one branch, and its verdict on them; raises InputError for any other name."""
+    if branch not in ("smooth", "printed"):
+        raise InputError(f"Unknown branch {branch[:40]!r}.", "Use smooth or printed.")
     return replace(report, rows=tuple(row for row in report.rows if row.branch == branch))

@@ -18,7 +18,10 @@ from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpz
 from heavytop.errors import HeavyTopError
 
 SLOTS = 64
-_MAX_PRODUCT = 4_000_000
+# terms of a product, and of numerator times denominator where a common factor is sought: the paper's claims need
+# 95 and 600, and what needs much more does not end
+_MAX_PRODUCT = 10_000
+_MAX_QUOTIENT = 1_500
 _FACTORED_BITS = 64
 
 
@@ -138,6 +141,8 @@ class Tower:
                     denominator = rational
         if not denominator:
             raise Unprovable("A denominator is identically 0.", "Check the formula, or the domain it is claimed on.")
+        if len(denominator) > 1 and len(numerator) * len(denominator) > _MAX_QUOTIENT:
+            raise Unprovable("A quotient of polynomials is too large.", "Split the claim into smaller ones.")
         common = numerator.gcd(denominator) if numerator else denominator
         numerator, denominator = numerator / common, denominator / common
         lead = denominator.leading_coefficient()
