@@ -96,7 +96,8 @@ def true_curves(case: ershkov.PartialCase, times: list[Fraction]) -> tuple[Curve
     if case.i1 == 2 * case.i3:
         return _exact(DeloneHomoclinic(case.alpha, case.i1), times), "closed form"
     gyrostat = case.solves
-    xi = perpendicular(gyrostat.start.gamma)
+    # the γ of the true motion leaves the pole towards φ = π: with this ξ, ψ is 0 there
+    xi = tuple(-part for part in perpendicular(gyrostat.start.gamma))
     halves = []
     for sign in (-1, 1):
         part = sorted((time for time in times if time * sign > 0), key=abs)
@@ -108,17 +109,21 @@ def true_curves(case: ershkov.PartialCase, times: list[Fraction]) -> tuple[Curve
     t = numpy.array([float(time) for time, _ in ordered])
     states = numpy.array([row for _, row in ordered])
     angles = numpy.array([euler_angles(row[3:6], row[6:9], NUMERIC) for row in states])
-    return Curves(t, states[:, :6], _continuous(angles, states)), "integrated in double precision, 1e-12"
+    return Curves(t, states[:, :6], _continuous(angles, states)), "integrated in double precision"
 
 
 def _continuous(angles: Any, states: Any) -> Any:
-    """Angles unwrapped; at the pole itself (t = 0) φ and ψ are the mean of their neighbours: γ only touches it."""
+    """Angles unwrapped; at the pole itself (t = 0) φ and ψ are the mean of their neighbours: γ only touches it.
+
+    Whole turns are taken off until φ and ψ lie within a turn of 0 there.
+    """
     pole = int(numpy.argmax(states[:, 5]))
     columns = [angles[:, 1]]
     for index in (0, 2):
         away = numpy.delete(angles[:, index], pole)
         turned = numpy.array(unwrap(list(away), 2 * numpy.pi))
-        columns.append(numpy.insert(turned, pole, (turned[pole - 1] + turned[pole]) / 2))
+        whole = numpy.insert(turned, pole, (turned[pole - 1] + turned[pole]) / 2)
+        columns.append(whole - 2 * numpy.pi * numpy.floor(whole[pole] / (2 * numpy.pi) + 0.25))
     return numpy.stack([columns[1], columns[0], columns[2]], axis=1)
 
 

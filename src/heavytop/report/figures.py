@@ -27,7 +27,7 @@ from heavytop.top.equations import GYROSTAT
 from heavytop.top.integrals import gyrostat_energy
 
 # Okabe and Ito's colours, told apart by any eye; line styles say the same again
-ORANGE, BLUE, VERMILION, GREEN, GREY = "#E69F00", "#0072B2", "#D55E00", "#009E73", "#666666"
+ORANGE, BLUE, VERMILION, GREEN = "#E69F00", "#0072B2", "#D55E00", "#009E73"
 _SYMBOLS = {"phi": "φ", "theta": "θ", "psi": "ψ"}
 _FORMULAS = {
     "phi": r"$\varphi=\arctan\sqrt{\alpha/u^2-1}$",
@@ -55,7 +55,7 @@ def draw_figures(directory: Path) -> list[Path]:
 def _quiet_style() -> Iterator[None]:
     import matplotlib
 
-    settings = {
+    settings: Any = {
         "svg.hashsalt": "heavytop",
         "font.size": 11,
         "axes.spines.top": False,
@@ -88,7 +88,9 @@ def _paper_figure(spec: PaperFigure) -> Any:
     """One of Figs 2-8: the printed formula, its parameters, and a warning where they contradict each other."""
     figure = _new(8, 5)
     axes = figure.add_subplot()
-    t = numpy.linspace(-4, 4, 801)
+    # beyond A t = 37 the printed logarithm loses every digit of a double
+    span = min(4, 24 / spec.a)
+    t = numpy.linspace(-span, span, 801)
     t = t[t != 0] if spec.angle == "phi" else t
     axes.plot(t, spec.values(t), color=BLUE)
     axes.set_xlabel("t")
@@ -97,10 +99,9 @@ def _paper_figure(spec: PaperFigure) -> Any:
     axes.set_title(
         f"Fig. {spec.number} of the paper, Eqs. ({spec.equation}): {stated}$A={spec.a}$, $\\alpha=1$", loc="left"
     )
-    figure.supxlabel(f"{_FORMULAS[spec.angle]},   {_U}", fontsize=11)
+    formula = f"{_FORMULAS[spec.angle]},   {_U}"
     if spec.consistent:
-        note = f"A = {spec.a} means I1/I3 = {spec.implied_ratio}, since A = √α (I1/I3 − 1)"
-        axes.text(0.02, 1.0, note, transform=axes.transAxes, color=GREY, va="bottom", fontsize=9)
+        formula += f"\n$A={spec.a}$ means $I_1/I_3={spec.implied_ratio}$, since $A=\\sqrt{{\\alpha}}\\,(I_1/I_3-1)$"
     else:
         forced = (spec.ratio or 0) - 1
         slope = (spec.ratio or 0) - spec.a / 2
@@ -111,7 +112,10 @@ def _paper_figure(spec: PaperFigure) -> Any:
         box = {"facecolor": "white", "edgecolor": VERMILION, "boxstyle": "round"}
         axes.text(0.03, 0.95, note, transform=axes.transAxes, color=VERMILION, va="top", fontsize=10, bbox=box)
         low, high = axes.get_ylim()
+        if high - low < 1:
+            low, high = -1.0, 1.0
         axes.set_ylim(low, high + 0.35 * max(high - low, 1))
+    figure.supxlabel(formula, fontsize=11)
     return figure
 
 
@@ -174,7 +178,7 @@ def _portrait() -> Any:
         axes.set_yticks([-1, 0, 1])
         axes.set_zticks([-1, 0, 1])
         axes.view_init(elev=25, azim=50)
-        axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.16), frameon=False)
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.2), frameon=False)
     figure.suptitle("$I_1=I_2=2I_3$, $\\alpha=1$, $I_1=1$")
     return figure
 
@@ -198,7 +202,7 @@ def _levels(case: PartialCase) -> list[Any]:
     lines = contour_generator(turn, height, gyrostat_energy(p, state))
     low, high = float(gyrostat_energy(p, state).min()), float(gyrostat_energy(p, state).max())
     found = [line for level in numpy.linspace(low, high, 14)[1:-1] for line in lines.lines(level)]
-    return [point(line[:, 0], line[:, 1]) for line in found]
+    return [point(*numpy.asarray(line).T) for line in found]
 
 
 def _sphere(length: float) -> list[Any]:
