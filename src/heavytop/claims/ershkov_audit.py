@@ -184,7 +184,7 @@ class GeneralClaim:
     @property
     def setting(self) -> Setting:
         """I1 > I3 and C0 > 0; b of either sign; s1, s3 stand for the signs of Ω1, Ω3."""
-        data = ((3, 2, 1, 1, "1/3", 2, 1), ("5/2", 3, "4/3", 2, "-1/8", "3/2", "3/5"))
+        data = ((3, 2, 1, 1, "1/3", 2, 1), ("5/2", 3, "4/3", 2, "-1/8", 3, 2))
         signs = ((1, 1), (1, -1), (-1, 1))
         symbols = (_I1, _I2, _I3, _P, _B, _C0, _C1, _S1, _S3)
         return Setting(

@@ -28,7 +28,7 @@ _MAX_DEPTH = 60
 _MAX_NODES = 2_000
 _MAX_BITS = 4_096
 _MAX_DEGREE = 64
-_MAX_TERMS = 5_000
+_MAX_TERMS = 200_000
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _TOKEN = re.compile(rf"\s*(?:{_NUMBER}|[A-Za-z]\w*|\*\*|[-+*/^(),])", re.ASCII)
 

@@ -105,8 +105,8 @@ class Tower:
     def reduce(self, p: Any) -> Any:
         """``p`` with every root to a power below 2."""
         for index in sorted(self._radicands, reverse=True):
-            parts = self._by_power(p, index)
-            if max(parts, default=0) > 1:
+            if p.degrees()[index] > 1:
+                parts = self._by_power(p, index)
                 q, root = self._radicands[index], self.gens[index]
                 total = self.context.constant(0)
                 for power, part in parts.items():
@@ -132,8 +132,8 @@ class Tower:
         """Reduced, with no root left in the denominator; raises Unprovable where that is 0."""
         numerator, denominator = self.reduce(numerator), self.reduce(denominator)
         for index in sorted(self._radicands, reverse=True):
-            parts = self._by_power(denominator, index)
-            if 1 in parts:
+            if denominator.degrees()[index] == 1:
+                parts = self._by_power(denominator, index)
                 conjugate = parts.get(0, self.context.constant(0)) - parts[1] * self.gens[index]
                 rational = self.reduce(self.times(denominator, conjugate))
                 if rational:
