@@ -66,7 +66,8 @@ def audit_claim(claim: Auditable, about: System) -> AuditReport:
     """The audit of a claim that is at hand, as a motion of ``about``."""
     rows = judge(claim.statements(about), claim.setting)
     why, solves = claim.explain()
-    return AuditReport(claim.name, about.name, claim.source, rows, tuple(why), solves)
+    constants = tuple((name, str(value)) for name, value in claim.setting.constants)
+    return AuditReport(claim.name, about.name, claim.source, rows, tuple(why), solves, constants)
 
 
 def only_branch(report: AuditReport, branch: str) -> AuditReport:

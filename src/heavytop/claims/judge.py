@@ -132,7 +132,7 @@ class AuditReport:
     """The audit of one claim about one system.
 
     why: what explains the verdict, each step checked.  solves: the systems whose equations of motion the claim
-    satisfies on its smooth branch.
+    satisfies on its smooth branch.  constants: names in the residuals with what they stand for, such as k/2.
     """
 
     claim: str
@@ -141,6 +141,7 @@ class AuditReport:
     rows: tuple[Row, ...]
     why: tuple[Finding, ...] = ()
     solves: tuple[str, ...] = ()
+    constants: tuple[tuple[str, str], ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -160,6 +161,7 @@ class AuditReport:
             "verdict": self.verdict,
             "source": self.source,
             "solves": list(self.solves),
+            "constants": dict(self.constants),
             "why": [{"statement": finding.statement, "holds": finding.holds} for finding in self.why],
             "equations": [row.to_json() for row in self.rows],
         }

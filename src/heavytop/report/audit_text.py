@@ -19,6 +19,7 @@ def audit_text(report: AuditReport) -> RenderableType:
     parts: list[RenderableType] = [head]
     if report.source:
         parts.append(Text(report.source))
+    parts += [Text(f"{name} = {value}") for name, value in report.constants if name != value]
     parts += [Text(), _table(report), Text(), *_witnesses(report)]
     if report.why:
         parts += [Text(), Text("Why, each step checked by the same algebra:")]
