@@ -167,28 +167,34 @@ def number(value: Fraction, precision: Precision) -> Any:
     """
     import numpy
 
-    significand, exponent = _significand(value, precision.bits) if value else (0, 0)
     result: Any
     if precision.family == "double":
         try:
             result = numpy.float64(float(value))
         except OverflowError:
             result = numpy.float64(math.inf)
-    elif precision.family == "extended":
-        high, low = divmod(significand, 1 << 32)
-        with numpy.errstate(over="ignore"):
-            result = numpy.ldexp(numpy.longdouble(high) * numpy.longdouble(1 << 32) + numpy.longdouble(low), exponent)
     else:
-        import heyoka
-
-        text = _integer_and_exponent(significand, exponent)
-        result = heyoka.real128(text) if precision.family == "quad" else heyoka.real(text, precision.bits)
+        result = _wide(*(_significand(value, precision.bits) if value else (0, 0)), precision)
     if not numpy.isfinite(result) or (value != 0 and result == 0):
         raise InputError(
             f"{decimal_text(value, 6)} is outside the exponent range of {precision.name}.",
             "Choose other units, or a format with a wider range such as real:237.",
         )
     return result
+
+
+def _wide(significand: int, exponent: int, precision: Precision) -> Any:
+    """m 2^e in a format wider than double."""
+    import numpy
+
+    if precision.family == "extended":
+        high, low = divmod(significand, 1 << 32)
+        with numpy.errstate(over="ignore", under="ignore"):
+            return numpy.ldexp(numpy.longdouble(high) * numpy.longdouble(1 << 32) + numpy.longdouble(low), exponent)
+    import heyoka
+
+    text = _integer_and_exponent(significand, exponent)
+    return heyoka.real128(text) if precision.family == "quad" else heyoka.real(text, precision.bits)
 
 
 def _integer_and_exponent(significand: int, exponent: int) -> str:

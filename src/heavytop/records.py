@@ -15,7 +15,7 @@ Kind = Literal["error", "duration", "value"]
 """How two values of a metric compare: a smaller error is better, a longer duration is better, a value must agree."""
 
 
-class Metric(msgspec.Struct, omit_defaults=True):
+class Metric(msgspec.Struct):
     """One measured number.
 
     value: decimal text; or a word that is no number: "nan", "missing", "never", "unresolved" (smaller than ten radii
@@ -29,14 +29,14 @@ class Metric(msgspec.Struct, omit_defaults=True):
     bound: str | None = None
 
 
-class Series(msgspec.Struct, omit_defaults=True):
+class Series(msgspec.Struct):
     """A measured quantity over time.  values: decimal text or the words of :class:`Metric`, one for each time."""
 
     times: list[str]
     values: list[str]
 
 
-class Row(msgspec.Struct, omit_defaults=True):
+class Row(msgspec.Struct):
     """One measurement, of one motion held against one reference.
 
     measured: what is held (known, claimed or computed); against: what it is held against, with method and radius.

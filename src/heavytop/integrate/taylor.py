@@ -146,7 +146,10 @@ class Stepper:
         if self._one_by_one or not self._largest_step or self._beyond(target):
             return 1
         distance = abs(float(target - self.engine.time))
-        count = min(distance / self._largest_step, _CHUNK_SECONDS / self._seconds_per_step)
+        # many steps average out; each of a few may be as long as the longest so far
+        far = distance > 100 * self._largest_step
+        count = 0.95 * distance * self.steps / abs(float(self.time)) if far else distance / self._largest_step
+        count = min(count, _CHUNK_SECONDS / self._seconds_per_step)
         if self.step_limit is not None:
             count = min(count, self.step_limit - self.steps)
         return int(count)
@@ -170,15 +173,20 @@ class Stepper:
         began = perf_counter()
         outcome, _, largest, done, *_ = self.engine.propagate_until(self.far, max_steps=count)
         self._seconds_per_step = (perf_counter() - began) / max(done, 1)
-        if outcome == heyoka.taylor_outcome.err_nf_state or self._beyond(target):
-            # step over the same ground again, one by one, to find where
+        # a longest step that was ever taken seldom is too short; half as long again surely is enough soon
+        self._largest_step = max(self._largest_step, abs(float(largest)))
+        failed = outcome == heyoka.taylor_outcome.err_nf_state
+        if failed or self._beyond(target):
             self.engine.state[:] = state
             self.engine.dtime = time
-            self._one_by_one = True
+            if failed:
+                # over the same ground again, one by one, to find where
+                self._one_by_one = True
+            else:
+                self._largest_step *= 1.5
             return Outcome.SUCCESS
         self.steps += done
         self.time = self.engine.time
-        self._largest_step = abs(float(largest))
         self._covers = False
         return Outcome.SUCCESS
 

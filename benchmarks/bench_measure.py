@@ -1,0 +1,45 @@
+"""What does it cost to measure one state: drift of the integrals, and distance from an exact motion?
+
+Run: python -m pytest benchmarks/bench_measure.py --benchmark-enable
+"""
+
+from fractions import Fraction
+
+import pytest
+
+from heavytop.exact.balls import radius, radius_text
+from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.integrate.taylor import propagate
+from heavytop.integrate.trajectory import Problem
+from heavytop.measure.drift import Drift
+from heavytop.measure.solution_error import SolutionError
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
+from heavytop.suite.cases import CASES
+from heavytop.top.integrals import holding
+
+FORMATS = [DOUBLE, EXTENDED, QUAD, real(237)]
+
+
+@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
+def test_drift_of_one_state(benchmark, precision) -> None:
+    case = CASES["kovalevskaya"]
+    drift = Drift(Problem.of(case.top, case.start, precision), holding(case.top, case.start))
+    state = propagate(case.top, case.start, [5], precision).states[0]
+    benchmark(drift, Fraction(5), state)
+    benchmark.extra_info["drift_of_the_energy"] = drift.metrics()["drift_energy_final"].value
+
+
+@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
+def test_solution_error_of_one_state(benchmark, precision) -> None:
+    known = DeloneHomoclinic(Fraction(5, 4), Fraction(3))
+    error = SolutionError(Problem.of(known.top, known.start, precision), known)
+    state = propagate(known.top, known.start, [3], precision).states[0]
+    benchmark(error, Fraction(3), state)
+    benchmark.extra_info["error_of_omega"] = error.metrics()["solution_error_omega_final"].value
+
+
+@pytest.mark.parametrize("bits", [117, 177, 365, 3400])
+def test_exact_evaluation(benchmark, bits: int) -> None:
+    known = DeloneHomoclinic(Fraction(5, 4), Fraction(3))
+    state = benchmark(known.state, Fraction(22, 7), bits)
+    benchmark.extra_info["largest_radius"] = radius_text(max(radius(value) for value in state))

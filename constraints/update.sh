@@ -1,0 +1,13 @@
+#!/bin/sh
+# Pin every package, with hashes, for every platform and Python >= 3.11.  Needs uv.
+set -eu
+cd "$(dirname "$0")/.."
+lock() {
+    name=$1
+    shift
+    uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url \
+        --no-annotate "$@" pyproject.toml constraints/build.in -o "constraints/$name.txt" --upgrade
+    sed -i '1i # Made by constraints/update.sh' "constraints/$name.txt"
+}
+lock test --extra test --extra peers --extra cluster
+lock run -c constraints/test.txt

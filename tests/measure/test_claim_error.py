@@ -1,0 +1,95 @@
+"""The claim as a motion of the heavy top: how wrong, against truths that do not come from it."""
+
+from fractions import Fraction
+from functools import partial
+
+import pytest
+from flint import arb
+
+from heavytop.claims.ershkov import PartialCase
+from heavytop.errors import OutOfReach
+from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.integrate.taylor import propagate
+from heavytop.measure.claim_error import claim_attitude, exact_claim, model_error
+from heavytop.measure.computed_reference import ComputedReference
+from heavytop.suite.measurements import CLAIM_XI, _truth
+from helpers import VECTORS
+
+TWO = PartialCase(Fraction(1), Fraction(2), Fraction(1))
+SIX = PartialCase(Fraction(1), Fraction(6), Fraction(1))
+
+
+@pytest.mark.parametrize(
+    ("case", "time", "expected"),
+    [
+        (TWO, "0.1", "0.0024912"),
+        (TWO, "1", "0.173905"),
+        (TWO, "2", "0.220605"),
+        (SIX, "0.1", "0.181054"),
+        (SIX, "1", "2.920776"),
+    ],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_error_in_omega_is_the_published_one_in_both_directions(case, time, expected, sign) -> None:
+    time = sign * Fraction(time)
+    truth, _ = _truth(case, [time])
+    off = model_error(case, time, truth).omega
+    assert abs(float(off) - float(expected)) < 0.5 * 10 ** -len(expected.partition(".")[2])
+
+
+def test_the_error_in_gamma_starts_like_half_k_t() -> None:
+    for case in (TWO, SIX):
+        time = Fraction(1, 1000)
+        truth, _ = _truth(case, [time])
+        error = model_error(case, time, truth)
+        assert float(error.gamma) == pytest.approx(float(case.solves.rate) / 2000, rel=1e-2)
+        assert float(error.omega) < 10 * float(case.solves.rate) ** 2 / 10**6
+
+
+def test_the_truth_for_six_is_the_motion_of_the_vectors() -> None:
+    given = next(v for v in VECTORS if v["name"].startswith("paper data"))
+    known = ComputedReference(SIX.solves.top, SIX.solves.start, [Fraction(1)])
+    for value, text in zip(known.state(Fraction(1)), given["state"], strict=True):
+        assert abs(midpoint(value) - Fraction(text)) < Fraction(1, 10**58)
+    assert "computed, not proven" in known.method
+
+
+def test_the_computed_truth_and_the_closed_form_agree_where_there_are_both() -> None:
+    times = [Fraction(1, 2), Fraction(3)]
+    delone = DeloneHomoclinic(TWO.alpha, TWO.i1)
+    computed = ComputedReference(delone.top, delone.start, times, xi=CLAIM_XI)
+    truth, method = _truth(TWO, times)
+    assert method.startswith("known")
+    for time in times:
+        state, xi = truth(time)
+        with working_precision(200):
+            for a, b in zip((*state, *xi), computed.state(time), strict=True):
+                assert abs(a - b) < ball(Fraction(1, 10**40))
+
+
+def test_a_computed_reference_that_does_not_arrive_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("heavytop.measure.computed_reference.propagate", partial(propagate, step_limit=2))
+    with pytest.raises(OutOfReach, match="stopped at the step limit"):
+        ComputedReference(SIX.solves.top, SIX.solves.start, [Fraction(10)])
+
+
+def test_claim_and_truth_start_from_the_same_attitude() -> None:
+    with working_precision(160):
+        for value, exact in zip(claim_attitude(TWO, Fraction(0), "smooth"), CLAIM_XI, strict=True):
+            assert value.overlaps(ball(exact))
+    tiny = Fraction(-1, 10**6)
+    truth, _ = _truth(TWO, [tiny])
+    assert float(model_error(TWO, tiny, truth).attitude) < 2e-6
+
+
+def test_angles_are_compared_modulo_a_turn() -> None:
+    truth, _ = _truth(TWO, [Fraction(5)])
+    error = model_error(TWO, Fraction(5), truth)
+    for angle in (error.phi, error.theta, error.psi):
+        assert abs(float(angle)) <= float(arb.pi()) + 1e-9
+
+
+def test_the_exact_claim_is_a_narrow_ball_far_out() -> None:
+    claim = exact_claim(SIX, Fraction(-150), "printed", 100)
+    assert all(radius(v) < Fraction(1, 2**99) * max(1, abs(midpoint(v))) for v in (*claim.omega, claim.psi))

@@ -1,0 +1,130 @@
+"""Drift and distance: evaluated with guard bits, never a number where there is none."""
+
+from fractions import Fraction
+
+import numpy
+import pytest
+
+from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.integrate.taylor import propagate
+from heavytop.integrate.trajectory import Problem
+from heavytop.measure.drift import Drift
+from heavytop.measure.scalar import metric, of_fraction, text, to_ball
+from heavytop.measure.solution_error import SolutionError, root, split
+from heavytop.precision import DOUBLE, QUAD, exact, number, real
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.integrals import holding
+
+TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
+START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
+
+
+@pytest.mark.parametrize("precision", [QUAD, real(237)], ids=lambda p: p.name)
+def test_drift_is_the_difference_of_the_integral_to_many_more_digits_than_the_format(precision) -> None:
+    problem = Problem.of(TOP, START, precision)
+    # 2/3 is rounded in the parameters: the run and the integral have the rounded one
+    n1, n2, _ = problem.parameters.moment
+
+    def by_hand(y) -> Fraction:
+        w1, w2, _, g1, g2, _ = y
+        a, b = n1 / Fraction(3, 2), n2 / Fraction(3, 2)
+        return (w1**2 - w2**2 - a * g1 + b * g2) ** 2 + (2 * w1 * w2 - a * g2 - b * g1) ** 2
+
+    drift = Drift(problem, holding(TOP, START))
+    states = []
+    propagate(TOP, START, range(1, 9), precision, observer=lambda t, y: (drift(t, y), states.append(y)))
+    first = by_hand(problem.start.flat)
+    offs = [abs(by_hand([exact(v) for v in y]) - first) for y in states]
+    metrics = drift.metrics()
+    assert exact(metrics["drift_kovalevskaya_max"].value) == pytest.approx(max(offs), rel=1e-7)
+    assert exact(metrics["drift_kovalevskaya_final"].value) == pytest.approx(offs[-1], rel=1e-7)
+    mean_square = sum(off**2 for off in offs) / len(offs)
+    assert float(exact(metrics["drift_kovalevskaya_rms"].value) ** 2 / mean_square) == pytest.approx(1, rel=1e-6)
+    assert 0 < max(offs) < 1000 * precision.eps
+
+
+def test_the_rms_lies_between_final_and_maximum_and_the_series_holds_the_kept_times() -> None:
+    problem = Problem.of(TOP, START, DOUBLE)
+    keep = [Fraction(10), Fraction(100)]
+    drift = Drift(problem, holding(TOP, START), keep)
+    propagate(TOP, START, range(1, 101), DOUBLE, observer=drift)
+    for name in ("gamma_squared", "area", "energy", "kovalevskaya"):
+        values = {part: exact(drift.metrics()[f"drift_{name}_{part}"].value) for part in ("max", "rms", "final")}
+        assert 0 < values["rms"] <= values["max"] < Fraction(1, 10**13)
+        assert values["final"] <= values["max"]
+        series = drift.series(str)[f"drift_{name}"]
+        assert series.times == ["10", "100"]
+        assert exact(series.values[-1]) == values["final"]
+
+
+def test_without_a_sample_the_metrics_are_missing() -> None:
+    drift = Drift(Problem.of(TOP, START, DOUBLE), holding(TOP, START))
+    assert {m.value for m in drift.metrics().values()} == {"missing"}
+    assert {m.log10 for m in drift.metrics().values()} == {None}
+
+
+def test_a_nan_is_never_a_number() -> None:
+    drift = Drift(Problem.of(TOP, START, DOUBLE), holding(TOP, START))
+    drift(Fraction(1), numpy.array([float("nan")] * 6))
+    drift(Fraction(2), numpy.array([float(v) for v in START.flat]))
+    assert drift.metrics()["drift_energy_max"].value == "nan"
+    assert drift.metrics()["drift_energy_rms"].value == "nan"
+
+
+def test_solution_error_of_a_run_started_on_a_known_motion() -> None:
+    known = DeloneHomoclinic(Fraction(5, 4), Fraction(3))
+    for precision in (DOUBLE, QUAD, real(237)):
+        problem = Problem.of(known.top, known.start, precision)
+        error = SolutionError(problem, known, threshold=Fraction(1, 1000))
+        propagate(known.top, known.start, [1, 2, 3, 4], precision, observer=error)
+        values = {k: exact(m.value) for k, m in error.metrics().items()}
+        assert 0 < values["solution_error_omega_max"] < 2000 * precision.eps
+        assert error.break_away is None
+
+
+def test_a_perturbed_start_is_charged_to_the_solution_error_with_its_size() -> None:
+    known = DeloneHomoclinic(Fraction(1), Fraction(2))
+    off = Fraction(1, 2**30)
+    moved = State((known.start.omega[0] + off, *known.start.omega[1:]), known.start.gamma)
+    error = SolutionError(Problem.of(known.top, known.start, QUAD), known)
+    propagate(known.top, moved, ["1/1000"], QUAD, observer=error)
+    assert exact(error.metrics()["solution_error_omega_max"].value) == pytest.approx(off, rel=1e-2)
+
+
+def test_the_split_along_and_across_the_flow_is_pythagoras() -> None:
+    with working_precision(200):
+        delta = [ball(Fraction(v)) for v in (3, 4, 0, 0, 0, 12)]
+        flow = [ball(Fraction(v)) for v in (0, 2, 0, 0, 0, 0)]
+        along, across = split(delta, flow)
+        assert along.overlaps(ball(4))
+        assert (across * across).overlaps(ball(9 + 144))
+        none, everything = split(delta, [ball(0)] * 6)
+        assert none == 0
+        assert everything.overlaps(ball(13))
+        # a pure phase error leaves a rest that is a ball around 0, not NaN
+        along, rest = split([v / 3 for v in flow], flow)
+        assert rest.contains(0)
+        assert root(ball(Fraction(1, 3)) - ball(Fraction(1, 3))).contains(0)
+
+
+def test_what_the_reference_does_not_resolve_is_said_and_bounded() -> None:
+    with working_precision(53):
+        third = ball(Fraction(1, 3))
+        difference = metric(third - ball(Fraction(1, 3)))
+        assert difference.value == "unresolved"
+        assert difference.log10 is None
+        assert float(difference.bound or "") < 1e-15
+        assert text(ball(-1).sqrt()) == "nan"
+        assert metric(ball(-1).sqrt()).value == "nan"
+        assert metric(ball(0)).value == "0"
+    assert of_fraction(Fraction(1, 10**997)).log10 == -997
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, QUAD, real(300)], ids=lambda p: p.name)
+def test_native_numbers_become_exact_balls(precision) -> None:
+    native = number(Fraction(1, 7), precision)
+    with working_precision(400):
+        assert to_ball(native).is_exact()
+        assert to_ball(native) == ball(exact(native))
+        assert not to_ball(number(Fraction(1), precision) * float("inf")).is_finite()

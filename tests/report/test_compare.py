@@ -1,0 +1,235 @@
+"""Comparison: planted changes are found, and nothing that failed counts as the same."""
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.measure.scalar import of_fraction
+from heavytop.precision import exact
+from heavytop.records import SCHEMA, Metric, Report, Row
+from heavytop.report import store
+from heavytop.report.compare import Policy, Verdict, compare
+from heavytop.report.text import short
+
+
+def error(value: str) -> Metric:
+    return of_fraction(exact(value))
+
+
+def row(**changes) -> Row:
+    basis = Row(
+        case="euler",
+        system="heavy_top",
+        integrator="heyoka",
+        precision="double",
+        bits=53,
+        outcome="success",
+        horizon="100",
+        time_reached="100",
+        steps=10,
+        finite=True,
+        metrics={"drift_energy_max": error("1e-12"), "break_away_time": of_fraction(exact("60"), "duration")},
+        measure="drift",
+        against="its own first integrals",
+        flags={"tolerance": "2e-16"},
+    )
+    return msgspec.structs.replace(basis, **changes)
+
+
+def report(*rows: Row) -> Report:
+    return Report(SCHEMA, {"name": "test"}, {"packages": {"heyoka": "7"}}, list(rows))
+
+
+def verdicts(old: Row, new: Row, **policy) -> dict[str, Verdict]:
+    return {f.metric: f.verdict for f in compare(report(old), report(new), Policy(**policy)).findings}
+
+
+def with_metric(value: Metric, name: str = "drift_energy_max") -> Row:
+    return row(metrics={**row().metrics, name: value})
+
+
+def test_a_report_is_the_same_as_itself() -> None:
+    result = compare(report(row()), report(row()), Policy())
+    assert result.verdict == "same"
+    assert result.exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"),
+    [
+        ("3.9e-12", Verdict.SAME),
+        ("4.1e-12", Verdict.WORSE),
+        ("1", Verdict.WORSE),
+        ("2.6e-13", Verdict.SAME),
+        ("2.4e-13", Verdict.BETTER),
+        ("0", Verdict.BETTER),
+    ],
+)
+def test_an_error_may_grow_by_two_bits_and_no_more(value: str, verdict: Verdict) -> None:
+    assert verdicts(row(), with_metric(error(value)))["drift_energy_max"] is verdict
+
+
+def test_errors_below_the_floor_are_rounding_luck() -> None:
+    tiny, small = with_metric(error("1e-25")), with_metric(error("8e-16"))
+    assert verdicts(tiny, small)["drift_energy_max"] is Verdict.SAME
+    assert verdicts(tiny, small, floor=exact("0"))["drift_energy_max"] is Verdict.WORSE
+    assert verdicts(with_metric(error("0")), small)["drift_energy_max"] is Verdict.SAME
+    assert verdicts(with_metric(error("0")), with_metric(error("1e-14")))["drift_energy_max"] is Verdict.WORSE
+
+
+@pytest.mark.parametrize("value", ["nan", "missing"])
+def test_what_is_no_number_is_never_the_same_not_even_as_itself(value: str) -> None:
+    bad = with_metric(Metric(value, None))
+    for old, new in ((row(), bad), (bad, row()), (bad, bad)):
+        assert verdicts(old, new)["drift_energy_max"] is Verdict.INCOMPARABLE
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"outcome": "non_finite", "time_reached": "3"},
+        {"horizon": "200", "time_reached": "200"},
+        {"bits": 64},
+        {"flags": {"tolerance": "1e-9"}},
+        {"flags": {}},
+        {"against": "something else"},
+    ],
+)
+def test_a_failure_another_horizon_format_flag_or_reference_is_incomparable(change) -> None:
+    for old, new in ((row(), row(**change)), (row(**change), row())):
+        result = compare(report(old), report(new), Policy())
+        assert {f.verdict for f in result.findings} == {Verdict.INCOMPARABLE}
+        assert result.exit_code == 3
+    if "outcome" in change:
+        assert verdicts(row(**change), row(**change)) == {"": Verdict.INCOMPARABLE}
+
+
+def test_missing_and_new_rows_and_metrics() -> None:
+    other = row(case="lagrange")
+    result = compare(report(row(), other), report(row()), Policy())
+    assert result.exit_code == 3
+    assert [f.verdict for f in result.findings].count(Verdict.MISSING) == 1
+    result = compare(report(row()), report(row(), other), Policy())
+    assert result.exit_code == 0
+    assert result.verdict == "same"
+    less = row(metrics={"break_away_time": row().metrics["break_away_time"]})
+    assert verdicts(row(), less)["drift_energy_max"] is Verdict.MISSING
+    assert verdicts(less, row())["drift_energy_max"] is Verdict.NEW
+    # another case is not the same row
+    assert {f.verdict for f in compare(report(row()), report(other), Policy()).findings} == {
+        Verdict.MISSING,
+        Verdict.NEW,
+    }
+
+
+def test_durations_are_better_when_longer_and_never_is_longest() -> None:
+    def at(value: str) -> Row:
+        metric = Metric(value, None, "duration") if value == "never" else of_fraction(exact(value), "duration")
+        return with_metric(metric, "break_away_time")
+
+    name = "break_away_time"
+    assert verdicts(row(), at("58"))[name] is Verdict.SAME
+    assert verdicts(row(), at("50"))[name] is Verdict.WORSE
+    assert verdicts(row(), at("70"))[name] is Verdict.BETTER
+    assert verdicts(row(), at("never"))[name] is Verdict.BETTER
+    assert verdicts(at("never"), row())[name] is Verdict.WORSE
+    assert verdicts(at("never"), at("never"))[name] is Verdict.SAME
+
+
+def test_a_value_that_must_agree_is_worse_in_either_direction() -> None:
+    def value(text: str) -> Row:
+        return with_metric(of_fraction(exact(text), "value"), "claim")
+
+    assert verdicts(value("0.25"), value("0.2500000001"))["claim"] is Verdict.SAME
+    assert verdicts(value("0.25"), value("0.26"))["claim"] is Verdict.WORSE
+    assert verdicts(value("0.26"), value("0.25"))["claim"] is Verdict.WORSE
+
+
+def test_worse_outranks_incomparable_and_environments_are_shown() -> None:
+    old = report(row(), row(case="lagrange"))
+    new = report(with_metric(error("1")), row(case="lagrange", outcome="step_limit", time_reached="1"))
+    new.environment["packages"]["heyoka"] = "8"
+    result = compare(old, new, Policy())
+    assert result.exit_code == 1
+    assert result.environment == [("packages.heyoka", "7", "8")]
+
+
+def test_two_empty_reports_are_refused() -> None:
+    with pytest.raises(InputError, match="Neither"):
+        compare(report(), report(), Policy())
+
+
+def test_a_report_comes_back_from_disk_as_it_was(tmp_path: Path) -> None:
+    store.write(report(row()), tmp_path)
+    assert store.read(tmp_path) == report(row())
+    assert store.read(tmp_path / "report.json") == report(row())
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["report.json", "report.json.sha256"]
+
+
+def edited(tmp_path: Path, old: bytes, new: bytes, *, keep_digest: bool = False) -> Path:
+    path = store.write(report(row()), tmp_path)
+    content = path.read_bytes()
+    assert old in content
+    path.write_bytes(content.replace(old, new))
+    if not keep_digest:
+        (tmp_path / "report.json.sha256").unlink()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (b'"1E-12"', b'"1E-13"', "disagree"),
+        (b'"log10": -12.0', b'"log10": null', "disagree"),
+        (b'"time_reached": "100"', b'"time_reached": "99"', "a success that reached only 99"),
+        (b'"1E-12"', b'"much"', "not a finite number"),
+        (b'"value": "1E-12",\n     "log10": -12.0', b'"value": "nan",\n     "log10": null', "said to be finite"),
+        (b"heavytop-report/1", b"other-report/7", "schema"),
+        (b'"steps": 10', b'"steps": "ten"', "not a whole report"),
+        (b'"metrics"', b'"metric"', "not a whole report"),
+    ],
+)
+def test_an_edited_report_is_refused(tmp_path: Path, old: bytes, new: bytes, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        store.read(edited(tmp_path, old, new))
+
+
+def test_any_edit_is_refused_while_the_checksum_lies_beside_the_report(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="was changed since it was written"):
+        store.read(edited(tmp_path, b'"steps": 10', b'"steps": 11', keep_digest=True))
+
+
+@pytest.mark.parametrize("share", [0, 0.1, 0.5, 0.99])
+def test_a_truncated_report_is_refused(tmp_path: Path, share: float) -> None:
+    path = store.write(report(row()), tmp_path)
+    (tmp_path / "report.json.sha256").unlink()
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * share)])
+    with pytest.raises(InputError, match="not a whole report"):
+        store.read(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b'{"schema": 3}', b"\xff\xfe", b"null", b'{"rows": []}'])
+def test_a_foreign_file_is_refused(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "x.json"
+    file.write_bytes(content)
+    with pytest.raises(InputError):
+        store.read(file)
+
+
+def test_a_missing_report_and_a_row_twice_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no report"):
+        store.read(tmp_path)
+    store.write(report(row(), row()), tmp_path)
+    with pytest.raises(InputError, match="twice"):
+        store.read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [("1.2345e-997", "1.23e-997"), ("0", "0"), ("nan", "nan"), ("0.1739", "0.1739"), ("-5", "-5")],
+)
+def test_short_numbers_for_tables(value: str, expected: str) -> None:
+    assert short(value) == expected

@@ -1,0 +1,109 @@
+"""Plans: what ships expands, what is impossible is refused with its place."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.suite.cases import CASES, case
+from heavytop.suite.plan import BUILT_IN, expand, load, log_spaced
+
+MEASURE = '[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "double", horizon = "10" }]\n'
+
+
+def plan_of(tmp_path: Path, text: str):
+    file = tmp_path / "plan.toml"
+    file.write_text(text, "utf-8")
+    return expand(load(str(file))[0])
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_the_plans_that_ship_expand(name: str) -> None:
+    plan, digest = load(name)
+    tasks = expand(plan)
+    assert plan.name == name
+    assert len(digest) == 64
+    assert len({task.label for task in tasks}) == len(tasks) > 10
+
+
+def test_the_default_plan_holds_what_it_promises() -> None:
+    tasks = expand(load("default")[0])
+    horizons = {(t.case.name, t.precision): t.times[-1] for t in tasks if t.kind == "drift"}
+    for name in ("euler", "lagrange", "kovalevskaya", "generic", "gyrostat"):
+        assert horizons[name, "double"] == 10**5
+        assert horizons[name, "extended"] == 10**4
+        assert horizons[name, "quad"] == 10**3
+        assert horizons[name, "real:237"] == 50
+    model = [t for t in tasks if t.kind == "claim_model"]
+    assert {t.name for t in model} == {f"ershkov-partial-{r}/{d}" for r in (2, 6) for d in ("forward", "backward")}
+    assert all({Fraction(1, 10), Fraction(1), Fraction(2)} <= {abs(t) for t in task.keep} for task in model)
+
+
+def test_no_parameter_of_the_five_tops_is_1_where_1_would_hide_a_factor() -> None:
+    for name in ("euler", "lagrange", "kovalevskaya", "generic", "gyrostat"):
+        top, start = CASES[name].top, CASES[name].start
+        assert 1 not in (*top.inertia, top.weight, *top.centre, *start.omega, *start.gamma)
+        start.require_unit_gamma()
+
+
+@pytest.mark.parametrize("name", ["ershkov-partial-2", "ershkov-partial-6", "delone"])
+def test_homoclinic_cases_have_dyadic_data(name: str) -> None:
+    each = case(name)
+    values = (*each.top.inertia, *each.top.moment, *each.start.flat, each.system.parameters(each.top, each.start).rotor)
+    assert all(Fraction(v).denominator & (Fraction(v).denominator - 1) == 0 for v in values)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name = 'x'\nmeasure = []", "measures nothing"),
+        (f"name = 'x'\nsurprise = 1\n{MEASURE}", "unknown field `surprise`"),
+        (f"name = 'x'\n{MEASURE}extra = 1\n", "unknown field `extra`"),
+        (f"name = 'x'\n{MEASURE.replace('drift', 'drifts')}", "drifts"),
+        (f"name = 'x'\n{MEASURE.replace('euler', 'oiler')}", "Unknown case 'oiler'"),
+        (f"name = 'x'\n{MEASURE.replace('double', 'float')}", "Unknown precision 'float'"),
+        (f"name = 'x'\n{MEASURE.replace('10', '-10')}", "positive"),
+        (f"name = 'x'\n{MEASURE.replace('10', 'nan')}", "not a finite number"),
+        (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 0 }')}", "0 samples"),
+        (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 1.5 }')}", "Expected `int`"),
+        (f"name = 'x'\n{MEASURE}{MEASURE}", "twice"),
+        ("name = 'x'\n[[measure]", "not valid"),
+        ("", "name"),
+        ("name='x'\n[[measure]]\nkind='claim_model'\ncases=['euler']\ntimes=['1']", "Nothing is claimed"),
+        ("name='x'\n[[measure]]\nkind='homoclinic'\ncases=['euler']\nprecisions=['double']", "not homoclinic"),
+    ],
+)
+def test_what_is_impossible_is_refused_and_named(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError) as error:
+        plan_of(tmp_path, text)
+    assert message in str(error.value).replace("\n", " ")
+
+
+def test_a_top_of_one_s_own_is_measured_under_its_name(tmp_path: Path) -> None:
+    own = (
+        '[[top]]\nname = "mine"\ninertia = ["3", "2", "1"]\nweight = "1"\ncentre = ["0", "0", "1/3"]\n'
+        'omega = ["1", "0.5", "-2/3"]\ngamma = ["3/5", "0", "4/5"]\n'
+    )
+    (task,) = plan_of(tmp_path, f"name = 'x'\n{own}{MEASURE.replace('euler', 'mine')}")
+    assert task.name == "mine"
+    assert task.case.start.omega[2] == Fraction(-2, 3)
+    with pytest.raises(InputError, match="not a unit vector"):
+        plan_of(tmp_path, f"name = 'x'\n{own.replace('3/5', '2/5')}{MEASURE}")
+    with pytest.raises(InputError, match="built-in"):
+        plan_of(tmp_path, f"name = 'x'\n{own.replace('mine', 'euler')}{MEASURE}")
+
+
+def test_unknown_plans_are_refused() -> None:
+    with pytest.raises(InputError, match="Unknown plan 'huge'"):
+        load("huge")
+    with pytest.raises(InputError, match="cannot be read"):
+        load("nowhere.toml")
+
+
+def test_log_spaced_indices_start_at_1_and_end_at_the_count() -> None:
+    assert log_spaced(1) == [1]
+    picked = log_spaced(1000)
+    assert picked[0] == 1
+    assert picked[-1] == 1000
+    assert 20 <= len(picked) <= 26

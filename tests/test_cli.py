@@ -1,0 +1,297 @@
+"""The command line as a newcomer and as a script meets it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from helpers import VECTORS
+
+COMMAND = [sys.executable, "-m", "heavytop"]
+TINY = """name = "tiny"
+[[measure]]
+kind = "drift"
+cases = ["euler", "kovalevskaya"]
+runs = [{ precision = "double", horizon = "20", samples = 20 }]
+[[measure]]
+kind = "homoclinic"
+cases = ["delone"]
+precisions = ["double"]
+directions = ["forward"]
+"""
+
+
+def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, cwd=cwd, timeout=120, check=False)
+
+
+def top_options(**changes: str) -> list[str]:
+    options = {
+        "inertia": "3,2,1",
+        "weight": "1",
+        "centre": "1/2,1/3,1/5",
+        "omega": "1/10,2/5,9/10",
+        "gamma": "3/5,0,4/5",
+        "times": "8",
+    } | changes
+    return [part for name, value in options.items() for part in (f"--{name}", value)]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("tiny")
+    (folder / "tiny.toml").write_text(TINY)
+    for name in ("one", "two"):
+        done = run("run", "--plan", "tiny.toml", "--out", name, "--workers", "1" if name == "one" else "2", cwd=folder)
+        assert done.returncode == 0, done.stderr
+        assert f"{name}/report.json" in done.stdout
+        assert "Traceback" not in done.stderr
+    return folder
+
+
+def test_propagate_gives_full_precision_strings_that_meet_the_reference() -> None:
+    given = VECTORS[0]
+    done = run("propagate", *top_options(times="1,8"), "--precision", "quad", "--json")
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert [answer[key] for key in ("precision", "bits", "system", "outcome")] == ["quad", 113, "heavy_top", "success"]
+    assert len(answer["times"]) == len(answer["states"]) == 2
+    assert answer["steps"] > 0
+    for value, text in zip(answer["states"][1], given["state"], strict=True):
+        assert abs(Fraction(value) - Fraction(text)) < Fraction(1, 10**31)
+
+
+def test_propagate_prints_for_people_and_carries_the_attitude() -> None:
+    done = run("propagate", *top_options(), "--attitude")
+    assert done.returncode == 0
+    assert "reached every time asked for" in done.stdout
+    assert "ψ" in done.stdout
+    assert "energy" in done.stdout
+    answer = json.loads(run("propagate", *top_options(), "--attitude", "--json").stdout)
+    assert len(answer["states"][0]) == 6
+    assert len(answer["attitude"][0]) == len(answer["angles"][0]) == 3
+    assert "drift_xi_squared_max" in answer["metrics"]
+
+
+def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> None:
+    done = run("propagate", *top_options(times="1,2,900"), "--max-steps", "40", "--json")
+    assert done.returncode == 3
+    answer = json.loads(done.stdout)
+    assert answer["outcome"] == "step_limit"
+    assert len(answer["states"]) == len(answer["times"]) == 2
+    done = run("propagate", *top_options(omega="1e160,1e160,1"), "--json")
+    assert done.returncode == 3
+    assert json.loads(done.stdout)["outcome"] == "non_finite"
+    assert json.loads(done.stdout)["states"] == []
+    assert "stopped" in run("propagate", *top_options(omega="1e160,1e160,1")).stdout
+
+
+@pytest.mark.parametrize(
+    ("changes", "more", "message"),
+    [
+        ({"inertia": "3,0,1"}, [], "I2 = 0 is not positive"),
+        ({"inertia": "3,-2,1"}, [], "I2 = -2 is not positive"),
+        ({"inertia": "3,2"}, [], "inertia has 2 numbers"),
+        ({"omega": "1,x,2"}, [], "omega: 'x' is not a finite number"),
+        ({"omega": "1,nan,2"}, [], "'nan' is not a finite number"),
+        ({"weight": "inf"}, [], "weight: 'inf' is not a finite number"),
+        ({"gamma": "1,1,0"}, [], "--normalize"),
+        ({"gamma": "0,0,0"}, ["--normalize"], "zero vector"),
+        ({"times": ""}, [], "not a finite number"),
+        ({"times": "2,1"}, [], "does not come after"),
+        ({"times": "1,1"}, [], "does not come after"),
+        ({"times": "-1,1"}, [], "different signs"),
+        ({}, ["--precision", "float"], "Unknown precision 'float'"),
+        ({}, ["--precision", "real:12"], "24 to 20000"),
+        ({}, ["--system", "spinning"], "Unknown system 'spinning'"),
+        ({}, ["--system", "gyrostat"], "centre of mass on axis 2"),
+        ({"centre": "0,1,0"}, ["--system", "gyrostat"], "parallel to M"),
+        ({"centre": "0,1,0", "omega": "0,1,0"}, ["--system", "gyrostat"], "M·gamma != 0"),
+        ({}, ["--max-steps", "0"], "allows no step"),
+        ({}, ["--colour", "red"], "--colour"),
+        ({"omega": "1e400,0,0"}, [], "exponent range of double"),
+    ],
+)
+def test_bad_input_gets_a_clear_error_and_exit_2(changes, more, message) -> None:
+    done = run("propagate", *top_options(**changes), *more, "--json")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr
+
+
+def test_normalize_moves_gamma_onto_the_sphere() -> None:
+    done = run("propagate", *top_options(gamma="1,1,0"), "--normalize", "--json")
+    assert done.returncode == 0
+    gamma = [Fraction(v) for v in json.loads(done.stdout)["states"][0][3:]]
+    assert abs(sum(g * g for g in gamma) - 1) < Fraction(1, 10**13)
+
+
+def test_moments_that_no_body_has_are_a_warning() -> None:
+    done = run("propagate", *top_options(inertia="9,2,1"), "--json")
+    assert done.returncode == 0
+    assert "no rigid body has such moments" in done.stderr
+    json.loads(done.stdout)
+
+
+def test_two_runs_of_a_plan_are_the_same_but_for_timings(finished: Path) -> None:
+    one, two = (json.loads((finished / name / "report.json").read_text()) for name in ("one", "two"))
+    for report in (one, two):
+        assert set(report) == {"schema", "plan", "environment", "rows"}
+        for row in report["rows"]:
+            row.pop("seconds", None)
+    assert one["rows"] == two["rows"]
+    assert {row["outcome"] for row in one["rows"]} == {"success"}
+    done = run("compare", "one", "two", "--json", cwd=finished)
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["verdict"] == "same"
+
+
+def test_show_and_compare_print_for_people(finished: Path) -> None:
+    shown = run("show", "one", cwd=finished)
+    assert shown.returncode == 0
+    assert "Drift of first integrals" in shown.stdout
+    assert "kovalevskaya" in shown.stdout
+    compared = run("compare", "one", "two", cwd=finished)
+    assert compared.stdout.startswith("Verdict: same (")
+
+
+def test_a_worse_report_is_found_with_exit_1(finished: Path) -> None:
+    report = json.loads((finished / "one" / "report.json").read_text())
+    metric = report["rows"][0]["metrics"]["drift_energy_max"]
+    metric["value"], metric["log10"] = "0.1", -1.0
+    (finished / "worse.json").write_text(json.dumps(report))
+    done = run("compare", "one", "worse.json", "--json", cwd=finished)
+    assert done.returncode == 1
+    answer = json.loads(done.stdout)
+    assert answer["verdict"] == "worse"
+    (found,) = [row for row in answer["rows"] if row["verdict"] == "worse"]
+    assert found["case"] == "euler"
+    assert found["metric"] == "drift_energy_max"
+    assert run("compare", "worse.json", "one", cwd=finished).returncode == 0
+
+
+def test_a_missing_row_is_incomparable_with_exit_3(finished: Path) -> None:
+    report = json.loads((finished / "one" / "report.json").read_text())
+    report["rows"].pop()
+    (finished / "less.json").write_text(json.dumps(report))
+    assert run("compare", "one", "less.json", cwd=finished).returncode == 3
+    assert run("compare", "less.json", "one", cwd=finished).returncode == 0
+
+
+def test_compare_and_show_refuse_what_is_no_report(finished: Path) -> None:
+    (finished / "cut.json").write_text((finished / "one" / "report.json").read_text()[:500])
+    for arguments in (["show", "nowhere"], ["show", "cut.json"], ["compare", "one", "cut.json"], ["show", "tiny.toml"]):
+        done = run(*arguments, cwd=finished)
+        assert done.returncode == 2
+        assert "heavytop: " in done.stderr
+        assert "Traceback" not in done.stderr
+
+
+def test_a_folder_with_other_content_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "precious.txt").write_text("keep me")
+    (tmp_path / "file").write_text("")
+    for out, message in (("out", "already holds precious.txt"), ("file", "is a file")):
+        done = run("run", "--plan", "tiny.toml", "--out", out, cwd=tmp_path)
+        assert done.returncode == 2
+        assert message in done.stderr
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["precious.txt"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--plan", "huge"], "Unknown plan 'huge'"),
+        (["--plan", "none.toml"], "cannot be read"),
+        (["--plan", "bad.toml"], "unknown field `surprise`"),
+        (["--workers", "0"], "cannot run anything"),
+        (["--resume"], "--out"),
+    ],
+)
+def test_a_bad_run_writes_nothing(tmp_path: Path, arguments: list[str], message: str) -> None:
+    (tmp_path / "bad.toml").write_text('name = "bad"\nmeasure = []\nsurprise = 1\n')
+    done = run("run", *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["bad.toml"]
+
+
+def test_an_interrupted_run_goes_on_where_it_was(tmp_path: Path, finished: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    process = subprocess.Popen(
+        [*COMMAND, "run", "--plan", "tiny.toml", "--out", "out", "--workers", "1"],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+    rows = tmp_path / "out" / "rows.jsonl"
+    deadline = time.monotonic() + 60
+    while process.poll() is None and time.monotonic() < deadline:
+        if rows.exists() and rows.read_bytes().count(b"\n") >= 2:
+            process.send_signal(signal.SIGKILL)
+            break
+        time.sleep(0.002)
+    process.communicate(timeout=60)
+    if process.returncode == -signal.SIGKILL:
+        assert not (tmp_path / "out" / "report.json").exists()
+        with rows.open("ab") as file:
+            file.write(b"deadbeef [0, {")
+        refused = run("run", "--plan", "smoke", "--out", "out", "--resume", cwd=tmp_path)
+        assert refused.returncode == 2
+        assert "belongs to another run" in refused.stderr
+        assert run("run", "--plan", "tiny.toml", "--out", "out", cwd=tmp_path).returncode == 2
+        done = run("run", "--plan", "tiny.toml", "--out", "out", "--resume", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    reports = [json.loads((folder / "report.json").read_text()) for folder in (tmp_path / "out", finished / "one")]
+    for report in reports:
+        for row in report["rows"]:
+            row.pop("seconds", None)
+    assert reports[0]["rows"] == reports[1]["rows"]
+    assert not rows.exists()
+
+
+def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130() -> None:
+    process = subprocess.Popen(
+        [*COMMAND, "propagate", *top_options(times="1e12")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    time.sleep(6)
+    assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    before = time.monotonic()
+    _, errors = process.communicate(timeout=30)
+    assert time.monotonic() - before < 2
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+
+
+def test_help_lists_the_commands_and_loads_nothing_heavy() -> None:
+    done = run("--help")
+    assert done.returncode == 0
+    for name in ("run", "propagate", "compare", "show", "list"):
+        assert name in done.stdout
+    code = "import sys; sys.argv = ['heavytop', '--help']\nfrom heavytop.__main__ import main\ntry: main()\nexcept SystemExit: pass\nprint([m for m in ('heyoka', 'numpy', 'flint', 'matplotlib', 'sympy', 'distributed') if m in sys.modules], file=sys.stderr)"  # noqa: E501
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+
+
+def test_list_names_cases_plans_systems_and_formats() -> None:
+    done = run("list")
+    assert done.returncode == 0
+    for word in ("ershkov-partial-6", "kovalevskaya", "default", "gyrostat", "real:BITS", "113 bits"):
+        assert word in done.stdout
+
+
+def test_a_reader_that_stops_reading_is_no_error() -> None:
+    shell = subprocess.run(
+        ["sh", "-c", f"{sys.executable} -m heavytop list | head -1"], capture_output=True, text=True, check=True,
+        env=os.environ,
+    )  # fmt: skip
+    assert "Traceback" not in shell.stderr
