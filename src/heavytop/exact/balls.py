@@ -76,10 +76,24 @@ def relative_bits(value: arb) -> int:
     """Bits that a ball of size about 1 or larger has right; absolute below 1; -1 if it is not finite."""
     if not value.is_finite():
         return -1
-    rad = radius(value)
-    scale = max(Fraction(1), abs(midpoint(value)))
-    ratio = scale / rad if rad else None
-    return _MAX_BITS if ratio is None else max(0, ratio.numerator.bit_length() - ratio.denominator.bit_length() - 1)
+    if value.is_exact():
+        return _MAX_BITS
+    # exponents only: values like exp(-1e9) have no fraction that fits into memory
+    return min(_MAX_BITS, max(0, max(0, _size(value.mid()) - 1) - _size(value.rad())))
+
+
+def _size(value: arb) -> int:
+    """The smallest e with |value| < 2^e, of an exact ball; a large negative number for 0."""
+    mantissa, exponent = value.man_exp()
+    return int(exponent) + int(mantissa).bit_length() if mantissa else -_MAX_BITS
+
+
+def _graspable(value: arb) -> arb:
+    """``value``, or a ball around 0 with it inside where it is smaller than 2^-_MAX_BITS."""
+    tiny = -_MAX_BITS
+    if (value.is_exact() and value == 0) or max(_size(value.mid()), _size(value.rad())) > tiny:
+        return value
+    return arb(0, arb(2) ** (tiny + 1))
 
 
 def to_bits(evaluate: Callable[[int], list[arb]], bits: int) -> list[arb]:
@@ -95,7 +109,7 @@ def to_bits(evaluate: Callable[[int], list[arb]], bits: int) -> list[arb]:
             values = evaluate(working)
         reached = min(relative_bits(value) for value in values)
         if reached >= bits:
-            return values
+            return [_graspable(value) for value in values]
         working += max(bits - reached, working // 2) if reached >= 0 else working
     raise OutOfReach(
         f"Only {max(reached, 0)} of {bits} bits could be proven.", "Ask for fewer digits or an earlier time."

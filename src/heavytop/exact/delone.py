@@ -1,6 +1,19 @@
-"""The homoclinic Delone motion of the Kovalevskaya top: elementary, from the paper's own data with I1 = I2 = 2 I3.
+"""The Delone class of the Kovalevskaya top, I1 = I2 = 2 I3, c = 0: the motions with ξ = 0, all of them elliptic.
 
-The heavy-top motion from Ω = (0, 0, 2α), γ = (0, 0, 1) at t = 0 with P b = α² I1/2, on the Delone class ξ = 0:
+With n = P r = (n1, n2, 0), w = Ω1 + iΩ2, g = γ1 + iγ2, the class is w² = (n1 + i n2) g/I3, two exact equations.  On it
+the integrals read, with A = Ω·n/|n| (Ω along r) and N = |n|/I3,
+
+    (2A)² + Ω3² = const,   |g|² + γ3² = |γ|²,   2A|g| + Ω3 γ3 = const,   N|g| = |w|²
+
+so that the plane vectors (2A, Ω3) and (|g|, γ3) keep their lengths and their angle and turn together, through b(t):
+
+    b' = −(n × Ω)_3/|n|,   b'² = |w|² − A² = |w0|² cos b − N γ3(0) sin b − (A0 cos b − ½ Ω3(0) sin b)²
+
+y = tan(b/2)/|n| makes that y'² = a quartic with rational coefficients, y(0) = 0, which Biermann and Weierstrass solve
+(:mod:`heavytop.exact.quartic`), and cos b, sin b/|n| follow from numerator and denominator of y, b' from their series.
+r may lie anywhere in the plane, |γ| be anything.  A double root of the quartic leaves hyperbolic or circular functions.
+
+The homoclinic one of them starts at Ω = (0, 0, 2α), γ = (0, 0, 1) with P b = α² I1/2, the paper's own data:
 
     q = tanh²(α t/√2),  sinθ = q/(2 − q),  cosφ = 2 sinθ − 1,  sinφ = −sgn(t) 2 √(sinθ (1 − sinθ)),  ψ = α t
     Ω = ( (α/2) sinφ,  α sinθ,  2 α cosθ ),   γ = ( sinθ sinφ, sinθ cosφ, cosθ )
@@ -10,24 +23,109 @@ In T = tanh(α t/√2), S = sech(α t/√2) no root is left: with d = 1 + S² (=
     sinθ = T²/d,  cosθ = 2 S/d,  sinφ = −2√2 T S/d
 
 It is homoclinic to Ω = (0, α, 0), γ = (0, 1, 0) with rate α/√2.
+Source: Delone's class is Kovalevskaya's of the first degenerate kind, Appelrot; derived here from ξ = 0 and (1.3).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
+from typing import Any
 
-from flint import arb
+from flint import arb, arb_series, ctx
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
+from heavytop.exact.closed_form import ClosedForm, balls, instant, series_length, tanh_sech
+from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 
 @dataclass(frozen=True, slots=True)
-class DeloneHomoclinic:
+class Delone(ClosedForm):
+    """Every motion of the Delone class with the small moment on axis 3.
+
+    Raises NotInClass unless I1 = I2 = 2 I3, P c = 0, P r ≠ 0 and ξ = 0, exactly.
+    """
+
+    top: HeavyTop
+    start: State
+    method: str = "closed form: Delone class of the Kovalevskaya top, Weierstrass functions"
+    system: System = HEAVY_TOP
+
+    def __post_init__(self) -> None:
+        (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
+        remedy = "The class is I1 = I2 = 2 I3, c = 0, (Omega1 + i Omega2)^2 = (P/I3) (a + ib) (gamma1 + i gamma2)."
+        if i1 != i2 or i1 != 2 * i3:
+            raise NotInClass(f"Delone needs I1 = I2 = 2 I3; I1 - I2 = {i1 - i2}, I1 - 2 I3 = {i1 - 2 * i3}.", remedy)
+        if n3 != 0 or n1 == n2 == 0:
+            raise NotInClass(f"Delone needs P c = 0 and P r != 0, but P r = ({n1}, {n2}, {n3}).", remedy)
+        (w1, w2, _), (g1, g2, _) = self.start.omega, self.start.gamma
+        xi = w1 * w1 - w2 * w2 - (n1 * g1 - n2 * g2) / i3, 2 * w1 * w2 - (n1 * g2 + n2 * g1) / i3
+        if any(xi):
+            raise NotInClass(f"Delone needs xi = 0, but xi = {xi[0]} + i ({xi[1]}).", remedy)
+
+    def evaluate(self, time: Fraction) -> list[arb_series]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        length = ctx.cap
+        with series_length(length + 1):
+            cosine, sine = self._turn(time)
+            square, along, _, weight = (ball(value) for value in _constants(self))
+            # the component across r is −b': one more coefficient, then one less
+            across = -square * (cosine * sine.derivative() - sine * cosine.derivative())
+        n1, n2, _ = balls(self.top.moment)
+        w3, g3, i3 = (ball(v) for v in (self.start.omega[2], self.start.gamma[2], self.top.inertia[2]))
+        forward = along * cosine - w3 * square / 2 * sine
+        first, second = (n1 * forward - n2 * across) / square, (n2 * forward + n1 * across) / square
+        real, imaginary = first * first - second * second, 2 * first * second
+        state = [
+            first,
+            second,
+            w3 * cosine + 2 * along * sine,
+            i3 / square * (n1 * real + n2 * imaginary),
+            i3 / square * (n1 * imaginary - n2 * real),
+            g3 * cosine + i3 * weight * sine,
+        ]
+        return [arb_series(part, prec=length) for part in state]
+
+    def _turn(self, time: Fraction) -> tuple[Any, Any]:
+        """cos b and sin b/|n|."""
+        motion = _prepared(self, ctx.prec)
+        point = motion.lattice.point(time, ctx.cap)
+        below, above = motion.denominator(point), motion.numerator(point)
+        square = ball(_constants(self)[0])
+        total = below * below + square * (above * above)
+        return (below * below - square * (above * above)) / total, 2 * (above * below) / total
+
+
+def _constants(case: Delone) -> tuple[Fraction, Fraction, Fraction, Fraction]:
+    """|n|², Ω·n, (n × Ω)_3 and |w|² at t = 0."""
+    n1, n2, _ = case.top.moment
+    w1, w2, _ = case.start.omega
+    return n1 * n1 + n2 * n2, n1 * w1 + n2 * w2, n1 * w2 - n2 * w1, w1 * w1 + w2 * w2
+
+
+@lru_cache(maxsize=64)
+def _prepared(case: Delone, _bits: int) -> PreparedMotion:
+    square, along, across, weight = _constants(case)
+    spin, lift = case.start.omega[2], case.start.gamma[2] / case.top.inertia[2]
+    # (weight − 2 s lift y − s weight y²)(1 + s y²) − (along − spin s y − s along y²)²/s with s = |n|², over 4 s
+    coefficients = (
+        weight - along**2 / square,
+        2 * along * spin - 2 * square * lift,
+        2 * along**2 - square * spin**2,
+        -2 * square**2 * lift - 2 * along * spin * square,
+        -(square**2) * weight - square * along**2,
+    )
+    quartic = tuple(c / (4 * square) for c in coefficients)
+    return QuarticMotion(quartic, Fraction(0), -across / (2 * square)).prepared()
+
+
+@dataclass(frozen=True, slots=True)
+class DeloneHomoclinic(ClosedForm):
     """The heavy-top motion that (4.2)-(4.6) should have been for I1 = I2 = 2 I3.
 
     alpha: α > 0, 1/time.  i1: I1 = I2 = 2 I3 > 0.  Raises NotInClass outside.
@@ -52,31 +150,27 @@ class DeloneHomoclinic:
         """The state at t = 0."""
         return State((0, 0, 2 * self.alpha), (0, 0, 1))
 
-    def _sines(self, time: Fraction) -> tuple[arb, arb, arb, arb]:
-        """(sinφ, cosφ, sinθ, cosθ)."""
-        x = ball(self.alpha * time) / arb(2).sqrt()
-        tanh, sech = x.tanh(), x.sech()
+    def _sines(self, time: Fraction) -> tuple[Any, Any, Any, Any]:
+        """(sinφ, cosφ, sinθ, cosθ) as power series."""
+        tanh, sech = tanh_sech(ball(self.alpha) / arb(2).sqrt() * instant(time))
         d = 1 + sech * sech
         sin_theta, cos_theta = tanh * tanh / d, 2 * sech / d
         # 1 - sinθ = 2 S²/d, so the root is exact and odd in t
-        return -tanh * sech * arb(8).sqrt() / d, 2 * sin_theta - 1, sin_theta, cos_theta
+        return -arb(8).sqrt() * (tanh * sech) / d, 2 * sin_theta - 1, sin_theta, cos_theta
 
-    def state(self, time: Fraction, bits: int) -> list[arb]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
-
-        def evaluate(_working: int) -> list[arb]:
-            alpha = ball(self.alpha)
-            sin_phi, cos_phi, sin_theta, cos_theta = self._sines(time)
-            omega = [alpha * sin_phi / 2, alpha * sin_theta, 2 * alpha * cos_theta]
-            return [*omega, sin_theta * sin_phi, sin_theta * cos_phi, cos_theta]
-
-        return to_bits(evaluate, bits)
+    def evaluate(self, time: Fraction) -> list[arb_series]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        alpha = ball(self.alpha)
+        sin_phi, cos_phi, sin_theta, cos_theta = self._sines(time)
+        omega = [alpha / 2 * sin_phi, alpha * sin_theta, 2 * alpha * cos_theta]
+        return [*omega, sin_theta * sin_phi, sin_theta * cos_phi, cos_theta]
 
     def angles(self, time: Fraction, bits: int) -> list[arb]:
         """(φ, θ, ψ), continuous for all t: θ in [0, π/2), φ rising from 0 through π at t = 0 to 2π."""
 
         def evaluate(_working: int) -> list[arb]:
-            sin_phi, cos_phi, sin_theta, cos_theta = self._sines(time)
+            with series_length(1):
+                sin_phi, cos_phi, sin_theta, cos_theta = (part[0] for part in self._sines(time))
             phi = arb.pi() + arb.atan2(-sin_phi, -cos_phi)
             return [phi, arb.atan2(sin_theta, cos_theta), ball(self.alpha * time)]
 

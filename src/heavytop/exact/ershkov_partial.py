@@ -15,18 +15,18 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from flint import arb
+from flint import arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
+from heavytop.exact.closed_form import ClosedForm, instant, tanh_sech
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 
-def hyperbolic(alpha: Any, ratio: Any, s: Any, lib: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any]]:
-    """(Ω, γ) at s = k t/2, over any ring; ``lib`` offers tanh and cosh."""
-    tanh, sech = lib.tanh(s), 1 / lib.cosh(s)
+def hyperbolic(alpha: Any, ratio: Any, tanh: Any, sech: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any]]:
+    """(Ω, γ) from tanh s and sech s, s = k t/2, over any ring."""
     gamma = (-tanh * sech, tanh * tanh, sech)
     return (alpha * gamma[0], alpha * gamma[1], alpha * ratio * gamma[2]), gamma
 
@@ -37,7 +37,7 @@ def hyperbolic_angles(s: Any, lib: Any) -> tuple[Any, Any]:
 
 
 @dataclass(frozen=True, slots=True)
-class ErshkovPartial:
+class ErshkovPartial(ClosedForm):
     """The homoclinic gyrostat motion from Ω = (0, 0, ρ α), γ = (0, 0, 1) at t = 0.
 
     alpha: α > 0, 1/time.  i1, i3: I1 = I2 > I3 > 0.  Raises NotInClass outside.
@@ -71,16 +71,11 @@ class ErshkovPartial:
         """The state at t = 0."""
         return State((0, 0, self.alpha * self.i1 / self.i3), (0, 0, 1))
 
-    def state(self, time: Fraction, bits: int) -> list[arb]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
-
-        def evaluate(_working: int) -> list[arb]:
-            s = ball(self.rate * time / 2)
-            alpha, ratio = ball(self.alpha), ball(self.i1 / self.i3)
-            omega, gamma = hyperbolic(alpha, ratio, s, FUNCTIONS)
-            return [*omega, *gamma]
-
-        return to_bits(evaluate, bits)
+    def evaluate(self, time: Fraction) -> list[arb_series]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        tanh, sech = tanh_sech(ball(self.rate / 2) * instant(time))
+        omega, gamma = hyperbolic(ball(self.alpha), ball(self.i1 / self.i3), tanh, sech)
+        return [*omega, *gamma]
 
     def angles(self, time: Fraction, bits: int) -> list[arb]:
         """(φ, θ, ψ), continuous for all t; θ takes the sign of −t."""

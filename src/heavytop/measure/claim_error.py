@@ -154,7 +154,7 @@ def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, fo
 def stable_case(alpha: Any, i1: Any, i3: Any, t: Any, lib: Any) -> Values:
     """The same motion in the forms that lose no digits, over any ring; smooth branch."""
     s = alpha * ((i1 - i3) / i3) * t / 2
-    omega, gamma = hyperbolic(alpha, i1 / i3, s, lib)
+    omega, gamma = hyperbolic(alpha, i1 / i3, lib.tanh(s), 1 / lib.cosh(s))
     phi, theta = hyperbolic_angles(s, lib)
     return Values(omega, gamma, phi, theta, alpha * t * ((i1 + i3) / i3) / 2)
 

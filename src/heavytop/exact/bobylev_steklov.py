@@ -1,0 +1,130 @@
+"""Bobylev-Steklov: r on axis 1, I1 = 2 I3, any I2, Ω2 = 0 and Ω1 = p constant.
+
+With n1 = P a and x = Ω3 the equations for Ω1, Ω2 and γ hold with
+
+    γ3 = I3 p x/n1,   γ1 = (h − ½ I3 x²)/n1,   γ2 = −I3 x'/n1
+    x'² = ¼ (α − x²)(x² − β),   α, β = 2B ± 2√(B² + C),   B = h/I3 − p²,   C = (|γ|² n1² − h²)/I3²
+
+(h is I3 p² less than the constant of the same name in the energy.)  With σ the sign of x at t = 0, u = ω t + u0:
+
+    β ≤ 0:  x = σ √α cn(u|m),  ω² = (α − β)/4,  m = α/(α − β);     β > 0:  x = σ √α dn(u|m),  ω² = α/4,  m = 1 − β/α
+
+β = 0 (C = 0) is the separatrix.  p = 0 is a pendulum.
+Source: Leimanis, The General Problem of the Motion of Coupled Rigid Bodies about a Fixed Point; DLMF 22.13.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+from flint import arb, arb_series, ctx
+
+from heavytop.errors import InputError, NotInClass
+from heavytop.exact.balls import ball
+from heavytop.exact.closed_form import ClosedForm, balls, half_angle, instant, sign
+from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
+from heavytop.top.equations import HEAVY_TOP, System, heavy_top
+from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
+
+
+@dataclass(frozen=True, slots=True)
+class BobylevSteklov(ClosedForm):
+    """Every Bobylev-Steklov motion with r on axis 1 and I1 = 2 I3.  Raises NotInClass where an equality fails."""
+
+    top: HeavyTop
+    start: State
+    method: str = "closed form: Bobylev-Steklov, Jacobi functions"
+    system: System = HEAVY_TOP
+
+    def __post_init__(self) -> None:
+        (i1, _, i3), n = self.top.inertia, self.top.moment
+        p, w2, w3 = self.start.omega
+        remedy = "`bobylev_steklov_motion` builds a top with such a motion."
+        if n[0] == 0 or n[1] != 0 or n[2] != 0:
+            raise NotInClass(f"Bobylev-Steklov needs r on axis 1, P r != 0; P r = ({', '.join(map(str, n))}).", remedy)
+        if i1 != 2 * i3:
+            raise NotInClass(f"Bobylev-Steklov needs I1 = 2 I3, but I1 - 2 I3 = {i1 - 2 * i3}.", remedy)
+        if w2 != 0:
+            raise NotInClass(f"Bobylev-Steklov needs Omega2 = 0, but Omega2 = {w2}.", remedy)
+        off = n[0] * self.start.gamma[2] - i3 * p * w3
+        if off != 0:
+            raise NotInClass(f"P a gamma3 - I3 Omega1 Omega3 = {off}, not 0.", remedy)
+
+    def evaluate(self, time: Fraction) -> list[arb_series]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        field = heavy_top(self.system.parameters(self.top, self.start), self.start.flat)
+        if not any(field):
+            return [arb_series([value], prec=ctx.cap) for value in balls(self.start.flat)]
+        x, slope = _lattice(self, ctx.prec).motion(instant(time))
+        p, n1, i3 = ball(self.start.omega[0]), ball(self.top.moment[0]), ball(self.top.inertia[2])
+        constant = arb_series([p], prec=ctx.cap)
+        gamma1 = (ball(_height(self)) - i3 / 2 * (x * x)) / n1
+        return [constant, arb_series([0], prec=ctx.cap), x, gamma1, -i3 / n1 * slope, i3 * p / n1 * x]
+
+
+@dataclass(frozen=True, slots=True)
+class _Lattice:
+    """All that does not depend on the time: amplitude = σ√α, crossing where x goes through 0 (cn, not dn)."""
+
+    functions: Jacobi
+    rate: arb
+    origin: arb
+    amplitude: arb
+    crossing: bool
+
+    def motion(self, time: arb_series) -> tuple[Any, Any]:
+        """(x, x')."""
+        sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
+        if self.crossing:
+            return self.amplitude * cn, -self.amplitude * self.rate * (sn * dn)
+        return self.amplitude * dn, -self.amplitude * self.rate * self.functions.parameter * (sn * cn)
+
+
+def _height(case: BobylevSteklov) -> Fraction:
+    """h = n1 γ1 + ½ I3 Ω3²."""
+    return case.top.moment[0] * case.start.gamma[0] + case.top.inertia[2] * case.start.omega[2] ** 2 / 2
+
+
+@lru_cache(maxsize=64)
+def _lattice(case: BobylevSteklov, _bits: int) -> _Lattice:
+    i3, n1, (p, _, x), gamma = case.top.inertia[2], case.top.moment[0], case.start.omega, case.start.gamma
+    h, speed, square = _height(case), -n1 * gamma[1] / i3, x * x
+    b, c = h / i3 - p * p, (dot(gamma, gamma) * n1 * n1 - h * h) / i3**2
+    spread = 2 * ball(b * b + c).sqrt()
+    larger = spread + ball(2 * abs(b))
+    # of two quantities with a known product, the one that cancels comes from the other
+    alpha, beta = (larger, ball(-4 * c) / larger) if b >= 0 else (ball(4 * c) / larger, -larger)
+    near = spread + ball(abs(square - 2 * b))
+    far = ball(4 * speed * speed) / near
+    below, above = (near, far) if square >= 2 * b else (far, near)
+    crossing = c >= 0
+    if crossing:
+        functions = jacobi(alpha / (2 * spread) if c else arb(1), -beta / (2 * spread))
+        rate = (spread / 2).sqrt()
+        origin = legendre_f(above / alpha, ball(square) / alpha, below / (2 * spread))
+    else:
+        functions = jacobi(2 * spread / alpha, beta / alpha)
+        rate = alpha.sqrt() / 2
+        origin = legendre_f(above / (2 * spread), below / (2 * spread), ball(square) / alpha)
+    side = sign(x)
+    return _Lattice(functions, rate, sign(-speed) * side * origin, side * alpha.sqrt(), crossing)
+
+
+def bobylev_steklov_motion(
+    inertia: tuple[Fraction, Fraction], moment: Fraction, rate: Fraction, tilt: Fraction, azimuth: Fraction
+) -> BobylevSteklov:
+    """A top of weight 1 with a Bobylev-Steklov motion and a start on it with |γ| = 1, all rational.
+
+    inertia: (I2, I3); I1 = 2 I3.  moment: a ≠ 0.  rate: Ω1 = p ≠ 0.  tilt, azimuth: tangents of half the angles in
+    γ = (cos tilt cos azimuth, cos tilt sin azimuth, sin tilt).  Raises InputError for a or p = 0.
+    """
+    if moment == 0 or rate == 0:
+        raise InputError(f"a = {moment}, p = {rate}.", "Give a centre of mass and a rate that are not 0.")
+    i2, i3 = inertia
+    (across, up), (cosine, sine) = half_angle(tilt), half_angle(azimuth)
+    gamma: Vector = (across * cosine, across * sine, up)
+    top = HeavyTop((2 * i3, i2, i3), 1, (moment, 0, 0))
+    return BobylevSteklov(top, State((rate, 0, moment * up / (i3 * rate)), gamma))

@@ -1,0 +1,91 @@
+"""Which closed form a motion has: exact rational tests on the exact data, up to a renaming of the axes.
+
+Constants first, then elementary functions, then elliptic ones; the validated enclosure for every other motion.
+Each case class makes its own test: its constructor raises NotInClass, saying which equality failed and by how much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from heavytop.errors import NotInClass
+from heavytop.exact.axes import ALL, CYCLIC, Axes, Renamed, inverse, renamed_state, renamed_top
+from heavytop.exact.bobylev_steklov import BobylevSteklov
+from heavytop.exact.delone import Delone, DeloneHomoclinic
+from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.exact.euler import Euler
+from heavytop.exact.grioli import Grioli
+from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.lagrange import Lagrange
+from heavytop.exact.pendulum import Pendulum
+from heavytop.exact.solution import ExactSolution
+from heavytop.exact.staude import Staude
+from heavytop.exact.validated import Validated
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+Case = Callable[[HeavyTop, State], ExactSolution]
+
+_KEEP: tuple[Axes, ...] = ALL[:1]
+
+
+def _delone_homoclinic(top: HeavyTop, start: State) -> ExactSolution:
+    return _same(DeloneHomoclinic(start.omega[2] / 2, top.inertia[0]), top, start)
+
+
+def _ershkov_partial(top: HeavyTop, start: State) -> ExactSolution:
+    i1, _, i3 = top.inertia
+    return _same(ErshkovPartial(start.omega[2] * i3 / i1, i1, i3), top, start)
+
+
+def _same(found: ExactSolution, top: HeavyTop, start: State) -> ExactSolution:
+    """The motion found; raises NotInClass unless its top and start are these, exactly."""
+    if (found.top, found.start) != (top, start):
+        raise NotInClass(f"{found.method} is of another top or start.", f"It starts from {found.start.flat}.")
+    return found
+
+
+def _permanent_gyrostat(top: HeavyTop, start: State) -> ExactSolution:
+    return Staude(top, start, GYROSTAT)
+
+
+# the case, and the namings of the axes under which it looks different
+_HEAVY_TOP: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
+    (Staude, _KEEP),
+    (Grioli, CYCLIC),
+    (_delone_homoclinic, ALL),
+    (Euler, _KEEP),
+    (Pendulum, _KEEP),
+    (Lagrange, CYCLIC),
+    (BobylevSteklov, ALL),
+    (Delone, CYCLIC),
+)
+_GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
+    (_permanent_gyrostat, _KEEP),
+    (_ershkov_partial, _KEEP),
+    (Gyrostat.of, _KEEP),
+)
+
+
+def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator[ExactSolution]:
+    """Every closed form of this motion, the simplest first; none for a motion that has none here.
+
+    Raises InputError where the system does not admit the top and start.
+    """
+    system.parameters(top, start)
+    for case, namings in _GYROSTAT if system is GYROSTAT else _HEAVY_TOP:
+        for axes in namings:
+            try:
+                found = case(renamed_top(top, axes), renamed_state(start, axes))
+            except NotInClass:
+                continue
+            yield found if axes == _KEEP[0] else Renamed(found, inverse(axes))
+            break
+
+
+def find(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> ExactSolution:
+    """The simplest closed form of this motion, or its validated enclosure.
+
+    Raises InputError where the system does not admit the top and start.
+    """
+    return next(matches(top, start, system), None) or Validated(top, start, system)

@@ -1,0 +1,155 @@
+"""What the closed forms share: one formula over power series serves the state, its series and the attitude.
+
+A closed form is written once, over power series in ε at t + ε.  Its coefficients of ε^0 are the state; more of them
+are the series whose residual proves the form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+from flint import acb_series, arb, arb_series, ctx
+
+from heavytop.exact.balls import ball, to_bits, working_precision
+from heavytop.exact.motion import enough_bits, initial_xi
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+
+Carry = Callable[[Sequence[Any]], list[Any]]
+"""Takes the body components at t = 0 of a vector fixed in space to those at the time in question."""
+
+
+@contextmanager
+def series_length(length: int) -> Iterator[None]:
+    """FLINT's cap on the length of power series set to ``length`` within the block."""
+    before = ctx.cap
+    ctx.cap = length
+    try:
+        yield
+    finally:
+        ctx.cap = before
+
+
+def instant(time: Fraction) -> arb_series:
+    """The power series t + ε, of the length set by :func:`series_length`."""
+    return arb_series([ball(time), 1], prec=ctx.cap)
+
+
+def real_part(series: acb_series) -> arb_series:
+    """The series of the real parts of the coefficients."""
+    return arb_series([c.real for c in series.coeffs()], prec=ctx.cap)
+
+
+def imaginary_part(series: acb_series) -> arb_series:
+    """The series of the imaginary parts of the coefficients."""
+    return arb_series([c.imag for c in series.coeffs()], prec=ctx.cap)
+
+
+def balls(vector: Sequence[Fraction]) -> list[arb]:
+    """The components of an exact vector as balls."""
+    return [ball(component) for component in vector]
+
+
+def sign(value: Fraction) -> int:
+    """+1, −1, or +1 for 0: the factor that keeps a root on the side where the start lies."""
+    return -1 if value < 0 else 1
+
+
+def half_angle(tangent: Fraction) -> tuple[Fraction, Fraction]:
+    """(cos, sin) of the angle with this tangent of its half: a rational point of the circle."""
+    square = Fraction(tangent) ** 2
+    return (1 - square) / (1 + square), 2 * Fraction(tangent) / (1 + square)
+
+
+def turned(vector: Sequence[Any], omega: Sequence[arb], rate: arb, time: arb_series) -> list[Any]:
+    """The solution of v' = v × Ω for a constant Ω of length ``rate`` > 0, at ``time``."""
+    sine, cosine = arb_series.sin_cos(rate * time)
+    axis = [component / rate for component in omega]
+    along = dot(axis, vector)
+    across = cross(vector, axis)
+    return [along * n + cosine * (v - along * n) + sine * w for n, v, w in zip(axis, vector, across, strict=True)]
+
+
+def tanh_sech(argument: arb_series) -> tuple[arb_series, arb_series]:
+    """(tanh, sech) of a series; nothing grows, whatever the sign and size of its first coefficient."""
+    side = -1 if argument[0] < 0 else 1
+    decay = (-side * argument).exp()
+    total = 1 + decay * decay
+    return side * (1 - decay * decay) / total, 2 * decay / total
+
+
+class ClosedForm:
+    """A motion given by one formula, :meth:`motion`, over power series.
+
+    Mixed into the dataclass of each case, which brings ``top``, ``start`` and ``method``.
+    """
+
+    __slots__ = ()
+    system: System = HEAVY_TOP
+
+    if TYPE_CHECKING:  # a property here would become the default of the dataclass fields
+
+        @property
+        def top(self) -> HeavyTop: ...
+
+        @property
+        def start(self) -> State: ...
+
+    def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
+        """Ω at the series ``time``, and what carries vectors fixed in space there, at FLINT's working precision."""
+        raise NotImplementedError
+
+    def evaluate(self, time: Fraction) -> list[arb_series]:
+        """The six components at ``time`` + ε, at FLINT's working precision and length of series."""
+        omega, carry = self.motion(instant(time))
+        return [*omega, *carry(balls(self.start.gamma))]
+
+    def _at(self, time: Fraction, working: int) -> list[arb_series]:
+        with working_precision(enough_bits(working, time)):
+            return self.evaluate(time)
+
+    def state(self, time: Fraction, bits: int) -> list[arb]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+        with series_length(1):
+            return to_bits(lambda working: [constant(part) for part in self._at(time, working)], bits)
+
+    def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+        found: list[arb_series] = []
+
+        def evaluate(working: int) -> list[arb]:
+            found[:] = [arb_series(part, prec=length) for part in self._at(time, working)]
+            return [part[0] for part in found]
+
+        with series_length(length):
+            to_bits(evaluate, bits)
+        return found
+
+
+class WithAttitude(ClosedForm):
+    """A closed form that also carries vectors fixed in space."""
+
+    __slots__ = ()
+
+    def attitude(self, time: Fraction, bits: int, initial: Sequence[Fraction] | None = None) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components.
+
+        ``initial``: ξ at t = 0; :func:`heavytop.exact.motion.initial_xi` of γ if not given.
+        """
+
+        def evaluate(working: int) -> list[arb]:
+            with working_precision(enough_bits(working, time)):
+                xi = initial_xi(self.start.gamma) if initial is None else balls(initial)
+                _, carry = self.motion(instant(time))
+                return [constant(part) for part in carry(xi)]
+
+        with series_length(1):
+            return to_bits(evaluate, bits)
+
+
+def constant(value: Any) -> arb:
+    """The coefficient of ε^0 of a series, or the ball itself."""
+    return value[0] if isinstance(value, arb_series) else arb(value)

@@ -1,0 +1,202 @@
+"""The gyrostat: M' = M × ω, γ' = γ × ω, ω = Ω + λ e2, for any inertia, rotor and start.
+
+What the paper's (2.1)-(2.4) solve exactly, with λ = P b/(M·γ) and γ = M/C0 (Zhukovsky 1885, Volterra 1899; Wittenburg,
+Dynamics of Multibody Systems, 3.2).  Integrals m² = |M|² and h = ½ M·Ω + λ M2.  With k = 1/I1 − 1/I3 and x = M2,
+(2.4) and (2.2) read k M1² = q1(x), k M3² = q3(x), and (2.3) is x'² = q1 q3, inverted by Biermann-Weierstrass:
+
+    q1 = 2h − m²/I3 − 2λ x − (1/I2 − 1/I3) x²,    q3 = −[2h − m²/I1 − 2λ x − (1/I2 − 1/I1) x²],    x' = k M1 M3
+
+No root is taken: M1 and M3 are functions of the second kind, V = the half-period ω_e of the root that goes with the
+factors, e = (½ a1 b1 − a0 b2 − a2 b0)/6 for q1 = a0 + a1 x + a2 x², q3 = b0 + b1 x + b2 x², so signs follow the flow.
+
+γ, or any vector fixed in space, has a constant part along M; the part Γ across it makes Z = M × Γ − i m Γ, with
+M × Z = −i m Z.
+Z1, Z3 are of the second kind too.  M2's azimuth about M moves at m (2h − m²/I2 − 2λx)/(m² − x²) + m/I2, which
+is what Z2 turns by; adding ω_e to its V gives that of Z1, Z3:
+
+    ℘(V) = e − k² m²/4,    ℘'(V) = ½ i k² m³ ν,    κ = ½ m (1/I1 + 1/I3),    ν = 1/(2I2) − ½ (1/I1 + 1/I3) + h/m²
+
+Z2 = i (M3 Z1 − M1 Z3)/m.  Valid for every start; λ = 0 is Euler's free top.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+from flint import arb, arb_series
+
+from heavytop.exact.balls import ball, to_bits, working_precision
+from heavytop.exact.motion import enough_bits, initial_xi, rotate, series_at, taylor, turned
+from heavytop.exact.quartic import Companion, PreparedMotion, QuarticMotion, Winding
+from heavytop.exact.weierstrass import Point, imag, real
+from heavytop.top.equations import GYROSTAT, Parameters, System, gyrostat, rotor
+from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
+
+_ZERO, _ONE = Fraction(0), Fraction(1)
+_UNITS: tuple[Vector, ...] = ((_ONE, _ZERO, _ZERO), (_ZERO, _ONE, _ZERO), (_ZERO, _ZERO, _ONE))
+
+
+@dataclass(frozen=True, slots=True)
+class Gyrostat:
+    """The motion of the gyrostat with rotor λ = ``rotor`` from any start, γ of any length and direction."""
+
+    top: HeavyTop
+    start: State
+    rotor: Fraction
+    method: str = "closed form: gyrostat, Weierstrass functions of M2"
+    system: System = GYROSTAT
+
+    @classmethod
+    def of(cls, top: HeavyTop, start: State) -> Gyrostat:
+        """The paper's gyrostat, λ = P b/(M·γ); raises InputError outside a = c = 0, M ∥ γ, M·γ != 0."""
+        return cls(top, start, Fraction(rotor(top, start)))
+
+    @property
+    def parameters(self) -> Parameters:
+        """The parameters of the field, with this motion's own rotor."""
+        return Parameters(self.top.inertia, self.top.moment, self.rotor)
+
+    @property
+    def momentum(self) -> Vector:
+        """M at t = 0."""
+        return self.top.angular_momentum(self.start.omega)
+
+    @property
+    def angular_velocity(self) -> Vector:
+        """ω = Ω + λ e2 at t = 0."""
+        first, second, third = self.start.omega
+        return first, second + self.rotor, third
+
+    @property
+    def permanent(self) -> bool:
+        """Whether M is at rest in the body: ω ∥ M, or nothing moves."""
+        return not any(cross(self.momentum, self.angular_velocity))
+
+    def state(self, time: Fraction, bits: int) -> list[arb]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+        return to_bits(lambda working: self._evaluate(time, 0, working), bits)
+
+    def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+        return series_at(lambda working, count: self._evaluate(time, count, working), length, bits)
+
+    def attitude(self, time: Fraction, bits: int, xi: Vector | None = None) -> list[arb]:
+        """ξ at ``time``; at t = 0 it is ``xi`` (any vector fixed in space) or the default one ⟂ γ."""
+
+        def evaluate(working: int) -> list[arb]:
+            inside = enough_bits(working, time)
+            with working_precision(inside):
+                if xi is not None:
+                    return self._carried(xi, time, 0, inside)
+                images = [self._carried(unit, time, 0, inside) for unit in _UNITS]
+                start = initial_xi(self.start.gamma)
+                return [dot(start, [image[axis] for image in images]) for axis in range(3)]
+
+        return to_bits(evaluate, bits)
+
+    def _evaluate(self, time: Fraction, length: int, working: int) -> list[Any]:
+        bits = enough_bits(working, time)
+        with working_precision(bits):
+            momentum, point, denominator = self._momentum(time, length, bits)
+            omega = [m * (1 / ball(i)) for m, i in zip(momentum, self.top.inertia, strict=True)]
+            gamma = self._fixed(self.start.gamma, momentum, point, denominator, bits)
+            return [*omega, *gamma]
+
+    def _carried(self, vector: Vector, time: Fraction, length: int, bits: int) -> list[Any]:
+        momentum, point, denominator = self._momentum(time, length, bits)
+        return self._fixed(vector, momentum, point, denominator, bits)
+
+    def _momentum(self, time: Fraction, length: int, bits: int) -> tuple[list[Any], Point, Any]:
+        prepared = _prepared(self, bits)
+        point = prepared.motion.lattice.point(time, length)
+        if self.permanent:
+            return [point.time * 0 + ball(m) for m in self.momentum], point, None
+        denominator = prepared.motion.denominator(point)
+        first, third = (real(companion.at(point, denominator)) for companion in prepared.momentum)
+        return [first, prepared.motion.position(point, denominator), third], point, denominator
+
+    def _fixed(self, vector: Vector, momentum: list[Any], point: Point, denominator: Any, bits: int) -> list[Any]:
+        """A vector fixed in space, in body components at the point."""
+        if self.permanent:
+            return rotate(vector, self.angular_velocity, point.time)
+        square = dot(self.momentum, self.momentum)
+        share = dot(vector, self.momentum) / square
+        along = [m * ball(share) for m in momentum]
+        if not any(cross(vector, self.momentum)):
+            return along
+        m = ball(square).sqrt()
+        first, third = (c.at(point, denominator) for c in _companions(self, vector, bits))
+        second = real(first) * momentum[2] - real(third) * momentum[0]
+        across = (imag(first) * (-1 / m), second * (-1 / ball(square)), imag(third) * (-1 / m))
+        return [a + b for a, b in zip(along, across, strict=True)]
+
+    def factors(self) -> tuple[tuple[Fraction, Fraction, Fraction], tuple[Fraction, Fraction, Fraction]]:
+        """q1 and q3, each as the coefficients of 1, x, x²."""
+        energy, square, (i1, i2, i3) = self.energy, dot(self.momentum, self.momentum), self.top.inertia
+        first = (2 * energy - square / i3, -2 * self.rotor, 1 / i3 - 1 / i2)
+        third = (square / i1 - 2 * energy, 2 * self.rotor, 1 / i2 - 1 / i1)
+        return first, third
+
+    @property
+    def energy(self) -> Fraction:
+        """h = ½ M·Ω + λ M2."""
+        return Fraction(dot(self.momentum, self.start.omega) / 2 + self.rotor * self.momentum[1])
+
+    def quartic(self) -> QuarticMotion:
+        """x = M2, x'² = q1 q3, x' = k M1 M3."""
+        (a0, a1, a2), (b0, b1, b2) = self.factors()
+        m1, m2, m3 = self.momentum
+        i1, _, i3 = self.top.inertia
+        product = (a0 * b0, a0 * b1 + a1 * b0, a0 * b2 + a1 * b1 + a2 * b0, a1 * b2 + a2 * b1, a2 * b2)
+        return QuarticMotion(product, m2, (1 / i1 - 1 / i3) * m1 * m3)
+
+    def root(self) -> Fraction:
+        """e, the root of the lattice that belongs to the factors q1, q3."""
+        (a0, a1, a2), (b0, b1, b2) = self.factors()
+        return (a1 * b1 / 2 - a0 * b2 - a2 * b0) / 6
+
+    def winding(self) -> Winding:
+        """V and κ of Z1, Z3."""
+        i1, i2, i3 = self.top.inertia
+        square, difference, mean = dot(self.momentum, self.momentum), 1 / i1 - 1 / i3, (1 / i1 + 1 / i3) / 2
+        nu = 1 / (2 * i2) - mean + self.energy / square
+        slope = difference**2 * square * nu / 2
+        return Winding(self.root() - difference**2 * square / 4, slope, mean, square)
+
+
+@dataclass(frozen=True, slots=True)
+class _Prepared:
+    motion: PreparedMotion
+    momentum: tuple[Companion, Companion]
+
+
+@lru_cache(maxsize=64)
+def _prepared(motion: Gyrostat, bits: int) -> _Prepared:
+    prepared = motion.quartic().prepared()
+    winding = Winding(motion.root(), Fraction(0), Fraction(0), Fraction(1))
+    rows = taylor(gyrostat, motion.parameters, motion.start.flat, 4)
+    first, third = (
+        prepared.companion(winding, [(motion.top.inertia[axis] * c, Fraction(0)) for c in rows[axis]])
+        for axis in (0, 2)
+    )
+    return _Prepared(prepared, (first, third))
+
+
+@lru_cache(maxsize=64)
+def _companions(motion: Gyrostat, vector: Vector, bits: int) -> tuple[Companion, Companion]:
+    """Z1 and Z3 of a vector fixed in space."""
+    prepared, winding, m = _prepared(motion, bits).motion, motion.winding(), motion.momentum
+    share = dot(vector, m) / winding.square
+    across = tuple(v - share * c for v, c in zip(vector, m, strict=True))
+    products = [
+        taylor(gyrostat, motion.parameters, (*motion.start.omega, *fixed), 4)[3:]
+        for fixed in (cross(m, across), across)
+    ]
+    first, third = (
+        prepared.companion(winding, turned(products[0][axis], [-c for c in products[1][axis]], winding))
+        for axis in (0, 2)
+    )
+    return first, third

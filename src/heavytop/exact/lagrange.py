@@ -1,0 +1,220 @@
+"""Lagrange's top: I1 = I2, a = b = 0, for every start.
+
+Data: n = P c, L = I3 Ω3, C0 = M·γ, E = ½ I1 (Ω1² + Ω2²) + n γ3, s = |γ|.  x = γ3 moves on a cubic
+(Whittaker, Analytical Dynamics, 71; Klein & Sommerfeld, Theorie des Kreisels; Hermite, Sur quelques applications des
+fonctions elliptiques):
+
+    x'² = (2/I1)(E − n x)(s² − x²) − ((C0 − L x)/I1)²,    x' = Ω2 γ1 − Ω1 γ2
+
+The horizontal parts g = γ1 + iγ2 and w = Ω1 + iΩ2 satisfy g' = −iΩ3 g + i x w, I1 w' = i (L − I1 Ω3) w − i n g, and
+share one function of the second kind:
+
+    ℘(V) = (4 I1 E − L²)/(12 I1²),    ℘'(V) = i (C0 n − E L)/(2 I1²),    κ = L/(2 I1) − Ω3
+
+All of it rational, whatever s is.  The axis of symmetry in space, e3·(ξ + iη), η = γ × ξ/s, ξ ⟂ γ, moves with
+
+    ℘(V) = (4 I1 E s² + 2 L² s² − 3 C0²)/(12 I1² s²),    κ = C0/(2 I1 s)
+    ℘'(V) = −i (C0³ − 2 C0 E I1 s² − C0 L² s² + 2 I1 L n s⁴)/(4 I1³ s³)
+
+and gives the attitude.  Sleeping tops, steady and regular precession, cusps, loops, passages through the poles, the
+spherical pendulum (L = 0) and the motions asymptotic to a sleeping top are starts like any other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+from flint import acb, arb, arb_series
+
+from heavytop.errors import NotInClass
+from heavytop.exact.balls import ball, to_bits, working_precision
+from heavytop.exact.motion import enough_bits, initial_xi, rotate, series_at, taylor, turned
+from heavytop.exact.quartic import Companion, PreparedMotion, QuarticMotion, Winding
+from heavytop.exact.weierstrass import imag, real
+from heavytop.top.equations import HEAVY_TOP, Parameters, System, heavy_top
+from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
+
+_ZERO, _ONE = Fraction(0), Fraction(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Lagrange:
+    """The motion of Lagrange's top about axis 3 from any start, γ of any length.
+
+    Raises NotInClass unless I1 = I2 and P a = P b = 0.
+    """
+
+    top: HeavyTop
+    start: State
+    method: str = "closed form: Lagrange, Weierstrass functions of gamma3"
+    system: System = HEAVY_TOP
+
+    def __post_init__(self) -> None:
+        i1, i2, _ = self.top.inertia
+        if i1 != i2:
+            raise NotInClass(f"I1 - I2 = {i1 - i2}, not 0.", "Lagrange's top has I1 = I2: rename the axes if need be.")
+        if any(self.top.moment[:2]):
+            n1, n2, _ = self.top.moment
+            raise NotInClass(
+                f"P a = {n1}, P b = {n2}, not 0.",
+                "Lagrange's top has its centre of mass on axis 3, that of symmetry.",
+            )
+
+    @property
+    def parameters(self) -> Parameters:
+        """The parameters of the field."""
+        return Parameters(self.top.inertia, self.top.moment, _ZERO)
+
+    def state(self, time: Fraction, bits: int) -> list[arb]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+        return to_bits(lambda working: self._evaluate(time, 0, working), bits)
+
+    def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+        return series_at(lambda working, count: self._evaluate(time, count, working), length, bits)
+
+    def _evaluate(self, time: Fraction, length: int, working: int) -> list[Any]:
+        bits = enough_bits(working, time)
+        with working_precision(bits):
+            prepared = _prepared(self, bits)
+            point = prepared.motion.lattice.point(time, length)
+            denominator = prepared.motion.denominator(point)
+            g, w = (companion.at(point, denominator) for companion in (prepared.gamma, prepared.omega))
+            spin = point.time * 0 + ball(self.start.omega[2])
+            x = prepared.motion.position(point, denominator)
+            return [real(w), imag(w), spin, real(g), imag(g), x]
+
+    @property
+    def constants(self) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
+        """(n, L, C0, E, s²)."""
+        (o1, o2, o3), gamma, (i1, _, i3) = self.start.omega, self.start.gamma, self.top.inertia
+        n = self.top.moment[2]
+        area = dot(self.top.angular_momentum(self.start.omega), gamma)
+        return n, i3 * o3, area, i1 * (o1 * o1 + o2 * o2) / 2 + n * gamma[2], dot(gamma, gamma)
+
+    def quartic(self) -> QuarticMotion:
+        """x = γ3 on its cubic."""
+        n, spin, area, energy, square = self.constants
+        i1 = self.top.inertia[0]
+        (o1, o2, _), (g1, g2, g3) = self.start.omega, self.start.gamma
+        cubic = (
+            2 * energy * square / i1 - area**2 / i1**2,
+            2 * area * spin / i1**2 - 2 * n * square / i1,
+            -2 * energy / i1 - spin**2 / i1**2,
+            2 * n / i1,
+        )
+        return QuarticMotion(cubic, g3, o2 * g1 - o1 * g2)
+
+    def winding(self) -> Winding:
+        """V and κ of g and w."""
+        n, spin, area, energy, _ = self.constants
+        i1 = self.top.inertia[0]
+        slope = (area * n - energy * spin) / (2 * i1**2)
+        return Winding((4 * i1 * energy - spin**2) / (12 * i1**2), slope, spin / (2 * i1) - self.start.omega[2], _ONE)
+
+    def axis_winding(self) -> Winding:
+        """V and κ of the axis of symmetry in space; needs γ != 0."""
+        n, spin, area, energy, square = self.constants
+        i1 = self.top.inertia[0]
+        value = (4 * i1 * energy * square + 2 * spin**2 * square - 3 * area**2) / (12 * i1**2 * square)
+        cubic = area**3 - 2 * area * energy * i1 * square - area * spin**2 * square + 2 * i1 * spin * n * square**2
+        return Winding(value, -cubic / (4 * i1**3 * square**2), area / (2 * i1 * square), square)
+
+    def attitude(self, time: Fraction, bits: int, xi: Vector | None = None) -> list[arb]:
+        """ξ at ``time``; at t = 0 it is ``xi`` (exact, ⟂ γ) or the default one ⟂ γ.
+
+        Raises OutOfReach where the axis has come so near to a sleeping top (a motion asymptotic to it, at large times)
+        that the angle about it is lost at any sensible precision.
+        """
+
+        def evaluate(working: int) -> list[arb]:
+            inside = enough_bits(working, time)
+            with working_precision(inside):
+                start = [ball(c) for c in xi] if xi is not None else initial_xi(self.start.gamma)
+                if time == 0:
+                    return start
+                # the default ξ need not be rational: carry one exact vector ⟂ γ and its companion across it
+                basis = _across(self.start.gamma)
+                first = self._carried(basis, time, inside)
+                size = ball(dot(self.start.gamma, self.start.gamma)).sqrt()
+                gamma = [g / size for g in self._evaluate(time, 0, working)[3:]]
+                second = cross(gamma, first)
+                unit = [ball(g) / size for g in self.start.gamma]
+                exact = [ball(c) for c in basis]
+                norm = ball(dot(basis, basis))
+                cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
+                return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
+
+        return to_bits(evaluate, bits)
+
+    def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[arb]:
+        """A vector ⟂ γ, fixed in space, at ``time``.
+
+        Z = ξ + iη, h = Z3 and Z± = Z1 ± iZ2 obey Z₊ ḡ = −h (x − s), Z₋ g = −h (x + s) and, as h' = (Z × Ω)3,
+        Z₋ w − Z₊ w̄ = 2i h'.
+        """
+        if not any((*self.start.omega[:2], *self.start.gamma[:2])):
+            return rotate(vector, self.start.omega, ball(time))
+        prepared = _prepared(self, bits)
+        axis = _axis(self, vector, bits)
+        point = prepared.motion.lattice.point(time, 2)
+        denominator = prepared.motion.denominator(point)
+        h, g, w = (c.at(point, denominator) for c in (axis, prepared.gamma, prepared.omega))
+        x, size = prepared.motion.position(point, denominator)[0], ball(self.constants[4]).sqrt()
+        plus, minus = _sides(h[0], h[1], g[0], w[0], x, size)
+        return [((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real, h[0].real]
+
+
+def _sides(h: acb, slope: acb, g: acb, w: acb, x: arb, size: arb) -> tuple[acb, acb]:
+    """(Z₊, Z₋) from the three equations, without dividing by what vanishes at a pole."""
+    weight = abs(g) ** 2 + abs(w) ** 2
+    if x > 0:
+        plus = h * g / (x + size)
+        twist = acb(0, 2) * slope + plus * w.conjugate()
+        return plus, (twist * w.conjugate() - h * (x + size) * g.conjugate()) / weight
+    minus = h * g.conjugate() / (x - size)
+    twist = minus * w - acb(0, 2) * slope
+    return (twist * w - h * (x - size) * g) / weight, minus
+
+
+def _across(gamma: Vector) -> Vector:
+    """An exact vector ⟂ γ, not 0."""
+    candidates = ((_ZERO, gamma[2], -gamma[1]), (-gamma[2], _ZERO, gamma[0]))
+    return candidates[0] if any(candidates[0]) else candidates[1]
+
+
+@dataclass(frozen=True, slots=True)
+class _Prepared:
+    motion: PreparedMotion
+    gamma: Companion
+    omega: Companion
+
+
+@lru_cache(maxsize=64)
+def _prepared(motion: Lagrange, bits: int) -> _Prepared:
+    prepared, winding = motion.quartic().prepared(), motion.winding()
+    rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)
+    gamma, omega = (prepared.companion(winding, turned(rows[axis], rows[axis + 1], winding)) for axis in (3, 0))
+    return _Prepared(prepared, gamma, omega)
+
+
+@lru_cache(maxsize=64)
+def _axis(motion: Lagrange, vector: Vector, bits: int) -> Companion:
+    """h = Z3 of Z = ξ + iη, η = γ × ξ/s, for a vector ξ ⟂ γ fixed in space."""
+    winding, square = motion.axis_winding(), dot(motion.start.gamma, motion.start.gamma)
+    # s Z = s ξ + i γ × ξ, so Z = ξ + i s (γ × ξ/s²)
+    normal = tuple(c / square for c in cross(motion.start.gamma, vector))
+    first, second = (_derivatives(motion, fixed) for fixed in (vector, normal))
+    return _prepared(motion, bits).motion.companion(winding, turned(first, second, winding))
+
+
+def _derivatives(motion: Lagrange, fixed: tuple[Fraction, ...]) -> list[Fraction]:
+    """The derivatives at 0 of the third component of a vector fixed in space."""
+
+    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
+        return (*heavy_top(p, y[:6]), *HEAVY_TOP.attitude(p, y[:6], y[6:]))
+
+    return taylor(field, motion.parameters, (*motion.start.flat, *fixed), 4)[8]

@@ -1,0 +1,109 @@
+"""What the elliptic motions share: working precision, exact Taylor coefficients at the start, rotation in space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from math import factorial, isqrt
+from typing import Any
+
+from flint import arb, arb_series, ctx, fmpq, fmpq_series
+
+from heavytop.errors import InputError
+from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.quartic import Pair, Winding
+from heavytop.top.angles import perpendicular
+from heavytop.top.equations import Parameters
+from heavytop.top.heavy_top import Vector, dot
+
+_GUARD = 40
+_STEP = 64
+
+
+def enough_bits(working: int, time: Fraction) -> int:
+    """The precision inside an evaluation: time costs its own bits, twice; in steps, so that lattices are made once."""
+    return -(-(working + _GUARD + 2 * int(abs(time)).bit_length()) // _STEP) * _STEP
+
+
+def series_at(evaluate: Callable[[int, int], list[arb_series]], length: int, bits: int) -> list[arb_series]:
+    """``evaluate(working bits, length)`` with the ε^0 coefficients certain to ``bits`` bits (:func:`to_bits`)."""
+    found: list[list[arb_series]] = []
+    before = ctx.cap
+    ctx.cap = max(length, before)
+
+    def leading(working: int) -> list[arb]:
+        found.append(evaluate(working, length))
+        return [component[0] for component in found[-1]]
+
+    try:
+        to_bits(leading, bits)
+    finally:
+        ctx.cap = before
+    return found[-1]
+
+
+def taylor(
+    field: Callable[[Parameters, Any], tuple[Any, ...]], parameters: Parameters, start: Sequence[Fraction], length: int
+) -> list[list[Fraction]]:
+    """The exact derivatives (not divided by factorials) of each component at the start, from the field itself."""
+    inertia, moment, rotor = parameters
+    exact = Parameters([_rational(i) for i in inertia], [_rational(n) for n in moment], _rational(rotor))
+    rows = [[_rational(value)] for value in start]
+    for order in range(1, length):
+        y = [fmpq_series(row, prec=length) for row in rows]
+        for row, slope in zip(rows, field(exact, y), strict=True):
+            row.append(fmpq_series(slope)[order - 1] / order)
+    return [[Fraction(int(c.p), int(c.q)) * factorial(n) for n, c in enumerate(row)] for row in rows]
+
+
+def _rational(value: Any) -> fmpq:
+    return fmpq(value.numerator, value.denominator)
+
+
+def turned(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
+    """Derivatives at 0 of e^(−iκt) (u + i √square v), κ = rate √square, as pairs (real, imaginary/√square).
+
+    real, imaginary: the derivatives of u and v.
+    """
+    found = []
+    for order in range(len(real)):
+        a = b = Fraction(0)
+        for k in range(order + 1):
+            ways = factorial(order) // (factorial(k) * factorial(order - k))
+            # (−iκ)^k = (−rate)^k (i√square)^k, and (i√square)² = −square
+            weight = ways * (-winding.rate) ** k * (-winding.square) ** (k // 2)
+            u, v = real[order - k], imaginary[order - k]
+            a, b = (a + weight * u, b + weight * v) if k % 2 == 0 else (a - weight * winding.square * v, b + weight * u)
+        found.append((a, b))
+    return found
+
+
+def rotate(vector: Vector, omega: Vector, time: Any) -> list[Any]:
+    """v' = v × ω for constant ω: v along ω, and v across it turning at |ω|."""
+    square = dot(omega, omega)
+    if square == 0:
+        return [time * 0 + ball(v) for v in vector]
+    size = ball(square).sqrt()
+    share = dot(vector, omega) / square
+    sine, cosine = (time * size).sin_cos()
+    crossed = (
+        vector[1] * omega[2] - vector[2] * omega[1],
+        vector[2] * omega[0] - vector[0] * omega[2],
+        vector[0] * omega[1] - vector[1] * omega[0],
+    )
+    return [
+        cosine * ball(v - share * w) + sine * (ball(c) / size) + ball(share * w)
+        for v, w, c in zip(vector, omega, crossed, strict=True)
+    ]
+
+
+def initial_xi(gamma: Vector) -> list[arb]:
+    """ξ at t = 0 where nobody gave it: :func:`perpendicular` of γ/|γ|; raises InputError for γ = 0."""
+    square = dot(gamma, gamma)
+    if square == 0:
+        raise InputError("gamma is the zero vector: no attitude stands on it.", "Give the direction of the weight.")
+    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
+    if root * root == square:
+        return [ball(x) for x in perpendicular((gamma[0] / root, gamma[1] / root, gamma[2] / root))]
+    size: Any = ball(square).sqrt()
+    return list(perpendicular((ball(gamma[0]) / size, ball(gamma[1]) / size, ball(gamma[2]) / size)))  # type: ignore[arg-type]

@@ -1,0 +1,158 @@
+"""The physical pendulum: rotation about a principal axis k held level, centre of mass in the plane across it.
+
+Ω = Ω_k e_k stays along axis k only if the torque does: (γ × n)_i = (γ × n)_j = 0, n = P r.  While Ω_k is not 0 the
+part of γ across k turns, so that asks n_k = 0 and γ_k = 0, unless γ ∥ e_k ∥ n, which is a steady rotation.
+With N = |n||γ| and x the angle of γ from −n in the plane (i, j, k cyclic), x' = −Ω_k:
+
+    x'' = −(N/I_k) sin x,   h = ½ I_k Ω_k² + n·γ = ½ I_k x'² − N cos x
+
+    h ≤ N:  sin(x/2) = σ √m sn u,  cos(x/2) = dn u,  x' = 2σ √m ω cn u,  m = (h + N)/(2N),  ω² = N/I_k
+    h > N:  sin(x/2) = σ sn u,     cos(x/2) = cn u,  x' = 2σ ω dn u,     m = 2N/(h + N),    ω² = (h + N)/(2 I_k)
+
+u = ω t + u0, and σ is the sign of x' at t = 0; h = N is the separatrix, m = 1.  Every vector fixed in space turns
+about e_k through x(t) − x(0).  Source: Whittaker, Analytical Dynamics, §44; DLMF 22.19(i).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+from flint import arb, arb_series, ctx
+
+from heavytop.errors import NotInClass
+from heavytop.exact.balls import ball
+from heavytop.exact.closed_form import Carry, WithAttitude, sign
+from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State, dot
+
+
+@dataclass(frozen=True, slots=True)
+class Pendulum(WithAttitude):
+    """Libration, rotation, separatrix and equilibria about any principal axis, |γ| as it is.
+
+    Raises NotInClass unless, exactly, Ω lies along one principal axis with P r and γ in the plane across it, P r ≠ 0
+    and γ ≠ 0.
+    """
+
+    top: HeavyTop
+    start: State
+    method: str = "closed form: physical pendulum, Jacobi functions"
+    system: System = HEAVY_TOP
+
+    def __post_init__(self) -> None:
+        if not any(self.top.moment) or not any(self.start.gamma):
+            raise NotInClass("A pendulum needs P r != 0 and gamma != 0.", "Without a torque the motion is Euler's.")
+        if not _axes(self.top, self.start):
+            omega, moment, gamma = self.start.omega, self.top.moment, self.start.gamma
+            turning = [k for k in range(3) if omega[k] != 0]
+            if len(turning) > 1:
+                cause = f"Omega = ({', '.join(map(str, omega))}) is not along a principal axis."
+            elif turning:
+                k = turning[0]
+                cause = (
+                    f"About axis {k + 1}, (P r)_{k + 1} = {moment[k]} and gamma_{k + 1} = {gamma[k]} are not both 0."
+                )
+            else:
+                cause = "At rest, P r and gamma do not lie in one plane across a principal axis."
+            raise NotInClass(
+                f"Not a pendulum: {cause}", "It turns about a principal axis, with P r and gamma across it."
+            )
+
+    @property
+    def axis(self) -> int:
+        """The principal axis k (0, 1 or 2) it turns about."""
+        return _axes(self.top, self.start)[0]
+
+    def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        k = self.axis
+        i, j = (k + 1) % 3, (k + 2) % 3
+        n, gamma = self.top.moment, self.start.gamma
+        if self.start.omega[k] == 0 and n[i] * gamma[j] == n[j] * gamma[i]:
+            return [arb(0)] * 3, list
+        lattice = _lattice(self, ctx.prec)
+        rate, half_cosine, half_sine = lattice.motion(time)
+        cosine, sine = half_cosine * half_cosine - half_sine * half_sine, 2 * half_cosine * half_sine
+        omega: list[Any] = [arb_series([0], prec=ctx.cap)] * 3
+        omega[k] = -rate
+
+        def carry(vector: Sequence[Any]) -> list[Any]:
+            result = list(vector)
+            result[i] = cosine * vector[i] - sine * vector[j]
+            result[j] = sine * vector[i] + cosine * vector[j]
+            return result
+
+        return omega, carry
+
+
+@dataclass(frozen=True, slots=True)
+class _Lattice:
+    """All that does not depend on the time: amplitude = σ√m (libration) or σ, half = (cos, sin) of x(0)/2."""
+
+    functions: Jacobi
+    rate: arb
+    origin: arb
+    amplitude: arb
+    rotating: bool
+    half: tuple[arb, arb]
+
+    def motion(self, time: arb_series) -> tuple[arb_series, arb_series, arb_series]:
+        """(x', cos, sin) with the cosine and sine of (x − x(0))/2."""
+        sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
+        cosine, speed = (cn, dn) if self.rotating else (dn, cn)
+        sine = self.amplitude * sn
+        cosine0, sine0 = self.half
+        return (
+            2 * self.rate * self.amplitude * speed,
+            cosine * cosine0 + sine * sine0,
+            sine * cosine0 - cosine * sine0,
+        )
+
+
+@lru_cache(maxsize=64)
+def _lattice(case: Pendulum, _bits: int) -> _Lattice:
+    k = case.axis
+    i, j = (k + 1) % 3, (k + 2) % 3
+    n, gamma, inertia = case.top.moment, case.start.gamma, case.top.inertia[k]
+    kinetic = inertia * case.start.omega[k] ** 2 / 2
+    height, torque = dot(n, gamma), n[i] * gamma[j] - n[j] * gamma[i]
+    energy, square = kinetic + height, dot(n, n) * dot(gamma, gamma)
+    largest = ball(square).sqrt()
+    rotating = energy > 0 and energy**2 > square
+    # 1 - cos x and 1 + cos x, times N; N² - height² = torque²
+    below, above = _sum(square, height, torque**2), _sum(square, -height, torque**2)
+    over, under = _sum(square, energy, square - energy**2), _sum(square, -energy, square - energy**2)
+    direction = sign(-case.start.omega[k])
+    side = sign(-torque) * direction
+    sine, cosine = (below / (2 * largest)).sqrt(), (above / (2 * largest)).sqrt()
+    if rotating:
+        functions = jacobi(2 * largest / over, -under / over)
+        origin = legendre_f(below / (2 * largest), above / (2 * largest), ball(kinetic) / over)
+        rate, amplitude = (over / (2 * ball(inertia))).sqrt(), arb(direction)
+    else:
+        parameter = arb(1) if under.is_zero() else over / (2 * largest)
+        functions = jacobi(parameter, under / (2 * largest))
+        origin = legendre_f(below / over, ball(kinetic) / over, above / (2 * largest))
+        rate, amplitude = (largest / ball(inertia)).sqrt(), direction * parameter.sqrt()
+    half = (cosine, side * direction * sine)
+    return _Lattice(functions, rate, side * origin, amplitude, rotating, half)
+
+
+def _sum(square: Fraction, value: Fraction, product: Fraction) -> arb:
+    """√square + value, without cancellation: product = square − value²; an exact 0 where it is 0."""
+    root = ball(square).sqrt()
+    return root + ball(value) if value >= 0 else ball(product) / (root - ball(value))
+
+
+def _axes(top: HeavyTop, start: State) -> list[int]:
+    """The axes about which this is a pendulum."""
+    return [
+        k
+        for k in range(3)
+        if top.moment[k] == start.gamma[k] == start.omega[(k + 1) % 3] == start.omega[(k + 2) % 3] == 0
+    ]

@@ -1,0 +1,165 @@
+"""Staude's permanent rotations: Ω ∥ γ, both constant in the body; and every other start that stays what it is.
+
+γ' = 0 asks Ω = ω γ, and M' = 0 then asks γ × (P r − ω² I γ) = 0.  So γ lies on Staude's cone, r·(I γ × γ) = 0, and
+
+    ω² = P (I γ × γ)·(r × γ) / |I γ × γ|²     where γ is not a principal axis; it must not be negative.
+
+On a principal axis that r lies on, every ω serves; on another one, none.  Turned about: P r = ω² I γ + κ γ gives
+every top that turns about γ at the rate ω.  Space turns about Ω in the body at the rate |Ω|.  Stability is not said.
+Source: O. Staude, J. reine angew. Math. 113 (1894) 318.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from math import gcd, isqrt
+from typing import Any
+
+from flint import arb, arb_series, ctx
+
+from heavytop.errors import InputError, NotInClass
+from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, turned
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot, vector
+
+
+@dataclass(frozen=True, slots=True)
+class Staude(WithAttitude):
+    """A start that is an equilibrium of all six equations.  Raises NotInClass where the field is not exactly 0."""
+
+    top: HeavyTop
+    start: State
+    system: System = HEAVY_TOP
+    method: str = "closed form: permanent rotation"
+
+    def __post_init__(self) -> None:
+        field = self.system.field(self.system.parameters(self.top, self.start), self.start.flat)
+        if any(field):
+            raise NotInClass(
+                f"Not a permanent rotation: (Omega', gamma') = ({', '.join(map(str, field))}), not 0.",
+                "`staude_rotations` finds those of a top.",
+            )
+
+    def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        parameters = self.system.parameters(self.top, self.start)
+        exact = self.system.angular_velocity(parameters, self.start.flat)
+        if not any(exact):
+            return balls(self.start.omega), list
+        omega, rate = balls(exact), ball(dot(exact, exact)).sqrt()
+        return balls(self.start.omega), lambda fixed: turned(fixed, omega, rate, time)
+
+    def evaluate(self, _time: Fraction) -> list[arb_series]:
+        """The start, at every time."""
+        return [arb_series([value], prec=ctx.cap) for value in balls(self.start.flat)]
+
+
+def staude_rate_squared(top: HeavyTop, gamma: Vector) -> Fraction | None:
+    """ω² of the permanent rotation Ω = ω γ about a rational direction, of any length; None where every ω serves.
+
+    Raises NotInClass for a direction off Staude's cone, for a principal axis that r is not on, and where ω² < 0.
+    """
+    turning = cross(top.angular_momentum(gamma), gamma)
+    torque = cross(top.moment, gamma)
+    if not any(gamma):
+        raise InputError("gamma is the zero vector, which has no direction.", "Give the direction of the weight.")
+    if not any(turning) and not any(torque):
+        return None
+    off = cross(turning, torque)
+    if not any(turning) or any(off):
+        cone = dot(turning, top.moment)
+        raise NotInClass(
+            f"No permanent rotation about ({', '.join(map(str, gamma))}): P r·(I gamma x gamma) = {cone}"
+            + ("." if any(turning) else ", and P r is not along this principal axis."),
+            "`staude_directions` gives rational directions on Staude's cone.",
+        )
+    square: Fraction = dot(turning, torque) / dot(turning, turning)
+    if square < 0:
+        raise NotInClass(f"The permanent rotation needs omega^2 = {square} >= 0.", "Turn gamma to -gamma.")
+    return square
+
+
+def staude_rate(top: HeavyTop, gamma: Vector, bits: int) -> arb:
+    """ω ≥ 0 of the permanent rotation about γ as a ball; raises as :func:`staude_rate_squared`, and where ω is free."""
+    square = staude_rate_squared(top, gamma)
+    if square is None:
+        raise NotInClass("gamma is a principal axis through r: every rate serves.", "Choose the rate.")
+    return to_bits(lambda _working: [ball(square).sqrt()], bits)[0]
+
+
+def staude_directions(top: HeavyTop, height: int) -> Iterator[Vector]:
+    """Rational directions on Staude's cone (integer components without common factor), both senses of each.
+
+    The cone r·(I γ × γ) = 0 holds e1, e2, e3 and r.  Lines through e1 meet it in one more point each; with n = P r,
+    D1 = n1 (I2 − I3) and so on the cone is D1 γ2 γ3 + D2 γ3 γ1 + D3 γ1 γ2 = 0, so that (γ2, γ3) = (p, q) gives
+    γ1 = −D1 p q/(D2 q + D3 p).  ``height`` bounds |p| and q.  Where the cone is a pair of planes, or all of space,
+    directions in the principal planes that belong to it come as well.
+    """
+    (i1, i2, i3), n = top.inertia, top.moment
+    d1, d2, d3 = n[0] * (i2 - i3), n[1] * (i3 - i1), n[2] * (i1 - i2)
+    seen = set()
+    for q in range(height + 1):
+        for p in range(-height, height + 1):
+            if gcd(p, q) != 1:
+                continue
+            through = d2 * q + d3 * p
+            found: list[tuple[Any, ...]] = [(-d1 * p * q / through, p, q)] if through else []
+            found += [
+                c
+                for c in ((0, p, q), (p, 0, q), (p, q, 0))
+                if d1 * c[1] * c[2] + d2 * c[2] * c[0] + d3 * c[0] * c[1] == 0
+            ]
+            for direction in found:
+                primitive = _primitive(vector(direction, "direction"))
+                for gamma in (primitive, tuple(-g for g in primitive)):
+                    if gamma not in seen:
+                        seen.add(gamma)
+                        yield vector(gamma, "direction")
+
+
+def staude_rotations(top: HeavyTop, height: int = 12) -> list[State]:
+    """Permanent rotations with |γ| = 1 and rational ω ≠ 0, exact, among :func:`staude_directions` of this height.
+
+    Both senses of ω are given.  Directions whose |γ| or ω is irrational, or whose ω is free, are left out:
+    :func:`staude_rate` serves them.
+    """
+    found = []
+    for direction in staude_directions(top, height):
+        length = _root(dot(direction, direction))
+        if length is None:
+            continue
+        gamma = vector((g / length for g in direction), "gamma")
+        try:
+            square = staude_rate_squared(top, gamma)
+        except NotInClass:
+            continue
+        rate = _root(square) if square else None
+        if rate is not None:
+            found += [State([turn * g for g in gamma], gamma) for turn in (rate, -rate)]
+    return found
+
+
+def staude_motion(inertia: Vector, gamma: Vector, rate: Fraction, along: Fraction = Fraction(0)) -> Staude:
+    """The permanent rotation Ω = ω γ of the top of weight 1 with r = ω² I γ + κ γ, κ = ``along``: all there are."""
+    centre = [(rate**2 * i + along) * g for i, g in zip(inertia, gamma, strict=True)]
+    return Staude(HeavyTop(inertia, 1, centre), State([rate * g for g in gamma], gamma))
+
+
+def _primitive(direction: Vector) -> tuple[Fraction, ...]:
+    """The direction with integer components without a common factor."""
+    scale = 1
+    for component in direction:
+        scale = scale * component.denominator // gcd(scale, component.denominator)
+    whole = [int(component * scale) for component in direction]
+    return tuple(Fraction(component, gcd(*whole)) for component in whole)
+
+
+def _root(square: Fraction) -> Fraction | None:
+    """The rational square root, or None."""
+    if square < 0:
+        return None
+    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
+    return root if root * root == square else None

@@ -1,0 +1,289 @@
+"""Weierstrass' functions of a real lattice, from its invariants or roots, as balls.
+
+℘'² = 4℘³ − g2 ℘ − g3 = 4 (℘ − e1)(℘ − e2)(℘ − e3), e1 + e2 + e3 = 0, real g2, g3 (DLMF 23.2, 23.3).  With half-periods
+ω (real) and ω', τ = ω'/ω where all roots are real (e1 > e2 > e3), and the basis ω, (ω + ω')/2, τ = (1 + ω'/ω)/2, where
+two are complex, z = u/(2ω) and T(u) = 2ω θ1(z)/θ1'(0), everything is a theta quotient (DLMF 23.6.2-23.6.15):
+
+    ℘ = e1 + (θ2(z)/(θ2(0) T))²,   ℘' = −2 θ2(z)θ3(z)θ4(z)/(θ2(0)θ3(0)θ4(0) T³),   σ = T exp(η u²/(2ω))
+
+:class:`Point` holds T, ℘ T² and ℘' T³, which stay finite at the poles of ℘, so that no formula built on it breaks down
+at t = 0 or at a whole period.  On discriminant 0 (a double root d) T is sinh(κu)/κ with κ² = 3d, or its trigonometric
+or rational form, and nothing is left of theta functions.  Near it they converge all the faster, after the modular
+transformation that FLINT makes, and only the roots' difference costs working precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from math import lcm
+from typing import Any
+
+from flint import acb, acb_series, arb, arb_series, ctx, fmpz_poly
+
+from heavytop.errors import InputError, OutOfReach
+from heavytop.exact.balls import ball, midpoint, working_precision
+
+Exact = Fraction | int
+Scalar = Fraction | int | arb
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A lattice's functions at a real time, without poles; numbers or power series in the time.
+
+    scale: T, odd, ~ u.  raised: √((℘ − e) T²) for the root e = ``root`` of the lattice.  slope: ℘' T³.
+    thetas: (−1)^(whole periods) and θ_j(z)/θ_j(0), j = 2, 3, 4 (none on discriminant 0).
+    time, z: u and u/(2ω) reduced.
+    """
+
+    scale: Any
+    raised: Any
+    slope: Any
+    root: Scalar
+    thetas: tuple[Any, ...]
+    time: Any
+    z: Any
+
+    def above(self, value: Scalar) -> Any:
+        """(℘ − value) T²; the difference of exact roots and values is exact."""
+        return self.raised * self.raised + as_ball(difference(self.root, value)) * (self.scale * self.scale)
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """A lattice of discriminant other than 0, at one working precision.
+
+    roots: the values e of ℘ at z = 1/2, (1 + τ)/2, τ/2.  half_period: ω, the smallest positive real one.  ratio: τ.
+    zero: θ1'(0), θ2(0), θ3(0), θ4(0).  quasi_period: η = ζ(ω).
+    """
+
+    roots: tuple[acb, acb, acb]
+    half_period: arb
+    ratio: acb
+    zero: tuple[acb, ...]
+    quasi_period: arb
+
+    def reduced(self, u: acb) -> tuple[acb, int]:
+        """(z − n, n): z = u/(2ω) moved by n whole real periods into |Re z| <= 1/2 (or just above)."""
+        z = u / (2 * self.half_period)
+        turns = round(midpoint(z.real)) if z.is_finite() else 0
+        return z - turns, turns
+
+    def point(self, time: Exact, length: int = 0) -> Point:
+        """:class:`Point` at a real time; with ``length``, power series in ε at time + ε, up to ε^(length − 1)."""
+        z, turns = self.reduced(acb(ball(time)))
+        u: Any = ball(time)
+        argument: Any = z
+        if length:
+            argument = acb_series([z, 1 / (2 * self.half_period)], length)
+            u = arb_series([u, 1], length)
+        theta = thetas(argument, self.ratio)
+        theta1, *others = theta
+        scale = real(theta1 * (2 * self.half_period / self.zero[0]))
+        ratios = tuple(value * (1 / start) for value, start in zip(others, self.zero[1:], strict=True))
+        slope = real(ratios[0] * ratios[1] * ratios[2]) * -2
+        sign = -1 if turns % 2 else 1
+        return Point(scale, real(ratios[0]), slope, self.roots[0].real, (sign, *ratios), u, argument)
+
+    def p(self, u: acb) -> acb:
+        """℘(u)."""
+        z, _ = self.reduced(u)
+        return z.elliptic_p(self.ratio) / (2 * self.half_period) ** 2
+
+    def p_prime(self, u: acb) -> acb:
+        """℘'(u), from −2 θ2 θ3 θ4/(θ2(0) θ3(0) θ4(0) T³)."""
+        z, _ = self.reduced(u)
+        one, two, three, four = thetas(z, self.ratio)
+        scale = 2 * self.half_period * one / self.zero[0]
+        return acb(-2 * (two * three * four) / (self.zero[1] * self.zero[2] * self.zero[3] * scale**3))
+
+    def zeta(self, u: acb) -> acb:
+        """ζ(u), with ζ(u + 2ω) = ζ(u) + 2η."""
+        z, turns = self.reduced(u)
+        return z.elliptic_zeta(self.ratio) / (2 * self.half_period) + 2 * turns * self.quasi_period
+
+    def sigma(self, u: acb) -> acb:
+        """σ(u) = T exp(η u²/(2ω)); entire."""
+        z, turns = self.reduced(u)
+        scale = 2 * self.half_period * thetas(z, self.ratio)[0] / self.zero[0]
+        return acb((-scale if turns % 2 else scale) * (self.quasi_period * u * u / (2 * self.half_period)).exp())
+
+    @property
+    def other_half_period(self) -> acb:
+        """τ ω: with ω a basis of the half-periods; on the imaginary axis where all roots are real."""
+        return self.ratio * self.half_period
+
+
+@dataclass(frozen=True, slots=True)
+class DegenerateLattice:
+    """Discriminant 0: ℘ = d + κ²/sinh²(κu), κ² = 3d, double root d and simple root −2d (DLMF 23.10(iv))."""
+
+    double: Scalar
+
+    @property
+    def half_period(self) -> arb:
+        """π/(2√(−3d)) where d < 0; infinite otherwise."""
+        square = -3 * as_ball(self.double)
+        return arb.pi() / (2 * square.sqrt()) if square > 0 else arb("inf")
+
+    def functions(self, u: Any) -> tuple[Any, Any]:
+        """(T, C) = (sinh(κu)/κ, cosh(κu)), or sin and cos, or (u, 1), of a number or a power series."""
+        if self.double == 0:
+            return u, u * 0 + 1
+        square = 3 * as_ball(self.double)
+        if square > 0:
+            rate = square.sqrt()
+            up, down = (u * rate).exp(), (u * -rate).exp()
+            return (up - down) * (1 / (2 * rate)), (up + down) * (arb(1) / 2)
+        rate = (-square).sqrt()
+        sine, cosine = (u * rate).sin_cos()
+        return sine * (1 / rate), cosine
+
+    def point(self, time: Exact, length: int = 0) -> Point:
+        """As :meth:`Lattice.point`."""
+        u: Any = arb_series([ball(time), 1], length) if length else ball(time)
+        scale, cosine = self.functions(u)
+        return Point(scale, u * 0 + 1, cosine * -2, self.double, (), u, u)
+
+    def p(self, u: acb) -> acb:
+        """℘(u)."""
+        return acb(as_ball(self.double) + self.functions(u)[0] ** -2)
+
+    def p_prime(self, u: acb) -> acb:
+        """℘'(u)."""
+        scale, cosine = self.functions(u)
+        return acb(-2 * cosine / scale**3)
+
+    def zeta(self, u: acb) -> acb:
+        """ζ(u) = κ coth(κu) − d u."""
+        scale, cosine = self.functions(u)
+        return acb(cosine / scale - as_ball(self.double) * u)
+
+    def sigma(self, u: acb) -> acb:
+        """σ(u) = exp(−d u²/2) sinh(κu)/κ."""
+        return acb((-as_ball(self.double) * u * u / 2).exp() * self.functions(u)[0])
+
+
+AnyLattice = Lattice | DegenerateLattice
+
+
+def thetas(z: Any, ratio: acb, order: int = 0) -> Any:
+    """(θ1, θ2, θ3, θ4) at z of a number or a power series, or their derivatives in z of a number."""
+    return z.modular_theta(ratio, order) if order else z.modular_theta(ratio)
+
+
+def as_ball(value: Scalar) -> arb:
+    """An exact number or a ball as a ball."""
+    return value if isinstance(value, arb) else ball(value)
+
+
+def difference(a: Scalar, b: Scalar) -> Scalar:
+    """a − b, exact where both are."""
+    return as_ball(a) - as_ball(b) if isinstance(a, arb) or isinstance(b, arb) else a - b
+
+
+def real(value: Any) -> Any:
+    """The real part of a ball or of a power series in a real variable."""
+    if isinstance(value, acb_series):
+        return arb_series([value[i].real for i in range(value.prec)], value.prec)
+    return value.real
+
+
+def imag(value: Any) -> Any:
+    """The imaginary part of a ball or of a power series in a real variable."""
+    if isinstance(value, acb_series):
+        return arb_series([value[i].imag for i in range(value.prec)], value.prec)
+    return value.imag
+
+
+def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
+    """The lattice of ℘'² = 4℘³ − g2 ℘ − g3 at the working precision.
+
+    Exact invariants: any, the sign of the discriminant g2³ − 27 g3² is decided exactly.  Balls: raises OutOfReach where
+    they do not decide it.
+    """
+    if not isinstance(g2, arb) and not isinstance(g3, arb):
+        return _exact_lattice(Fraction(g2), Fraction(g3), ctx.prec)
+    g2, g3 = as_ball(g2), as_ball(g3)
+    discriminant = g2**3 - 27 * g3**2
+    if not (discriminant > 0 or discriminant < 0):
+        raise OutOfReach(
+            f"The discriminant g2^3 - 27 g3^2 = {discriminant.str(10)} has no certain sign.",
+            "Give the invariants exactly, or as narrower balls.",
+        )
+    near = _cubic_roots(*(Fraction(midpoint(g)) for g in (g2, g3)))
+    return _from_roots([_enclose(root, g2, g3) for root in near])
+
+
+def from_roots(roots: Sequence[Exact | arb | acb]) -> AnyLattice:
+    """The lattice with these roots e (their sum 0): exact numbers or balls, all real or one real and a conjugate pair.
+
+    Raises InputError unless three, with a sum that can be 0; OutOfReach where balls do not tell two roots apart.
+    """
+    total = sum(roots)
+    if len(roots) != 3 or not (total == 0 if isinstance(total, (int, Fraction)) else total.contains(0)):
+        raise InputError(f"Roots with the sum {total}.", "Three roots e1 + e2 + e3 = 0 make a lattice.")
+    if all(isinstance(root, (int, Fraction)) for root in roots):
+        a, b, c = (Fraction(root) for root in roots)  # type: ignore[arg-type]
+        return from_invariants(-4 * (a * b + b * c + c * a), 4 * a * b * c)
+    balls = [root if isinstance(root, acb) else acb(as_ball(root)) for root in roots]
+    if any(a.overlaps(b) for a, b in ((balls[0], balls[1]), (balls[1], balls[2]), (balls[2], balls[0]))):
+        raise OutOfReach("Two roots cannot be told apart.", "Give the roots exactly, or as narrower balls.")
+    return _from_roots(balls)
+
+
+@lru_cache(maxsize=64)
+def _exact_lattice(g2: Fraction, g3: Fraction, bits: int) -> AnyLattice:
+    with working_precision(bits):
+        if g2**3 == 27 * g3**2:
+            return DegenerateLattice(Fraction(-3, 2) * g3 / g2 if g2 else Fraction(0))
+        return _from_roots(_cubic_roots(g2, g3))
+
+
+def _cubic_roots(g2: Fraction, g3: Fraction) -> list[acb]:
+    """The roots of 4x³ − g2 x − g3, each to the working precision however close they are."""
+    common = lcm(g2.denominator, g3.denominator)
+    cubic = fmpz_poly([int(-g3 * common), int(-g2 * common), 0, 4 * common])
+    found: Any = cubic.complex_roots()
+    return [root for root, _ in found]
+
+
+def _enclose(near: acb, g2: arb, g3: arb) -> acb:
+    """The ball around ``near`` that holds a root of 4x³ − g2 x − g3: a contracting interval Newton step."""
+    middle = near.mid() if not near.imag.contains(0) else acb(near.real.mid())
+    value = 4 * middle**3 - g2 * middle - g3
+    spread = abs(value / (12 * middle**2 - g2)).upper() * 2 + arb(2) ** (-ctx.prec)
+    wide = middle + (acb(arb(0, spread)) if middle.imag == 0 else acb(arb(0, spread), arb(0, spread)))
+    narrow = middle - value / (12 * wide**2 - g2)
+    if not wide.contains(narrow):
+        raise OutOfReach(f"A root near {near.str(10)} is not certain.", "Give the invariants as narrower balls.")
+    return narrow
+
+
+def _from_roots(roots: list[acb]) -> Lattice:
+    """The lattice of three different roots; real half-periods by the arithmetic-geometric mean (DLMF 23.22(ii))."""
+    reals = sorted((root.real for root in roots if root.imag == 0), key=midpoint, reverse=True)
+    if len(reals) == 3:
+        e1, e2, e3 = reals
+        side = (e1 - e3).sqrt()
+        half = arb.pi() / (2 * acb(side).agm((e1 - e2).sqrt()).real)
+        imaginary = arb.pi() / (2 * acb(side).agm((e2 - e3).sqrt()).real)
+        return _with_thetas((acb(e1), acb(e2), acb(e3)), half, acb(0, imaginary / half))
+    e, pair = reals[0], next(root for root in roots if root.imag > 0)
+    apart = acb(e - pair.real, pair.imag)
+    # √(e − pair) has these real and imaginary parts; each from the sum that does not cancel
+    size = (apart.real**2 + apart.imag**2).sqrt()
+    larger = ((size + abs(apart.real)) / 2).sqrt()
+    smaller = apart.imag / (2 * larger)
+    along, across = (larger, smaller) if apart.real > 0 else (smaller, larger)
+    half, imaginary = (arb.pi() / (2 * acb(size.sqrt()).agm(part).real) for part in (along, across))
+    return _with_thetas((acb(e), pair.conjugate(), pair), half, acb(arb(1) / 2, imaginary / (2 * half)))
+
+
+def _with_thetas(roots: tuple[acb, acb, acb], half: arb, ratio: acb) -> Lattice:
+    _, two, three, four = thetas(acb(0), ratio)
+    first, third = (thetas(acb(0), ratio, order)[0] for order in (1, 3))
+    return Lattice(roots, half, ratio, (first, two, three, four), (-third / (12 * half * first)).real)

@@ -1,0 +1,173 @@
+"""What a reference is certified by: a second source that shares no formula with the first, and the digits both give.
+
+The second source of a closed form is the validated integration from the same exact start.  Where that is out of reach,
+it is any other motion that is handed in (a heyoka run at twice the precision, say: computed, not proven), and where
+none is, the closed form is held against the validated integration at an early time from the start, and over the last
+unit of time before t from its own state there: a formula that is a motion near 0 and near t, and in between the same
+analytic function.  No reference below its certified digits is used to score anything: :func:`certified_state`
+widens the balls to what is certified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, log2
+
+from flint import arb
+
+from heavytop.errors import OutOfReach
+from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.solution import ExactSolution
+from heavytop.exact.validated import Validated
+from heavytop.top.equations import Parameters
+from heavytop.top.heavy_top import State
+from heavytop.top.integrals import holding
+
+SecondSource = Callable[[Fraction, int], Sequence[arb]]
+"""Six balls at (time, bits), computed elsewhere."""
+
+_EARLY = Fraction(4)
+_LAST = Fraction(1)
+# a second source may cost this many seconds of the model of the cost
+_EFFORT = 20.0
+_BITS_A_DIGIT = log2(10)
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """Two sources and how far they agree.
+
+    method, second_source: in words.  agreed_digits: digits that both give, relative above 1 and absolute below.
+    kind: ``proven`` if both are balls that hold the motion at the time itself, ``proven at both ends`` if the second is
+    one near 0 and over the last unit of time only, ``computed`` if the second is no ball.
+    """
+
+    method: str
+    second_source: str
+    agreed_digits: int
+    kind: str
+
+
+def bits_of(digits: int) -> int:
+    """Bits that hold ``digits`` decimal digits."""
+    return ceil(digits * _BITS_A_DIGIT) + 4
+
+
+def agreed_digits(first: Sequence[arb], second: Sequence[arb]) -> int:
+    """The digits to which every pair of balls agrees, whatever numbers they stand for; relative to a size above 1."""
+    digits = []
+    for one, two in zip(first, second, strict=True):
+        apart = abs(midpoint(one) - midpoint(two)) + radius(one) + radius(two)
+        digits.append(_digits(apart / max(Fraction(1), abs(midpoint(one)))))
+    return min(digits)
+
+
+def certify(
+    solution: ExactSolution,
+    time: Fraction,
+    digits: int,
+    second: tuple[str, SecondSource] | None = None,
+    enclosure: Validated | None = None,
+) -> Certificate:
+    """The certificate of ``solution`` at ``time`` for ``digits`` digits.
+
+    second: name and values of a computed source, taken where validated integration does not reach.
+    enclosure: :func:`enclosure_of` the solution, to be used again for many times; None for a new one.
+    Raises OutOfReach where two proven sources exclude each other: one of them is wrong.
+    """
+    bits = bits_of(digits)
+    values = solution.state(time, bits)
+    if isinstance(solution, Validated):
+        if second is None:
+            return Certificate(solution.method, "its own proven tail", agreed_digits(values, values), "proven")
+        return Certificate(solution.method, second[0], agreed_digits(values, second[1](time, bits)), "computed")
+    enclosure = enclosure or enclosure_of(solution)
+    try:
+        other = enclosure.state(time, bits)
+    except OutOfReach:
+        if second is not None:
+            return Certificate(solution.method, second[0], agreed_digits(values, second[1](time, bits)), "computed")
+        return _early_and_last(solution, enclosure, time, values, bits)
+    _require_overlap(solution, time, values, other)
+    return Certificate(solution.method, "validated integration", agreed_digits(values, other), "proven")
+
+
+def certified_state(
+    solution: ExactSolution, time: Fraction, digits: int, second: tuple[str, SecondSource] | None = None
+) -> tuple[list[arb], Certificate]:
+    """The state with no radius below what is certified, and its certificate: fit to score with."""
+    certificate = certify(solution, time, digits, second)
+    values = solution.state(time, bits_of(digits))
+    if certificate.agreed_digits >= digits:
+        return values, certificate
+    slack = Fraction(1, 10) ** certificate.agreed_digits
+    with working_precision(bits_of(digits) + 64):
+        widened = [
+            ball(midpoint(value)) + arb(0, (ball(slack * max(Fraction(1), abs(midpoint(value)))) + value.rad()).upper())
+            for value in values
+        ]
+    return widened, certificate
+
+
+def enclosure_of(solution: ExactSolution, start: State | None = None, effort: float = _EFFORT) -> Validated:
+    """The validated integration of the same motion, or from another start with the same parameters."""
+    rotor = Fraction(_parameters(solution).rotor)
+    return Validated(solution.top, start or solution.start, solution.system, rotor=rotor, effort=effort)
+
+
+def _early_and_last(
+    solution: ExactSolution, enclosure: Validated, time: Fraction, values: Sequence[arb], bits: int
+) -> Certificate:
+    sign = 1 if time > 0 else -1
+    early = sign * _EARLY
+    known = solution.state(early, bits)
+    enclosed = enclosure.state(early, bits)
+    _require_overlap(solution, early, known, enclosed)
+    before = [midpoint(value) for value in solution.state(time - sign * _LAST, bits + 64)]
+    last = enclosure_of(solution, State(before[:3], before[3:])).state(sign * _LAST, bits + 16)
+    agreed = min(agreed_digits(known, enclosed), agreed_digits(values, last), _integral_digits(solution, values, bits))
+    source = f"validated integration from 0 to {early} and from t - {sign * _LAST} to t".replace("- -", "+ ")
+    source += "; first integrals at t"
+    return Certificate(solution.method, source, agreed, "proven at both ends")
+
+
+def _integral_digits(solution: ExactSolution, values: Sequence[arb], bits: int) -> int:
+    """The digits to which the first integrals at ``values`` are those of the exact start."""
+    exact = _parameters(solution)
+    digits = []
+    with working_precision(bits + 64):
+        p = Parameters([ball(i) for i in exact.inertia], [ball(n) for n in exact.moment], ball(Fraction(exact.rotor)))
+        for integral in holding(solution.top, solution.start, solution.system):
+            known = Fraction(integral.value(exact, solution.start.flat))
+            drift = integral.value(p, values) - ball(known)
+            digits.append(_digits((abs(midpoint(drift)) + radius(drift)) / max(Fraction(1), abs(known))))
+    return min(digits)
+
+
+def _parameters(solution: ExactSolution) -> Parameters:
+    """The motion's own parameters: the rotor of a gyrostat from rounded data is not that of its start."""
+    own: Parameters | None = getattr(solution, "parameters", None)
+    return own or solution.system.parameters(solution.top, solution.start)
+
+
+def _require_overlap(solution: ExactSolution, time: Fraction, first: Sequence[arb], second: Sequence[arb]) -> None:
+    for component, (one, two) in enumerate(zip(first, second, strict=True), 1):
+        apart = abs(midpoint(one) - midpoint(two))
+        if apart > radius(one) + radius(two):
+            raise OutOfReach(
+                f"{solution.method} and validated integration exclude each other at t = {float(time):.6g}: component "
+                f"{component} differs at digit {_digits(apart)}.",
+                "One of them is wrong: neither can serve as a reference.",
+            )
+
+
+def _digits(gap: Fraction) -> int:
+    """The largest d ≥ 0 with gap ≤ 10^-d; for no gap at all, more digits than anyone may ask for."""
+    if gap == 0:
+        return 10**6
+    digits = max(0, int((gap.denominator.bit_length() - gap.numerator.bit_length() - 1) / _BITS_A_DIGIT) - 1)
+    while gap * 10 ** (digits + 1) <= 1:
+        digits += 1
+    return digits if gap * 10**digits <= 1 else 0

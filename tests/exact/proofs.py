@@ -1,0 +1,104 @@
+"""What proves a closed form: its series in the equations, its start, and an integration that knows nothing of it."""
+
+from __future__ import annotations
+
+import random
+from fractions import Fraction
+
+import mpmath
+from flint import arb
+
+from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.top.equations import Parameters
+
+DIGITS_60 = 200
+
+
+def parameters(solution):
+    """The parameters of the solution's field as balls at the working precision."""
+    exact = solution.system.parameters(solution.top, solution.start)
+    return Parameters([ball(i) for i in exact.inertia], [ball(n) for n in exact.moment], ball(Fraction(exact.rotor)))
+
+
+def residual(solution, time, bits=DIGITS_60):
+    """y' - f(y) at the time, all coefficients that the series has."""
+    series = solution.series(time, 3, bits)
+    with working_precision(2 * bits):
+        field = solution.system.field(parameters(solution), series)
+        return [(y.derivative() - f)[k] for y, f in zip(series, field, strict=True) for k in range(2)]
+
+
+def assert_solves(solution, time):
+    """The residual of all six equations contains 0 with radius below 1e-40 at 60 digits; t = 0 gives the start."""
+    for value in residual(solution, time):
+        assert value.contains(0), value
+        assert value.rad() < arb("1e-40")
+    for value, exact in zip(solution.state(Fraction(0), DIGITS_60), solution.start.flat, strict=True):
+        assert abs(midpoint(value) - exact) <= 2 * radius(value) + Fraction(1, 10**70) * abs(exact)
+
+
+def assert_attitude(solution, time, step=Fraction(1, 10**12)):
+    """ξ is a unit vector across γ that turns with the body: a difference quotient against ξ × ω."""
+    bits = DIGITS_60
+    xi, later, earlier = (solution.attitude(t, bits) for t in (time, time + step, time - step))
+    state = solution.state(time, bits)
+    with working_precision(2 * bits):
+        omega = solution.system.angular_velocity(parameters(solution), state)
+        one = sum(x * x for x in xi)
+        across = sum(x * g for x, g in zip(xi, state[3:], strict=True))
+        assert abs(one - 1).abs_upper() < arb("1e-55")
+        assert across.abs_upper() < arb("1e-50")
+        wanted = (
+            xi[1] * omega[2] - xi[2] * omega[1],
+            xi[2] * omega[0] - xi[0] * omega[2],
+            xi[0] * omega[1] - xi[1] * omega[0],
+        )
+        size = (1 + sum(abs(w) for w in omega) + sum(abs(s) for s in state)) ** 3
+        for a, b, w in zip(later, earlier, wanted, strict=True):
+            # the error of the central difference is step²/6 times a third derivative
+            assert abs((a - b) / (2 * ball(step)) - w).abs_upper() < size.abs_upper() ** 2 * arb("1e-20")
+
+
+def integrated(solution, time, digits=55):
+    """The state by mpmath's Taylor integrator, from the equations alone."""
+    exact = solution.system.parameters(solution.top, solution.start)
+    with mpmath.workdps(digits + 5):
+        number = lambda x: mpmath.mpf(x.numerator) / x.denominator  # noqa: E731
+        p = Parameters(
+            [number(i) for i in exact.inertia], [number(n) for n in exact.moment], number(Fraction(exact.rotor))
+        )
+        start = [number(value) for value in solution.start.flat]
+        flow = mpmath.odefun(lambda _t, y: list(solution.system.field(p, y)), 0, start)
+        return flow(number(time))
+
+
+def assert_agrees(solution, time, digits=50):
+    """The closed form and the integration agree to that many digits."""
+    with mpmath.workdps(digits + 10):
+        for value, other in zip(solution.state(time, 200), integrated(solution, time), strict=True):
+            assert abs(mpmath.mpf(value.str(60, radius=False)) - other) < mpmath.mpf(10) ** -digits * (1 + abs(other))
+
+
+def assert_narrow(solution, time, digits=50):
+    """The digits asked for come out at that time."""
+    bits = int(digits * 3.33) + 8
+    for value in solution.state(time, bits):
+        assert value.is_finite()
+        assert value.rad() < arb(10) ** -digits * (1 + abs(value).abs_upper())
+
+
+def rational(rng: random.Random, size=4, denominator=12):
+    """A random rational number of about that size, at most 1/denominator fine."""
+    bottom = rng.randint(1, denominator)
+    return Fraction(rng.randint(-size * bottom, size * bottom), bottom)
+
+
+def positive(rng: random.Random, size=4, denominator=9):
+    """A random positive rational number."""
+    bottom = rng.randint(1, denominator)
+    return Fraction(rng.randint(1, size * bottom), bottom)
+
+
+def triple(rng, draw=rational):
+    """Three random numbers."""
+    return tuple(draw(rng) for _ in range(3))

@@ -1,0 +1,83 @@
+"""Bobylev-Steklov motions: both kinds, the separatrix, and the builder."""
+
+import random
+from fractions import Fraction
+
+import pytest
+from proofs import assert_agrees, assert_narrow, assert_solves, positive, rational
+
+from heavytop.errors import InputError, NotInClass
+from heavytop.exact.bobylev_steklov import BobylevSteklov, bobylev_steklov_motion
+from heavytop.top.heavy_top import HeavyTop, State
+
+TINY = Fraction(1, 10**30)
+
+
+def motion_from(p, x, gamma1, gamma2, moment=1, inertia=(Fraction(3, 2), Fraction(1))):
+    i2, i3 = inertia
+    top = HeavyTop((2 * i3, i2, i3), 1, (moment, 0, 0))
+    return BobylevSteklov(top, State((p, 0, x), (gamma1, gamma2, i3 * p * x / Fraction(moment))))
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_every_random_motion_solves_all_six_equations(seed):
+    rng = random.Random(seed)
+    moment, p = positive(rng) * rng.choice((1, -1)), rational(rng)
+    motion = motion_from(p, rational(rng), rational(rng), rational(rng), moment, (positive(rng), positive(rng)))
+    assert_solves(motion, rational(rng, size=30))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_builder_gives_unit_gamma(seed):
+    rng = random.Random(seed)
+    inertia = (positive(rng), positive(rng))
+    motion = bobylev_steklov_motion(inertia, rational(rng) + 5, positive(rng), rational(rng), rational(rng))
+    motion.start.require_unit_gamma()
+    assert_solves(motion, rational(rng, size=30))
+
+
+# C = 0 is |γ|² n1² = h²: I3 = n1 = 1, γ3 = p x, h = γ1 + x²/2; γ1² + γ2² + p² x² = (γ1 + x²/2)², and so
+# γ2² = x² (γ1 + x²/4 − p²): x = 2, p = 1, γ1 = 1, γ2 = 2
+@pytest.mark.parametrize("off", [0, TINY, -TINY])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_on_the_separatrix_and_beside_it_every_digit_comes_out(off, sign):
+    motion = motion_from(Fraction(1), Fraction(2 * sign), Fraction(1), 2 + off)
+    for time in (Fraction(1, 3), Fraction(-20), Fraction(500)):
+        assert_solves(motion, time)
+        assert_narrow(motion, time)
+
+
+def test_beside_equilibria_every_digit_comes_out():
+    # x = 0, γ = (±1, 0, 0) turns steadily about the vertical, stable or not; so does γ2 = 0, x² = 2B
+    for gamma1, p, x in ((1, Fraction(1, 2), 0), (-1, Fraction(1, 2), 0), (1, 2, 0), (-1, 1, 1), (2, 1, 2)):
+        for off in (Fraction(0), TINY, -TINY):
+            motion = motion_from(Fraction(p), x + off, Fraction(gamma1), off)
+            for time in (Fraction(3), Fraction(200), Fraction(10**6)):
+                assert_solves(motion, time)
+
+
+def test_turning_points_are_starts_like_any_other():
+    for x in (Fraction(1, 2), Fraction(-3)):
+        assert_solves(motion_from(Fraction(2, 3), x, Fraction(4, 5), Fraction(0)), Fraction(5, 2))
+
+
+def test_the_independent_integration_agrees_to_fifty_digits():
+    motion = bobylev_steklov_motion(
+        (Fraction(3, 2), Fraction(1)), Fraction(1), Fraction(1, 2), Fraction(1, 3), Fraction(2)
+    )
+    assert_agrees(motion, Fraction(3))
+    assert_narrow(motion, Fraction(10**9))
+
+
+def test_what_is_outside_is_refused_with_the_test_that_failed():
+    start = State((1, 0, 1), (0, 1, 1))
+    with pytest.raises(NotInClass, match=r"P r = \(1, 1, 0\)"):
+        BobylevSteklov(HeavyTop((2, 2, 1), 1, (1, 1, 0)), start)
+    with pytest.raises(NotInClass, match="I1 - 2 I3 = 1"):
+        BobylevSteklov(HeavyTop((3, 2, 1), 1, (1, 0, 0)), start)
+    with pytest.raises(NotInClass, match="Omega2 = 1/9"):
+        BobylevSteklov(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((1, "1/9", 1), (0, 1, 1)))
+    with pytest.raises(NotInClass, match="= 1, not 0"):
+        BobylevSteklov(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((1, 0, 1), (0, 1, 2)))
+    with pytest.raises(InputError, match="a = 0"):
+        bobylev_steklov_motion((Fraction(1), Fraction(1)), Fraction(0), Fraction(1), Fraction(1), Fraction(1))

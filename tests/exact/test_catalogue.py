@@ -1,0 +1,94 @@
+"""The catalogue finds every class, under every naming of the axes, and falls back to the enclosure."""
+
+from fractions import Fraction
+
+import pytest
+from proofs import assert_solves
+
+from heavytop.errors import InputError
+from heavytop.exact.axes import ALL, Renamed, renamed_state, renamed_top
+from heavytop.exact.bobylev_steklov import BobylevSteklov, bobylev_steklov_motion
+from heavytop.exact.catalogue import find, matches
+from heavytop.exact.delone import Delone, DeloneHomoclinic
+from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.exact.euler import Euler
+from heavytop.exact.grioli import Grioli, grioli_motion
+from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.lagrange import Lagrange
+from heavytop.exact.pendulum import Pendulum
+from heavytop.exact.staude import Staude, staude_motion
+from heavytop.exact.validated import Validated
+from heavytop.top.equations import GYROSTAT
+from heavytop.top.heavy_top import HeavyTop, State
+
+F = Fraction
+UNIT = (F(2, 3), F(-1, 3), F(2, 3))
+SAMPLES = {
+    Staude: staude_motion((F(3), F(2), F(1)), UNIT, F(3, 2), F(1, 2)),
+    Grioli: grioli_motion(F(1, 3), F(1, 4), F(2, 7), F(3, 2)),
+    DeloneHomoclinic: DeloneHomoclinic(F(3, 2), F(5, 3)),
+    Euler: Euler(HeavyTop((3, 2, 1), 1, (0, 0, 0)), State((1, "1/2", "-1/3"), UNIT)),
+    Pendulum: Pendulum(HeavyTop((3, 2, 1), 1, (0, 1, "1/2")), State(("1/2", 0, 0), (0, "3/5", "4/5"))),
+    Lagrange: Lagrange(HeavyTop(("3/2", "3/2", 1), 2, (0, 0, "3/4")), State(("1/5", "-1/3", 2), ("3/5", 0, "4/5"))),
+    BobylevSteklov: bobylev_steklov_motion((F(5, 2), F(1)), F(1), F(1, 2), F(1, 3), F(2)),
+    Delone: Delone(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((1, "1/2", "1/3"), ("3/4", 1, "1/5"))),
+}
+
+
+def kind(solution):
+    return type(solution.solution if isinstance(solution, Renamed) else solution)
+
+
+@pytest.mark.parametrize("case", SAMPLES, ids=lambda case: case.__name__)
+@pytest.mark.parametrize("axes", ALL)
+def test_every_class_is_found_under_every_naming_of_the_axes(case, axes):
+    sample = SAMPLES[case]
+    top, start = renamed_top(sample.top, axes), renamed_state(sample.start, axes)
+    found = find(top, start)
+    assert kind(found) is case
+    assert (found.top, found.start) == (top, start)
+    assert_solves(found, F(7, 3))
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (2, 1, 0)])
+def test_the_gyrostat_is_found(axes):
+    partial = ErshkovPartial(F(1), F(2), F(1))
+    top, start = renamed_top(partial.top, axes), renamed_state(partial.start, axes)
+    found = find(top, start, GYROSTAT)
+    assert kind(found) is (ErshkovPartial if axes == (0, 1, 2) else Gyrostat)
+    assert_solves(found, F(7, 3))
+    moving = Renamed(partial, axes)
+    assert_solves(moving, F(-5, 3))
+    steady = find(HeavyTop((3, 2, 1), 1, (0, 1, 0)), State((0, 1, 0), (0, 1, 0)), GYROSTAT)
+    assert kind(steady) is Staude
+
+
+def test_several_forms_of_one_motion_agree():
+    for top, start in (
+        (HeavyTop((2, 2, 1), 1, (0, 0, 0)), State((1, "1/2", "-1/3"), UNIT)),
+        (HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, "1/2", 0), ("3/5", 0, "4/5"))),
+        (HeavyTop((2, 3, 1), 1, (1, 0, 0)), State((0, 0, "1/2"), ("3/5", "4/5", 0))),
+        (SAMPLES[DeloneHomoclinic].top, SAMPLES[DeloneHomoclinic].start),
+    ):
+        forms = list(matches(top, start))
+        assert len(forms) > 1
+        states = [form.state(F(13, 3), 200) for form in [*forms, Validated(top, start)]]
+        for other in states[1:]:
+            assert all(a.overlaps(b) for a, b in zip(states[0], other, strict=True))
+
+
+@pytest.mark.parametrize("case", SAMPLES, ids=lambda case: case.__name__)
+def test_the_validated_enclosure_agrees_to_fifty_digits_at_ten(case):
+    sample = SAMPLES[case]
+    for a, b in zip(sample.state(F(10), 168), Validated(sample.top, sample.start).state(F(10), 168), strict=True):
+        assert a.overlaps(b)
+
+
+def test_a_generic_motion_is_left_to_the_enclosure():
+    top, start = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+    assert kind(find(top, start)) is Validated
+
+
+def test_what_the_gyrostat_does_not_admit_is_an_input_error():
+    with pytest.raises(InputError, match="a = 1"):
+        find(HeavyTop((3, 2, 1), 1, (1, 0, 0)), State((1, 0, 0), (1, 0, 0)), GYROSTAT)

@@ -1,0 +1,94 @@
+"""The Delone class: any direction of r, the homoclinic motion as its limit, and its neighbourhood."""
+
+import json
+import random
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from flint import arb
+from proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational
+
+from heavytop.errors import NotInClass
+from heavytop.exact.balls import working_precision
+from heavytop.exact.delone import Delone, DeloneHomoclinic
+from heavytop.top.heavy_top import HeavyTop, State
+
+VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text())
+TINY = Fraction(1, 10**30)
+
+
+def delone(omega, gamma3, moment, i3=Fraction(1)):
+    """The start of the class with this Ω and γ3: γ1 + iγ2 = I3 (Ω1 + iΩ2)²/(n1 + i n2)."""
+    (w1, w2, _), (n1, n2) = omega, moment
+    real, imaginary, square = w1 * w1 - w2 * w2, 2 * w1 * w2, Fraction(n1 * n1 + n2 * n2)
+    gamma = (i3 * (real * n1 + imaginary * n2) / square, i3 * (imaginary * n1 - real * n2) / square, gamma3)
+    return Delone(HeavyTop((2 * i3, 2 * i3, i3), 1, (n1, n2, 0)), State(omega, gamma))
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_every_random_motion_solves_all_six_equations(seed):
+    rng = random.Random(seed)
+    omega = [rational(rng) for _ in range(3)]
+    if seed % 6 == 1:
+        omega[rng.randrange(3)] = Fraction(0)
+    motion = delone(omega, rational(rng), (rational(rng), positive(rng)), positive(rng))
+    assert_solves(motion, rational(rng, size=20))
+
+
+@pytest.mark.parametrize("off", [0, TINY, -TINY])
+def test_on_the_homoclinic_motion_and_beside_it_every_digit_comes_out(off):
+    motion = delone((Fraction(0), Fraction(0), 2 + off), Fraction(1), (0, Fraction(1, 2)), Fraction(1, 2))
+    for time in (Fraction(1, 3), Fraction(-4), Fraction(60), Fraction(300)):
+        assert_solves(motion, time)
+        assert_narrow(motion, time)
+
+
+def test_the_limit_of_the_class_is_the_homoclinic_form():
+    special = DeloneHomoclinic(Fraction(3, 2), Fraction(5, 3))
+    general = Delone(special.top, special.start)
+    for time in (Fraction(-7, 3), Fraction(1, 5), Fraction(30)):
+        assert_solves(special, time)
+        for a, b in zip(special.state(time, 200), general.state(time, 200), strict=True):
+            assert a.overlaps(b)
+    assert_attitude(special, Fraction(1, 3))
+
+
+def test_the_reference_state_lies_in_the_balls():
+    vector = next(v for v in VECTORS if v["name"].startswith("delone"))
+    top, start = (
+        HeavyTop(vector["inertia"], vector["weight"], vector["centre"]),
+        State(vector["omega"], vector["gamma"]),
+    )
+    with working_precision(300):
+        for motion in (Delone(top, start), DeloneHomoclinic(Fraction(1), Fraction(1))):
+            assert (motion.top, motion.start) == (top, start)
+            for value, text in zip(motion.state(Fraction(vector["time"]), 210), vector["state"], strict=True):
+                assert abs(value - arb(text)).abs_upper() < arb("1e-59")
+
+
+def test_the_independent_integration_agrees_to_fifty_digits():
+    motion = delone((Fraction(1, 2), Fraction(1, 3), Fraction(1)), Fraction(2, 3), (1, Fraction(1, 2)))
+    assert_agrees(motion, Fraction(3))
+    assert_narrow(motion, Fraction(10**9))
+
+
+def test_beside_the_permanent_rotation_every_digit_comes_out():
+    for off in (0, TINY, -TINY):
+        motion = delone((Fraction(off), Fraction(1), Fraction(0)), Fraction(0), (0, Fraction(1, 2)), Fraction(1, 2))
+        for time in (Fraction(2), Fraction(40)):
+            assert_solves(motion, time)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "centre", "omega", "message"),
+    [
+        ((2, 2, "3/4"), (1, 0, 0), (1, 0, 0), "I1 - 2 I3 = 1/2"),
+        ((2, 2, 1), (1, 0, "1/9"), (1, 0, 0), "1/9"),
+        ((2, 2, 1), (0, 0, 0), (1, 0, 0), "P r != 0"),
+        ((2, 2, 1), (1, 0, 0), (1, 1, 0), r"xi = -1 \+ i \(2\)"),
+    ],
+)
+def test_what_is_outside_is_refused_with_the_test_that_failed(inertia, centre, omega, message):
+    with pytest.raises(NotInClass, match=message):
+        Delone(HeavyTop(inertia, 1, centre), State(omega, (1, 0, 0)))

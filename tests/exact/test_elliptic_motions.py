@@ -1,0 +1,239 @@
+"""Gyrostat and Lagrange: the equations at random data and at every edge, long times, and independent integrations."""
+
+import json
+import random
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+
+import mpmath
+import pytest
+from elliptic_helpers import (
+    assert_same,
+    assert_solves_its_equations,
+    assert_starts_there,
+    in_balls,
+    positive,
+    rational,
+    vector,
+)
+from flint import arb
+
+from heavytop.errors import InputError, NotInClass
+from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.lagrange import Lagrange
+from heavytop.exact.weierstrass import DegenerateLattice, Lattice
+from heavytop.top.equations import GYROSTAT
+from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+
+F = Fraction
+TINY = F(1, 10**30)
+BITS_50 = 167
+POLE, BELOW, SIDE = (0, 0, 1), (0, 0, -1), (F(3, 5), 0, F(4, 5))
+
+
+def random_gyrostat(seed):
+    rng = random.Random(seed)
+    top = HeavyTop((positive(rng), positive(rng), positive(rng)), 1, (0, rational(rng), 0))
+    return Gyrostat(top, State(vector(rng), vector(rng)), rational(rng))
+
+
+def paper_gyrostat(seed):
+    """(2.2)-(2.4): γ = M/|M| with a rational |M|."""
+    rng = random.Random(seed)
+    inertia = tuple(positive(rng) for _ in range(3))
+    u, v, size = rational(rng), rational(rng), positive(rng)
+    norm = 1 + u * u + v * v
+    gamma = (2 * u / norm, 2 * v / norm, 1 - 2 / norm)
+    top = HeavyTop(inertia, positive(rng), (0, rational(rng), 0))
+    return Gyrostat.of(top, State([size * g / i for g, i in zip(gamma, inertia, strict=True)], gamma))
+
+
+def random_lagrange(seed):
+    rng = random.Random(seed)
+    i1 = positive(rng)
+    return Lagrange(HeavyTop((i1, i1, positive(rng)), 1, (0, 0, rational(rng))), State(vector(rng), vector(rng)))
+
+
+def lagrange(omega, gamma, i3=1, centre=1):
+    return Lagrange(HeavyTop((2, 2, i3), 1, (0, 0, centre)), State(omega, gamma))
+
+
+def gyrostat(inertia, omega, gamma=SIDE, rotor=F(1, 3)):
+    return Gyrostat(HeavyTop(inertia, 1, (0, 1, 0)), State(omega, gamma), F(rotor))
+
+
+PARTIAL = ErshkovPartial(F(1), F(6), F(1))
+
+
+def near_partial(off):
+    first, second, third = PARTIAL.start.omega
+    return Gyrostat(PARTIAL.top, State((first + off, second, third), PARTIAL.start.gamma), PARTIAL.rate / 2)
+
+
+EDGES = {
+    "sleeping": lagrange((0, 0, 4), POLE),
+    "sleeping, unstable": lagrange((0, 0, 1), POLE),
+    "sleeping, near": lagrange((TINY, 0, 1), POLE),
+    "hanging": lagrange((0, 0, 1), BELOW),
+    "through the upper pole": lagrange((1, 0, 2), POLE),
+    "through the lower pole": lagrange((1, 2, 2), BELOW),
+    "spherical pendulum": lagrange((F(1, 3), 1, 0), SIDE),
+    "plane pendulum": lagrange((0, 1, 0), SIDE),
+    "pendulum from rest": lagrange((0, 0, 0), SIDE),
+    "cusp": lagrange((0, 0, 3), SIDE),
+    "loop": lagrange((F(-1, 2), 0, 3), SIDE),
+    "pendulum separatrix": Lagrange(HeavyTop((1, 1, 1), 1, POLE), State((2, 0, 0), BELOW)),
+    "inside the separatrix": Lagrange(HeavyTop((1, 1, 1), 1, POLE), State((2 - TINY, 0, 0), BELOW)),
+    "outside the separatrix": Lagrange(HeavyTop((1, 1, 1), 1, POLE), State((2 + TINY, 0, 0), BELOW)),
+    "asymptotic to sleeping": lagrange((0, 0, 2), POLE),
+    # I3 Ω3 ψ' = n + I1 ψ'² γ3 with ψ' = 1: a double root of the cubic
+    "steady precession": lagrange((F(3, 5), 0, F(13, 5)), SIDE),
+    "no weight": lagrange((1, 0, 1), SIDE, centre=0),
+    "sphere": lagrange((1, F(1, 2), 1), SIDE, i3=2, centre=0),
+    "gamma is 0": lagrange((1, 0, 1), (0, 0, 0)),
+    "homoclinic": near_partial(F(0)),
+    "homoclinic, gamma not along M": Gyrostat(PARTIAL.top, State(PARTIAL.start.omega, SIDE), PARTIAL.rate / 2),
+    "near homoclinic above": near_partial(TINY),
+    "near homoclinic below": near_partial(-TINY),
+    "I1 = I2": gyrostat((2, 2, 1), (1, 2, 3)),
+    "I1 = I3": gyrostat((2, 3, 2), (1, 2, 3)),
+    "I2 = I3": gyrostat((3, 1, 1), (1, 2, 3)),
+    "gyrostat sphere": gyrostat((2, 2, 2), (1, 2, 3)),
+    "no rotor": gyrostat((3, 2, 1), (1, 2, 3), rotor=0),
+    "free separatrix": gyrostat((9, 8, 4), (4, 3, 3), rotor=0),
+    "no rotor, symmetric": gyrostat((2, 2, 1), (1, 2, 3), rotor=0),
+    "permanent": gyrostat((3, 2, 1), (0, 2, 0)),
+    "permanent off the axis": gyrostat((3, 2, 1), (1, F(-2, 1), 0), rotor=-1),
+    "gyrostat at rest": gyrostat((3, 2, 1), (0, 0, 0)),
+    "zero of M1 and M3": gyrostat((3, 2, 1), (0, 2, 1)),
+}
+
+
+@pytest.mark.parametrize("family", [random_gyrostat, paper_gyrostat, random_lagrange])
+def test_the_residual_of_all_six_equations_is_a_narrow_ball_around_zero(family):
+    rng = random.Random(77)
+    for seed in range(50):
+        motion = family(seed)
+        assert_starts_there(motion)
+        assert_solves_its_equations(motion, motion.parameters, rational(rng, 20))
+
+
+@pytest.mark.parametrize("name", list(EDGES))
+def test_the_edges_of_every_regime_solve_the_equations_too(name):
+    motion = EDGES[name]
+    assert_starts_there(motion)
+    for time in (F(0), F(7, 5), F(-33, 2)):
+        assert_solves_its_equations(motion, motion.parameters, time)
+
+
+@pytest.mark.parametrize("name", list(EDGES))
+@pytest.mark.parametrize("time", [F(10**6), F(10**9) + F(1, 3)])
+def test_the_digits_asked_for_come_out_at_large_times(name, time):
+    motion = EDGES[name]
+    state = motion.state(time, BITS_50)
+    more = motion.state(time, 260)
+    assert_same(state, more)
+    with working_precision(400):
+        gamma, expected = state[3:], dot(motion.start.gamma, motion.start.gamma)
+        assert dot(gamma, gamma).contains(ball(expected))
+        momentum = motion.top.angular_momentum(motion.start.omega)
+        moved = [m * ball(i) for m, i in zip(state[:3], motion.top.inertia, strict=True)]
+        assert dot(moved, gamma).contains(ball(dot(momentum, motion.start.gamma)))
+
+
+@pytest.mark.parametrize("family", [random_gyrostat, random_lagrange])
+def test_general_motions_keep_fifty_digits_at_large_times_and_solve_the_equations_there(family):
+    for seed in range(5):
+        motion = family(100 + seed)
+        for time in (F(10**6), F(10**9)):
+            assert_same(motion.state(time, BITS_50), motion.state(time, 260))
+            assert_solves_its_equations(motion, motion.parameters, time)
+
+
+def test_exact_separatrices_have_no_lattice_and_their_neighbours_have():
+    for name, kind in (
+        ("homoclinic", DegenerateLattice),
+        ("near homoclinic above", Lattice),
+        ("near homoclinic below", Lattice),
+        ("pendulum separatrix", DegenerateLattice),
+        ("inside the separatrix", Lattice),
+        ("asymptotic to sleeping", DegenerateLattice),
+        ("steady precession", DegenerateLattice),
+        ("free separatrix", DegenerateLattice),
+    ):
+        assert isinstance(EDGES[name].quartic().lattice(), kind), name
+
+
+def test_steady_precession_keeps_its_inclination():
+    assert EDGES["steady precession"].state(F(100), 100)[5].overlaps(ball(F(4, 5)))
+
+
+def test_the_homoclinic_gyrostat_is_the_papers_partial_case():
+    for time in (F(0), F(3, 2), F(-7), F(10**6), F(10**9)):
+        assert_same(EDGES["homoclinic"].state(time, 200), PARTIAL.state(time, 200))
+    for time in (F(0), F(3, 2), F(-40)):
+        assert_solves_its_equations(PARTIAL, GYROSTAT.parameters(PARTIAL.top, PARTIAL.start), time)
+
+
+def vectors():
+    return {entry["name"]: entry for entry in json.loads((Path(__file__).parents[1] / "data/vectors.json").read_text())}
+
+
+@pytest.mark.parametrize(("name", "make"), [("lagrange", Lagrange), ("euler", partial(Gyrostat, rotor=F(0)))])
+def test_reference_states_of_another_integrator_are_met_to_sixty_digits(name, make):
+    entry = vectors()[name]
+    top = HeavyTop(entry["inertia"], entry["weight"], entry["centre"])
+    motion = make(top, State(entry["omega"], entry["gamma"]))
+    with working_precision(300):
+        for value, expected in zip(motion.state(F(entry["time"]), 230), entry["state"], strict=True):
+            assert abs(midpoint(value) - F(expected)) < F(1, 10**59)
+
+
+@pytest.mark.parametrize("motion", [random_gyrostat(3), paper_gyrostat(4), random_lagrange(5), EDGES["loop"]])
+def test_a_taylor_integration_in_multiple_precision_agrees(motion):
+    with mpmath.workdps(30):
+        numbers = [[mpmath.mpf(v.numerator) / v.denominator for v in vs] for vs in motion.parameters[:2]]
+        rotor = mpmath.mpf(motion.parameters.rotor.numerator) / motion.parameters.rotor.denominator
+        parameters = type(motion.parameters)(*numbers, rotor)
+        start = [mpmath.mpf(v.numerator) / v.denominator for v in motion.start.flat]
+        final = mpmath.odefun(lambda _t, y: list(motion.system.field(parameters, y)), 0, start)(mpmath.mpf(1))
+        for value, other in zip(motion.state(F(1), 120), final, strict=True):
+            assert abs(mpmath.mpf(str(float(midpoint(value)))) - other) < 1e-13
+            assert abs(value - arb(mpmath.nstr(other, 28))) < 1e-15 * max(1, abs(float(other)))
+
+
+@pytest.mark.parametrize(
+    "name", ["loop", "through the upper pole", "through the lower pole", "hanging", "spherical pendulum", "homoclinic",
+             "steady precession", "I1 = I2", "no rotor", "permanent"],
+)  # fmt: skip
+def test_the_attitude_is_a_fixed_unit_vector_across_gamma(name):
+    motion, step, bits = EDGES[name], F(1, 10**25), 300
+    for time in (F(0), F(7, 5), F(-31)):
+        before, here, after = (motion.attitude(time + k * step, bits) for k in (-1, 0, 1))
+        state = motion.state(time, bits)
+        with working_precision(bits):
+            omega = motion.system.angular_velocity(in_balls(motion.parameters), state)
+            for a, b, slope in zip(before, after, cross(here, omega), strict=True):
+                assert abs((b - a) / ball(2 * step) - slope) < 1e-40
+            assert abs(dot(here, here) - 1) < 1e-60
+            assert abs(dot(here, state[3:])) < 1e-60
+
+
+def test_starts_outside_the_class_say_which_test_failed():
+    with pytest.raises(NotInClass, match="I1 - I2 = 1"):
+        Lagrange(HeavyTop((2, 1, 1), 1, (0, 0, 1)), State(POLE, POLE))
+    with pytest.raises(NotInClass, match="P a = 1"):
+        Lagrange(HeavyTop((2, 2, 1), 1, (1, 0, 1)), State(POLE, POLE))
+    with pytest.raises(InputError, match="parallel"):
+        Gyrostat.of(HeavyTop((3, 2, 1), 1, (0, 1, 0)), State((1, 2, 3), SIDE))
+    with pytest.raises(InputError, match="zero vector"):
+        EDGES["gamma is 0"].attitude(F(1), 60)
+
+
+def test_a_thousand_digits_come_out():
+    for motion in (random_gyrostat(8), random_lagrange(8)):
+        for value in motion.state(F(10**6), 3322):
+            assert radius(value) < F(1, 10**990)

@@ -1,0 +1,115 @@
+"""Euler-Poinsot against its equations, an integration, and its separatrix."""
+
+import json
+import random
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from flint import arb
+from proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
+
+from heavytop.errors import NotInClass
+from heavytop.exact.balls import working_precision
+from heavytop.exact.euler import Euler
+from heavytop.top.heavy_top import HeavyTop, State
+
+VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text())
+TINY = Fraction(1, 10**30)
+
+
+def euler(inertia, omega, gamma=(Fraction(2, 3), Fraction(-1, 3), Fraction(2, 3))):
+    return Euler(HeavyTop(inertia, 1, (0, 0, 0)), State(omega, gamma))
+
+
+def random_case(rng, k):
+    inertia, omega = list(triple(rng, positive)), list(triple(rng))
+    if k % 4 == 1:
+        inertia[rng.randrange(3)] = inertia[rng.randrange(3)]
+    if k % 5 == 2:
+        omega[rng.randrange(3)] = Fraction(0)
+    if k % 11 == 3:
+        inertia = [inertia[0]] * 3
+    return euler(inertia, omega, triple(rng))
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_every_random_motion_solves_all_six_equations(seed):
+    rng = random.Random(seed)
+    assert_solves(random_case(rng, seed), rational(rng, size=30))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_attitude_turns_with_the_body(seed):
+    rng = random.Random(100 + seed)
+    assert_attitude(random_case(rng, seed), rational(rng))
+
+
+# the separatrix L² = 2E I2 is I1 (I1 − I2) Ω1² = I3 (I2 − I3) Ω3²: for these moments 36 Ω1² = 4 Ω3², rational
+SEPARATRIX_INERTIA = (9, 5, 1)
+
+
+@pytest.mark.parametrize("off", [0, TINY, -TINY, Fraction(1, 10**12)])
+@pytest.mark.parametrize("signs", [(1, 1, 1), (-1, 1, 1), (1, -1, -1), (-1, -1, 1)])
+def test_on_the_separatrix_and_beside_it_every_digit_comes_out(off, signs):
+    omega = [sign * w for sign, w in zip(signs, (Fraction(1, 3), Fraction(2, 7), 1 + off), strict=True)]
+    motion = euler(SEPARATRIX_INERTIA, omega)
+    for time in (Fraction(7, 3), Fraction(-40), Fraction(250)):
+        assert_solves(motion, time)
+        assert_narrow(motion, time)
+
+
+def test_beside_the_saddle_every_digit_comes_out():
+    for omega in ((TINY, 1, 0), (0, 1, TINY), (TINY, 1, 3 * TINY), (TINY, 1, -TINY)):
+        motion = euler(SEPARATRIX_INERTIA, omega)
+        for time in (Fraction(1), Fraction(100), Fraction(10**6)):
+            assert_solves(motion, time)
+
+
+def test_beside_a_steady_rotation_and_beside_symmetry_every_digit_comes_out():
+    for inertia, omega in (
+        ((3, 2, 1), (1, TINY, 0)),
+        ((3, 2, 1), (TINY, 0, 1)),
+        ((2 + TINY, 2, 1), (1, 1, 1)),
+        ((2, 1, 1 - TINY), (1, 1, 1)),
+        ((2 + TINY, 2, 2 - TINY), (1, 2, 1)),
+        ((2 + TINY, 2, 2), (1, 2, 1)),
+    ):
+        for time in (Fraction(3), Fraction(10**6)):
+            assert_solves(euler(inertia, omega), time)
+
+
+def test_a_body_at_rest_stays_at_rest():
+    motion = euler((3, 2, 1), (0, 0, 0))
+    assert [int(w.unique_fmpz()) for w in motion.state(Fraction(10**9), 100)[:3]] == [0, 0, 0]
+    assert_solves(motion, Fraction(5))
+
+
+@pytest.mark.parametrize("time", [10**6, 10**9, -(10**9) - Fraction(1, 3)])
+@pytest.mark.parametrize("inertia", [(3, 2, 1), (1, 2, 3), (2, 2, 1), SEPARATRIX_INERTIA])
+def test_fifty_digits_come_out_at_any_time(inertia, time):
+    motion = euler(inertia, (Fraction(1, 3), Fraction(1, 5), Fraction(1)))
+    for value in motion.state(Fraction(time), 200):
+        assert value.rad() < arb("1e-50")
+    assert_solves(motion, Fraction(time))
+
+
+def test_the_independent_integration_agrees_to_fifty_digits():
+    assert_agrees(
+        euler((3, Fraction(5, 2), 1), (Fraction(-1, 2), Fraction(1, 3), 1), (Fraction(1, 2), 2, -1)), Fraction(3)
+    )
+
+
+def test_the_reference_state_lies_in_the_balls():
+    vector = next(v for v in VECTORS if v["name"] == "euler")
+    motion = Euler(
+        HeavyTop(vector["inertia"], vector["weight"], vector["centre"]), State(vector["omega"], vector["gamma"])
+    )
+    with working_precision(300):
+        for value, text in zip(motion.state(Fraction(vector["time"]), 210), vector["state"], strict=True):
+            assert abs(value - arb(text)).abs_upper() < arb("1e-59")
+
+
+def test_a_moment_of_the_weight_is_refused_with_its_value():
+    with pytest.raises(NotInClass, match=r"P r = \(0, 3/2, 0\)"):
+        Euler(HeavyTop((3, 2, 1), 3, (0, "1/2", 0)), State((1, 0, 0), (0, 0, 1)))

@@ -1,0 +1,95 @@
+"""The physical pendulum: libration, rotation, separatrix, equilibria, about each axis."""
+
+import random
+from fractions import Fraction
+
+import pytest
+from flint import arb
+from proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
+
+from heavytop.errors import NotInClass
+from heavytop.exact.pendulum import Pendulum
+from heavytop.top.heavy_top import HeavyTop, State
+
+TINY = Fraction(1, 10**30)
+
+
+def pendulum(axis, rate, gamma, centre, inertia=(3, 2, Fraction(3, 2))):
+    """About that axis, from the components of γ and r on the next two axes."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    omega, up, arm = [0, 0, 0], [0, 0, 0], [0, 0, 0]
+    omega[axis], up[i], up[j], arm[i], arm[j] = rate, *gamma, *centre
+    return Pendulum(HeavyTop(inertia, 2, arm), State(omega, up))
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_every_random_motion_solves_all_six_equations(seed):
+    rng = random.Random(seed)
+    gamma, centre = (rational(rng), 1 + positive(rng)), (positive(rng), rational(rng))
+    motion = pendulum(seed % 3, rational(rng, size=8), gamma, centre, triple(rng, positive))
+    assert_solves(motion, rational(rng, size=20))
+
+
+@pytest.mark.parametrize("seed", range(9))
+def test_the_attitude_turns_with_the_body(seed):
+    rng = random.Random(100 + seed)
+    assert_attitude(
+        pendulum(seed % 3, rational(rng), (Fraction(3, 5), Fraction(-4, 5)), (1, rational(rng))), rational(rng)
+    )
+
+
+# the separatrix is ½ I Ω² + n·γ = |n||γ|: n = (0, 2), γ = (3/5, −4/5) and I = 4/5 ask Ω² = 9
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("rate", [3, -3])
+@pytest.mark.parametrize("off", [0, TINY, -TINY])
+def test_on_the_separatrix_and_beside_it_every_digit_comes_out(axis, rate, off):
+    motion = pendulum(axis, rate + off, (Fraction(3, 5), Fraction(-4, 5)), (0, 1), [Fraction(4, 5)] * 3)
+    for time in (Fraction(1, 3), Fraction(-20), Fraction(300)):
+        assert_solves(motion, time)
+        assert_narrow(motion, time)
+
+
+@pytest.mark.parametrize("rate", [0, TINY, -TINY])
+@pytest.mark.parametrize("gamma", [(0, 1), (0, -1), (TINY, 1), (-TINY, -1)])
+def test_the_equilibria_and_their_neighbourhood(rate, gamma):
+    motion = pendulum(1, rate, gamma, (0, 1))
+    for time in (Fraction(2), Fraction(50), Fraction(10**6)):
+        assert_solves(motion, time)
+
+
+def test_a_separatrix_with_irrational_length_is_found_exactly():
+    # r = (1, 1), γ = (2, 2): n·γ = 8 = N, at the top; ½ I Ω² = 0 is the equilibrium, any other Ω rotates
+    assert_solves(pendulum(0, TINY, (2, 2), (1, 1)), Fraction(30))
+    assert_solves(pendulum(0, 0, (2, 2), (1, 1)), Fraction(30))
+    # γ = (2, -2) is level: N = 8 again, and ½ I Ω² = 8 on the separatrix with I = 4, Ω = 2
+    motion = pendulum(0, 2, (2, -2), (1, 1), (4, 3, 2))
+    assert_solves(motion, Fraction(3))
+    assert_solves(motion, Fraction(1000))
+
+
+@pytest.mark.parametrize("time", [10**6, 10**9])
+@pytest.mark.parametrize("rate", [Fraction(1, 3), 7])
+def test_fifty_digits_come_out_at_any_time(rate, time):
+    motion = pendulum(2, rate, (Fraction(3, 5), Fraction(-4, 5)), (0, 1))
+    for value in motion.state(Fraction(time), 200):
+        assert value.rad() < arb("1e-50")
+    assert_solves(motion, Fraction(time))
+
+
+def test_the_independent_integration_agrees_to_fifty_digits():
+    assert_agrees(pendulum(1, Fraction(1, 2), (Fraction(3, 5), Fraction(-4, 5)), (1, Fraction(1, 3))), Fraction(3))
+
+
+@pytest.mark.parametrize(
+    ("omega", "gamma", "centre", "message"),
+    [
+        ((1, 1, 0), (0, 0, 1), (0, 1, 0), r"Omega = \(1, 1, 0\) is not along a principal axis"),
+        ((1, 0, 0), ("3/5", 0, "4/5"), (0, 1, 0), r"gamma_1 = 3/5 are not both 0"),
+        ((1, 0, 0), (0, 0, 1), ("1/7", 1, 0), r"\(P r\)_1 = 1/7 and"),
+        ((0, 0, 0), ("3/5", 0, "4/5"), (0, 1, 0), r"do not lie in one plane"),
+        ((1, 0, 0), (0, 0, 1), (0, 0, 0), r"P r != 0"),
+    ],
+)
+def test_a_start_outside_is_refused_with_the_test_that_failed(omega, gamma, centre, message):
+    with pytest.raises(NotInClass, match=message):
+        Pendulum(HeavyTop((3, 2, 1), 1, centre), State(omega, gamma))

@@ -1,0 +1,270 @@
+"""Validated enclosures hold the true motion and are narrow."""
+
+import json
+import random
+from fractions import Fraction
+from pathlib import Path
+from time import process_time
+
+import mpmath
+import numpy as np
+import pytest
+from flint import arb
+
+from heavytop.errors import InputError, OutOfReach
+from heavytop.exact import enclosure
+from heavytop.exact.balls import midpoint, radius, relative_bits, working_precision
+from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.exact.quadratic import quadratic
+from heavytop.exact.validated import Validated
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.integrals import area, energy, gamma_squared
+
+VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text(encoding="utf-8"))
+BITS_OF_60_DIGITS = 200
+
+
+def motion(vector, system=HEAVY_TOP):
+    top = HeavyTop(vector["inertia"], vector["weight"], vector["centre"])
+    return Validated(top, State(vector["omega"], vector["gamma"]), system)
+
+
+def random_motion(rng):
+    def some(low, high):
+        return Fraction(rng.randint(low, high), rng.randint(7, 13))
+
+    top = HeavyTop([some(5, 30) for _ in range(3)], some(-9, 9), [some(-9, 9) for _ in range(3)])
+    state = State([some(-14, 14) for _ in range(3)], [some(-9, 9), some(-9, 9), some(1, 9)])
+    return Validated(top, state.normalized(24))
+
+
+def holds(balls, vector):
+    """Each ball and the 60 digits of the vector (within one unit of the last) have a number in common."""
+    off = [abs(midpoint(b) - Fraction(x)) for b, x in zip(balls, vector["state"], strict=True)]
+    return all(
+        o <= radius(b) + Fraction(1, 10**59) * max(1, abs(Fraction(x)))
+        for o, b, x in zip(off, balls, vector["state"], strict=True)
+    )
+
+
+@pytest.mark.parametrize("vector", VECTORS, ids=lambda v: v["name"])
+def test_every_reference_state_is_inside_its_ball_to_60_digits(vector):
+    balls = motion(vector).state(Fraction(vector["time"]), BITS_OF_60_DIGITS)
+    assert min(map(relative_bits, balls)) >= BITS_OF_60_DIGITS
+    assert holds(balls, vector)
+
+
+def test_a_wrong_sign_in_the_field_is_caught_by_the_reference_states():
+    def reversed_gamma(p, y):
+        return (*HEAVY_TOP.field(p, y)[:3], *(-rate for rate in HEAVY_TOP.field(p, y)[3:]))
+
+    fault = System("heavy_top", reversed_gamma, HEAVY_TOP.angular_velocity)
+    balls = motion(VECTORS[0], fault).state(Fraction(VECTORS[0]["time"]), BITS_OF_60_DIGITS)
+    assert not holds(balls, VECTORS[0])
+
+
+@pytest.mark.parametrize("time", [Fraction(-31, 7), Fraction(1, 3), Fraction(6)])
+@pytest.mark.parametrize(
+    "known",
+    [DeloneHomoclinic(Fraction(3, 5), Fraction(7, 4)), ErshkovPartial(Fraction(1, 2), Fraction(2), Fraction(1))],
+)
+def test_balls_agree_with_hyperbolic_closed_forms_of_both_systems(known, time):
+    enclosed = Validated(known.top, known.start, known.system).state(time, 330)
+    for ball, true in zip(enclosed, known.state(time, 400), strict=True):
+        assert ball.overlaps(true)
+        assert relative_bits(ball) >= 330
+
+
+def test_random_motions_agree_with_mpmath_to_40_digits():
+    rng = random.Random(20)
+    for _ in range(3):
+        solution = random_motion(rng)
+        time = Fraction(rng.choice([-1, 1]) * rng.randint(5, 15), 11)
+        with mpmath.workdps(50):
+            p = solution.parameters._replace(
+                inertia=[mpmath.mpf(x.numerator) / x.denominator for x in solution.top.inertia],
+                moment=[mpmath.mpf(x.numerator) / x.denominator for x in solution.top.moment],
+            )
+            sign = 1 if time > 0 else -1
+            other = mpmath.odefun(
+                lambda _t, y, p=p, sign=sign: [sign * rate for rate in HEAVY_TOP.field(p, y)],
+                0,
+                [mpmath.mpf(x.numerator) / x.denominator for x in solution.start.flat],
+            )(mpmath.mpf(abs(time).numerator) / time.denominator)
+            for ball, value in zip(solution.state(time, 160), other, strict=True):
+                middle = midpoint(ball)
+                assert abs(mpmath.mpf(middle.numerator) / middle.denominator - value) < mpmath.mpf(10) ** -40
+
+
+def test_first_integrals_of_the_enclosure_hold_the_exact_value():
+    rng = random.Random(21)
+    for _ in range(4):
+        solution = random_motion(rng)
+        balls = solution.state(Fraction(rng.randint(20, 60), 7), 150)
+        with working_precision(220):
+            p = solution.parameters._replace(
+                inertia=[arb(x.numerator) / x.denominator for x in solution.top.inertia],
+                moment=[arb(x.numerator) / x.denominator for x in solution.top.moment],
+            )
+            for integral in (gamma_squared, area, energy):
+                exact = integral(solution.parameters, solution.start.flat)
+                drift = integral(p, balls) - arb(exact.numerator) / exact.denominator
+                assert drift.contains(0)
+                assert drift.rad() < 1e-35
+
+
+def test_forward_and_back_returns_to_the_start():
+    solution = random_motion(random.Random(22))
+    time = Fraction(9, 2)
+    there = solution.state(time, 240)
+    arrived = State(*(tuple(midpoint(b) for b in there[i : i + 3]) for i in (0, 3)))
+    back = Validated(solution.top, arrived).state(-time, 200)
+    for ball, start in zip(back, solution.start.flat, strict=True):
+        # the motion back starts within 2^-240 of the true state, and grows apart by far less than 2^40 on the way
+        assert abs(midpoint(ball) - start) < Fraction(1, 2**195)
+
+
+def test_the_series_solves_the_equations_and_starts_at_the_state():
+    solution = motion(VECTORS[0])
+    with working_precision(200):
+        series = solution.series(Fraction(5, 3), 6, 150)
+        p = solution.parameters
+        for rate, field in zip([y.derivative() for y in series], HEAVY_TOP.field(_balls(p), series), strict=True):
+            difference = rate - field
+            for n in range(5):
+                assert difference[n].contains(0)
+                assert difference[n].rad() < 1e-38
+    for y, ball in zip(series, solution.state(Fraction(5, 3), 150), strict=True):
+        assert y[0].overlaps(ball)
+    later = solution.state(Fraction(5, 3) + Fraction(1, 1000), 150)
+    with working_precision(200):
+        for y, ball in zip(series, later, strict=True):
+            assert abs(sum((y[n] / 1000**n for n in range(6)), arb(0)) - ball) < 1e-15
+
+
+def _balls(p):
+    def of(values):
+        return [arb(v.numerator) / v.denominator for v in values]
+
+    return p._replace(inertia=of(p.inertia), moment=of(p.moment))
+
+
+def test_taylor_coefficients_of_a_known_motion_obey_the_a_priori_bound():
+    rng = random.Random(23)
+    for _ in range(5):
+        known = DeloneHomoclinic(Fraction(rng.randint(2, 9), 7), Fraction(rng.randint(2, 9), 5))
+        p = known.system.parameters(known.top, known.start)
+        field = quadratic(lambda y, p=p: HEAVY_TOP.field(p, y), 6)
+        size = max(map(abs, known.start.flat))
+        bound = enclosure.coefficient_bound(field, size)
+        series = Validated(known.top, known.start).series(Fraction(0), 20, 100)
+        for y in series:
+            for n in range(20):
+                assert midpoint(y[n].abs_upper()) <= size * bound**n * (1 + Fraction(1, 10**9))
+        # a single step of half the proven radius of convergence, against the closed form
+        step = Fraction(1, 2) / bound
+        tail = size * Fraction(1, 2) ** 20 * 2 / (1 - Fraction(1, 2)) / 2
+        with working_precision(150):
+            for y, true in zip(series, known.state(step, 100), strict=True):
+                value = sum((y[n] * arb(step.numerator) ** n / arb(step.denominator) ** n for n in range(20)), arb(0))
+                assert abs(midpoint(value) - midpoint(true)) <= tail
+
+
+def test_the_set_of_errors_holds_neighbouring_motions():
+    """Starts in the corners of the ball at time 0 stay inside the ball at later times: what the frames are for."""
+    vector = VECTORS[0]
+    solution = motion(vector)
+    p = solution.parameters
+    field = quadratic(lambda y: HEAVY_TOP.field(p, y), 6)
+    precision = 120
+    wide = enclosure.start_node(field, solution.start.flat, precision)
+    size = 1 << 60
+    wide = enclosure.Node(wide.time, wide.centre, enclosure.Errors(np.eye(6), np.full(6, float(size)), 0), 3)
+    rng = random.Random(24)
+    starts = [tuple(Fraction(int(c) + rng.choice([-size, size]), 2**precision) for c in wide.centre) for _ in range(4)]
+    node = wide
+    while node.time < 6:
+        node = enclosure.step(field, node, precision).end()
+    last = enclosure.step(field, node, precision)
+    with working_precision(200):
+        balls = last.at(Fraction(1, 3))
+        widest = max(radius(b) for b in balls)
+        assert widest < Fraction(2**12 * size, 2**precision)
+        for start in starts:
+            neighbour = Validated(solution.top, State(start[:3], start[3:]))
+            for ball, value in zip(balls, neighbour.state(node.time + last.length / 3, 150), strict=True):
+                assert abs(midpoint(value) - midpoint(ball)) <= radius(ball) + Fraction(1, 2**140)
+
+
+def test_balls_do_not_depend_on_what_was_asked_before():
+    fresh, used = motion(VECTORS[0]), motion(VECTORS[0])
+    for earlier in (Fraction(25), Fraction(3), Fraction(-2), Fraction(40)):
+        used.state(earlier, 120)
+    for time in (Fraction(24), Fraction(61, 2)):
+        for one, two in zip(fresh.state(time, 120), used.state(time, 120), strict=True):
+            assert midpoint(one) == midpoint(two)
+            assert radius(one) == radius(two)
+
+
+def test_increasing_times_continue_from_what_is_known():
+    solution = motion(VECTORS[0])
+    solution.state(Fraction(30), 100)
+    before = process_time()
+    solution.state(Fraction(30) + Fraction(1, 64), 100)
+    assert process_time() - before < 0.1
+
+
+def test_equilibria_cost_nothing_and_are_exact():
+    hanging = Validated(HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 2), (0, 0, 1)))
+    for ball, value in zip(hanging.state(Fraction(1000), 200), (0, 0, 2, 0, 0, 1), strict=True):
+        assert ball.contains(value)
+
+
+def test_attitude_stays_orthonormal_and_agrees_with_the_closed_form():
+    known = DeloneHomoclinic(Fraction(1), Fraction(1))
+    xi = (Fraction(-1), Fraction(0), Fraction(0))
+    enclosed = Validated(known.top, known.start, xi=xi).attitude(Fraction(-7, 3), 150)
+    for ball, true in zip(enclosed, known.attitude(Fraction(-7, 3), 200), strict=True):
+        assert ball.overlaps(true)
+        assert relative_bits(ball) >= 150
+
+
+def test_attitude_of_a_gamma_off_the_sphere_asks_for_xi():
+    off = Validated(HeavyTop((3, 2, 1), 1, (1, 0, 0)), State((1, 0, 0), (0, 0, "1.1")))
+    with pytest.raises(InputError, match="not a unit vector"):
+        off.attitude(Fraction(1), 60)
+
+
+def test_a_rounded_gyrostat_takes_its_rotor_as_data():
+    known = ErshkovPartial(Fraction(1), Fraction(6), Fraction(1))
+    exact = Validated(known.top, known.start, GYROSTAT).state(Fraction(1), 150)
+    nudged = State((Fraction(1, 2**200), 0, known.start.omega[2]), known.start.gamma)
+    with pytest.raises(InputError, match="parallel"):
+        Validated(known.top, nudged, GYROSTAT)
+    rotor = known.system.parameters(known.top, known.start).rotor
+    near = Validated(known.top, nudged, GYROSTAT, rotor=rotor).state(Fraction(1), 150)
+    for one, two in zip(exact, near, strict=True):
+        assert abs(midpoint(one) - midpoint(two)) < Fraction(1, 2**140)
+
+
+@pytest.mark.parametrize("time", [Fraction(10**6), Fraction(-(10**9)), Fraction(10**30)])
+def test_a_horizon_out_of_reach_is_refused_at_once_with_the_digits_that_could_be_reached(time):
+    vector = VECTORS[0]
+    before = process_time()
+    with pytest.raises(OutOfReach, match=r"out of reach.*\n.*0 digits could be proven"):
+        motion(vector).state(time, 100)
+    assert process_time() - before < 15
+
+
+def test_too_many_digits_are_refused_with_the_digits_that_could_be_reached():
+    with pytest.raises(OutOfReach) as caught:
+        motion(VECTORS[0]).state(Fraction(8), 66439)
+    digits = int(caught.value.remedy.split()[1])
+    assert 100 < digits < 20000
+
+
+def test_motions_too_fast_for_the_bounds_are_refused():
+    with pytest.raises(OutOfReach, match="rate"):
+        Validated(HeavyTop((1, 2, 3), 1, (0, 0, 1)), State(("1e80", 0, 0), (0, 0, 1)))

@@ -1,0 +1,168 @@
+"""Lattices: containment both ways, the value is inside and the ball is narrow."""
+
+import random
+from fractions import Fraction
+
+import pytest
+from flint import acb, arb
+
+from heavytop.errors import InputError, OutOfReach
+from heavytop.exact.balls import ball, radius, working_precision
+from heavytop.exact.quartic import QuarticMotion
+from heavytop.exact.weierstrass import DegenerateLattice, Lattice, from_invariants, from_roots
+
+NARROW = Fraction(1, 10**35)
+TINY = Fraction(1, 10**30)
+EDGES = [(Fraction(12), Fraction(sign * 8) + off) for sign in (1, -1) for off in (-TINY, Fraction(0), TINY)] + [
+    (Fraction(0), Fraction(0)),
+    (Fraction(0), Fraction(-1)),
+    (Fraction(-1), Fraction(0)),
+]
+
+
+def lattices():
+    rng = random.Random(20)
+    return [(Fraction(rng.randint(-40, 60), 7), Fraction(rng.randint(-40, 40), 9)) for _ in range(20)] + EDGES
+
+
+def argument(rng):
+    return acb(ball(Fraction(rng.randint(5, 95), 99)), ball(Fraction(rng.randint(3, 40), 99)))
+
+
+def is_zero(value, limit=NARROW):
+    value = acb(value)
+    assert value.contains(0), value
+    assert radius(value.real) < limit
+    assert radius(value.imag) < limit
+
+
+@pytest.fixture(autouse=True)
+def _digits():
+    with working_precision(320):
+        yield
+
+
+@pytest.mark.parametrize(("g2", "g3"), lattices())
+def test_p_satisfies_its_differential_equation_and_addition_theorems(g2, g3):
+    lattice, rng = from_invariants(g2, g3), random.Random(3)
+    u, v = argument(rng), argument(rng)
+    for z in (u, v):
+        p, slope = lattice.p(z), lattice.p_prime(z)
+        is_zero(slope * slope - (4 * p**3 - ball(g2) * p - ball(g3)))
+    p, q, dp, dq = lattice.p(u), lattice.p(v), lattice.p_prime(u), lattice.p_prime(v)
+    quotient = (dp - dq) / (p - q)
+    is_zero(lattice.p(u + v) + p + q - quotient**2 / 4, Fraction(1, 10**20))
+    is_zero(lattice.p(2 * u) + 2 * p - ((6 * p * p - ball(g2) / 2) / dp) ** 2 / 4)
+    is_zero(lattice.zeta(u + v) - lattice.zeta(u) - lattice.zeta(v) - quotient / 2, Fraction(1, 10**20))
+    left = lattice.sigma(u + v) * lattice.sigma(u - v)
+    is_zero(left + (p - q) * (lattice.sigma(u) * lattice.sigma(v)) ** 2)
+
+
+@pytest.mark.parametrize(("g2", "g3"), [pair for pair in lattices() if pair[0] ** 3 != 27 * pair[1] ** 2])
+def test_periods_quasi_periods_and_the_relation_of_legendre(g2, g3):
+    lattice, rng = from_invariants(g2, g3), random.Random(4)
+    assert isinstance(lattice, Lattice)
+    u, other = argument(rng), lattice.other_half_period
+    half, eta = acb(lattice.half_period), lattice.quasi_period
+    is_zero(lattice.p(u + 2 * half) - lattice.p(u))
+    is_zero(lattice.p(u + 2 * other) - lattice.p(u))
+    is_zero(lattice.zeta(u + 2 * half) - lattice.zeta(u) - 2 * eta)
+    # ζ(u + 2ω') − ζ(u) = 2η', and η ω' − η' ω = iπ/2
+    other_eta = (lattice.zeta(u + 2 * other) - lattice.zeta(u)) / 2
+    is_zero(eta * other - other_eta * half - acb(0, arb.pi() / 2))
+    is_zero(lattice.p_prime(half))
+    is_zero(lattice.p(half) - lattice.roots[0])
+    total = sum(lattice.roots, acb(0))
+    is_zero(total)
+
+
+@pytest.mark.parametrize(("g2", "g3"), lattices())
+def test_the_point_without_poles_agrees_with_p(g2, g3):
+    lattice = from_invariants(g2, g3)
+    start = lattice.point(Fraction(0))
+    is_zero(start.scale)
+    is_zero(start.above(0) - 1)
+    is_zero(start.slope + 2)
+    for time in (Fraction(1, 3), Fraction(5), Fraction(-7, 2)):
+        point, u = lattice.point(time), acb(ball(time))
+        is_zero(point.above(0) / point.scale**2 - lattice.p(u), Fraction(1, 10**12))
+        series = lattice.point(time, 3)
+        p = series.above(0) / (series.scale * series.scale)
+        is_zero(p[1] - lattice.p_prime(u), Fraction(1, 10**12))
+
+
+def test_the_sign_of_the_discriminant_is_decided_exactly():
+    assert isinstance(from_invariants(Fraction(12), Fraction(8)), DegenerateLattice)
+    assert isinstance(from_invariants(Fraction(12), 8 + Fraction(1, 10**500)), Lattice)
+    with pytest.raises(OutOfReach, match="no certain sign"):
+        from_invariants(arb(12), arb(8, 1e-9))
+
+
+def test_balls_and_roots_give_the_same_lattice_as_exact_invariants():
+    exact = from_invariants(Fraction(28), Fraction(-24))
+    from_exact_roots = from_roots([Fraction(1), Fraction(2), Fraction(-3)])
+    from_balls = from_invariants(arb(28), arb(-24))
+    from_ball_roots = from_roots([arb(1), arb(2), arb(-3)])
+    for lattice in (from_exact_roots, from_balls, from_ball_roots):
+        is_zero(lattice.half_period - exact.half_period)
+        is_zero(lattice.ratio - exact.ratio)
+    rhombic = from_invariants(Fraction(1), Fraction(5))
+    is_zero(from_invariants(arb(1), arb(5)).half_period - rhombic.half_period)
+    is_zero(from_roots(list(rhombic.roots)).ratio - rhombic.ratio)
+
+
+def test_roots_that_make_no_lattice_are_refused():
+    with pytest.raises(InputError, match="sum"):
+        from_roots([Fraction(1), Fraction(2), Fraction(3)])
+    with pytest.raises(OutOfReach, match="told apart"):
+        from_roots([arb(1), arb(1), arb(-2)])
+
+
+def quartics():
+    """(1 − x²)-like quartics with rational starts: f(x0) a square; turning points and double roots among them."""
+    rng = random.Random(9)
+    for _ in range(20):
+        x0, speed = Fraction(rng.randint(-9, 9), 5), Fraction(rng.randint(-9, 9), 4)
+        rest = [Fraction(rng.randint(-8, 8), 3) for _ in range(3)] + [Fraction(-rng.randint(1, 5))]
+        constant = speed**2 - sum(c * x0 ** (k + 1) for k, c in enumerate(rest))
+        yield (constant, *rest), x0, speed
+    yield (Fraction(1), Fraction(0), Fraction(-1)), Fraction(0), Fraction(1)
+    yield (Fraction(1), Fraction(0), Fraction(-1)), Fraction(1), Fraction(0)
+    yield (Fraction(1), Fraction(0), Fraction(-2), Fraction(0), Fraction(1)), Fraction(0), Fraction(1)
+    yield (Fraction(0), Fraction(0), Fraction(1)), Fraction(0), Fraction(0)
+    yield (Fraction(0), Fraction(0), Fraction(1), Fraction(0), Fraction(-1)), Fraction(1), Fraction(0)
+
+
+@pytest.mark.parametrize(("coefficients", "x0", "speed"), list(quartics()))
+def test_biermann_weierstrass_solves_any_quartic_from_any_start(coefficients, x0, speed):
+    motion = QuarticMotion(coefficients, x0, speed).prepared()
+    for time in (Fraction(0), Fraction(1, 3), Fraction(-17, 2)):
+        point = motion.lattice.point(time, 3)
+        x = motion.position(point, motion.denominator(point))
+        f = sum((ball(c) * x[0] ** k for k, c in enumerate(coefficients)), arb(0))
+        slope = sum((k * ball(c) * x[0] ** (k - 1) for k, c in enumerate(coefficients) if k), arb(0))
+        is_zero(x[1] ** 2 - f)
+        is_zero(2 * x[2] - slope / 2)
+        if time == 0:
+            is_zero(x[0] - ball(x0))
+            is_zero(x[1] - ball(speed))
+
+
+def test_known_quartics_have_their_elementary_motions():
+    time = Fraction(13, 4)
+    for coefficients, x0, speed, expected in (
+        ((1, 0, -1), 0, 1, ball(time).sin()),
+        ((1, 0, -2, 0, 1), 0, 1, ball(time).tanh()),
+        ((0, 0, 1, 0, -1), 1, 0, ball(time).sech()),
+    ):
+        motion = QuarticMotion(tuple(Fraction(c) for c in coefficients), Fraction(x0), Fraction(speed)).prepared()
+        point = motion.lattice.point(time)
+        is_zero(motion.position(point, motion.denominator(point)) - expected)
+
+
+def test_irrational_starts_come_as_balls():
+    coefficients = (Fraction(2), Fraction(0), Fraction(-3), Fraction(0), Fraction(1, 2))
+    motion = QuarticMotion(coefficients, Fraction(0), arb(2).sqrt()).prepared()
+    point = motion.lattice.point(Fraction(3), 2)
+    x = motion.position(point, motion.denominator(point))
+    is_zero(x[1] ** 2 - (2 - 3 * x[0] ** 2 + x[0] ** 4 / 2))

@@ -1,0 +1,124 @@
+"""Certificates: two sources, the digits on which they agree, and faults that must be caught."""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import msgspec
+import pytest
+from flint import arb
+
+from heavytop.errors import InputError, OutOfReach
+from heavytop.exact.balls import midpoint, radius, working_precision
+from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.exact.validated import Validated
+from heavytop.measure.certify import agreed_digits, certified_state, certify
+from heavytop.measure.reference import reference
+from heavytop.top.equations import GYROSTAT
+from heavytop.top.heavy_top import HeavyTop, State
+
+VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text(encoding="utf-8"))
+KNOWN = [DeloneHomoclinic(Fraction(1), Fraction(1)), ErshkovPartial(Fraction(1), Fraction(6), Fraction(1))]
+
+
+class Shifted:
+    """A closed form that is wrong by ``error`` in its second component after a time."""
+
+    def __init__(self, known, error, after):
+        self.known, self.error, self.after = known, error, after
+        self.method, self.system, self.top, self.start = known.method, known.system, known.top, known.start
+
+    def state(self, time, bits):
+        values = self.known.state(time, bits)
+        with working_precision(bits + 32):
+            return [values[0], values[1] + (self.error if abs(time) > self.after else 0), *values[2:]]
+
+
+@pytest.mark.parametrize("known", KNOWN, ids=lambda k: k.system.name)
+@pytest.mark.parametrize("time", [Fraction(-7, 3), Fraction(8)])
+def test_closed_forms_are_certified_by_validated_integration(known, time):
+    certificate = certify(known, time, 60)
+    assert certificate.kind == "proven"
+    assert certificate.second_source == "validated integration"
+    assert certificate.agreed_digits >= 60
+
+
+@pytest.mark.parametrize("known", KNOWN, ids=lambda k: k.system.name)
+def test_far_times_are_certified_at_both_ends(known):
+    certificate = certify(known, Fraction(10**6), 50)
+    assert "from t - 1 to t; first integrals" in certificate.second_source
+    assert certificate.kind == "proven at both ends"
+    assert certificate.agreed_digits >= 50
+
+
+def test_a_wrong_closed_form_is_refused():
+    with pytest.raises(OutOfReach, match="exclude each other at t = 8: component 2 differs at digit 29"):
+        certify(Shifted(KNOWN[0], arb("1e-30"), 5), Fraction(8), 50)
+
+
+def test_a_formula_wrong_only_far_away_loses_its_digits():
+    certificate = certify(Shifted(KNOWN[0], arb("1e-20"), 10**5), Fraction(10**6), 50)
+    assert 18 <= certificate.agreed_digits <= 20
+
+
+def test_a_computed_second_source_gives_the_digits_it_has_and_widens_the_balls():
+    truth = KNOWN[0]
+
+    def rough(time, bits):
+        with working_precision(bits):
+            return [value + arb("1e-25") for value in truth.state(time, bits)]
+
+    balls, certificate = certified_state(truth, Fraction(10**6), 50, ("a computed run", rough))
+    assert certificate.kind == "computed"
+    assert certificate.second_source == "a computed run"
+    assert 24 <= certificate.agreed_digits <= 25
+    for ball in balls:
+        assert radius(ball) >= Fraction(1, 10**25)
+    for ball, value in zip(balls, truth.state(Fraction(10**6), 170), strict=True):
+        assert abs(midpoint(ball) - midpoint(value)) < radius(ball)
+
+
+def test_validated_stands_on_its_own_proof():
+    top, start = HeavyTop((3, 2, 1), 1, (1, 0, 0)), State((0, 0, 1), (0, 0, 1))
+    certificate = certify(Validated(top, start), Fraction(1), 40)
+    assert certificate.kind == "proven"
+    assert certificate.agreed_digits >= 40
+
+
+def test_agreement_counts_the_radii():
+    with working_precision(200):
+        assert agreed_digits([arb(1)], [arb(1, "1e-12")]) in (11, 12)
+        assert agreed_digits([arb(100)], [arb(101)]) == 2
+        assert agreed_digits([arb(0)], [arb(5)]) == 0
+
+
+def test_reference_has_the_keys_that_scripts_rely_on_and_holds_the_reference_states():
+    vector = VECTORS[0]
+    top = HeavyTop(vector["inertia"], vector["weight"], vector["centre"])
+    record = reference(top, State(vector["omega"], vector["gamma"]), ["1/3", vector["time"]], 60)
+    document = json.loads(msgspec.json.encode(record))
+    assert {"method", "digits", "times", "states"} <= set(document)
+    assert document["times"] == ["1/3", "8"]
+    for ball, value in zip(document["states"][1], vector["state"], strict=True):
+        assert abs(Fraction(ball["value"]) - Fraction(value)) <= Fraction(ball["radius"]) + Fraction(1, 10**59)
+        assert Fraction(ball["radius"]) < Fraction(1, 10**59)
+
+
+def test_reference_serves_the_gyrostat():
+    known = KNOWN[1]
+    record = reference(known.top, known.start, ["-1/2"], 40, GYROSTAT)
+    for ball, value in zip(record.states[0], known.state(Fraction(-1, 2), 160), strict=True):
+        assert abs(Fraction(ball.value) - midpoint(value)) <= Fraction(ball.radius) + radius(value)
+
+
+@pytest.mark.parametrize("digits", [0, -1, 20001])
+def test_digits_outside_the_range_are_bad_input(digits):
+    with pytest.raises(InputError, match="1 to 20000"):
+        reference(KNOWN[0].top, KNOWN[0].start, ["1"], digits)
+
+
+@pytest.mark.parametrize("time", ["nan", "inf", "1/0", "soon"])
+def test_times_that_are_no_finite_rationals_are_bad_input(time):
+    with pytest.raises(InputError):
+        reference(KNOWN[0].top, KNOWN[0].start, [time], 30)
