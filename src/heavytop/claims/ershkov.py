@@ -111,6 +111,14 @@ def theta(c: Constants, u: Any, lib: Any) -> Any:
     return lib.arccos(lib.sqrt(1 - c.i1 / c.c0 * (u * u)))
 
 
+def angles_smooth(c: Constants, u: Any, lib: Any) -> tuple[Any, Any]:
+    """(φ, θ) with φ = arccos(u/√α), θ = arctan(u/√(α − u²)): (4.5) for t <= 0, and its continuation for t > 0.
+
+    θ takes the sign of −t and φ passes π/2 at t = 0, so γ of (3.2) is that of the smooth branch for all t.
+    """
+    return lib.arccos(u / lib.sqrt(c.alpha)), lib.arctan(u / lib.sqrt(c.alpha - u * u))
+
+
 def phi_of_6_1(alpha: Any, u: Any, lib: Any) -> Any:
     """(6.1): φ = arctan √(α/u² − 1).  Divides by 0 at t = 0."""
     return lib.arctan(lib.sqrt(alpha / (u * u) - 1))

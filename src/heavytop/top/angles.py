@@ -19,6 +19,16 @@ def gamma_from_angles(phi: Any, theta: Any, lib: Any) -> tuple[Any, Any, Any]:
     return lib.sin(theta) * lib.sin(phi), lib.sin(theta) * lib.cos(phi), lib.cos(theta)
 
 
+def omega_from_angles(gamma: Any, phi: Any, rates: Any, lib: Any) -> tuple[Any, Any, Any]:
+    """(3.1): (ψ'γ1 + θ' cosφ, ψ'γ2 − θ' sinφ, ψ'γ3 + φ'), from ``rates`` = (φ', θ', ψ')."""
+    phi_rate, theta_rate, psi_rate = rates
+    return (
+        psi_rate * gamma[0] + theta_rate * lib.cos(phi),
+        psi_rate * gamma[1] - theta_rate * lib.sin(phi),
+        psi_rate * gamma[2] + phi_rate,
+    )
+
+
 def attitude_from_angles(phi: Any, theta: Any, psi: Any, lib: Any) -> tuple[Any, Any, Any]:
     """ξ, the space axis e_x in body components, for any angles (θ of either sign)."""
     sin_psi, cos_psi, cos_theta = lib.sin(psi), lib.cos(psi), lib.cos(theta)

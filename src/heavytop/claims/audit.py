@@ -1,0 +1,77 @@
+"""`audit`: one claim, one system, a verdict for every equation and the reason for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+from heavytop.claims.guard import in_time
+from heavytop.claims.judge import AuditReport, Finding, Setting, Statement, judge
+from heavytop.errors import InputError
+from heavytop.top.equations import HEAVY_TOP, System, system
+
+PAPER = ("ershkov-general", "ershkov-partial")
+
+
+class Auditable(Protocol):
+    """A claim that can state what it says, equation by equation."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def source(self) -> str: ...
+
+    @property
+    def setting(self) -> Setting: ...
+
+    def statements(self, system: System) -> list[Statement]:
+        """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
+        ...
+
+    def explain(self) -> tuple[list[Finding], tuple[str, ...]]:
+        """The steps that explain the verdict, and the names of the systems whose motions the claim is."""
+        ...
+
+
+def find_claim(name: str) -> Auditable:
+    """The paper's claim of that name, or the claim in the TOML file at that path; raises InputError for neither."""
+    if name in PAPER:
+        from heavytop.claims.ershkov_audit import GeneralClaim, PartialClaim
+
+        return GeneralClaim() if name == "ershkov-general" else PartialClaim()
+    path = Path(name)
+    if path.suffix != ".toml":
+        raise InputError(f"Unknown claim {name[:60]!r}.", f"Use {', '.join(PAPER)} or the path of a TOML file.")
+    from heavytop.claims.from_file import read_claim
+
+    return read_claim(path)
+
+
+def audit(name: str, system_name: str = HEAVY_TOP.name) -> AuditReport:
+    """The audit of a claim of the paper, or of a TOML file, as a motion of that system.
+
+    Raises InputError for an unknown claim or system and for a file that cannot be read.
+    """
+    about = system(system_name)
+    claim = find_claim(name)
+    if name in PAPER:
+        return audit_claim(claim, about)
+    claim.statements(about)  # what cannot be stated is said at once
+    return in_time(name, about.name)
+
+
+def audit_claim(claim: Auditable, about: System) -> AuditReport:
+    """The audit of a claim that is at hand, as a motion of ``about``."""
+    rows = judge(claim.statements(about), claim.setting)
+    why, solves = claim.explain()
+    constants = tuple((name, str(value)) for name, value in claim.setting.constants)
+    return AuditReport(claim.name, about.name, claim.source, rows, tuple(why), solves, constants)
+
+
+def only_branch(report: AuditReport, branch: str) -> AuditReport:
+    """The same report with the rows of one branch, and its verdict on them; raises InputError for any other name."""
+    if branch not in ("smooth", "printed"):
+        raise InputError(f"Unknown branch {branch[:40]!r}.", "Use smooth or printed.")
+    return replace(report, rows=tuple(row for row in report.rows if row.branch == branch))

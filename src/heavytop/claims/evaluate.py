@@ -1,0 +1,80 @@
+"""An expression at exact parameters and an exact time, as a ball."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+import sympy
+from flint import arb
+
+from heavytop.claims.rational import Unprovable
+from heavytop.exact.balls import ball, working_precision
+
+_FUNCTIONS: dict[str, Callable[..., arb]] = {
+    "exp": arb.exp,
+    "log": arb.log,
+    "sin": arb.sin,
+    "cos": arb.cos,
+    "tan": arb.tan,
+    "sinh": arb.sinh,
+    "cosh": arb.cosh,
+    "tanh": arb.tanh,
+    "sech": arb.sech,
+    "csch": arb.csch,
+    "coth": arb.coth,
+    "asin": arb.asin,
+    "acos": arb.acos,
+    "atan": arb.atan,
+    "asinh": arb.asinh,
+    "acosh": arb.acosh,
+    "atanh": arb.atanh,
+    "atan2": lambda y, x: arb.atan2(y, x),
+    "Abs": abs,
+    "sign": arb.sgn,
+}
+
+
+def evaluate(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: int) -> arb:
+    """The ball of ``expression`` where each symbol has its exact value; not finite where it is undefined there."""
+    known: dict[sympy.Expr, arb] = {}
+
+    def visit(e: sympy.Expr) -> arb:
+        if e not in known:
+            known[e] = compute(e)
+        return known[e]
+
+    def compute(e: sympy.Expr) -> Any:
+        if e.is_Rational:
+            return ball(Fraction(int(e.p), int(e.q)))
+        if e.is_Symbol:
+            return ball(values[e])
+        if e is sympy.pi:
+            return arb.pi()
+        if e is sympy.E:
+            return arb(1).exp()
+        if e.is_Add:
+            return sum((visit(part) for part in e.args), arb(0))
+        if e.is_Mul:
+            product = arb(1)
+            for part in e.args:
+                product *= visit(part)
+            return product
+        if e.is_Pow and not isinstance(e, sympy.exp):
+            return _power(visit(e.args[0]), e.args[1])
+        name = type(e).__name__
+        if name not in _FUNCTIONS:
+            raise Unprovable(f"{name} cannot be evaluated.")
+        return _FUNCTIONS[name](*(visit(part) for part in e.args))
+
+    with working_precision(bits):
+        return visit(expression)
+
+
+def _power(base: arb, exponent: sympy.Expr) -> arb:
+    if exponent.is_Rational and exponent.q in (1, 2):
+        root = base if exponent.q == 1 else base.sqrt()
+        power = root ** abs(int(exponent.p))
+        return power if exponent.p > 0 else 1 / power
+    raise Unprovable(f"The power {exponent} is no multiple of 1/2.")

@@ -1,0 +1,232 @@
+"""A parser of formulas that people send: text in, sympy expression out; nothing is ever evaluated as code.
+
+    expression := term (("+" | "-") term)*          term  := factor (("*" | "/") factor)*
+    factor     := ("+" | "-") factor | power        power := atom (("^" | "**") factor)?
+    atom       := number | name | function "(" expression ("," expression)* ")" | "(" expression ")"
+
+Length, depth, number of nodes, size of numbers, degree and number of terms when expanded are bounded before anything
+is built, so that no formula can take more than its share of time and memory.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import comb
+from typing import NamedTuple
+
+import sympy
+
+from heavytop.errors import InputError
+from heavytop.precision import exact
+
+_OF_ONE = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sech", "asin", "acos", "atan")
+FUNCTIONS = {**{name: (getattr(sympy, name), 1) for name in _OF_ONE}, "atan2": (sympy.atan2, 2)}
+_MAX_LENGTH = 10_000
+_MAX_DEPTH = 60
+_MAX_NODES = 2_000
+_MAX_BITS = 4_096
+_MAX_DEGREE = 64
+_MAX_TERMS = 200_000
+_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_TOKEN = re.compile(rf"\s*(?:{_NUMBER}|[A-Za-z]\w*|\*\*|[-+*/^(),])", re.ASCII)
+
+
+class Size(NamedTuple):
+    """Bounds on what an expression can grow into: nodes, bits of its numbers, degree, terms when expanded."""
+
+    nodes: int
+    bits: int
+    degree: int
+    terms: int
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A parsed formula with the bounds on its size."""
+
+    expression: sympy.Expr
+    size: Size
+
+
+def symbol(expression: sympy.Expr) -> Formula:
+    """A name that formulas may use."""
+    return Formula(expression, Size(1, 0, 1, 1))
+
+
+def parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
+    """The formula that ``text`` says in ``names``; ``where`` says in error texts which formula it is.
+
+    Raises InputError for anything else than the grammar above, and beyond the bounds on its size.
+    """
+    if len(text) > _MAX_LENGTH:
+        raise InputError(f"{where}: {len(text)} characters.", f"A formula has at most {_MAX_LENGTH}.")
+    parser = _Parser(_tokens(text, where), names, where)
+    result = parser.sum()
+    parser.end()
+    return result
+
+
+def _tokens(text: str, where: str) -> list[str]:
+    tokens, position = [], 0
+    text = text.rstrip()
+    while position < len(text):
+        match = _TOKEN.match(text, position)
+        if match is None:
+            raise InputError(
+                f"{where}: {text[position : position + 20].strip()!r} is not part of a formula.",
+                "Use numbers, names, + - * / ^ ( ) and the functions " + ", ".join(FUNCTIONS) + ".",
+            )
+        tokens.append(match[0].strip())
+        position = match.end()
+    return tokens
+
+
+class _Parser:
+    """Recursive descent over the tokens; the depth is counted."""
+
+    def __init__(self, tokens: list[str], names: Mapping[str, Formula], where: str) -> None:
+        self._tokens = tokens
+        self._names = names
+        self._where = where
+        self._position = 0
+        self._depth = 0
+
+    def _next(self) -> str:
+        return self._tokens[self._position] if self._position < len(self._tokens) else ""
+
+    def _take(self, *expected: str) -> str:
+        token = self._next()
+        if token and token in expected:
+            self._position += 1
+            return token
+        return ""
+
+    def _require(self, token: str) -> None:
+        if not self._take(token):
+            raise self._error(f"{token!r} expected before {self._next()[:20]!r}")
+
+    def _error(self, what: str) -> InputError:
+        return InputError(f"{self._where}: {what}.", "See docs/claims-in-toml.md for what a formula may hold.")
+
+    def end(self) -> None:
+        """Raises InputError if anything is left."""
+        if self._next():
+            raise self._error(f"{self._next()[:20]!r} was not expected")
+
+    def sum(self) -> Formula:
+        """The expression from here on."""
+        self._depth += 1
+        if self._depth > _MAX_DEPTH:
+            raise self._error(f"parentheses nested deeper than {_MAX_DEPTH}")
+        total = self._term()
+        while sign := self._take("+", "-"):
+            part = self._term()
+            total = self._checked(
+                total.expression + part.expression if sign == "+" else total.expression - part.expression,
+                _added(total.size, part.size),
+            )
+        self._depth -= 1
+        return total
+
+    def _term(self) -> Formula:
+        total = self._factor()
+        while operator := self._take("*", "/"):
+            part = self._factor()
+            if operator == "/":
+                if part.expression == 0:
+                    raise self._error("a division by 0")
+                part = Formula(1 / part.expression, part.size)
+            size = _multiplied(total.size, part.size)
+            self._check(size)
+            total = Formula(total.expression * part.expression, size)
+        return total
+
+    def _factor(self) -> Formula:
+        negative = False
+        while sign := self._take("+", "-"):
+            negative ^= sign == "-"
+        value = self._power()
+        return Formula(-value.expression, value.size) if negative else value
+
+    def _power(self) -> Formula:
+        base = self._atom()
+        if not self._take("^", "**"):
+            return base
+        self._depth += 1
+        if self._depth > _MAX_DEPTH:
+            raise self._error(f"powers nested deeper than {_MAX_DEPTH}")
+        exponent = self._factor().expression
+        self._depth -= 1
+        if not exponent.is_Rational or exponent.q > 2 or abs(exponent.p) > _MAX_DEGREE:
+            raise self._error(f"the exponent is no integer or half-integer up to {_MAX_DEGREE}; write exp() for others")
+        if base.expression == 0 and exponent < 0:
+            raise self._error("a division by 0")
+        whole = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
+        n = base.size
+        size = Size(n.nodes + 1, n.bits * whole, n.degree * whole, comb(min(n.terms, _MAX_TERMS) + whole - 1, whole))
+        self._check(size)
+        return Formula(base.expression**exponent, size)
+
+    def _atom(self) -> Formula:
+        token = self._next()
+        self._position += 1
+        if token == "(":
+            inside = self.sum()
+            self._require(")")
+            return inside
+        if token[:1].isdigit() or token[:1] == ".":
+            return self._number(token)
+        if token[:1].isalpha():
+            return self._function(token) if token in FUNCTIONS else self._name(token)
+        raise self._error(f"a number, a name or '(' expected, not {token[:20]!r}")
+
+    def _number(self, token: str) -> Formula:
+        exponent = re.search(r"[eE]([+-]?\d+)$", token)
+        if exponent and (len(exponent[1]) > 6 or abs(int(exponent[1])) > _MAX_BITS // 4):
+            raise self._error(f"the number {token[:20]!r} is too large or too small")
+        value = exact(token)
+        bits = value.numerator.bit_length() + value.denominator.bit_length()
+        return self._checked(sympy.Rational(value.numerator, value.denominator), Size(1, bits, 0, 1))
+
+    def _name(self, token: str) -> Formula:
+        if token not in self._names:
+            known = ", ".join(sorted(self._names))
+            raise InputError(f"{self._where}: unknown name {token[:40]!r}.", f"Known here: {known[:400]}.")
+        return self._names[token]
+
+    def _function(self, token: str) -> Formula:
+        function, count = FUNCTIONS[token]
+        self._require("(")
+        arguments = [self.sum()]
+        while self._take(","):
+            arguments.append(self.sum())
+        self._require(")")
+        if len(arguments) != count:
+            raise self._error(f"{token} takes {count} argument{'s' if count > 1 else ''}, not {len(arguments)}")
+        size = arguments[0].size
+        for argument in arguments[1:]:
+            size = _added(size, argument.size)
+        size = size._replace(nodes=size.nodes + 1)
+        return self._checked(function(*(argument.expression for argument in arguments)), size)
+
+    def _checked(self, expression: sympy.Expr, size: Size) -> Formula:
+        self._check(size)
+        if expression.has(sympy.zoo, sympy.oo, -sympy.oo, sympy.nan, sympy.I):
+            raise self._error(f"{expression} is no real number")
+        return Formula(expression, size)
+
+    def _check(self, size: Size) -> None:
+        limits = Size(_MAX_NODES, _MAX_BITS, _MAX_DEGREE, _MAX_TERMS)
+        for what, value, limit in zip(Size._fields, size, limits, strict=True):
+            if value > limit:
+                raise self._error(f"the formula grows beyond {limit} {what}")
+
+
+def _added(a: Size, b: Size) -> Size:
+    return Size(a.nodes + b.nodes + 1, max(a.bits, b.bits) + 1, max(a.degree, b.degree), a.terms + b.terms)
+
+
+def _multiplied(a: Size, b: Size) -> Size:
+    return Size(a.nodes + b.nodes + 1, a.bits + b.bits, a.degree + b.degree, a.terms * b.terms)

@@ -1,0 +1,123 @@
+"""Claims that a user writes in TOML: a motion, a first integral or an invariant relation.
+
+The format is that of docs/claims-in-toml.md.  Formulas go through :mod:`heavytop.claims.expression`; nothing in a
+file is ever evaluated as code.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from heavytop.claims.audit import Auditable
+from heavytop.errors import InputError
+
+_MAX_BYTES = 100_000
+_REMEDY = "See docs/claims-in-toml.md; worked examples are in src/heavytop/claims/examples."
+
+Text = Annotated[str, msgspec.Meta(max_length=20_000)]
+Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,30}$")]
+Three = Annotated[list[Text], msgspec.Meta(min_length=3, max_length=3)]
+Samples = Annotated[list[Text], msgspec.Meta(min_length=1, max_length=8)]
+
+
+def _two_states() -> list[list[str]]:
+    return [["1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"], ["1", "2", "-1", "3/5", "0", "4/5"]]
+
+
+class TopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[top]: principal moments, weight, centre of mass, and the rotor λ where the claim is about `gyrostat`."""
+
+    inertia: Three
+    weight: Text
+    centre: Three
+    rotor: Text | None = None
+
+
+class MotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[motion]: Ω(t), γ(t), and the angles (φ, θ, ψ); γ may be left out where the angles are given, and so may Ω."""
+
+    omega: Three | None = None
+    gamma: Three | None = None
+    angles: Three | None = None
+
+
+class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[integral]: F(Ω, γ), where it is claimed to be constant, and exact states to look for a witness at."""
+
+    value: Text
+    where: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
+    states: Annotated[
+        list[Annotated[list[Text], msgspec.Meta(min_length=6, max_length=6)]], msgspec.Meta(min_length=1, max_length=8)
+    ] = msgspec.field(default_factory=_two_states)
+
+
+class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The whole file."""
+
+    name: Annotated[str, msgspec.Meta(max_length=80)]
+    kind: str
+    top: TopTable
+    source: Annotated[str, msgspec.Meta(max_length=2_000)] = ""
+    domain: str = "all"
+    times: Samples | None = None
+    assume: Annotated[list[Text], msgspec.Meta(max_length=20)] = []
+    parameters: Annotated[dict[Name, Samples | Text], msgspec.Meta(max_length=20)] = {}
+    definitions: Annotated[dict[Name, Text], msgspec.Meta(max_length=40)] = {}
+    relations: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
+    motion: MotionTable | None = None
+    integral: IntegralTable | None = None
+
+
+def read_claim(path: Path) -> Auditable:
+    """The claim in a TOML file; raises InputError, with the reason, for anything that is not one."""
+    try:
+        with path.open("rb") as stream:
+            raw = stream.read(_MAX_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.", "Give the path of a claim in TOML.") from None
+    if len(raw) > _MAX_BYTES:
+        raise InputError(f"{path} is longer than {_MAX_BYTES} bytes.", "A claim is a page of formulas.")
+    try:
+        table = tomllib.loads(raw.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"{path} is not TOML: {str(error)[:200]}.", _REMEDY) from None
+    return claim_from_table(table, str(path))
+
+
+def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable:
+    """The claim in a TOML table that has been read; raises InputError for anything that is not one."""
+    try:
+        content = msgspec.convert(table, ClaimFile)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise InputError(f"{where}: {error}.", _REMEDY) from None
+    tables = {"motion": content.motion, "integral": content.integral, "relation": content.integral}
+    if content.kind not in tables:
+        raise InputError(f"{where}: kind = {content.kind[:40]!r}.", "Use motion, integral or relation.")
+    wanted = "motion" if content.kind == "motion" else "integral"
+    if tables[content.kind] is None or (content.motion is not None and content.integral is not None):
+        raise InputError(f"{where}: kind {content.kind!r} needs the table [{wanted}], and no other claim.", _REMEDY)
+    if content.domain not in ("all", "t<=0", "t>0"):
+        raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
+    from heavytop.claims.user_claim import UserIntegral, UserMotion
+
+    return UserMotion(content) if content.kind == "motion" else UserIntegral(content)
+
+
+def sample_rows(parameters: Mapping[str, Sequence[str] | str]) -> list[dict[str, str]]:
+    """The sample values of the parameters, one dict a sample; a single value serves all samples.
+
+    Raises InputError where the lists differ in length.
+    """
+    lengths = {len(values) for values in parameters.values() if not isinstance(values, str)}
+    if len(lengths) > 1:
+        raise InputError(f"The samples of the parameters have lengths {sorted(lengths)}.", "Give as many for each.")
+    count = max(lengths, default=1)
+    return [
+        {name: values if isinstance(values, str) else values[index] for name, values in parameters.items()}
+        for index in range(count)
+    ]

@@ -1,0 +1,298 @@
+"""Rational functions over FLINT modulo square roots: where an identity is proven, exactly.
+
+A :class:`Tower` holds generators x0, x1, ...; some are free (parameters, time, an exponential), some are roots with
+a relation R² = q, q a polynomial in the generators before R.  Whatever reduces to 0 modulo the relations is 0
+wherever it is defined: that is the whole proof.  The converse needs the roots to be independent and is not claimed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from math import isqrt, prod
+from typing import Any
+
+from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpz
+
+from heavytop.errors import HeavyTopError
+
+SLOTS = 64
+# terms of a product, and of numerator times denominator where a common factor is sought: the paper's claims need
+# 95 and 600, and what needs much more does not end
+_MAX_PRODUCT = 10_000
+_MAX_QUOTIENT = 1_500
+_FACTORED_BITS = 64
+
+
+class Unprovable(HeavyTopError):
+    """An expression that the exact algebra cannot carry: it leaves the verdict to the balls, and so undecided."""
+
+
+@dataclass(frozen=True, slots=True)
+class Generator:
+    """One generator: what it stands for, whether it is constant in time, its sign if that is known (else 0)."""
+
+    meaning: Any
+    constant: bool
+    sign: int
+
+
+@dataclass(frozen=True, slots=True)
+class Quotient:
+    """numerator / denominator, reduced by its tower."""
+
+    numerator: Any
+    denominator: Any
+
+
+class Tower:
+    """Generators with their relations and signs, and the arithmetic of quotients modulo them."""
+
+    def __init__(self) -> None:
+        self.context = fmpq_mpoly_ctx.get([f"x{index}" for index in range(SLOTS)], Ordering.lex)
+        self.gens = self.context.gens()
+        self.generators: list[Generator] = []
+        self._radicands: dict[int, Any] = {}
+        self._positive_forms: dict[int, Any] = {}
+        self._below_one: set[int] = set()
+        self._roots: dict[str, int] = {}
+        self.one = self.context.constant(1)
+
+    # --- generators -----------------------------------------------------------------------------------------------
+
+    def add(self, meaning: Any, *, constant: bool, sign: int = 0) -> int:
+        """The index of a new free generator."""
+        if len(self.generators) == SLOTS:
+            raise Unprovable(f"More than {SLOTS} independent quantities.", "Split the claim into smaller ones.")
+        self.generators.append(Generator(meaning, constant, sign))
+        return len(self.generators) - 1
+
+    def add_root(self, meaning: Any, square: Any, *, sign: int) -> int:
+        """The index of a new generator R with R² = ``square``, a polynomial in the generators so far."""
+        index = self.add(meaning, constant=all(self.generators[i].constant for i in used(square)), sign=sign)
+        self._radicands[index] = square
+        return index
+
+    def relations(self) -> list[Any]:
+        """R² − q for every root R = √q."""
+        return [self.gens[index] ** 2 - square for index, square in self._radicands.items()]
+
+    def declare_form(self, index: int, form: Any) -> None:
+        """In sign tests generator ``index`` is ``form``, a polynomial in generators of known sign."""
+        self._positive_forms[index] = form
+
+    def declare_below_one(self, index: int) -> None:
+        """Generator ``index`` lies in (0, 1)."""
+        self._below_one.add(index)
+
+    # --- arithmetic -----------------------------------------------------------------------------------------------
+
+    def polynomial(self, numerator: Any) -> Quotient:
+        """A polynomial as a quotient."""
+        return Quotient(self.reduce(numerator), self.one)
+
+    def number(self, value: Fraction | int) -> Quotient:
+        """A rational number as a quotient."""
+        return Quotient(self.context.constant(fmpq(value.numerator, value.denominator)), self.one)
+
+    def times(self, a: Any, b: Any) -> Any:
+        """The product of two polynomials; raises Unprovable where it would be too large to hold."""
+        if len(a) * len(b) > _MAX_PRODUCT:
+            raise Unprovable("A product of polynomials is too large.", "Split the claim into smaller ones.")
+        return a * b
+
+    def reduce(self, p: Any) -> Any:
+        """``p`` with every root to a power below 2."""
+        for index in sorted(self._radicands, reverse=True):
+            if p.degrees()[index] > 1:
+                parts = self._by_power(p, index)
+                q, root = self._radicands[index], self.gens[index]
+                total = self.context.constant(0)
+                for power, part in parts.items():
+                    total += self.times(self._power(q, power // 2), part * root ** (power % 2))
+                p = total
+        return p
+
+    def _power(self, p: Any, exponent: int) -> Any:
+        result = self.one
+        for _ in range(exponent):
+            result = self.times(result, p)
+        return result
+
+    def _by_power(self, p: Any, index: int) -> dict[int, Any]:
+        """The coefficients of the powers of one generator."""
+        parts: dict[int, dict[Any, Any]] = {}
+        for monomial, coefficient in p.to_dict().items():
+            rest = (*monomial[:index], 0, *monomial[index + 1 :])
+            parts.setdefault(int(monomial[index]), {})[rest] = coefficient
+        return {power: self.context.from_dict(terms) for power, terms in parts.items()}
+
+    def quotient(self, numerator: Any, denominator: Any) -> Quotient:
+        """Reduced, with no root left in the denominator; raises Unprovable where that is 0."""
+        numerator, denominator = self.reduce(numerator), self.reduce(denominator)
+        for index in sorted(self._radicands, reverse=True):
+            if denominator.degrees()[index] == 1:
+                parts = self._by_power(denominator, index)
+                conjugate = parts.get(0, self.context.constant(0)) - parts[1] * self.gens[index]
+                rational = self.reduce(self.times(denominator, conjugate))
+                if rational:
+                    numerator = self.reduce(self.times(numerator, conjugate))
+                    denominator = rational
+        if not denominator:
+            raise Unprovable("A denominator is identically 0.", "Check the formula, or the domain it is claimed on.")
+        if len(denominator) > 1 and len(numerator) * len(denominator) > _MAX_QUOTIENT:
+            raise Unprovable("A quotient of polynomials is too large.", "Split the claim into smaller ones.")
+        common = numerator.gcd(denominator) if numerator else denominator
+        numerator, denominator = numerator / common, denominator / common
+        lead = denominator.leading_coefficient()
+        return Quotient(numerator / lead, denominator / lead)
+
+    def sum(self, parts: Iterable[Quotient]) -> Quotient:
+        """The sum of quotients."""
+        total = self.number(0)
+        for part in parts:
+            if part.denominator == total.denominator:
+                total = self.quotient(total.numerator + part.numerator, total.denominator)
+            else:
+                left = self.times(total.numerator, part.denominator)
+                right = self.times(part.numerator, total.denominator)
+                total = self.quotient(left + right, self.times(total.denominator, part.denominator))
+        return total
+
+    def product(self, parts: Iterable[Quotient]) -> Quotient:
+        """The product of quotients."""
+        total = self.number(1)
+        for part in parts:
+            total = self.quotient(
+                self.times(total.numerator, part.numerator), self.times(total.denominator, part.denominator)
+            )
+        return total
+
+    def power(self, base: Quotient, exponent: int) -> Quotient:
+        """An integer power, by squaring."""
+        if exponent < 0:
+            return self.power(self.quotient(base.denominator, base.numerator), -exponent)
+        result, square = self.number(1), base
+        while exponent:
+            if exponent & 1:
+                result = self.product((result, square))
+            exponent >>= 1
+            if exponent:
+                square = self.product((square, square))
+        return result
+
+    def divide(self, a: Quotient, b: Quotient) -> Quotient:
+        """a / b."""
+        return self.product((a, self.power(b, -1)))
+
+    # --- signs, absolute values, roots ------------------------------------------------------------------------------
+
+    def sign(self, value: Quotient) -> int:
+        """1 or -1 where the sign is the same all over the domain (0 allowed), else 0."""
+        return self.sign_of_polynomial(value.numerator) * self.sign_of_polynomial(value.denominator)
+
+    def sign_of_polynomial(self, p: Any) -> int:
+        """The product of the signs of its factors."""
+        constant, factors = p.factor()
+        signs = (self._sign_of_factor(factor) ** int(power) for factor, power in factors)
+        return int(prod(signs, start=1 if constant > 0 else -1))
+
+    def _sign_of_factor(self, p: Any) -> int:
+        """By coefficients of one sign, after each generator is written through positive ones."""
+        for index in self._below_one & used(p):
+            # p(X) has the sign of X^n p(1/Z) with Z = 1/X > 1
+            degree = int(p.degrees()[index])
+            terms = {
+                (*monomial[:index], degree - monomial[index], *monomial[index + 1 :]): coefficient
+                for monomial, coefficient in p.to_dict().items()
+            }
+            p = self.context.from_dict(terms)
+        while forms := self._positive_forms.keys() & used(p):
+            # the last first: a form uses only what was declared before it, and generators without a form
+            last = max(forms, key=list(self._positive_forms).index)
+            p = self._substitute(p, last, self._positive_forms[last])
+        found = {self._sign_of_term(monomial, coefficient) for monomial, coefficient in p.to_dict().items()}
+        return found.pop() if len(found) == 1 else 0
+
+    def _substitute(self, p: Any, index: int, form: Any) -> Any:
+        total = self.context.constant(0)
+        for power, part in self._by_power(p, index).items():
+            total += self.times(part, self._power(form, power))
+        return total
+
+    def _sign_of_term(self, monomial: Any, coefficient: Any) -> int:
+        sign = 1 if coefficient > 0 else -1
+        for index, power in enumerate(monomial):
+            if power % 2:
+                sign *= self.generators[index].sign
+        return sign
+
+    def absolute(self, value: Quotient) -> Quotient:
+        """|value|, factor by factor; a factor of unknown sign becomes a root of its square."""
+        return self.divide(
+            self.polynomial(self._absolute(value.numerator)), self.polynomial(self._absolute(value.denominator))
+        )
+
+    def _absolute(self, p: Any) -> Any:
+        constant, factors = p.factor()
+        result = self.context.constant(abs(constant))
+        for factor, power in factors:
+            sign = self._sign_of_factor(factor)
+            size = factor * sign if sign else self.gens[self._root_of(factor * factor)]
+            result = self.times(result, self._power(size, int(power)))
+        return result
+
+    def root(self, value: Quotient) -> Quotient:
+        """√value >= 0; raises Unprovable where value is negative all over the domain."""
+        square = self.times(value.numerator, value.denominator)
+        if not square:
+            return self.number(0)
+        return self.divide(self._root(square), self.polynomial(self._absolute(value.denominator)))
+
+    def _root(self, p: Any) -> Quotient:
+        """√p: squares come out as absolute values, factors of known sign as roots of their own."""
+        constant, factors = p.factor()
+        outside, rest, sign = self.one, self.one, 1 if constant > 0 else -1
+        for factor, power in factors:
+            outside = self.times(outside, self._absolute(self._power(factor, int(power) // 2)))
+            if power % 2:
+                known = self._sign_of_factor(factor)
+                if known:
+                    outside = self.times(outside, self.gens[self._root_of(factor * known)])
+                    sign *= known
+                else:
+                    rest = self.times(rest, factor)
+        if rest != self.one:
+            outside = self.times(outside, self.gens[self._root_of(rest * sign)])
+        elif sign < 0:
+            raise Unprovable(
+                "A square root of a negative number.", "Check the formula, or the domain it is claimed on."
+            )
+        return self.product((self.polynomial(outside), self._root_of_number(abs(constant))))
+
+    def _root_of_number(self, value: Any) -> Quotient:
+        """√(p/q) = √(p q)/q, over the primes of p q."""
+        whole = int(value.p) * int(value.q)
+        root = isqrt(whole)
+        if root * root == whole:
+            return self.number(Fraction(root, int(value.q)))
+        primes = fmpz(whole).factor() if whole.bit_length() <= _FACTORED_BITS else [(whole, 1)]
+        result = self.one / fmpq(value.q)
+        for prime, power in primes:
+            result *= int(prime) ** (int(power) // 2)
+            if power % 2:
+                result = self.times(result, self.gens[self._root_of(self.context.constant(int(prime)))])
+        return self.polynomial(result)
+
+    def _root_of(self, square: Any) -> int:
+        """The generator √square, made once."""
+        key = str(square)
+        if key not in self._roots:
+            self._roots[key] = self.add_root(("sqrt", square), square, sign=1)
+        return self._roots[key]
+
+
+def used(p: Any) -> set[int]:
+    """The generators that occur in a polynomial."""
+    return {index for index, degree in enumerate(p.degrees()) if degree > 0}

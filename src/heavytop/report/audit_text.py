@@ -1,0 +1,60 @@
+"""An audit in words and tables, for people."""
+
+from __future__ import annotations
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from heavytop.claims.judge import AuditReport, Row
+
+_WORDS = {True: "holds", False: "refuted", None: "undecided"}
+_STYLES = {True: "green", False: "bold red", None: "yellow"}
+
+
+def audit_text(report: AuditReport) -> RenderableType:
+    """Verdict, a table of the equations, the witnesses of what is refuted, and why."""
+    head = Text(f"{report.claim} as a motion of {report.system}: ")
+    head.append(report.verdict, style=_STYLES[{"holds": True, "refuted": False}.get(report.verdict)])
+    parts: list[RenderableType] = [head]
+    if report.source:
+        parts.append(Text(report.source))
+    parts += [Text(f"{name} = {value}") for name, value in report.constants if name != value]
+    parts += [Text(), _table(report), Text(), *_witnesses(report)]
+    if report.why:
+        parts += [Text(), Text("Why, each step checked by the same algebra:")]
+        parts += [Text(f"  [{_WORDS[finding.holds]}] {finding.statement}") for finding in report.why]
+    solved = ", ".join(report.solves) or "none of the systems known here"
+    parts += [Text(), Text(f"Its equations of motion are proven for: {solved}")]
+    return Group(*parts)
+
+
+def _table(report: AuditReport) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for name in ("equation", "branch", "domain", "verdict", "residual", "statement"):
+        table.add_column(name, overflow="fold", no_wrap=name in ("equation", "branch", "domain", "verdict"))
+    for row in report.rows:
+        verdict = Text(_WORDS[row.holds], style=_STYLES[row.holds])
+        cells = (Text(value) for value in (_label(row), row.branch, row.domain))
+        table.add_row(*cells, verdict, Text(row.residual), Text(row.statement))
+    return table
+
+
+def _label(row: Row) -> str:
+    number = row.equation if not row.equation[0].isdigit() else f"({row.equation})"
+    return f"{number} {row.component}"
+
+
+def _witnesses(report: AuditReport) -> list[Text]:
+    """Where each refuted equation fails: exact parameters, an exact time, and a ball that excludes 0."""
+    refuted = [row for row in report.rows if row.witness is not None]
+    lines = [Text("Witnesses, with the residual as a ball that excludes 0:")] if refuted else []
+    for row in refuted:
+        witness = dict(row.witness or {})
+        value, radius, parameters = witness.pop("value"), witness.pop("radius"), witness.pop("parameters")
+        place = ", ".join(f"{name} = {number}" for name, number in {**parameters, **witness}.items())
+        lines.append(Text(f"  {_label(row)} {row.branch} {row.domain}: {value} +/- {radius} at {place}"))
+    notes = {f"  {row.branch} {row.domain}: {row.note}" for row in report.rows if row.note}
+    if notes:
+        lines += [Text("The domains:"), *(Text(note) for note in sorted(notes))]
+    return lines

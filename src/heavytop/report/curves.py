@@ -1,0 +1,144 @@
+"""What the figures draw: the paper's curves in its own formulas, and claim, gyrostat and true motion in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from types import SimpleNamespace
+from typing import Any
+
+import numpy
+
+from heavytop.claims import ershkov
+from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.integrate.taylor import propagate
+from heavytop.precision import DOUBLE
+from heavytop.top.angles import euler_angles, perpendicular, unwrap
+from heavytop.top.equations import HEAVY_TOP
+
+NUMERIC = SimpleNamespace(
+    sqrt=numpy.sqrt, exp=numpy.exp, log=numpy.log, arctan=numpy.arctan, arccos=numpy.arccos, atan2=numpy.arctan2
+)
+_BITS = 64
+PART = 0.01
+"""The relative distance max|ΔΩ| / max|Ω| at which claim and truth are said to part."""
+
+
+@dataclass(frozen=True, slots=True)
+class PaperFigure:
+    """One of Figs 2-8: ``a`` is A, ``ratio`` is I1/I3 where the paper states it; α = 1 throughout."""
+
+    number: int
+    angle: str
+    equation: str
+    a: int
+    ratio: int | None = None
+
+    @property
+    def implied_ratio(self) -> int:
+        """I1/I3 = 1 + A/√α, which (6.2) forces."""
+        return 1 + self.a
+
+    @property
+    def consistent(self) -> bool:
+        """False where the paper states an I1/I3 that its A excludes."""
+        return self.ratio in (None, self.implied_ratio)
+
+    def values(self, t: Any) -> Any:
+        """The angle at the times ``t``, with u of (4.2) for ψ and u = √Ω2 for φ and θ, as printed."""
+        u = ershkov.u(self.a, 1.0, t, NUMERIC)
+        with numpy.errstate(divide="ignore"):
+            if self.angle == "phi":
+                return ershkov.phi_of_6_1(1.0, numpy.sqrt(u * u), NUMERIC)
+            if self.angle == "theta":
+                return ershkov.theta_of_6_1(1.0, numpy.sqrt(u * u), NUMERIC)
+        return ershkov.psi(float(self.ratio or self.implied_ratio), 1.0, 1.0, u, t, NUMERIC)
+
+
+PAPER_FIGURES = (
+    PaperFigure(2, "phi", "6.1", 5),
+    PaperFigure(3, "phi", "6.1", 1),
+    PaperFigure(4, "theta", "6.1", 5),
+    PaperFigure(5, "theta", "6.1", 1),
+    PaperFigure(6, "psi", "6.2", 1, 5),
+    PaperFigure(7, "psi", "6.2", 9, 5),
+    PaperFigure(8, "psi", "6.2", 10, 5),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """One motion in time: states (n, 6) and angles (n, 3) = (φ, θ, ψ), continuous."""
+
+    times: Any
+    states: Any
+    angles: Any
+
+
+def gyrostat_curves(motion: ErshkovPartial, times: list[Fraction]) -> Curves:
+    """The exact motion of the gyrostat, smooth branch: Ω as the paper has it, θ taking the sign of −t."""
+    return _exact(motion, times)
+
+
+def claim_curves(case: ershkov.PartialCase, times: list[Fraction]) -> Curves:
+    """The claim as printed: u = √Ω2, positive roots and arctan."""
+    t = numpy.array([float(time) for time in times])
+    i1, i3, c1 = float(case.i1), float(case.i3), float(case.c1)
+    with numpy.errstate(divide="ignore"):
+        v = ershkov.partial_case(i1, i3, c1, t, NUMERIC, "printed")
+    # at t = 0 (4.5) divides by 0 and arctan takes it to π/2; the radicand of θ can fall below 0 by rounding
+    return Curves(t, numpy.stack([*v.omega, *v.gamma], axis=1), numpy.stack([v.phi, v.theta, v.psi], axis=1))
+
+
+def true_curves(case: ershkov.PartialCase, times: list[Fraction]) -> tuple[Curves, str]:
+    """The heavy top from the claim's own data at t = 0, and the method: exact for I1 = 2 I3, else integrated."""
+    if case.i1 == 2 * case.i3:
+        return _exact(DeloneHomoclinic(case.alpha, case.i1), times), "closed form"
+    gyrostat = case.solves
+    # the γ of the true motion leaves the pole towards φ = π: with this ξ, ψ is 0 there
+    xi = tuple(-part for part in perpendicular(gyrostat.start.gamma))
+    halves = []
+    for sign in (-1, 1):
+        part = sorted((time for time in times if time * sign > 0), key=abs)
+        run = propagate(gyrostat.top, gyrostat.start, part, DOUBLE, system=HEAVY_TOP, xi=xi)
+        rows = [[float(value) for value in state] for state in run.states]
+        halves.append([*zip(part, rows, strict=True)])
+    start = [float(value) for value in (*gyrostat.start.flat, *xi)]
+    ordered = sorted([*halves[0], (Fraction(0), start), *halves[1]])
+    t = numpy.array([float(time) for time, _ in ordered])
+    states = numpy.array([row for _, row in ordered])
+    angles = numpy.array([euler_angles(row[3:6], row[6:9], NUMERIC) for row in states])
+    return Curves(t, states[:, :6], _continuous(angles, states)), "integrated in double precision"
+
+
+def _continuous(angles: Any, states: Any) -> Any:
+    """Angles unwrapped; at the pole itself (t = 0) φ and ψ are the mean of their neighbours: γ only touches it.
+
+    Whole turns are taken off until φ and ψ lie within a turn of 0 there.
+    """
+    pole = int(numpy.argmax(states[:, 5]))
+    columns = [angles[:, 1]]
+    for index in (0, 2):
+        away = numpy.delete(angles[:, index], pole)
+        turned = numpy.array(unwrap(list(away), 2 * numpy.pi))
+        whole = numpy.insert(turned, pole, (turned[pole - 1] + turned[pole]) / 2)
+        columns.append(whole - 2 * numpy.pi * numpy.floor(whole[pole] / (2 * numpy.pi) + 0.25))
+    return numpy.stack([columns[1], columns[0], columns[2]], axis=1)
+
+
+def _exact(motion: ErshkovPartial | DeloneHomoclinic, times: list[Fraction]) -> Curves:
+    t = numpy.array([float(time) for time in times])
+    states = numpy.array([[float(value.mid()) for value in motion.state(time, _BITS)] for time in times])
+    angles = numpy.array([[float(value.mid()) for value in motion.angles(time, _BITS)] for time in times])
+    return Curves(t, states, angles)
+
+
+def parting_time(case: ershkov.PartialCase, limit: Fraction = Fraction(2)) -> float:
+    """The first t > 0 where max|ΔΩ| of claim (smooth branch) and truth is 1 % of max|Ω(0)|, to 1/500 of ``limit``."""
+    times = [limit * index / 500 for index in range(1, 501)]
+    truth, _ = true_curves(case, [-times[0], Fraction(0), *times])
+    ours = gyrostat_curves(case.solves, times)
+    distance = numpy.abs(truth.states[2:, :3] - ours.states[:, :3]).max(axis=1)
+    first = int(numpy.argmax(distance >= PART * float(case.solves.start.omega[2])))
+    return float(times[first])

@@ -1,0 +1,184 @@
+"""The verdicts on the paper's claims, and what the audit makes of planted mistakes."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cache
+
+import pytest
+import sympy
+
+from heavytop.claims import ershkov, ershkov_general
+from heavytop.claims.audit import audit, only_branch
+from heavytop.claims.ershkov_audit import GeneralClaim, PartialClaim
+from heavytop.claims.judge import AuditReport, Row, judge
+from heavytop.errors import InputError
+from heavytop.exact.balls import FUNCTIONS, ball, working_precision
+from heavytop.top.equations import HEAVY_TOP
+
+
+@cache
+def report(name: str, system: str = "heavy_top") -> AuditReport:
+    return audit(name, system)
+
+
+def rows(found: AuditReport, equation: str, branch: str = "smooth", domain: str = "all") -> dict[int, Row]:
+    chosen = [r for r in found.rows if (r.equation, r.branch, r.domain) == (equation, branch, domain)]
+    assert chosen, f"no row for {equation} {branch} {domain}"
+    return {row.component: row for row in chosen}
+
+
+def verdicts(found: AuditReport, equation: str, branch: str = "smooth", domain: str = "all") -> list[bool | None]:
+    return [row.holds for _, row in sorted(rows(found, equation, branch, domain).items())]
+
+
+@pytest.mark.parametrize("place", [("smooth", "all"), ("printed", "t<=0")])
+def test_partial_case_fails_in_1_2_alone_where_the_roots_follow_the_flow(place):
+    found = report("ershkov-partial")
+    assert verdicts(found, "1.1", *place) == [True, True, True]
+    assert verdicts(found, "1.2", *place) == [False, True, False]
+    assert verdicts(found, "1.3", *place) == [True, True, True]
+    assert verdicts(found, "3.1", *place) == [True, False, True]
+    kinematics = rows(found, "1.2", *place)
+    assert [kinematics[1].residual, kinematics[3].residual] == ["-(k/2)*gamma3", "(k/2)*gamma1"]
+    assert rows(found, "3.1", *place)[2].residual == "-k/2"
+
+
+def test_partial_case_fails_everywhere_on_the_printed_roots_after_0():
+    found = report("ershkov-partial")
+    assert verdicts(found, "1.1", "printed", "t>0") == [False, False, False]
+    assert verdicts(found, "1.2", "printed", "t>0") == [False, False, False]
+    assert verdicts(found, "1.3", "printed", "t>0") == [True, True, True]
+
+
+def test_psi_is_a_line_with_u_of_4_2_and_breaks_at_0_with_u_the_root_of_omega2():
+    found = report("ershkov-partial")
+    assert verdicts(found, "4.6") == [True, True]
+    assert verdicts(found, "4.6", "printed", "t<=0") == [True, True]
+    assert verdicts(found, "4.6", "printed", "t>0")[0] is False
+
+
+def test_arctan_of_4_5_loses_the_quadrant_after_0():
+    found = report("ershkov-partial")
+    assert verdicts(found, "4.5", "printed", "t<=0") == [True, True, True]
+    assert verdicts(found, "4.5", "printed", "t>0") == [False, True, True]
+
+
+@pytest.mark.parametrize("name", ["ershkov-partial", "ershkov-general"])
+def test_everything_holds_on_the_smooth_branch_of_the_gyrostat(name):
+    smooth = only_branch(report(name, "gyrostat"), "smooth")
+    assert smooth.verdict == "holds"
+    assert smooth.exit_code == 0
+    assert {row.equation for row in smooth.rows} >= {"1.1", "1.2", "1.3", "3.1"}
+
+
+def test_general_case_holds_in_1_1_and_1_3_and_is_refuted_in_1_2():
+    found = report("ershkov-general")
+    assert verdicts(found, "1.1") == verdicts(found, "1.3") == [True, True, True]
+    assert verdicts(found, "1.2") == [False, True, False]
+    assert [rows(found, "1.2")[i].residual for i in (1, 3)] == ["-(P*b/C0)*gamma3", "(P*b/C0)*gamma1"]
+    assert verdicts(found, "3.1") == [True, False, True]
+    assert verdicts(found, "2.2") == verdicts(found, "2.3") == verdicts(found, "2.4") == [True]
+
+
+def test_general_case_with_positive_roots_holds_only_where_omega2_falls():
+    found = report("ershkov-general")
+    assert verdicts(found, "1.1", "printed", "t<=0") == [True, True, True]
+    assert verdicts(found, "1.1", "printed", "t>0") == [False, False, False]
+    assert "Omega2' > 0" in rows(found, "1.1", "printed", "t>0")[1].note
+
+
+@pytest.mark.parametrize("name", ["ershkov-partial", "ershkov-general"])
+def test_the_reason_is_proven_and_the_system_that_is_solved_is_named(name):
+    found = report(name)
+    assert found.solves == ("gyrostat",)
+    assert all(finding.holds for finding in found.why)
+    assert any("det(gamma, M, r)" in finding.statement for finding in found.why)
+    assert (found.verdict, found.exit_code) == ("refuted", 1)
+
+
+def test_the_json_has_the_keys_that_scripts_read():
+    document = report("ershkov-partial").to_json()
+    assert document.keys() >= {"claim", "system", "verdict", "equations"}
+    for row in document["equations"]:
+        assert row.keys() >= {"equation", "component", "branch", "domain", "holds", "residual"}
+        assert row["branch"] in ("smooth", "printed")
+        assert row["domain"] in ("all", "t<=0", "t>0")
+        assert (row["holds"] is False) == ("witness" in row)
+
+
+def test_every_witness_is_confirmed_by_an_independent_evaluation_of_1_2():
+    # the residual of (1.2) 1, by differences of the printed formulas in balls, at the witness of the audit
+    witness = rows(report("ershkov-partial"), "1.2")[1].witness
+    assert witness is not None
+    i1, i3, alpha = (Fraction(witness["parameters"][name]) for name in ("I1", "I3", "alpha"))
+    time, step = Fraction(witness["t"]), Fraction(1, 10**20)
+
+    def values(t: Fraction) -> ershkov.Values:
+        c1 = alpha**2 * i1**2 / (2 * i3)
+        return ershkov.partial_case(ball(i1), ball(i3), ball(c1), ball(t), FUNCTIONS)
+
+    with working_precision(300):
+        here, before, after = values(time), values(time - step), values(time + step)
+        rate = (after.gamma[0] - before.gamma[0]) / ball(2 * step)
+        residual = rate - (here.omega[2] * here.gamma[1] - here.omega[1] * here.gamma[2])
+        assert abs(residual - ball(Fraction(witness["value"]))) < 1e-18
+        assert not ball(Fraction(witness["value"])).contains(0)
+
+
+def _wrong_sign_in_2_4(c, omega2):
+    linear = 2 * c.weight * c.inertia[2] * c.b * c.inertia[1] / (c.c0 * c.inertia[0] * (c.inertia[0] - c.inertia[2]))
+    return ershkov_general.omega1_squared(c, omega2) - 2 * linear * omega2
+
+
+def _shifted_alpha_in_4_3(c, omega2, lib):
+    return lib.sqrt((c.alpha + sympy.Rational(1, 10**10)) * omega2 - omega2 * omega2)
+
+
+def _swapped_moments_in_4_4(c, omega2, lib):
+    return ershkov.omega3(c._replace(i1=c.i3, i3=c.i1), omega2, lib)
+
+
+def _steeper_psi(i1, i3, alpha, u, t, lib):
+    return ershkov.psi(i1, i3, alpha, u, t, lib) + sympy.Rational(1, 10**12) * t
+
+
+@pytest.mark.parametrize(
+    ("claim", "equation"),
+    [
+        (GeneralClaim(omega1_squared=_wrong_sign_in_2_4), "2.4"),
+        (PartialClaim(omega1=_shifted_alpha_in_4_3), "4.3"),
+        (PartialClaim(omega3=_swapped_moments_in_4_4), "4.4"),
+        (PartialClaim(psi=_steeper_psi), "4.6"),
+    ],
+)
+def test_a_planted_mistake_is_refuted_in_its_own_equation_and_in_no_other_step(claim, equation):
+    found = AuditReport(claim.name, "heavy_top", "", judge(claim.statements(HEAVY_TOP), claim.setting))
+    clean = report(claim.name)
+    broken = {
+        row.equation for row, before in zip(found.rows, clean.rows, strict=True) if before.holds and not row.holds
+    }
+    assert equation in broken
+    assert broken <= {equation, "1.1", "1.2", "1.3", "3.1"} | ({"4.5", "4.6"} if equation == "4.4" else set())
+    assert all(row.holds is False for row in found.rows if row.equation == equation and row.equation in ("2.4", "4.4"))
+
+
+def test_samples_of_the_general_case_lie_where_both_roots_are_real():
+    claim = GeneralClaim()
+    for statement in claim.statements(HEAVY_TOP):
+        for sample in claim.setting.samples:
+            for omega2 in statement.domain.points:
+                values = {str(symbol): number for symbol, number in sample.items()}
+                c = ershkov_general.GeneralConstants(
+                    (values["I1"], values["I2"], values["I3"]), values["P"], values["b"], values["C0"], values["C1"]
+                )
+                assert ershkov_general.f1(c, omega2) > 0
+                assert ershkov_general.f2(c, omega2) > 0
+
+
+def test_unknown_names_are_refused():
+    for arguments in (("ershkov",), ("ershkov-partial", "pendulum")):
+        with pytest.raises(InputError):
+            audit(*arguments)
+    with pytest.raises(InputError):
+        only_branch(report("ershkov-partial"), "rough")
