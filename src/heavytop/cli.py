@@ -179,22 +179,17 @@ def propagate(
     """Integrate one motion and print its states.  Numbers are exact: 3, 0.25, 1e-3, -2/5."""
     from heavytop import precision as formats
     from heavytop.top.equations import system as system_named
-    from heavytop.top.heavy_top import HeavyTop, State
+    from heavytop.top.times import check_times
 
-    top = HeavyTop(_numbers(inertia), weight, _numbers(centre))
-    start = State(_numbers(omega), _numbers(gamma))
-    start = (start.normalized() if normalize else start).require_unit_gamma()
-    form, which = formats.parse(precision), system_named(system)
+    top, start = _motion(inertia, weight, centre, omega, gamma, normalize)
+    form, which, instants = formats.parse(precision), system_named(system), check_times(_numbers(times))
     if max_steps is not None and max_steps < 1:
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top, start)
-    for warning in top.warnings():
-        print(f"heavytop: warning: {warning}", file=sys.stderr)
 
-    from heavytop.integrate.taylor import check_times
     from heavytop.measure.motion import compute
 
-    motion = compute(top, start, check_times(_numbers(times)), form, which, attitude, max_steps)
+    motion = compute(top, start, instants, form, which, attitude, max_steps)
     if json:
         _print_json(motion.to_json())
     else:
@@ -202,6 +197,47 @@ def propagate(
 
         _print(motion_text(motion))
     return 0 if motion.complete else 3
+
+
+@command
+def reference(
+    inertia: Annotated[str, typer.Option(help="Principal moments A,B,C at the fixed point.")],
+    weight: Annotated[str, typer.Option(help="Weight P.")],
+    centre: Annotated[str, typer.Option(help="Centre of mass a,b,c.")],
+    omega: Annotated[str, typer.Option(help="Angular velocity x,y,z at t = 0.")],
+    gamma: Annotated[str, typer.Option(help="Unit vector of weight x,y,z at t = 0.")],
+    times: Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly away from 0.")],
+    digits: Annotated[int, typer.Option(help="Proven digits, 1 to 20000.")] = 50,
+    system: Annotated[str, typer.Option(help="heavy_top or gyrostat.")] = "heavy_top",
+    normalize: Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")] = False,
+    json: Json = False,
+) -> int:
+    """Print proven states: a closed form where there is one, else a validated enclosure."""
+    from heavytop.measure.reference import reference as proven
+    from heavytop.top.equations import system as system_named
+    from heavytop.top.times import check_times
+
+    top, start = _motion(inertia, weight, centre, omega, gamma, normalize)
+    found = proven(top, start, check_times(_numbers(times)), digits, system_named(system))
+    if json:
+        _print_json(found)
+    else:
+        from heavytop.report.motion_text import reference_text
+
+        _print(reference_text(found))
+    return 0
+
+
+def _motion(inertia: str, weight: str, centre: str, omega: str, gamma: str, normalize: bool) -> Any:
+    """The exact top and start of the options; what no rigid body has is a warning."""
+    from heavytop.top.heavy_top import HeavyTop, State
+
+    top = HeavyTop(_numbers(inertia), weight, _numbers(centre))
+    start = State(_numbers(omega), _numbers(gamma))
+    start = (start.normalized() if normalize else start).require_unit_gamma()
+    for warning in top.warnings():
+        print(f"heavytop: warning: {warning}", file=sys.stderr)
+    return top, start
 
 
 @command

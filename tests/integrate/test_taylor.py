@@ -6,12 +6,13 @@ import numpy
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.integrate.taylor import Stepper, check_times, compiled, propagate
+from heavytop.integrate.taylor import Stepper, compiled, propagate
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.top.times import check_times
 from helpers import VECTORS, start_of, top_of
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))

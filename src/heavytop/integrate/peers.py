@@ -30,7 +30,8 @@ def scipy_dop853(
     if precision != DOUBLE:
         raise InputError(f"SciPy has no {precision.name}.", "Use double.")
     problem = Problem.of(top, start, precision, system)
-    p = Parameters(*(tuple(map(float, values)) for values in problem.parameters[:2]), float(problem.parameters.rotor))
+    given = problem.parameters
+    p = Parameters([float(v) for v in given.inertia], [float(v) for v in given.moment], float(given.rotor))
     grid = [float(number(time, precision)) for time in times]
     began = perf_counter()
     run = solve_ivp(
@@ -83,7 +84,8 @@ def mpmath_odefun(
         def big(value: Fraction) -> Any:
             return mpmath.mpf(value.numerator) / value.denominator
 
-        p = Parameters(*([big(v) for v in values] for values in problem.parameters[:2]), big(problem.parameters.rotor))
+        given = problem.parameters
+        p = Parameters([big(v) for v in given.inertia], [big(v) for v in given.moment], big(given.rotor))
         solve = mpmath.odefun(lambda _, y: list(system.field(p, y)), 0, [big(v) for v in problem.start.flat])
         grid = [exact(number(time, precision)) for time in times]
         values = [[_exact(v) for v in solve(big(time))] for time in grid]

@@ -15,11 +15,11 @@ from typing import Any
 import heyoka
 import numpy
 
-from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import Precision, exact, number, require
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, VARIABLES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.times import check_times
 
 # A machine-code cache on disk is not protected against corruption: a flipped bit there gives wrong numbers silently.
 heyoka.llvm_state.set_diskcache_enabled(False)
@@ -263,20 +263,3 @@ def _load(engine: Any, problem: Problem) -> None:
     engine.pars[:] = numpy.array(problem.native(numbers))
     engine.state[:] = numpy.array(problem.native([*problem.start.flat, *(problem.xi or ())]))
     engine.time = number(Fraction(0), problem.precision)
-
-
-def check_times(times: Sequence[Any]) -> list[Fraction]:
-    """Exact times; raises InputError unless they are of one sign and strictly monotone away from 0."""
-    values = [exact(time) for time in times]
-    if not values:
-        raise InputError("No times were given.", "Give at least one, such as --times 1,2,5.")
-    for earlier, later in zip([Fraction(0), *values], values, strict=False):
-        if earlier * later < 0:
-            raise InputError(f"The times {earlier} and {later} have different signs.", "Run each direction by itself.")
-        if abs(later) <= abs(earlier) and (later or earlier):
-            raise InputError(
-                f"The time {later} does not come after {earlier}.", "Times go strictly away from 0, each once."
-            )
-    if values.count(Fraction(0)) > 1:
-        raise InputError("The time 0 is given more than once.", "Times go strictly away from 0, each once.")
-    return values

@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from heavytop.measure.motion import Motion
+from heavytop.measure.reference import Reference
 from heavytop.report.text import short
 
 
@@ -37,4 +38,16 @@ def motion_text(motion: Motion) -> RenderableType:
         worst = {k[6:-4]: m.value for k, m in motion.drift.items() if k.endswith("_max")}
         drifts = ", ".join(f"{name} {short(value, 2)}" for name, value in worst.items())
         parts += [Text(), Text(f"Largest drift of the first integrals at these times: {drifts}")]
+    return Group(*parts)
+
+
+def reference_text(found: Reference) -> RenderableType:
+    """Proven states with the radius of each component."""
+    parts: list[RenderableType] = [Text(f"{found.system}, {found.digits} digits; {found.method}")]
+    for time, state in zip(found.times, found.states, strict=True):
+        table = Table(box=None, show_header=False)
+        table.add_row("t", Text(time))
+        for name, ball in zip(("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3"), state, strict=True):
+            table.add_row(name, Text(f"{ball.value} ± {ball.radius}", overflow="fold"))
+        parts += [Text(), table]
     return Group(*parts)

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from heavytop.errors import InputError
+from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import decimal_text, exact
 from heavytop.records import Report, Row
 from heavytop.report.compare import Comparison, Verdict
@@ -38,6 +39,7 @@ def summary(report: Report) -> RenderableType:
         by_measure.setdefault(row.measure, []).append(row)
     parts: list[RenderableType] = [_head(report)]
     for name, section in (
+        ("audit", _audit),
         ("claim_model", _claim_model),
         ("claim_evaluation", _claim_evaluation),
         ("homoclinic", _homoclinic),
@@ -75,6 +77,23 @@ def _table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
     return table
 
 
+def _audit(rows: Sequence[Row]) -> list[RenderableType]:
+    parts: list[RenderableType] = [_title("Verdict on the paper's solution, equation by equation (heavytop audit)")]
+    for row in rows:
+        refuted = [name for name, metric in row.metrics.items() if metric.value == "0"]
+        undecided = [name for name, metric in row.metrics.items() if metric.value == UNRESOLVED]
+        verdict = "refuted" if refuted else "undecided" if undecided else "holds"
+        smooth = " on the smooth branch" if row.system == "gyrostat" else ""
+        held = len(row.metrics) - len(refuted) - len(undecided)
+        line = Text(f"  {row.case} as a motion of {row.system}: ")
+        line.append(verdict, style={"refuted": "bold red", "holds": "bold green"}.get(verdict, "bold yellow"))
+        line.append(f"{smooth} ({held} of {len(row.metrics)} equations proven, {len(refuted)} refuted")
+        smooth_ones = sorted({name.split()[0] for name in refuted if " smooth " in name})
+        line.append(f"; on the smooth branch: {', '.join(smooth_ones)})" if smooth_ones else ")")
+        parts.append(line)
+    return parts
+
+
 def _claim_model(rows: Sequence[Row]) -> list[RenderableType]:
     parts: list[RenderableType] = [
         _title("Claim against truth: the paper's (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0"),
@@ -98,7 +117,7 @@ def _claim_model(rows: Sequence[Row]) -> list[RenderableType]:
         ]
         for row in rows
     ]
-    parts.append(_table(columns, lines))
+    parts.append(_table(columns, both(lines)))
     parts += [Text(f"  {case}: {against}", style="dim") for case, against in dict(_truths(rows)).items()]
     return parts
 
@@ -127,9 +146,22 @@ def _claim_evaluation(rows: Sequence[Row]) -> list[RenderableType]:
         ]
         for row in rows
     ]
+    columns = ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω from |t|"]
     return [
         _title("Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated"),
-        _table(["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω from |t|"], lines),
+        _table(columns, both(lines)),
+    ]
+
+
+def both(lines: Sequence[list[str]]) -> list[list[str]]:
+    """Lines that are the same forward and backward as one; the direction then is not named."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for line in lines:
+        case, _, direction = line[0].partition("/")
+        found.setdefault((case, *line[1:]), []).append(direction)
+    return [
+        [case if len(directions) > 1 else f"{case}/{directions[0]}".rstrip("/"), *rest]
+        for (case, *rest), directions in found.items()
     ]
 
 
@@ -142,7 +174,7 @@ def _homoclinic(rows: Sequence[Row]) -> list[RenderableType]:
     return [
         _title("Integrators on a homoclinic motion, against its closed form"),
         Text("  Ω error while rate·|t| <= 10; break-away: Ω wrong by 1e-3 α, where the saddle has eaten every digit."),
-        _table(["case", "format", "Ω error", "break-away |t|", "outcome"], lines),
+        _table(["case", "format", "Ω error", "break-away |t|", "outcome"], both(lines)),
     ]
 
 
@@ -158,7 +190,7 @@ def _laws(rows: Sequence[Row]) -> list[RenderableType]:
     ]
     return [
         _title("Break-away time gained per bit of the format"),
-        _table(["case", "measured", "ln 2 / rate", "off by"], lines),
+        _table(["case", "measured", "ln 2 / rate", "off by"], both(lines)),
     ]
 
 
@@ -171,11 +203,28 @@ def _drift(rows: Sequence[Row]) -> list[RenderableType]:
             if name.startswith("drift_") and name.endswith("_max")
         ]
         cells = "  ".join(f"{name} {short(value, 2)}" for name, value in worst)
-        lines.append([row.case, row.precision, row.horizon, str(row.steps), row.outcome, cells])
-    table = _table(["case", "format", "T", "steps", "outcome", "largest drift of each first integral"], lines)
-    table.columns[5].justify = "left"
+        error, across = (
+            short(row.metrics[f"solution_error_{name}_max"].value, 2)
+            if f"solution_error_{name}_max" in row.metrics
+            else "no reference"
+            for name in ("along", "across")
+        )
+        lines.append([row.case, row.precision, row.horizon, str(row.steps), row.outcome, error, across, cells])
+    columns = [
+        "case",
+        "format",
+        "T",
+        "steps",
+        "outcome",
+        "error along",
+        "across",
+        "largest drift of each first integral",
+    ]
+    table = _table(columns, lines)
+    table.columns[-1].justify = "left"
     return [
-        _title("Drift of first integrals (absolute); an invariant that holds is no proof that the motion is right"),
+        _title("Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals"),
+        Text("  Both absolute and largest on the way: an invariant that holds is no proof that the motion is right."),
         table,
     ]
 

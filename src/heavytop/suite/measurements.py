@@ -10,18 +10,23 @@ from typing import Any
 
 from flint import arb
 
+from heavytop.claims.audit import audit
 from heavytop.claims.ershkov import Branch, PartialCase
-from heavytop.exact.balls import FUNCTIONS, ball, working_precision
+from heavytop.errors import OutOfReach
+from heavytop.exact.balls import FUNCTIONS, ball, radius_text, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.exact.validated import Validated
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure import claim_error
 from heavytop.measure.computed_reference import ComputedReference
 from heavytop.measure.drift import Drift
-from heavytop.measure.scalar import largest, metric, of_fraction, text
+from heavytop.measure.known import certified, known_motion
+from heavytop.measure.scalar import GUARD_BITS, largest, metric, of_fraction, text
 from heavytop.measure.solution_error import SolutionError
 from heavytop.precision import decimal_text, exact, number, parse
 from heavytop.records import Metric, Row, Series
+from heavytop.suite.cases import Case
 from heavytop.suite.plan import Task
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, Parameters
@@ -33,6 +38,10 @@ PARTED = Fraction(1, 100)
 """Claim and truth have parted when Ω differs by this, in units of α."""
 WINDOW = 10
 """The error of a homoclinic run is a number only while rate·|t| is below this; later the saddle amplifies rounding."""
+_EFFORT = 20.0
+"""Seconds that a validated truth may cost before two runs at different precisions take its place."""
+_CERTIFIED_AT = 4
+"""The closed form of a homoclinic case is certified at this |t|."""
 CLAIM = "claimed: (4.2)-(4.6)"
 CLAIM_XI = (Fraction(0), Fraction(-1), Fraction(0))
 """ξ at t = 0 of the claimed attitude, where φ + ψ = π/2 and θ = 0."""
@@ -47,6 +56,37 @@ def time_text(time: Fraction) -> str:
 def measure(task: Task) -> Row:
     """The row of ``task``; a run that fails is a row with its outcome."""
     return _MEASURES[task.kind](task)
+
+
+def _audit(task: Task) -> Row:
+    """1 for an equation that holds, 0 for one that is refuted, unresolved for one that is neither."""
+    report = audit(task.name, task.form)
+    words = {
+        True: Metric("1", 0.0, "value"),
+        False: Metric("0", None, "value"),
+        None: Metric("unresolved", None, "value"),
+    }
+    metrics = {
+        f"({row.equation}).{row.component} {row.branch} {row.domain}": words[row.holds]
+        for row in report.rows
+        if row.branch == "smooth" or report.system == HEAVY_TOP.name
+    }
+    return Row(
+        case=task.name,
+        system=task.form,
+        integrator="audit",
+        precision="exact",
+        bits=0,
+        outcome=Outcome.SUCCESS.value,
+        horizon="0",
+        time_reached="0",
+        steps=0,
+        finite=True,
+        metrics=metrics,
+        measure=task.kind,
+        measured=f"claimed: {report.source}",
+        against=f"the equations of {task.form}",
+    )
 
 
 def _claim_model(task: Task) -> Row:
@@ -89,24 +129,34 @@ def _claim_model(task: Task) -> Row:
 
 def _truth(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_error.Truth, str]:
     """The true heavy-top motion from the claim's own data, and what it is."""
+    bits = claim_error.MODEL_BITS
     if claim.i1 == 2 * claim.i3:
         known = DeloneHomoclinic(claim.alpha, claim.i1)
 
         def delone(time: Fraction) -> tuple[list[arb], list[arb]]:
-            bits = claim_error.MODEL_BITS
             phi, theta, psi = known.angles(time, bits)
             with working_precision(bits):
                 xi = attitude_from_angles(phi, theta, psi - arb.pi() / 2, FUNCTIONS)
             return known.state(time, bits), list(xi)
 
-        return delone, f"known: {known.method}"
-    computed = ComputedReference(claim.solves.top, claim.solves.start, times, xi=CLAIM_XI)
+        return delone, f"known: {known.method}, radius below {radius_text(Fraction(1, 2**bits))}"
+    top, start = claim.solves.top, claim.solves.start
+    enclosed = Validated(top, start, xi=CLAIM_XI, effort=_EFFORT)
+    try:
+        enclosed.state(max(times, key=abs), bits)
+    except OutOfReach:
+        computed = ComputedReference(top, start, times, xi=CLAIM_XI)
 
-    def runs(time: Fraction) -> tuple[list[arb], list[arb]]:
-        values = computed.state(time)
-        return values[:6], values[6:]
+        def runs(time: Fraction) -> tuple[list[arb], list[arb]]:
+            values = computed.state(time)
+            return values[:6], values[6:]
 
-    return runs, computed.method
+        return runs, computed.method
+
+    def validated(time: Fraction) -> tuple[list[arb], list[arb]]:
+        return enclosed.state(time, bits), enclosed.attitude(time, bits)
+
+    return validated, f"known: {enclosed.method}, radius below {radius_text(Fraction(1, 2**bits))}"
 
 
 def _claim_evaluation(task: Task) -> Row:
@@ -148,15 +198,19 @@ def _claim_evaluation(task: Task) -> Row:
 
 
 def _homoclinic(task: Task) -> Row:
-    case, precision = task.case, parse(task.precision)
-    known = case.homoclinic
-    assert known is not None
+    case, precision = _case(task), parse(task.precision)
+    closed = case.homoclinic
+    assert closed is not None
     problem = Problem.of(case.top, case.start, precision, case.system)
     if (problem.parameters, problem.start) != (_as_tuples(case), case.start):
         raise ValueError(f"{case.name} is not exact in {precision.name}: its data must be dyadic")
+    sign = 1 if task.times[-1] > 0 else -1
+    known = certified(closed, Fraction(sign * _CERTIFIED_AT), precision.bits + GUARD_BITS)
+    if known is None:
+        raise OutOfReach(f"{closed.method} is not certified for {precision.name}.", "Use a format with fewer bits.")
     drift = Drift(problem, holding(case.top, case.start, case.system), task.keep)
-    near = SolutionError(problem, known, task.keep)
-    far = SolutionError(problem, known, task.keep, threshold=BREAK_AWAY * case.alpha)
+    near = SolutionError(problem, closed, task.keep)
+    far = SolutionError(problem, closed, task.keep, threshold=BREAK_AWAY * case.alpha)
 
     def observe(time: Fraction, state: Any) -> None:
         drift(time, state)
@@ -168,9 +222,7 @@ def _homoclinic(task: Task) -> Row:
     name = "integration_error" if case.claim else "solution_error"
     metrics = {"break_away_time": _time_metric(far.break_away, "duration")}
     metrics |= near.metrics(name) | drift.metrics()
-    return _computed_row(
-        task, run, metrics, far.series(time_text, name) | drift.series(time_text), f"known: {known.method}"
-    )
+    return _computed_row(task, run, metrics, far.series(time_text, name) | drift.series(time_text), known.text)
 
 
 def _as_tuples(case: Any) -> Parameters:
@@ -179,13 +231,24 @@ def _as_tuples(case: Any) -> Parameters:
 
 
 def _drift(task: Task) -> Row:
-    case, precision = task.case, parse(task.precision)
+    case, precision = _case(task), parse(task.precision)
     problem = Problem.of(case.top, case.start, precision, case.system)
     # samples are taken at the rounded times, so the series must be asked for by these
     keep = [exact(number(time, precision)) for time in task.keep]
     drift = Drift(problem, holding(case.top, case.start, case.system), keep)
-    run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=drift)
-    return _computed_row(task, run, drift.metrics(), drift.series(time_text), "its own first integrals")
+    known = known_motion(problem, exact(number(task.times[-1], precision)))
+    if known is None:
+        run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=drift)
+        return _computed_row(task, run, drift.metrics(), drift.series(time_text), "its own first integrals")
+    error = SolutionError(problem, known.solution, keep)
+
+    def observe(time: Fraction, state: Any) -> None:
+        drift(time, state)
+        error(time, state)
+
+    run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=observe)
+    series = drift.series(time_text) | error.series(time_text)
+    return _computed_row(task, run, drift.metrics() | error.metrics(), series, known.text)
 
 
 def _computed_row(
@@ -218,9 +281,10 @@ def _computed_row(
 
 def input_rounding(task: Task, problem: Problem) -> Fraction:
     """The largest relative rounding of the data that the run was given: not charged to it, but said."""
-    given = task.case.system.parameters(task.case.top, task.case.start)
+    case = _case(task)
+    given = case.system.parameters(case.top, case.start)
     pairs = zip(
-        (*given.inertia, *given.moment, Fraction(given.rotor), *task.case.start.flat),
+        (*given.inertia, *given.moment, Fraction(given.rotor), *case.start.flat),
         (*problem.parameters.inertia, *problem.parameters.moment, problem.parameters.rotor, *problem.start.flat),
         strict=True,
     )
@@ -231,9 +295,15 @@ def _time_metric(time: Fraction | None, kind: Any) -> Metric:
     return Metric("never", None, kind) if time is None else of_fraction(abs(time), kind, time_text(abs(time)))
 
 
+def _case(task: Task) -> Case:
+    assert task.case is not None
+    return task.case
+
+
 def _claim(task: Task) -> PartialCase:
-    assert task.case.claim is not None
-    return task.case.claim
+    claim = _case(task).claim
+    assert claim is not None
+    return claim
 
 
 def _branch(task: Task) -> Branch:
@@ -241,6 +311,7 @@ def _branch(task: Task) -> Branch:
 
 
 _MEASURES: dict[str, Callable[[Task], Row]] = {
+    "audit": _audit,
     "claim_model": _claim_model,
     "claim_evaluation": _claim_evaluation,
     "homoclinic": _homoclinic,

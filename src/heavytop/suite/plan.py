@@ -64,6 +64,13 @@ class Homoclinic(Strict, tag="homoclinic"):
     directions: tuple[Literal["forward", "backward"], ...] = ("forward", "backward")
 
 
+class Audit(Strict, tag="audit"):
+    """Every equation of a claim of the paper, proven or refuted, as a motion of each system."""
+
+    claims: list[Literal["ershkov-general", "ershkov-partial"]]
+    systems: list[Literal["heavy_top", "gyrostat"]]
+
+
 class Run(msgspec.Struct, forbid_unknown_fields=True):
     """One format with its horizon; ``samples`` uniform samples."""
 
@@ -95,7 +102,7 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True):
     """A whole plan."""
 
     name: str
-    measure: list[ClaimModel | ClaimEvaluation | Homoclinic | Drift]
+    measure: list[Audit | ClaimModel | ClaimEvaluation | Homoclinic | Drift]
     top: list[Top] = []
 
 
@@ -103,22 +110,18 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True):
 class Task:
     """One measurement, and the row it will fill.
 
+    name: as the row names its case.  case: None for an audit, whose ``form`` is the system.
     times: exact, of the sign of the direction; for claim_evaluation they are values of k |t| with that sign.
     keep: the times that go into the series.  precision: "" where no format is involved.
     """
 
     kind: str
-    case: Case
-    direction: str
+    name: str
+    case: Case | None
     precision: str
     form: str
-    times: tuple[Fraction, ...]
-    keep: tuple[Fraction, ...]
-
-    @property
-    def name(self) -> str:
-        """The case as the row names it."""
-        return f"{self.case.name}/{self.direction}" if self.direction else self.case.name
+    times: tuple[Fraction, ...] = ()
+    keep: tuple[Fraction, ...] = ()
 
     @property
     def label(self) -> str:
@@ -129,10 +132,12 @@ class Task:
     def cost(self) -> float:
         """Seconds it may take, roughly: for the progress bar and for running long ones first."""
         if not self.precision:
-            return 2.0
+            return 5.0
         bits = parse(self.precision).bits
         per_step = 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5
-        return 0.3 + float(abs(self.times[-1])) * 4 * per_step + len(self.times) * 1e-4
+        return (
+            (3.0 if self.kind == "drift" else 1.0) + float(abs(self.times[-1])) * 4 * per_step + len(self.times) * 1e-4
+        )
 
 
 def load(name: str) -> tuple[Plan, str]:
@@ -163,8 +168,10 @@ def expand(plan: Plan) -> list[Task]:
     own = {top.name: _own_case(top) for top in plan.top}
     tasks: list[Task] = []
     for table in plan.measure:
-        cases = [case(name, own) for name in table.cases]
+        cases = [] if isinstance(table, Audit) else [case(name, own) for name in table.cases]
         match table:
+            case Audit():
+                tasks += [Task("audit", claim, None, "", about) for claim in table.claims for about in table.systems]
             case ClaimModel():
                 tasks += _claim_model(table, cases)
             case ClaimEvaluation():
@@ -198,7 +205,15 @@ def _claim_model(table: ClaimModel, cases: list[Case]) -> list[Task]:
     grid = [times[-1] * i / table.grid for i in range(1, _samples(table.grid) + 1)]
     every = sorted({*times, *grid})
     return [
-        Task("claim_model", each, direction, "", form, _signed(every, direction), _signed(times, direction))
+        Task(
+            "claim_model",
+            f"{each.name}/{direction}",
+            each,
+            "",
+            form,
+            _signed(every, direction),
+            _signed(times, direction),
+        )
         for each in map(_claimed, cases)
         for direction in table.directions
         for form in (("smooth", "printed") if direction == "forward" else ("smooth",))
@@ -208,7 +223,14 @@ def _claim_model(table: ClaimModel, cases: list[Case]) -> list[Task]:
 def _claim_evaluation(table: ClaimEvaluation, cases: list[Case]) -> list[Task]:
     times = _positive(table.rate_times, "rate_times")
     return [
-        Task("claim_evaluation", each, direction, parse(name).name, form, *[_signed(times, direction)] * 2)
+        Task(
+            "claim_evaluation",
+            f"{each.name}/{direction}",
+            each,
+            parse(name).name,
+            form,
+            *[_signed(times, direction)] * 2,
+        )
         for each in map(_claimed, cases)
         for name in table.precisions
         for direction in table.directions
@@ -226,8 +248,8 @@ def _homoclinic(table: Homoclinic, cases: list[Case]) -> list[Task]:
             times = [spacing * i for i in range(1, int(end / spacing) + 1)]
             keep = times[table.samples - 1 :: table.samples]
             tasks += [
-                Task("homoclinic", each, direction, name, "", _signed(times, direction), _signed(keep, direction))
-                for direction in table.directions
+                Task("homoclinic", f"{each.name}/{d}", each, name, "", _signed(times, d), _signed(keep, d))
+                for d in table.directions
             ]
     return tasks
 
@@ -240,7 +262,7 @@ def _drift(table: Drift, cases: list[Case]) -> list[Task]:
             count = _samples(run.samples)
             times = tuple(horizon * i / count for i in range(1, count + 1))
             keep = tuple(times[i - 1] for i in log_spaced(count))
-            tasks.append(Task("drift", each, "", parse(run.precision).name, "", times, keep))
+            tasks.append(Task("drift", each.name, each, parse(run.precision).name, "", times, keep))
     return tasks
 
 

@@ -33,6 +33,6 @@ def run(
     if any(row.measure == "homoclinic" for row in measured):
         from heavytop.suite.measurements import break_away_law
 
-        rates = {task.name: task.case.rate for task in tasks if task.kind == "homoclinic"}
+        rates = {task.name: task.case.rate for task in tasks if task.case and task.kind == "homoclinic"}
         measured += break_away_law(measured, rates)
     return measured

@@ -1,0 +1,72 @@
+"""The known motion that a run is held against: from the same rounded data, and certified by a second source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from heavytop.errors import OutOfReach
+from heavytop.exact.balls import radius_text
+from heavytop.exact.catalogue import matches
+from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.solution import ExactSolution
+from heavytop.exact.validated import Validated
+from heavytop.integrate.trajectory import Problem
+from heavytop.measure.certify import Certificate, certify, enclosure_of
+from heavytop.measure.scalar import GUARD_BITS
+from heavytop.top.equations import GYROSTAT
+
+_DIGITS_A_BIT = Fraction(30103, 100000)
+_VALIDATED_HORIZON = 100
+"""Beyond this time the validated enclosure of a motion without a closed form is not even tried."""
+_SPARE_DIGITS = 3
+_EFFORT = 1.0
+"""Seconds that a second source at the horizon itself may cost; beyond, it is held near 0 and near the horizon."""
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A known motion and its certificate."""
+
+    solution: ExactSolution
+    certificate: Certificate
+    bits: int
+
+    @property
+    def text(self) -> str:
+        """Method, radius and certificate, for the row."""
+        c = self.certificate
+        limit = radius_text(Fraction(1, 2**self.bits))
+        by = f"certified to {c.agreed_digits} digits by {c.second_source} ({c.kind})"
+        return f"known: {c.method}, radius below {limit}; {by}"
+
+
+def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | None:
+    """``solution`` for references of ``bits`` bits, if it is certified to more digits than its format has at ``time``.
+
+    None if not: a reference below its certified digits scores nothing.
+    """
+    digits = int(bits * _DIGITS_A_BIT)
+    certificate = certify(solution, time, digits, enclosure=enclosure_of(solution, effort=_EFFORT))
+    needed = int((bits - GUARD_BITS) * _DIGITS_A_BIT) + _SPARE_DIGITS
+    return Known(solution, certificate, bits) if certificate.agreed_digits >= needed else None
+
+
+def known_motion(problem: Problem, horizon: Fraction) -> Known | None:
+    """The closed form of a rounded problem, or up to |t| = 100 its enclosure; None where there is neither.
+
+    Certified at ``horizon`` for the bits of the format and its guard bits.
+    """
+    bits = problem.precision.bits + GUARD_BITS
+    found: ExactSolution | None
+    if problem.system is GYROSTAT:
+        # rounded, γ is no longer parallel to M: the rotor is that of the exact data
+        found = Gyrostat(problem.top, problem.start, problem.parameters.rotor)
+    else:
+        found = next(matches(problem.top, problem.start), None)
+    if found is None and abs(horizon) > _VALIDATED_HORIZON:
+        return None
+    try:
+        return certified(found or Validated(problem.top, problem.start, problem.system), horizon, bits)
+    except OutOfReach:
+        return None
