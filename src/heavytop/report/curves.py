@@ -12,10 +12,8 @@ import numpy
 from heavytop.claims import ershkov
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
-from heavytop.integrate.taylor import propagate
-from heavytop.precision import DOUBLE
+from heavytop.exact.validated import Validated
 from heavytop.top.angles import euler_angles, perpendicular, unwrap
-from heavytop.top.equations import HEAVY_TOP
 
 NUMERIC = SimpleNamespace(
     sqrt=numpy.sqrt, exp=numpy.exp, log=numpy.log, arctan=numpy.arctan, arccos=numpy.arccos, atan2=numpy.arctan2
@@ -92,24 +90,19 @@ def claim_curves(case: ershkov.PartialCase, times: list[Fraction]) -> Curves:
 
 
 def true_curves(case: ershkov.PartialCase, times: list[Fraction]) -> tuple[Curves, str]:
-    """The heavy top from the claim's own data at t = 0, and the method: exact for I1 = 2 I3, else integrated."""
+    """The heavy top from the claim's own data at t = 0, and the method: closed form for I1 = 2 I3, else enclosed."""
     if case.i1 == 2 * case.i3:
         return _exact(DeloneHomoclinic(case.alpha, case.i1), times), "closed form"
     gyrostat = case.solves
     # the γ of the true motion leaves the pole towards φ = π: with this ξ, ψ is 0 there
-    xi = tuple(-part for part in perpendicular(gyrostat.start.gamma))
-    halves = []
-    for sign in (-1, 1):
-        part = sorted((time for time in times if time * sign > 0), key=abs)
-        run = propagate(gyrostat.top, gyrostat.start, part, DOUBLE, system=HEAVY_TOP, xi=xi)
-        rows = [[float(value) for value in state] for state in run.states]
-        halves.append([*zip(part, rows, strict=True)])
-    start = [float(value) for value in (*gyrostat.start.flat, *xi)]
-    ordered = sorted([*halves[0], (Fraction(0), start), *halves[1]])
-    t = numpy.array([float(time) for time, _ in ordered])
-    states = numpy.array([row for _, row in ordered])
+    first, second, third = (-part for part in perpendicular(gyrostat.start.gamma))
+    known = Validated(gyrostat.top, gyrostat.start, xi=(first, second, third))
+    ordered = sorted({*times, Fraction(0)})
+    balls = [[*known.state(time, _BITS), *known.attitude(time, _BITS)] for time in ordered]
+    states = numpy.array([[float(value.mid()) for value in row] for row in balls])
     angles = numpy.array([euler_angles(row[3:6], row[6:9], NUMERIC) for row in states])
-    return Curves(t, states[:, :6], _continuous(angles, states)), "integrated in double precision"
+    t = numpy.array([float(time) for time in ordered])
+    return Curves(t, states[:, :6], _continuous(angles, states)), "proven enclosure"
 
 
 def _continuous(angles: Any, states: Any) -> Any:
