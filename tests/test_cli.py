@@ -295,3 +295,44 @@ def test_a_reader_that_stops_reading_is_no_error() -> None:
         env=os.environ,
     )  # fmt: skip
     assert "Traceback" not in shell.stderr
+
+
+def test_reference_gives_proven_values_that_enclose_the_vectors() -> None:
+    given = VECTORS[0]
+    done = run("reference", *top_options(times="1,8"), "--digits", "60", "--json")
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert answer["digits"] == 60
+    assert answer["method"].startswith("validated")
+    assert len(answer["times"]) == len(answer["states"]) == 2
+    for ball, text in zip(answer["states"][1], given["state"], strict=True):
+        # the vector itself is rounded at its 60th digit
+        assert abs(Fraction(ball["value"]) - Fraction(text)) <= Fraction(ball["radius"]) + Fraction(1, 10**59)
+        assert Fraction(ball["radius"]) < Fraction(1, 10**58)
+
+
+def test_reference_of_the_gyrostat_uses_its_closed_form() -> None:
+    options = top_options(inertia="6,6,1", weight="1", centre="0,15,0", omega="0,0,6", gamma="0,0,1", times="-3")
+    done = run("reference", *options, "--system", "gyrostat", "--digits", "40")
+    assert done.returncode == 0, done.stderr
+    assert "(4.2)-(4.6)" in done.stdout
+    assert "±" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("changes", "more", "code", "message"),
+    [
+        ({}, ["--digits", "20001"], 2, "1 to 20000"),
+        ({}, ["--digits", "0"], 2, "1 to 20000"),
+        ({}, ["--digits", "many"], 2, "--digits"),
+        ({"times": "inf"}, [], 2, "not a finite number"),
+        ({"gamma": "1,1,1"}, [], 2, "--normalize"),
+        ({"times": "1e6"}, [], 3, "digits"),
+    ],
+)
+def test_reference_refuses_what_it_cannot_prove(changes, more, code, message) -> None:
+    done = run("reference", *top_options(**changes), *more, "--json")
+    assert done.returncode == code
+    assert message in done.stderr
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr

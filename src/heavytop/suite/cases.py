@@ -99,6 +99,13 @@ CASES: dict[str, Case] = {
             State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5")),
         ),
         Case(
+            "pendulum",
+            "physical pendulum about axis 1, turning over",
+            HEAVY_TOP,
+            HeavyTop((3, "5/2", "3/2"), "3/2", (0, "1/2", "1/5")),
+            State(("9/7", 0, 0), (0, "3/5", "4/5")),
+        ),
+        Case(
             "gyrostat",
             "asymmetric gyrostat of (2.1)-(2.4), gamma = M/|M|",
             GYROSTAT,

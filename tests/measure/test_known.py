@@ -1,0 +1,82 @@
+"""References come from the catalogue, from the rounded data, and are certified before they score anything."""
+
+from fractions import Fraction
+
+import pytest
+
+from heavytop.errors import OutOfReach
+from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.integrate.trajectory import Problem
+from heavytop.measure.known import certified, known_motion
+from heavytop.precision import DOUBLE, QUAD
+from heavytop.suite.cases import CASES
+
+
+def problem(name: str, precision=DOUBLE) -> Problem:
+    case = CASES[name]
+    return Problem.of(case.top, case.start, precision, case.system)
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        ("euler", "Euler-Poinsot"),
+        ("lagrange", "Lagrange"),
+        ("pendulum", "pendulum"),
+        ("gyrostat", "gyrostat"),
+        ("kovalevskaya", "validated"),
+    ],
+)
+def test_every_case_finds_its_reference_from_the_rounded_data(name: str, method: str) -> None:
+    given = problem(name)
+    known = known_motion(given, Fraction(5))
+    assert known is not None
+    assert method in known.solution.method
+    assert known.certificate.agreed_digits >= 19
+    assert f"certified to {known.certificate.agreed_digits} digits" in known.text
+    assert "radius below" in known.text
+    for value, start in zip(known.solution.state(Fraction(0), 117), given.start.flat, strict=True):
+        assert abs(midpoint(value) - start) <= radius(value)
+
+
+def test_a_motion_without_a_closed_form_has_no_reference_over_a_long_horizon() -> None:
+    assert known_motion(problem("generic"), Fraction(10**5)) is None
+
+
+def test_the_rounded_gyrostat_keeps_the_rotor_of_the_exact_data() -> None:
+    given = problem("gyrostat", QUAD)
+    known = known_motion(given, Fraction(3))
+    assert known is not None
+    assert known.solution.parameters.rotor == given.parameters.rotor
+
+
+class Wrong:
+    """A closed form that is wrong by 1e-17: it must not serve as a reference of 19 digits and more."""
+
+    def __init__(self, true) -> None:
+        self.true = true
+        self.method, self.system, self.top, self.start = "wrong", true.system, true.top, true.start
+
+    def state(self, time: Fraction, bits: int):
+        first, *rest = self.true.state(time, bits)
+        with working_precision(bits + 32):
+            return [first + ball(Fraction(1, 10**17)), *rest]
+
+
+def test_a_reference_that_its_second_source_excludes_scores_nothing() -> None:
+    known = known_motion(problem("euler"), Fraction(3))
+    assert known is not None
+    with pytest.raises(OutOfReach, match="exclude each other"):
+        certified(Wrong(known.solution), Fraction(3), 117)
+
+
+def test_a_reference_with_fewer_digits_than_the_format_scores_nothing() -> None:
+    class Blurred(Wrong):
+        def state(self, time: Fraction, bits: int):
+            first, *rest = self.true.state(time, bits)
+            with working_precision(bits + 32):
+                return [first + ball(Fraction(1, 10**12)) * ball(0).union(ball(1)), *rest]
+
+    known = known_motion(problem("euler"), Fraction(3))
+    assert known is not None
+    assert certified(Blurred(known.solution), Fraction(3), 117) is None
