@@ -1,6 +1,6 @@
 """The command line.  Only this module prints; each command is a few lines that join the rooms.
 
-Exit codes: 0 good, 1 a finding, 2 usage or bad input, 3 incomplete or incomparable, 130 interrupted.
+Exit codes: 0 good, 1 a finding, 2 usage or bad input, 3 incomplete, undecided or incomparable, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -113,6 +113,9 @@ def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, schedu
             path = store.write(report, directory)
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {error}.", "Choose a writable --out with space.") from None
+    except KeyboardInterrupt:
+        print(f"heavytop: interrupted; finished rows are kept: --out {directory} --resume goes on", file=sys.stderr)
+        return 130
     _print(text.summary(report))
     print(f"\nReport: {path}")
     return 0 if all(row.outcome == "success" for row in rows) else 3
