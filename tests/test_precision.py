@@ -5,6 +5,8 @@ from random import Random
 
 import numpy
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from heavytop.errors import InputError
 from heavytop.precision import (
@@ -141,3 +143,25 @@ def test_decimal_text_rounds_to_nearest() -> None:
     assert decimal_text(Fraction(2, 3), 5) == "0.66667"
     assert decimal_text(Fraction(1, 3 * 10**1000), 3) == "3.33E-1001"
     assert decimal_text(Fraction(0), 9) == "0"
+
+
+@given(st.fractions(), st.integers(24, 300))
+def test_rounding_is_to_nearest_and_idempotent(value: Fraction, bits: int) -> None:
+    near = round_to(value, bits)
+    assert round_to(near, bits) == near
+    assert round_to(-value, bits) == -near
+    assert abs(near - value) * 2**bits <= abs(near)
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_double_comes_back_from_its_exact_value_and_from_its_text(value: float) -> None:
+    assert float(number(exact(value), DOUBLE)) == value
+    assert float(exact(native_text(numpy.float64(value), DOUBLE))) == value
+
+
+@given(st.text(max_size=12))
+def test_any_text_is_a_number_or_a_clear_error(text: str) -> None:
+    try:
+        assert isinstance(exact(text), Fraction)
+    except InputError as error:
+        assert error.remedy
