@@ -105,6 +105,7 @@ def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, schedu
 
     surroundings = environment()
     identity = {**plan, **surroundings["packages"]}
+    identity |= {key: str(surroundings[key]) for key in ("commit", "processor", "simd_width_double")}
     try:
         directory.mkdir(parents=True, exist_ok=True)
         with Checkpoint(directory, identity) as checkpoint, _progress(tasks) as advance:
@@ -271,6 +272,8 @@ def figures(out: Annotated[Path, typer.Option(help="Folder for the pictures.")])
     """Draw Figs 2-8 of the paper, and the same with the true motion beside the claim, as SVG and PNG."""
     from heavytop.report.figures import draw_figures
 
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"{out} already holds other content.", "Give a new folder with --out.")
     try:
         files = draw_figures(out)
     except OSError as error:

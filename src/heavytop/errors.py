@@ -20,6 +20,12 @@ class NotInClass(InputError):
     """A start outside the class of motions that a closed form covers; says which exact test failed and by how much."""
 
 
+class Contradiction(HeavyTopError):
+    """Two proven sources exclude each other: one of them is wrong, and nothing may be scored against either."""
+
+    exit_code = 1
+
+
 class OutOfReach(HeavyTopError):
     """A reference that cannot be proven to the digits asked for; says how many could be reached."""
 

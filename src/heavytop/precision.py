@@ -17,6 +17,8 @@ from heavytop.errors import InputError
 
 REAL_BITS = range(24, 20001)
 _MAX_TEXT = 100_000
+LARGEST = Fraction(10) ** 150
+"""Beyond this, physical data overflow in some float on the way; a change of units brings them back."""
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,6})?")
 _REMEDY = "Write an integer, a decimal such as 0.25 or 1e-3, or a fraction such as -2/5."
 
@@ -61,7 +63,7 @@ def parse(name: str) -> Precision:
     for precision in (DOUBLE, EXTENDED, QUAD):
         if name == precision.name:
             return precision
-    if re.fullmatch(r"real:\d{1,9}", name):
+    if re.fullmatch(r"real:[1-9][0-9]{0,8}", name):
         return real(int(name[5:]))
     raise InputError(f"Unknown precision {name[:60]!r}.", "Use double, extended, quad or real:BITS, such as real:237.")
 
@@ -116,6 +118,19 @@ def exact(value: Any) -> Fraction:
     if hasattr(value, "__index__"):
         return Fraction(value.__index__())
     raise InputError(f"A {kind} is not a number: {str(value)[:60]!r}.", _REMEDY)
+
+
+def shown(value: Fraction) -> str:
+    """An exact number for a message: as it is where that is short, else to six digits."""
+    short = max(value.numerator.bit_length(), value.denominator.bit_length()) < 100
+    return str(value) if short else decimal_text(value, 6)
+
+
+def physical(value: Fraction, what: str) -> Fraction:
+    """``value``; raises InputError if it is larger than 10^150."""
+    if abs(value) > LARGEST:
+        raise InputError(f"{what} = {shown(value)} is too large.", "Choose other units: numbers go up to 1e150.")
+    return value
 
 
 def _from_text(text: str) -> Fraction:

@@ -102,7 +102,7 @@ def test_the_attitude_rides_along_and_stays_orthonormal() -> None:
 
 
 def test_an_overflow_is_an_outcome_and_not_numbers() -> None:
-    run = propagate(TOP, State((10**160, 10**160, 1), (0, 0, 1)), [1], DOUBLE)
+    run = propagate(TOP, State((10**140, 10**140, 1), (0, 0, 1)), [1], DOUBLE)
     assert run.outcome is Outcome.NON_FINITE
     assert run.states == ()
     assert run.time_reached == 0
@@ -159,3 +159,29 @@ def test_the_start_may_be_asked_for() -> None:
     run = propagate(TOP, START, [0, 1], real(100))
     assert bits(run)[0] == [exact(number(v, real(100))) for v in START.flat]
     assert run.times == (0, 1)
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(100)], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    ("top", "start"),
+    [
+        (HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))),
+        (HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 0), (0, 0, -1))),
+        (HeavyTop((3, 2, 1), 1, (0, "1/3", 0)), State((0, "14/9", 0), (0, 1, 0))),
+    ],
+    ids=["sleeping", "hanging", "permanent rotation"],
+)
+def test_an_equilibrium_stays_where_it_is(precision, top: HeavyTop, start: State) -> None:
+    run = propagate(top, start, [1, 2000], precision)
+    assert run.outcome is Outcome.SUCCESS
+    assert bits(run) == [[exact(number(v, precision)) for v in start.flat]] * 2
+    back = propagate(top, start, [-5], precision)
+    assert bits(back) == bits(run)[:1]
+
+
+def test_the_body_of_a_sleeping_top_turns_though_omega_and_gamma_rest() -> None:
+    top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))
+    run = propagate(top, start, [1], QUAD, xi=perpendicular(start.gamma))
+    values = [exact(v) for v in run.states[0]]
+    assert values[:6] == list(start.flat)
+    assert float(values[6]) == pytest.approx(float(numpy.cos(3.0)))

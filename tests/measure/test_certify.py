@@ -8,7 +8,7 @@ import msgspec
 import pytest
 from flint import arb
 
-from heavytop.errors import InputError, OutOfReach
+from heavytop.errors import Contradiction, InputError
 from heavytop.exact.balls import midpoint, radius, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
@@ -53,7 +53,7 @@ def test_far_times_are_certified_at_both_ends(known):
 
 
 def test_a_wrong_closed_form_is_refused():
-    with pytest.raises(OutOfReach, match="exclude each other at t = 8: component 2 differs at digit 29"):
+    with pytest.raises(Contradiction, match="exclude each other at t = 8: component 2 differs at digit 29"):
         certify(Shifted(KNOWN[0], arb("1e-30"), 5), Fraction(8), 50)
 
 

@@ -233,3 +233,38 @@ def test_a_missing_report_and_a_row_twice_are_refused(tmp_path: Path) -> None:
 )
 def test_short_numbers_for_tables(value: str, expected: str) -> None:
     assert short(value) == expected
+
+
+def test_an_unresolved_error_is_at_most_its_bound_and_never_better() -> None:
+    def unresolved(bound: str | None) -> Row:
+        return with_metric(Metric("unresolved", None, "error", bound))
+
+    name = "drift_energy_max"
+    assert verdicts(row(), unresolved("1e-13"))[name] is Verdict.SAME
+    assert verdicts(row(), unresolved("1"))[name] is Verdict.INCOMPARABLE
+    assert verdicts(row(), unresolved(None))[name] is Verdict.INCOMPARABLE
+    assert verdicts(unresolved("1e-13"), row())[name] is Verdict.WORSE
+    assert verdicts(unresolved("1e-11"), row())[name] is Verdict.SAME
+
+
+def test_a_duration_may_start_from_0() -> None:
+    zero = with_metric(of_fraction(exact("0"), "duration"), "break_away_time")
+    assert verdicts(zero, row())["break_away_time"] is Verdict.BETTER
+    assert verdicts(zero, zero)["break_away_time"] is Verdict.SAME
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"bits": 10**12},
+        {"bits": -1},
+        {"measure": "homoclinic", "metrics": {}},
+        {"measure": "claim_evaluation"},
+        {"metrics": {"drift_energy_max": Metric("never", None)}},
+        {"metrics": {"break_away_time": Metric("unresolved", None, "duration")}},
+    ],
+)
+def test_rows_that_cannot_be_are_refused(tmp_path: Path, change) -> None:
+    store.write(report(row(**change)), tmp_path)
+    with pytest.raises(InputError, match="euler"):
+        store.read(tmp_path)

@@ -74,4 +74,7 @@ def only_branch(report: AuditReport, branch: str) -> AuditReport:
     """The same report with the rows of one branch, and its verdict on them; raises InputError for any other name."""
     if branch not in ("smooth", "printed"):
         raise InputError(f"Unknown branch {branch[:40]!r}.", "Use smooth or printed.")
-    return replace(report, rows=tuple(row for row in report.rows if row.branch == branch))
+    rows = tuple(row for row in report.rows if row.branch == branch)
+    if not rows:
+        raise InputError(f"{report.claim} says nothing on the {branch} branch.", "Leave out --branch.")
+    return replace(report, rows=rows)

@@ -126,10 +126,11 @@ class Stepper:
     _largest_step: float = 0.0
     _seconds_per_step: float = field(default=_CHUNK_SECONDS)
     _one_by_one: bool = False
+    _at_rest: Any = None
 
     def reach(self, target: Any) -> Outcome:
         """Step until the polynomial of the last step covers ``target``."""
-        while not (self._covers and self._beyond(target)):
+        while self._at_rest is None and not (self._covers and self._beyond(target)):
             if self.step_limit is not None and self.steps >= self.step_limit:
                 return Outcome.STEP_LIMIT
             count = self._steps_short_of(target)
@@ -155,12 +156,16 @@ class Stepper:
         return int(count)
 
     def _single(self) -> Outcome:
-        before, began = self.engine.time, perf_counter()
+        before, state, began = self.engine.time, self.engine.state.copy(), perf_counter()
         outcome, _ = (self.engine.step if self.forwards else self.engine.step_backward)(write_tc=True)
         self._seconds_per_step = perf_counter() - began
         self._covers = True
         if outcome == heyoka.taylor_outcome.err_nf_state or not numpy.isfinite(self.engine.time):
-            return Outcome.NON_FINITE
+            # at an equilibrium every Taylor coefficient is 0 and heyoka finds no step: the motion is constant
+            if not numpy.isfinite(state).all() or self.engine.tc[:, 1:].any():
+                return Outcome.NON_FINITE
+            self._at_rest = state
+            return Outcome.SUCCESS
         if self.engine.time == before:
             return Outcome.STEP_TOO_SMALL
         self.steps += 1
@@ -193,6 +198,8 @@ class Stepper:
     def sample(self, target: Any) -> Any:
         """The state at ``target``, inside the last step; a copy, shape (6,) or (9,)."""
         self._one_by_one = False
+        if self._at_rest is not None:
+            return self._at_rest.copy()
         return self.engine.update_d_output(target).copy()
 
 

@@ -17,7 +17,7 @@ from math import ceil, log2
 
 from flint import arb
 
-from heavytop.errors import OutOfReach
+from heavytop.errors import Contradiction, OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.validated import Validated
@@ -75,7 +75,7 @@ def certify(
 
     second: name and values of a computed source, taken where validated integration does not reach.
     enclosure: :func:`enclosure_of` the solution, to be used again for many times; None for a new one.
-    Raises OutOfReach where two proven sources exclude each other: one of them is wrong.
+    Raises Contradiction where two proven sources exclude each other: one of them is wrong.
     """
     bits = bits_of(digits)
     values = solution.state(time, bits)
@@ -156,7 +156,7 @@ def _require_overlap(solution: ExactSolution, time: Fraction, first: Sequence[ar
     for component, (one, two) in enumerate(zip(first, second, strict=True), 1):
         apart = abs(midpoint(one) - midpoint(two))
         if apart > radius(one) + radius(two):
-            raise OutOfReach(
+            raise Contradiction(
                 f"{solution.method} and validated integration exclude each other at t = {float(time):.6g}: component "
                 f"{component} differs at digit {_digits(apart)}.",
                 "One of them is wrong: neither can serve as a reference.",

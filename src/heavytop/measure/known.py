@@ -44,7 +44,8 @@ class Known:
 def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | None:
     """``solution`` for references of ``bits`` bits, if it is certified to more digits than its format has at ``time``.
 
-    None if not: a reference below its certified digits scores nothing.
+    None if not: a reference below its certified digits scores nothing.  Raises Contradiction where the second source
+    excludes it.
     """
     digits = int(bits * _DIGITS_A_BIT)
     certificate = certify(solution, time, digits, enclosure=enclosure_of(solution, effort=_EFFORT))
@@ -52,10 +53,11 @@ def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | Non
     return Known(solution, certificate, bits) if certificate.agreed_digits >= needed else None
 
 
-def known_motion(problem: Problem, horizon: Fraction) -> Known | None:
-    """The closed form of a rounded problem, or up to |t| = 100 its enclosure; None where there is neither.
+def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
+    """The closed form of a rounded problem, or up to |t| = 100 its enclosure; why not, where there is neither.
 
-    Certified at ``horizon`` for the bits of the format and its guard bits.
+    Certified at ``horizon`` for the bits of the format and its guard bits.  Raises Contradiction where the second
+    source excludes it: then something is wrong with this program.
     """
     bits = problem.precision.bits + GUARD_BITS
     found: ExactSolution | None
@@ -65,8 +67,9 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | None:
     else:
         found = next(matches(problem.top, problem.start), None)
     if found is None and abs(horizon) > _VALIDATED_HORIZON:
-        return None
+        return f"no closed form, and no enclosure beyond |t| = {_VALIDATED_HORIZON}"
     try:
-        return certified(found or Validated(problem.top, problem.start, problem.system), horizon, bits)
-    except OutOfReach:
-        return None
+        known = certified(found or Validated(problem.top, problem.start, problem.system), horizon, bits)
+    except OutOfReach as error:
+        return error.cause
+    return known or "certified to fewer digits than the format has"

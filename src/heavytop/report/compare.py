@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from heavytop.errors import InputError
+from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
 from heavytop.records import Metric, Report, Row
 
@@ -157,7 +158,9 @@ def _metrics(old: Metric, new: Metric, eps: Fraction, policy: Policy) -> tuple[V
     if old.kind != new.kind:
         return Verdict.INCOMPARABLE, f"kind {old.kind} against {new.kind}"
     for metric in (old, new):
-        if metric.value in ("nan", "missing"):
+        if metric.value in ("nan", "missing") or (
+            metric.value == UNRESOLVED and old.kind == "error" and not metric.bound
+        ):
             return Verdict.INCOMPARABLE, f"{metric.value} is no number"
     if old.kind == "error":
         return _errors(old, new, policy.floor * eps, policy)
@@ -165,7 +168,7 @@ def _metrics(old: Metric, new: Metric, eps: Fraction, policy: Policy) -> tuple[V
         return Verdict.SAME, ""
     if old.kind == "duration":
         return _durations(old, new, policy)
-    if "never" in (old.value, new.value) or "unresolved" in (old.value, new.value):
+    if "never" in (old.value, new.value) or UNRESOLVED in (old.value, new.value):
         return Verdict.WORSE, "a value that must agree does not"
     a, b = exact(old.value), exact(new.value)
     agree = abs(a - b) <= policy.value * max(abs(a), abs(b))
@@ -173,8 +176,15 @@ def _metrics(old: Metric, new: Metric, eps: Fraction, policy: Policy) -> tuple[V
 
 
 def _errors(old: Metric, new: Metric, floor: Fraction, policy: Policy) -> tuple[Verdict, str]:
-    """Smaller is better; below the floor, and below what the reference resolves, all errors are the same."""
-    a, b = (floor if m.value == "unresolved" else max(abs(exact(m.value)), floor) for m in (old, new))
+    """Smaller is better; below the floor all errors are the same.  What its reference does not resolve is at most its
+    bound: never better, and incomparable where the bound itself would be worse.
+    """
+    a, b = (max(abs(exact((m.bound or "") if m.value == UNRESOLVED else m.value)), floor) for m in (old, new))
+    if new.value == UNRESOLVED:
+        small = b <= a * Fraction(2) ** int(policy.loss)
+        return (Verdict.SAME, "") if small else (Verdict.INCOMPARABLE, f"unresolved below {new.bound}")
+    if old.value == UNRESOLVED and b <= a:
+        return Verdict.SAME, ""
     if a == b:
         return Verdict.SAME, ""
     if not a or not b:
@@ -193,6 +203,8 @@ def _durations(old: Metric, new: Metric, policy: Policy) -> tuple[Verdict, str]:
         return Verdict.WORSE, f"now at {new.value}"
     if new.value == "never":
         return Verdict.BETTER, "now never"
+    if exact(old.value) == 0:
+        return Verdict.BETTER, f"now at {new.value}"
     ratio = exact(new.value) / exact(old.value)
     if ratio < 1 - policy.duration:
         return Verdict.WORSE, f"{float(1 - ratio):.0%} earlier"

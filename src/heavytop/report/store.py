@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 
 from heavytop.errors import InputError
+from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
 from heavytop.records import SCHEMA, Metric, Report, Row
 from heavytop.suite.checkpoint import replace
@@ -72,17 +73,41 @@ def _check_row(file: Path, row: Row) -> None:
     horizon, reached = (_number(where, value) for value in (row.horizon, row.time_reached))
     if row.outcome == "success" and abs(reached) < abs(horizon):
         raise InputError(f"{where}: a success that reached only {row.time_reached} of {row.horizon}.", _REMEDY)
+    if not 0 <= row.bits <= _MOST_BITS:
+        raise InputError(f"{where}: {row.bits} bits are no format.", _REMEDY)
+    lacking = [name for name in _NEEDED.get(row.measure, ()) if name not in row.metrics]
+    if lacking:
+        raise InputError(f"{where}: a row of {row.measure} without {', '.join(lacking)}.", _REMEDY)
     for name, metric in row.metrics.items():
         _check_metric(f"{where}, {name[:60]}", metric)
     if row.finite and any(metric.value == "nan" for metric in row.metrics.values()):
         raise InputError(f"{where}: said to be finite, but holds a NaN.", _REMEDY)
 
 
-WORDS = ("nan", "missing", "never", "unresolved")
+WORDS = {
+    "error": ("nan", "missing", UNRESOLVED),
+    "duration": ("nan", "missing", "never"),
+    "value": ("nan", "missing", "never", UNRESOLVED),
+}
+"""What may stand in the place of a number, for each kind of metric."""
+_MOST_BITS = 100_000
+_QUANTITIES = ("omega", "theta", "psi")
+_NEEDED = {
+    "homoclinic": ("break_away_time",),
+    "claim_model": ("claim_parts_by_1_percent_at",),
+    "claim_evaluation": (
+        *(f"claim_evaluation_error_{name}_max_finite" for name in _QUANTITIES),
+        *(f"claim_evaluation_{name}_not_finite_from" for name in _QUANTITIES),
+    ),
+    "break_away_law": ("break_away_slope", "break_away_slope_expected", "break_away_slope_off_by"),
+}
+"""Metrics that a summary of such a row cannot do without."""
 
 
 def _check_metric(where: str, metric: Metric) -> None:
-    if metric.value in WORDS:
+    if metric.bound is not None:
+        _number(where, metric.bound)
+    if metric.value in WORDS[metric.kind]:
         if metric.log10 is not None:
             raise InputError(f"{where}: {metric.value} with a logarithm.", _REMEDY)
         return

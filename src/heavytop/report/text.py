@@ -169,7 +169,7 @@ def _homoclinic(rows: Sequence[Row]) -> list[RenderableType]:
     lines = []
     for row in rows:
         prefix = "integration_error" if "integration_error_omega_max" in row.metrics else "solution_error"
-        error = row.metrics[f"{prefix}_omega_max"].value
+        error = row.metrics[f"{prefix}_omega_max"].value if f"{prefix}_omega_max" in row.metrics else "-"
         lines.append([row.case, row.precision, short(error), short(row.metrics["break_away_time"].value), row.outcome])
     return [
         _title("Integrators on a homoclinic motion, against its closed form"),

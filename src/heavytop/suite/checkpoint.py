@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO
@@ -83,8 +84,12 @@ class Checkpoint:
             self._file.close()
         if kind is None:
             self.path.unlink(missing_ok=True)
+        if not self.done:
+            self.path.unlink(missing_ok=True)
         self.lock.unlink(missing_ok=True)
         self._lock_file.close()
+        with suppress(OSError):  # only an empty folder goes: nothing was finished, so nothing stays
+            self.path.parent.rmdir()
 
 
 def _line(content: bytes) -> bytes:

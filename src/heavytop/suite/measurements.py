@@ -173,6 +173,8 @@ def _claim_evaluation(task: Task) -> Row:
             finite = [value for value in values if value.is_finite()]
             worst = metric(largest(finite)) if finite else Metric("missing", None)
             metrics[f"claim_evaluation_error_{name}_max_finite"] = worst
+            lost = Fraction(len(values) - len(finite))
+            metrics[f"claim_evaluation_{name}_samples_not_finite"] = of_fraction(lost, "value", str(lost))
             failure = claim_error.first_failure(times, values)
             metrics[f"claim_evaluation_{name}_not_finite_from"] = _time_metric(failure, "duration")
             series[f"claim_evaluation_error_{name}"] = Series(
@@ -188,7 +190,7 @@ def _claim_evaluation(task: Task) -> Row:
         horizon=time_text(times[-1]),
         time_reached=time_text(times[-1]),
         steps=0,
-        finite=all(m.value in ("never",) for k, m in metrics.items() if k.endswith("not_finite_from")),
+        finite=all(m.value == "0" for k, m in metrics.items() if k.endswith("_not_finite")),
         metrics=metrics,
         measure=task.kind,
         measured=f"{CLAIM}, {task.form} form, evaluated in {precision.name}; times of the series are k t",
@@ -237,9 +239,11 @@ def _drift(task: Task) -> Row:
     keep = [exact(number(time, precision)) for time in task.keep]
     drift = Drift(problem, holding(case.top, case.start, case.system), keep)
     known = known_motion(problem, exact(number(task.times[-1], precision)))
-    if known is None:
+    if isinstance(known, str):
         run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=drift)
-        return _computed_row(task, run, drift.metrics(), drift.series(time_text), "its own first integrals")
+        return _computed_row(
+            task, run, drift.metrics(), drift.series(time_text), f"its own first integrals; no reference: {known}"
+        )
     error = SolutionError(problem, known.solution, keep)
 
     def observe(time: Fraction, state: Any) -> None:
@@ -329,7 +333,8 @@ def break_away_law(rows: Sequence[Row], rates: dict[str, float]) -> list[Row]:
 
     found: dict[str, list[Row]] = {}
     for row in rows:
-        if row.measure == "homoclinic" and row.metrics["break_away_time"].log10 is not None:
+        done = row.measure == "homoclinic" and row.outcome == Outcome.SUCCESS.value
+        if done and row.metrics["break_away_time"].log10 is not None:
             found.setdefault(row.case, []).append(row)
     laws = []
     for case, members in found.items():

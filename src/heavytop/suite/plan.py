@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 import tomllib
 from dataclasses import dataclass
 from fractions import Fraction
@@ -14,7 +15,7 @@ from typing import Literal
 import msgspec
 
 from heavytop.errors import InputError
-from heavytop.precision import exact, parse
+from heavytop.precision import exact, parse, physical
 from heavytop.suite.cases import CASES, Case, case
 from heavytop.top.equations import system
 from heavytop.top.heavy_top import HeavyTop, State
@@ -156,6 +157,10 @@ def load(name: str) -> tuple[Plan, str]:
         raise InputError(f"Unknown plan {name[:60]!r}.", f"Use {', '.join(BUILT_IN)} or a file ending in .toml.")
     try:
         plan = msgspec.convert(tomllib.loads(text), Plan)
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", plan.name):
+            raise msgspec.ValidationError(f"name {plan.name[:40]!r} is not letters, digits, '.', '_' and '-'")
+    except RecursionError:
+        raise InputError(f"The plan {name} is nested too deeply.", "The plans that ship show every key.") from None
     except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise InputError(f"The plan {name} is not valid: {error}.", "The plans that ship show every key.") from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
@@ -283,7 +288,7 @@ def _claimed(case: Case) -> Case:
 
 
 def _positive(texts: list[str], what: str) -> list[Fraction]:
-    values = [exact(text) for text in texts]
+    values = [physical(exact(text), what) for text in texts]
     if not values or values != sorted(set(values)) or values[0] <= 0:
         raise InputError(f"{what} = {texts}", "Give positive numbers in growing order, each once.")
     return values

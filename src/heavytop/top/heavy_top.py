@@ -9,7 +9,7 @@ from math import isqrt
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.precision import exact
+from heavytop.precision import LARGEST, exact, physical, shown
 
 Vector = tuple[Fraction, Fraction, Fraction]
 
@@ -20,7 +20,7 @@ def vector(values: Iterable[Any], what: str) -> Vector:
     if len(parts) != 3:
         raise InputError(f"{what} has {len(parts)} numbers.", "Give three, one for each principal axis: x,y,z.")
     try:
-        first, second, third = (exact(part) for part in parts)
+        first, second, third = (physical(exact(part), "a component") for part in parts)
     except InputError as error:
         raise InputError(f"{what}: {error.cause}", error.remedy) from None
     return first, second, third
@@ -54,13 +54,14 @@ class HeavyTop:
     def __init__(self, inertia: Iterable[Any], weight: Any, centre: Iterable[Any]) -> None:
         moments = vector(inertia, "inertia")
         for axis, value in enumerate(moments, 1):
-            if value <= 0:
+            if value * LARGEST < 1:
                 raise InputError(
-                    f"The principal moment I{axis} = {value} is not positive.",
+                    f"The principal moment I{axis} = {shown(value)} is not positive"
+                    f"{', or too small' if value > 0 else ''}.",
                     "Moments of inertia are positive numbers.",
                 )
         try:
-            load = exact(weight)
+            load = physical(exact(weight), "it")
         except InputError as error:
             raise InputError(f"weight: {error.cause}", error.remedy) from None
         object.__setattr__(self, "inertia", moments)
@@ -84,7 +85,8 @@ class HeavyTop:
             others = sum(self.inertia) - value
             if value > others:
                 found.append(
-                    f"I{axis + 1} = {value} exceeds the sum {others} of the other two: no rigid body has such moments."
+                    f"I{axis + 1} = {shown(value)} exceeds the sum {shown(others)} of the other two: "
+                    "no rigid body has such moments."
                 )
         return found
 

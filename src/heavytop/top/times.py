@@ -7,20 +7,23 @@ from fractions import Fraction
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.precision import exact
+from heavytop.precision import exact, physical, shown
 
 
 def check_times(times: Sequence[Any]) -> list[Fraction]:
     """Exact times; raises InputError unless they are of one sign and strictly monotone away from 0."""
-    values = [exact(time) for time in times]
+    values = [physical(exact(time), "a time") for time in times]
     if not values:
         raise InputError("No times were given.", "Give at least one, such as --times 1,2,5.")
     for earlier, later in zip([Fraction(0), *values], values, strict=False):
         if earlier * later < 0:
-            raise InputError(f"The times {earlier} and {later} have different signs.", "Run each direction by itself.")
+            raise InputError(
+                f"The times {shown(earlier)} and {shown(later)} have different signs.", "Run each direction by itself."
+            )
         if abs(later) <= abs(earlier) and (later or earlier):
             raise InputError(
-                f"The time {later} does not come after {earlier}.", "Times go strictly away from 0, each once."
+                f"The time {shown(later)} does not come after {shown(earlier)}.",
+                "Times go strictly away from 0, each once.",
             )
     if values.count(Fraction(0)) > 1:
         raise InputError("The time 0 is given more than once.", "Times go strictly away from 0, each once.")
