@@ -24,6 +24,7 @@ from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.gyrostat import Gyrostat
 from heavytop.exact.lagrange import Lagrange
+from heavytop.exact.validated import Validated
 from heavytop.exact.weierstrass import DegenerateLattice, Lattice
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
@@ -237,3 +238,12 @@ def test_a_thousand_digits_come_out():
     for motion in (random_gyrostat(8), random_lagrange(8)):
         for value in motion.state(F(10**6), 3322):
             assert radius(value) < F(1, 10**990)
+
+
+@pytest.mark.parametrize("make", [random_gyrostat, paper_gyrostat, random_lagrange])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_validated_integration_agrees_to_fifty_digits(make, seed):
+    motion = make(1000 + seed)
+    time = F(-10, 3) if seed % 2 else F(5, 2)
+    enclosed = Validated(motion.top, motion.start, motion.system, rotor=F(motion.parameters.rotor))
+    assert_same(motion.state(time, 200), enclosed.state(time, 200))

@@ -8,6 +8,7 @@ from flint import arb
 from proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import InputError, NotInClass
+from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.grioli import Grioli, grioli_motion
 from heavytop.exact.staude import (
     Staude,
@@ -16,7 +17,9 @@ from heavytop.exact.staude import (
     staude_rate,
     staude_rate_squared,
     staude_rotations,
+    staude_stability,
 )
+from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
 
@@ -126,3 +129,29 @@ def test_what_cannot_turn_steadily_is_refused_with_the_reason():
     assert staude_rate_squared(HeavyTop((3, 2, 1), 1, (0, 0, 1)), (Fraction(0), Fraction(0), Fraction(1))) is None
     with pytest.raises(NotInClass, match=r"\(Omega', gamma'\) = \("):
         Staude(top, State((1, 0, 0), (1, 0, 0)))
+
+
+def test_the_sleeping_top_is_stable_where_it_turns_fast_enough() -> None:
+    """Ω3² > 4 P c I1/I3² (Lagrange)."""
+    top = HeavyTop((2, 2, 1), 3, (0, 0, 1))
+    upright = (0, 0, 1)
+    assert staude_stability(Staude(top, State((0, 0, Fraction(49, 10)), upright))) == "spectrally stable"
+    assert staude_stability(Staude(top, State((0, 0, Fraction(48, 10)), upright))) == "unstable"
+
+
+def test_a_free_top_turns_stably_about_its_largest_and_smallest_moment_only() -> None:
+    for axis, verdict in ((0, "spectrally stable"), (1, "unstable"), (2, "spectrally stable")):
+        unit = [Fraction(int(i == axis)) for i in range(3)]
+        # weight along the axis, too small to matter: P r = 0 leaves gamma's own rotation, which first order counts
+        motion = Staude(HeavyTop((3, 2, 1), Fraction(1, 1000), unit), State([2 * u for u in unit], unit))
+        assert staude_stability(motion) == verdict
+
+
+def test_the_saddle_of_the_paper_s_gyrostat_is_unstable_and_the_hanging_top_is_not() -> None:
+    """MATH: exponents ±k/2 of the gyrostat at Ω = (0, α, 0); ρ < 2 a saddle-centre of the heavy top."""
+    known = ErshkovPartial(Fraction(1), Fraction(6), Fraction(1))
+    saddle = State((0, 1, 0), (0, 1, 0))
+    assert staude_stability(Staude(known.top, saddle, GYROSTAT)) == "unstable"
+    assert staude_stability(Staude(known.top, saddle)) == "unstable"
+    hanging = Staude(HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, Fraction(1, 2)), (0, 0, -1)))
+    assert staude_stability(hanging) == "spectrally stable"

@@ -5,7 +5,8 @@
     ω² = P (I γ × γ)·(r × γ) / |I γ × γ|²     where γ is not a principal axis; it must not be negative.
 
 On a principal axis that r lies on, every ω serves; on another one, none.  Turned about: P r = ω² I γ + κ γ gives
-every top that turns about γ at the rate ω.  Space turns about Ω in the body at the rate |Ω|.  Stability is not said.
+every top that turns about γ at the rate ω.  Space turns about Ω in the body at the rate |Ω|.  Whether one is
+stable to first order :func:`staude_stability` says.
 Source: O. Staude, J. reine angew. Math. 113 (1894) 318.
 """
 
@@ -17,12 +18,12 @@ from fractions import Fraction
 from math import gcd, isqrt
 from typing import Any
 
-from flint import arb, arb_series, ctx
+from flint import arb, arb_series, ctx, fmpq, fmpq_mat, fmpq_poly
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, turned
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot, vector
 
 
@@ -163,3 +164,30 @@ def _root(square: Fraction) -> Fraction | None:
         return None
     root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
     return root if root * root == square else None
+
+
+def staude_stability(motion: Staude) -> str:
+    """``unstable``, ``spectrally stable`` or ``degenerate``, decided exactly from the linearized motion.
+
+    The characteristic polynomial of the Jacobian is x² (x⁴ + A x² + B): |γ|² and M·γ give the zeros, reversibility the
+    even powers.  All exponents are imaginary and simple where A, B and A² − 4B are positive; one has a positive real
+    part where any of them is negative; where one is 0 and none negative, first order does not decide.
+    """
+    p = motion.system.parameters(motion.top, motion.start)
+    exact = Parameters(
+        [_rational(i) for i in p.inertia], [_rational(n) for n in p.moment], _rational(Fraction(p.rotor))
+    )
+    columns = []
+    for moved in range(6):
+        y = [fmpq_poly([_rational(v), int(axis == moved)]) for axis, v in enumerate(motion.start.flat)]
+        columns.append([rate[1] for rate in motion.system.field(exact, y)])
+    polynomial = fmpq_mat(6, 6, [columns[j][i] for i in range(6) for j in range(6)]).charpoly()
+    a, b = polynomial[4], polynomial[2]
+    signs = (a, b, a * a - 4 * b)
+    if any(value < 0 for value in signs):
+        return "unstable"
+    return "spectrally stable" if all(value > 0 for value in signs) else "degenerate"
+
+
+def _rational(value: Fraction) -> fmpq:
+    return fmpq(value.numerator, value.denominator)
