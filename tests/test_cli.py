@@ -117,7 +117,7 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
         ({}, ["--colour", "red"], "--colour"),
         ({"omega": "1e400,0,0"}, [], "too large"),
         ({"times": "1e5000,1e5000"}, [], "too large"),
-        ({"inertia": "-1e5000,1,1"}, [], "too large"),
+        ({"inertia": "-1e5000,1,1"}, [], "not positive"),
     ],
 )
 def test_bad_input_gets_a_clear_error_and_exit_2(changes, more, message) -> None:

@@ -234,10 +234,11 @@ def reference(
 
 def _motion(inertia: str, weight: str, centre: str, omega: str, gamma: str, normalize: bool) -> Any:
     """The exact top and start of the options; what no rigid body has is a warning."""
-    from heavytop.top.heavy_top import HeavyTop, State
+    from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
     top = HeavyTop(_numbers(inertia), weight, _numbers(centre))
     start = State(_numbers(omega), _numbers(gamma))
+    require_physical(top, start)
     start = (start.normalized() if normalize else start).require_unit_gamma()
     for warning in top.warnings():
         print(f"heavytop: warning: {warning}", file=sys.stderr)

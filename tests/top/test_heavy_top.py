@@ -7,7 +7,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
-from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.top.heavy_top import HeavyTop, State, dot, require_physical
 from helpers import unit_vector, vector
 
 
@@ -85,13 +85,18 @@ def test_systems_are_found_by_name() -> None:
 
 
 def test_numbers_beyond_every_float_are_refused_and_shown_short() -> None:
-    huge = "1e5000"
-    for build in (
-        lambda: HeavyTop((huge, 1, 1), 1, (0, 0, 1)),
-        lambda: HeavyTop((1, 1, 1), huge, (0, 0, 1)),
-        lambda: State((huge, 0, 0), (0, 0, 1)),
-        lambda: HeavyTop(("1e-5000", 1, 1), 1, (0, 0, 1)),
+    body, start = HeavyTop((1, 1, 1), 1, (0, 0, 1)), State((1, 0, 0), (0, 0, 1))
+    require_physical(body, start)
+    for top, state in (
+        (HeavyTop(("1e5000", 1, 1), 1, (0, 0, 1)), start),
+        (HeavyTop((1, 1, "1e-5000"), 1, (0, 0, 1)), start),
+        (HeavyTop((1, 1, 1), "-1e5000", (0, 0, 1)), start),
+        (body, State(("1e151", 0, 0), (0, 0, 1))),
     ):
-        with pytest.raises(InputError, match=r"too (large|small)") as error:
-            build()
+        with pytest.raises(InputError, match="is too large") as error:
+            require_physical(top, state)
         assert len(str(error.value)) < 200
+    assert all(len(warning) < 200 for warning in HeavyTop(("1e5000", 1, 1), 1, (0, 0, 1)).warnings())
+    with pytest.raises(InputError, match="not positive") as error:
+        HeavyTop(("-1e5000", 1, 1), 1, (0, 0, 1))
+    assert len(str(error.value)) < 200

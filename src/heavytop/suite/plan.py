@@ -18,7 +18,7 @@ from heavytop.errors import InputError
 from heavytop.precision import exact, parse, physical
 from heavytop.suite.cases import CASES, Case, case
 from heavytop.top.equations import system
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
 BUILT_IN = ("smoke", "default", "long")
 _MAX_SAMPLES = 1_000_000
@@ -200,6 +200,7 @@ def _own_case(top: Top) -> Case:
         raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", "Give it another name.")
     body = HeavyTop(top.inertia, top.weight, top.centre)
     start = State(top.omega, top.gamma).require_unit_gamma()
+    require_physical(body, start)
     which = system(top.system)
     which.parameters(body, start)
     return Case(top.name, "from the plan", which, body, start)

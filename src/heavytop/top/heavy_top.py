@@ -9,7 +9,7 @@ from math import isqrt
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.precision import LARGEST, exact, physical, shown
+from heavytop.precision import exact, physical, shown
 
 Vector = tuple[Fraction, Fraction, Fraction]
 
@@ -20,7 +20,7 @@ def vector(values: Iterable[Any], what: str) -> Vector:
     if len(parts) != 3:
         raise InputError(f"{what} has {len(parts)} numbers.", "Give three, one for each principal axis: x,y,z.")
     try:
-        first, second, third = (physical(exact(part), "a component") for part in parts)
+        first, second, third = (exact(part) for part in parts)
     except InputError as error:
         raise InputError(f"{what}: {error.cause}", error.remedy) from None
     return first, second, third
@@ -54,14 +54,13 @@ class HeavyTop:
     def __init__(self, inertia: Iterable[Any], weight: Any, centre: Iterable[Any]) -> None:
         moments = vector(inertia, "inertia")
         for axis, value in enumerate(moments, 1):
-            if value * LARGEST < 1:
+            if value <= 0:
                 raise InputError(
-                    f"The principal moment I{axis} = {shown(value)} is not positive"
-                    f"{', or too small' if value > 0 else ''}.",
+                    f"The principal moment I{axis} = {shown(value)} is not positive.",
                     "Moments of inertia are positive numbers.",
                 )
         try:
-            load = physical(exact(weight), "it")
+            load = exact(weight)
         except InputError as error:
             raise InputError(f"weight: {error.cause}", error.remedy) from None
         object.__setattr__(self, "inertia", moments)
@@ -89,6 +88,15 @@ class HeavyTop:
                     "no rigid body has such moments."
                 )
         return found
+
+
+def require_physical(top: HeavyTop, start: State) -> None:
+    """Raises InputError for data beyond 10^150, and moments below 10^-150, which overflow in some float on the way."""
+    named = {"inertia": top.inertia, "weight": (top.weight,), "centre": top.centre}
+    for what, values in (named | {"omega": start.omega, "gamma": start.gamma}).items():
+        for value in values:
+            physical(value, what)
+    physical(1 / min(top.inertia), "1/inertia")
 
 
 @dataclass(frozen=True, slots=True, init=False)

@@ -1,0 +1,86 @@
+"""Rows of the default plan: what they must show."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from heavytop.suite.measurements import break_away_law, measure, time_text
+from heavytop.suite.plan import Task, expand, load
+
+TASKS = expand(load("default")[0])
+
+
+def task(label: str) -> Task:
+    (found,) = [each for each in TASKS if each.label == label]
+    return found
+
+
+@pytest.mark.parametrize(("case", "rate"), [("ershkov-partial-6", 2.5), ("delone", 1.25 / math.sqrt(2))])
+def test_the_break_away_time_grows_linearly_with_the_bits(case: str, rate: float) -> None:
+    labels = [f"homoclinic {case}/forward {name}" for name in ("double", "extended", "quad", "real:237")]
+    rows = [measure(task(label)) for label in labels]
+    (law,) = break_away_law(rows, {f"{case}/forward": rate})
+    slope = float(Fraction(law.metrics["break_away_slope"].value))
+    assert slope == pytest.approx(math.log(2) / rate, rel=0.1)
+    for row in rows:
+        assert row.outcome == "success"
+        assert row.against.startswith("known: closed form")
+        # pairs of formats lie on one line: no format keeps to the saddle longer than its bits allow
+        time = float(Fraction(row.metrics["break_away_time"].value))
+        assert row.bits * math.log(2) / rate * 0.6 < time < row.bits * math.log(2) / rate
+
+
+def test_a_failed_member_is_left_out_of_the_law() -> None:
+    row = measure(task("homoclinic delone/forward double"))
+    failed = measure(task("homoclinic delone/forward extended"))
+    failed.outcome = "step_limit"
+    assert break_away_law([row, failed], {"delone/forward": 1.0}) == []
+
+
+def test_the_long_run_of_euler_is_held_against_its_closed_form() -> None:
+    row = measure(task("drift euler double"))
+    assert row.against.startswith("known: closed form: Euler-Poinsot")
+    assert "certified to" in row.against
+    error = Fraction(row.metrics["solution_error_omega_max"].value)
+    drift = Fraction(row.metrics["drift_energy_max"].value)
+    assert drift < Fraction(1, 10**12) < error < Fraction(1, 10**6)
+    assert len(row.series["solution_error_along"].times) == len(row.series["drift_energy"].times) > 20
+
+
+def test_printed_formulas_that_die_are_said_not_to_be_finite() -> None:
+    row = measure(task("claim_evaluation ershkov-partial-2/backward printed double"))
+    assert row.finite is False
+    assert row.metrics["claim_evaluation_omega_not_finite_from"].value == "710"
+    assert int(row.metrics["claim_evaluation_psi_samples_not_finite"].value) > 10
+    stable = measure(task("claim_evaluation ershkov-partial-2/backward stable double"))
+    assert stable.finite is True
+    assert stable.metrics["claim_evaluation_psi_not_finite_from"].value == "never"
+
+
+def test_the_verdict_on_the_claim_is_a_row() -> None:
+    row = measure(task("audit ershkov-partial heavy_top"))
+    refuted = {name for name, metric in row.metrics.items() if metric.value == "0" and " smooth " in name}
+    assert {name.split()[0] for name in refuted} == {"(1.2).1", "(1.2).3", "(3.1).2"}
+    row = measure(task("audit ershkov-partial gyrostat"))
+    assert {metric.value for metric in row.metrics.values()} == {"1"}
+
+
+def test_a_run_that_fails_is_a_row_with_its_outcome() -> None:
+    given = task("drift kovalevskaya double")
+    assert given.case is not None
+    wild = replace(given.case.start, omega=(Fraction(10) ** 140, Fraction(10) ** 140, Fraction(1)))
+    row = measure(replace(given, case=replace(given.case, start=wild)))
+    assert row.outcome == "non_finite"
+    assert row.finite is False
+    assert row.time_reached == "0"
+    assert {metric.value for metric in row.metrics.values()} == {"missing"}
+
+
+@pytest.mark.parametrize(
+    ("time", "text"),
+    [(Fraction(1, 10), "0.1"), (Fraction(100000), "100000"), (Fraction(0), "0"), (Fraction(-5, 4), "-1.25")],
+)
+def test_times_are_printed_plainly(time: Fraction, text: str) -> None:
+    assert time_text(time) == text
