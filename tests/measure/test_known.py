@@ -33,7 +33,7 @@ def test_every_case_finds_its_reference_from_the_rounded_data(name: str, method:
     assert isinstance(known, Known)
     assert method in known.solution.method
     assert known.certificate.agreed_digits >= 19
-    assert f"certified to {known.certificate.agreed_digits} digits" in known.text
+    assert f"certified at t = 5 to {known.certificate.agreed_digits} digits" in known.text
     assert "radius below" in known.text
     for value, start in zip(known.solution.state(Fraction(0), 117), given.start.flat, strict=True):
         assert abs(midpoint(value) - start) <= radius(value)

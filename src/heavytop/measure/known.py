@@ -14,6 +14,7 @@ from heavytop.exact.validated import Validated
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.certify import Certificate, certify, enclosure_of
 from heavytop.measure.scalar import GUARD_BITS
+from heavytop.precision import shown
 from heavytop.top.equations import GYROSTAT
 
 _DIGITS_A_BIT = Fraction(30103, 100000)
@@ -26,10 +27,11 @@ _EFFORT = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """A known motion and its certificate."""
+    """A known motion and its certificate at ``time``."""
 
     solution: ExactSolution
     certificate: Certificate
+    time: Fraction
     bits: int
 
     @property
@@ -37,7 +39,7 @@ class Known:
         """Method, radius and certificate, for the row."""
         c = self.certificate
         limit = radius_text(Fraction(1, 2**self.bits))
-        by = f"certified to {c.agreed_digits} digits by {c.second_source} ({c.kind})"
+        by = f"certified at t = {shown(self.time)} to {c.agreed_digits} digits by {c.second_source} ({c.kind})"
         return f"known: {c.method}, radius below {limit}; {by}"
 
 
@@ -50,7 +52,7 @@ def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | Non
     digits = int(bits * _DIGITS_A_BIT)
     certificate = certify(solution, time, digits, enclosure=enclosure_of(solution, effort=_EFFORT))
     needed = int((bits - GUARD_BITS) * _DIGITS_A_BIT) + _SPARE_DIGITS
-    return Known(solution, certificate, bits) if certificate.agreed_digits >= needed else None
+    return Known(solution, certificate, time, bits) if certificate.agreed_digits >= needed else None
 
 
 def known_motion(problem: Problem, horizon: Fraction) -> Known | str:

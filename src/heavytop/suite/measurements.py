@@ -132,6 +132,9 @@ def _truth(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_error.T
     bits = claim_error.MODEL_BITS
     if claim.i1 == 2 * claim.i3:
         known = DeloneHomoclinic(claim.alpha, claim.i1)
+        proven = certified(known, max(times, key=abs), bits)
+        if proven is None:
+            raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
 
         def delone(time: Fraction) -> tuple[list[arb], list[arb]]:
             phi, theta, psi = known.angles(time, bits)
@@ -139,7 +142,7 @@ def _truth(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_error.T
                 xi = attitude_from_angles(phi, theta, psi - arb.pi() / 2, FUNCTIONS)
             return known.state(time, bits), list(xi)
 
-        return delone, f"known: {known.method}, radius below {radius_text(Fraction(1, 2**bits))}"
+        return delone, proven.text
     top, start = claim.solves.top, claim.solves.start
     enclosed = Validated(top, start, xi=CLAIM_XI, effort=_EFFORT)
     try:
