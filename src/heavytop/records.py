@@ -21,12 +21,14 @@ class Metric(msgspec.Struct):
     value: decimal text; or a word that is no number: "nan", "missing", "never", "unresolved" (smaller than ten radii
     of the reference, see ``bound``).
     log10: its decimal logarithm; null for 0 and for the words.
+    band: half-width in decades of the 95 % interval in which rounding luck alone moves the value, where measured.
     """
 
     value: str
     log10: float | None
     kind: Kind = "error"
     bound: str | None = None
+    band: float | None = None
 
 
 class Series(msgspec.Struct):
@@ -36,11 +38,36 @@ class Series(msgspec.Struct):
     values: list[str]
 
 
+Growth = Literal["bounded", "t^0.5", "t", "t^1.5", "t^2", "exponential", "unresolved"]
+
+
+class Law(msgspec.Struct):
+    """How a quantity grows with |t|: a fit to its RMS over an ensemble of starts.
+
+    growth: the class; exponent of |t| (or rate of e^(rate |t|) where exponential) with its 95 % bootstrap interval over
+    starts, null where unresolved.
+    first, last: the span of |t| that was fitted, which ends before saturation.
+    detects: decimal text; the smallest relative fault a step that this ensemble would have told from the healthy law.
+    lost_at: |t| from which the format holds no digit, reached or extrapolated; null where no law says so.
+    """
+
+    growth: Growth
+    starts: int
+    exponent: float | None = None
+    low: float | None = None
+    high: float | None = None
+    first: str | None = None
+    last: str | None = None
+    detects: str | None = None
+    lost_at: str | None = None
+
+
 class Row(msgspec.Struct):
     """One measurement, of one motion held against one reference.
 
     measured: what is held (known, claimed or computed); against: what it is held against, with method and radius.
     outcome, time_reached, steps, finite travel with every number.  seconds: timings, not compared.
+    starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     """
 
     case: str
@@ -61,6 +88,8 @@ class Row(msgspec.Struct):
     flags: dict[str, str] = {}
     input_rounding: str | None = None
     series: dict[str, Series] = {}
+    starts: int = 1
+    laws: dict[str, Law] = {}
     seconds: dict[str, float] = {}
 
     @property
