@@ -59,5 +59,5 @@ def test_only_taylor_propagates_with_heyoka() -> None:
 def test_only_the_command_line_prints() -> None:
     for path in FILES:
         calls = [n for n in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(n, ast.Call)]
-        if path.name != "cli.py":
+        if path.parent.name != "cli":
             assert not [c for c in calls if isinstance(c.func, ast.Name) and c.func.id == "print"], path

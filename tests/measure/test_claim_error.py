@@ -13,7 +13,7 @@ from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.integrate.taylor import propagate
 from heavytop.measure.claim_error import claim_attitude, exact_claim, model_error
 from heavytop.measure.computed_reference import ComputedReference
-from heavytop.suite.measurements import CLAIM_XI, _truth
+from heavytop.suite.measurements.claimed import CLAIM_XI, true_motion
 from helpers import VECTORS
 
 TWO = PartialCase(Fraction(1), Fraction(2), Fraction(1))
@@ -33,7 +33,7 @@ SIX = PartialCase(Fraction(1), Fraction(6), Fraction(1))
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_error_in_omega_is_the_published_one_in_both_directions(case, time, expected, sign) -> None:
     time = sign * Fraction(time)
-    truth, _ = _truth(case, [time])
+    truth, _ = true_motion(case, [time])
     off = model_error(case, time, truth).omega
     assert abs(float(off) - float(expected)) < 0.5 * 10 ** -len(expected.partition(".")[2])
 
@@ -41,7 +41,7 @@ def test_the_error_in_omega_is_the_published_one_in_both_directions(case, time, 
 def test_the_error_in_gamma_starts_like_half_k_t() -> None:
     for case in (TWO, SIX):
         time = Fraction(1, 1000)
-        truth, _ = _truth(case, [time])
+        truth, _ = true_motion(case, [time])
         error = model_error(case, time, truth)
         assert float(error.gamma) == pytest.approx(float(case.solves.rate) / 2000, rel=1e-2)
         assert float(error.omega) < 10 * float(case.solves.rate) ** 2 / 10**6
@@ -59,7 +59,7 @@ def test_the_computed_truth_and_the_closed_form_agree_where_there_are_both() -> 
     times = [Fraction(1, 2), Fraction(3)]
     delone = DeloneHomoclinic(TWO.alpha, TWO.i1)
     computed = ComputedReference(delone.top, delone.start, times, xi=CLAIM_XI)
-    truth, method = _truth(TWO, times)
+    truth, method = true_motion(TWO, times)
     assert method.startswith("known")
     for time in times:
         state, xi = truth(time)
@@ -79,12 +79,12 @@ def test_claim_and_truth_start_from_the_same_attitude() -> None:
         for value, exact in zip(claim_attitude(TWO, Fraction(0), "smooth"), CLAIM_XI, strict=True):
             assert value.overlaps(ball(exact))
     tiny = Fraction(-1, 10**6)
-    truth, _ = _truth(TWO, [tiny])
+    truth, _ = true_motion(TWO, [tiny])
     assert float(model_error(TWO, tiny, truth).attitude) < 2e-6
 
 
 def test_angles_are_compared_modulo_a_turn() -> None:
-    truth, _ = _truth(TWO, [Fraction(5)])
+    truth, _ = true_motion(TWO, [Fraction(5)])
     error = model_error(TWO, Fraction(5), truth)
     for angle in (error.phi, error.theta, error.psi):
         assert abs(float(angle)) <= float(arb.pi()) + 1e-9

@@ -6,8 +6,11 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.suite.measurements import break_away_law, measure, time_text
-from heavytop.suite.plan import Task, expand, load
+from heavytop.suite.measurements import measure
+from heavytop.suite.measurements.laws import break_away_law
+from heavytop.suite.measurements.shared import time_text
+from heavytop.suite.plan import expand, load
+from heavytop.suite.task import Task
 
 TASKS = expand(load("default")[0])
 

@@ -7,7 +7,8 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.suite.cases import CASES, case
-from heavytop.suite.plan import BUILT_IN, expand, load, log_spaced
+from heavytop.suite.plan import BUILT_IN, expand, load
+from heavytop.suite.tables import log_spaced
 
 MEASURE = '[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "double", horizon = "10" }]\n'
 

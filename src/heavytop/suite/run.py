@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Checkpoint
-from heavytop.suite.plan import Task
+from heavytop.suite.task import Task
 from heavytop.suite.workers import rows
 
 Progress = Callable[[Task], None]
@@ -31,7 +31,7 @@ def run(
         progress(tasks[missing[position]])
     measured = [checkpoint.done[index] for index in range(len(tasks))]
     if any(row.measure == "homoclinic" for row in measured):
-        from heavytop.suite.measurements import break_away_law
+        from heavytop.suite.measurements.laws import break_away_law
 
         rates = {task.name: task.case.rate for task in tasks if task.case and task.kind == "homoclinic"}
         measured += break_away_law(measured, rates)

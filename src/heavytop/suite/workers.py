@@ -11,7 +11,7 @@ from multiprocessing import get_context
 
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.records import Row
-from heavytop.suite.plan import Task
+from heavytop.suite.task import Task
 
 
 def _leave_interrupts_to_the_parent() -> None:

@@ -1,0 +1,26 @@
+"""The command line.  Only this room prints; each command is a few lines that join the other rooms.
+
+Exit codes: 0 good, 1 a finding, 2 usage or bad input, 3 incomplete, undecided or incomparable, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from heavytop.cli import claims, motions, reports, suite  # noqa: F401 - in the order of `heavytop --help`
+from heavytop.cli.app import app
+from heavytop.errors import HeavyTopError
+
+
+def run_command_line() -> int:
+    """Run the command in sys.argv; returns or exits with its code.  Errors are printed as cause and remedy."""
+    try:
+        app()
+    except HeavyTopError as error:
+        print(f"heavytop: {error}", file=sys.stderr)
+        return error.exit_code
+    except BrokenPipeError:
+        # whoever read our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0

@@ -1,0 +1,50 @@
+"""What the commands share: the application, printing, exact numbers in options."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import wraps
+from typing import Annotated, Any
+
+import typer
+
+app = typer.Typer(
+    help="Measure how wrong computed and claimed motions of a heavy top are, against references that are proven.",
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output and nothing else there.")]
+
+
+def command(function: Callable[..., int]) -> Callable[..., None]:
+    """A command of the program that ends with the exit code which ``function`` returns."""
+
+    @wraps(function)
+    def with_exit_code(*args: Any, **options: Any) -> None:
+        raise typer.Exit(function(*args, **options))
+
+    return app.command(name=function.__name__.rstrip("_"))(with_exit_code)
+
+
+def show_on_terminal(renderable: Any) -> None:
+    """Print text or a rich table, as wide as the terminal, or 160 columns into a file."""
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=False, width=None if sys.stdout.isatty() else 160)
+    console.print(renderable)
+
+
+def print_json(document: Any) -> None:
+    """Print one JSON document."""
+    import msgspec
+
+    print(msgspec.json.format(msgspec.json.encode(document), indent=1).decode())
+
+
+def numbers(text: str) -> list[str]:
+    """The parts of ``a,b,c``, still text."""
+    return [part.strip() for part in text.split(",")]

@@ -1,0 +1,50 @@
+"""`audit` and `figures`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from heavytop.cli.app import Json, command, print_json, show_on_terminal
+from heavytop.errors import InputError
+
+
+@command
+def audit(
+    claim: Annotated[str, typer.Argument(help="ershkov-general, ershkov-partial, or a TOML file.")],
+    system: Annotated[str, typer.Option(help="heavy_top or gyrostat.")] = "heavy_top",
+    branch: Annotated[str | None, typer.Option(help="smooth or printed: that branch alone.")] = None,
+    json: Json = False,
+) -> int:
+    """Prove or refute a motion, equation by equation: exit 0 if all hold, 1 if one is refuted, 3 if undecided."""
+    from heavytop.claims.audit import audit as audit_named
+    from heavytop.claims.audit import only_branch
+
+    report = audit_named(claim, system)
+    if branch is not None:
+        report = only_branch(report, branch)
+    if json:
+        print_json(report.to_json())
+    else:
+        from heavytop.report.audit_text import audit_text
+
+        show_on_terminal(audit_text(report))
+    return report.exit_code
+
+
+@command
+def figures(out: Annotated[Path, typer.Option(help="Folder for the pictures.")]) -> int:
+    """Draw Figs 2-8 of the paper, and the same with the true motion beside the claim, as SVG and PNG."""
+    from heavytop.report.figures import draw_figures
+
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"{out} already holds other content.", "Give a new folder with --out.")
+    try:
+        files = draw_figures(out)
+    except OSError as error:
+        raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None
+    for file in files:
+        print(file)
+    return 0

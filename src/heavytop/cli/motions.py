@@ -1,0 +1,100 @@
+"""`propagate` and `reference`."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated, Any
+
+import typer
+
+from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal
+from heavytop.errors import InputError
+
+Inertia = Annotated[str, typer.Option(help="Principal moments A,B,C at the fixed point.")]
+Weight = Annotated[str, typer.Option(help="Weight P.")]
+Centre = Annotated[str, typer.Option(help="Centre of mass a,b,c.")]
+Omega = Annotated[str, typer.Option(help="Angular velocity x,y,z at t = 0.")]
+Gamma = Annotated[str, typer.Option(help="Unit vector of weight x,y,z at t = 0.")]
+Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly away from 0.")]
+SystemName = Annotated[str, typer.Option(help="heavy_top or gyrostat.")]
+Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]
+
+
+@command
+def propagate(
+    inertia: Inertia,
+    weight: Weight,
+    centre: Centre,
+    omega: Omega,
+    gamma: Gamma,
+    times: Times,
+    precision: Annotated[str, typer.Option(help="double, extended, quad or real:BITS.")] = "double",
+    system: SystemName = "heavy_top",
+    attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
+    normalize: Normalize = False,
+    max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
+    json: Json = False,
+) -> int:
+    """Integrate one motion and print its states.  Numbers are exact: 3, 0.25, 1e-3, -2/5."""
+    from heavytop import precision as formats
+    from heavytop.top.equations import system as system_named
+    from heavytop.top.times import check_times
+
+    top, start = _motion(inertia, weight, centre, omega, gamma, normalize)
+    form, which, instants = formats.parse(precision), system_named(system), check_times(numbers(times))
+    if max_steps is not None and max_steps < 1:
+        raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
+    which.parameters(top, start)
+
+    from heavytop.measure.motion import compute
+
+    motion = compute(top, start, instants, form, which, attitude, max_steps)
+    if json:
+        print_json(motion.to_json())
+    else:
+        from heavytop.report.motion_text import motion_text
+
+        show_on_terminal(motion_text(motion))
+    return 0 if motion.complete else 3
+
+
+@command
+def reference(
+    inertia: Inertia,
+    weight: Weight,
+    centre: Centre,
+    omega: Omega,
+    gamma: Gamma,
+    times: Times,
+    digits: Annotated[int, typer.Option(help="Proven digits, 1 to 20000.")] = 50,
+    system: SystemName = "heavy_top",
+    normalize: Normalize = False,
+    json: Json = False,
+) -> int:
+    """Print proven states: a closed form where there is one, else a validated enclosure."""
+    from heavytop.measure.reference import reference as proven
+    from heavytop.top.equations import system as system_named
+    from heavytop.top.times import check_times
+
+    top, start = _motion(inertia, weight, centre, omega, gamma, normalize)
+    found = proven(top, start, check_times(numbers(times)), digits, system_named(system))
+    if json:
+        print_json(found)
+    else:
+        from heavytop.report.motion_text import reference_text
+
+        show_on_terminal(reference_text(found))
+    return 0
+
+
+def _motion(inertia: str, weight: str, centre: str, omega: str, gamma: str, normalize: bool) -> Any:
+    """The exact top and start of the options; what no rigid body has is a warning."""
+    from heavytop.top.heavy_top import HeavyTop, State, require_physical
+
+    top = HeavyTop(numbers(inertia), weight, numbers(centre))
+    start = State(numbers(omega), numbers(gamma))
+    require_physical(top, start)
+    start = (start.normalized() if normalize else start).require_unit_gamma()
+    for warning in top.warnings():
+        print(f"heavytop: warning: {warning}", file=sys.stderr)
+    return top, start

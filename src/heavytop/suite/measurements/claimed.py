@@ -1,0 +1,179 @@
+"""Claims: their equations, their distance from the truth, and their formulas evaluated in a format."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from fractions import Fraction
+
+from flint import arb
+
+from heavytop.claims.audit import audit as audit_of
+from heavytop.claims.ershkov import PartialCase
+from heavytop.errors import OutOfReach
+from heavytop.exact.balls import FUNCTIONS, ball, radius_text, working_precision
+from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.exact.validated import Validated
+from heavytop.integrate.trajectory import Outcome
+from heavytop.measure import claim_error
+from heavytop.measure.computed_reference import ComputedReference
+from heavytop.measure.known import certified
+from heavytop.measure.scalar import largest, metric, of_fraction, text
+from heavytop.precision import parse
+from heavytop.records import Metric, Row, Series
+from heavytop.suite.measurements.shared import branch_of, claim_of, time_metric, time_text
+from heavytop.suite.task import Task
+from heavytop.top.angles import attitude_from_angles
+from heavytop.top.equations import HEAVY_TOP
+
+PARTED = Fraction(1, 100)
+"""Claim and truth have parted when Ω differs by this, in units of α."""
+_EFFORT = 20.0
+"""Seconds that a validated truth may cost before two runs at different precisions take its place."""
+CLAIM = "claimed: (4.2)-(4.6)"
+CLAIM_XI = (Fraction(0), Fraction(-1), Fraction(0))
+"""ξ at t = 0 of the claimed attitude, where φ + ψ = π/2 and θ = 0."""
+
+
+def audit(task: Task) -> Row:
+    """1 for an equation that holds, 0 for one that is refuted, unresolved for one that is neither."""
+    report = audit_of(task.name, task.form)
+    words = {
+        True: Metric("1", 0.0, "value"),
+        False: Metric("0", None, "value"),
+        None: Metric("unresolved", None, "value"),
+    }
+    metrics = {
+        f"({row.equation}).{row.component} {row.branch} {row.domain}": words[row.holds]
+        for row in report.rows
+        if row.branch == "smooth" or report.system == HEAVY_TOP.name
+    }
+    return Row(
+        case=task.name,
+        system=task.form,
+        integrator="audit",
+        precision="exact",
+        bits=0,
+        outcome=Outcome.SUCCESS.value,
+        horizon="0",
+        time_reached="0",
+        steps=0,
+        finite=True,
+        metrics=metrics,
+        measure=task.kind,
+        measured=f"claimed: {report.source}",
+        against=f"the equations of {task.form}",
+    )
+
+
+def claim_model(task: Task) -> Row:
+    claim, branch = claim_of(task), branch_of(task)
+    truth, against = true_motion(claim, task.times)
+    errors = {time: claim_error.model_error(claim, time, truth, branch) for time in task.times}
+    with working_precision(claim_error.MODEL_BITS):
+        names = [each.name for each in fields(claim_error.ModelError)]
+        metrics = {
+            f"claim_model_error_{name}_max": metric(largest(getattr(e, name) for e in errors.values()), "value")
+            for name in names
+        }
+        limit = claim.alpha * PARTED
+        parted = next((time for time in task.times if errors[time].omega > ball(limit)), None)
+        metrics["claim_parts_by_1_percent_at"] = time_metric(parted, "value")
+        series = {
+            f"claim_model_error_{name}": Series(
+                [time_text(t) for t in task.keep], [text(abs(getattr(errors[t], name)), 12) for t in task.keep]
+            )
+            for name in names
+        }
+    return Row(
+        case=task.name,
+        system=HEAVY_TOP.name,
+        integrator=f"claim:{branch}",
+        precision="exact",
+        bits=claim_error.MODEL_BITS,
+        outcome=Outcome.SUCCESS.value,
+        horizon=time_text(task.times[-1]),
+        time_reached=time_text(task.times[-1]),
+        steps=0,
+        finite=all(m.value != "nan" for m in metrics.values()),
+        metrics=metrics,
+        measure=task.kind,
+        measured=f"{CLAIM}, {branch} branch, exactly evaluated",
+        against=against,
+        series=series,
+    )
+
+
+def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_error.Truth, str]:
+    """The true heavy-top motion from the claim's own data, and what it is."""
+    bits = claim_error.MODEL_BITS
+    if claim.i1 == 2 * claim.i3:
+        known = DeloneHomoclinic(claim.alpha, claim.i1)
+        proven = certified(known, max(times, key=abs), bits)
+        if proven is None:
+            raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
+
+        def delone(time: Fraction) -> tuple[list[arb], list[arb]]:
+            phi, theta, psi = known.angles(time, bits)
+            with working_precision(bits):
+                xi = attitude_from_angles(phi, theta, psi - arb.pi() / 2, FUNCTIONS)
+            return known.state(time, bits), list(xi)
+
+        return delone, proven.text
+    top, start = claim.solves.top, claim.solves.start
+    enclosed = Validated(top, start, xi=CLAIM_XI, effort=_EFFORT)
+    try:
+        enclosed.state(max(times, key=abs), bits)
+    except OutOfReach:
+        computed = ComputedReference(top, start, times, xi=CLAIM_XI)
+
+        def runs(time: Fraction) -> tuple[list[arb], list[arb]]:
+            values = computed.state(time)
+            return values[:6], values[6:]
+
+        return runs, computed.method
+
+    def validated(time: Fraction) -> tuple[list[arb], list[arb]]:
+        return enclosed.state(time, bits), enclosed.attitude(time, bits)
+
+    return validated, f"known: {enclosed.method}, radius below {radius_text(Fraction(1, 2**bits))}"
+
+
+def claim_evaluation(task: Task) -> Row:
+    claim = claim_of(task)
+    precision = parse(task.precision)
+    rate = claim.solves.rate
+    times = [time / rate for time in task.times]
+    errors = [claim_error.evaluation_error(claim, time, precision, task.form) for time in times]
+    metrics: dict[str, Metric] = {}
+    series: dict[str, Series] = {}
+    with working_precision(precision.bits + 64):
+        for name in (each.name for each in fields(claim_error.EvaluationError)):
+            values = [getattr(error, name) for error in errors]
+            finite = [value for value in values if value.is_finite()]
+            worst = metric(largest(finite)) if finite else Metric("missing", None)
+            metrics[f"claim_evaluation_error_{name}_max_finite"] = worst
+            lost = Fraction(len(values) - len(finite))
+            metrics[f"claim_evaluation_{name}_samples_not_finite"] = of_fraction(lost, "value", str(lost))
+            failure = claim_error.first_failure(times, values)
+            metrics[f"claim_evaluation_{name}_not_finite_from"] = time_metric(failure, "duration")
+            series[f"claim_evaluation_error_{name}"] = Series(
+                [time_text(time) for time in task.times], [text(value) for value in values]
+            )
+    return Row(
+        case=task.name,
+        system="gyrostat",
+        integrator=f"formula:{task.form}",
+        precision=precision.name,
+        bits=precision.bits,
+        outcome=Outcome.SUCCESS.value,
+        horizon=time_text(times[-1]),
+        time_reached=time_text(times[-1]),
+        steps=0,
+        finite=all(m.value == "0" for k, m in metrics.items() if k.endswith("_not_finite")),
+        metrics=metrics,
+        measure=task.kind,
+        measured=f"{CLAIM}, {task.form} form, evaluated in {precision.name}; times of the series are k t",
+        against="the same form exactly evaluated from the same rounded data",
+        series=series,
+    )

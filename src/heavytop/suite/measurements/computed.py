@@ -1,0 +1,123 @@
+"""Computed motions, held against their first integrals and against known motions."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+from heavytop.errors import OutOfReach
+from heavytop.integrate.taylor import propagate
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.measure.drift import Drift
+from heavytop.measure.known import certified, known_motion
+from heavytop.measure.scalar import GUARD_BITS
+from heavytop.measure.solution_error import SolutionError
+from heavytop.precision import decimal_text, exact, number, parse
+from heavytop.records import Metric, Row, Series
+from heavytop.suite.measurements.shared import case_of, time_metric, time_text
+from heavytop.suite.task import Task
+from heavytop.top.equations import Parameters
+from heavytop.top.integrals import holding
+
+BREAK_AWAY = Fraction(1, 1000)
+"""A computed homoclinic motion has broken away when Ω is wrong by this, in units of α."""
+WINDOW = 10
+"""The error of a homoclinic run is a number only while rate·|t| is below this; later the saddle amplifies rounding."""
+_CERTIFIED_AT = 4
+"""The closed form of a homoclinic case is certified at this |t|."""
+
+
+def homoclinic(task: Task) -> Row:
+    case, precision = case_of(task), parse(task.precision)
+    closed = case.homoclinic
+    assert closed is not None
+    problem = Problem.of(case.top, case.start, precision, case.system)
+    if (problem.parameters, problem.start) != (_as_tuples(case), case.start):
+        raise ValueError(f"{case.name} is not exact in {precision.name}: its data must be dyadic")
+    sign = 1 if task.times[-1] > 0 else -1
+    known = certified(closed, Fraction(sign * _CERTIFIED_AT), precision.bits + GUARD_BITS)
+    if known is None:
+        raise OutOfReach(f"{closed.method} is not certified for {precision.name}.", "Use a format with fewer bits.")
+    drift = Drift(problem, holding(case.top, case.start, case.system), task.keep)
+    near = SolutionError(problem, closed, task.keep)
+    far = SolutionError(problem, closed, task.keep, threshold=BREAK_AWAY * case.alpha)
+
+    def observe(time: Fraction, state: Any) -> None:
+        drift(time, state)
+        far(time, state)
+        if float(abs(time)) * case.rate <= WINDOW:
+            near(time, state)
+
+    run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=observe)
+    name = "integration_error" if case.claim else "solution_error"
+    metrics = {"break_away_time": time_metric(far.break_away, "duration")}
+    metrics |= near.metrics(name) | drift.metrics()
+    return computed_row(task, run, metrics, far.series(time_text, name) | drift.series(time_text), known.text)
+
+
+def _as_tuples(case: Any) -> Parameters:
+    given = case.system.parameters(case.top, case.start)
+    return Parameters(tuple(given.inertia), tuple(given.moment), Fraction(given.rotor))
+
+
+def drift(task: Task) -> Row:
+    case, precision = case_of(task), parse(task.precision)
+    problem = Problem.of(case.top, case.start, precision, case.system)
+    # samples are taken at the rounded times, so the series must be asked for by these
+    keep = [exact(number(time, precision)) for time in task.keep]
+    drift = Drift(problem, holding(case.top, case.start, case.system), keep)
+    known = known_motion(problem, exact(number(task.times[-1], precision)))
+    if isinstance(known, str):
+        run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=drift)
+        return computed_row(
+            task, run, drift.metrics(), drift.series(time_text), f"its own first integrals; no reference: {known}"
+        )
+    error = SolutionError(problem, known.solution, keep)
+
+    def observe(time: Fraction, state: Any) -> None:
+        drift(time, state)
+        error(time, state)
+
+    run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=observe)
+    series = drift.series(time_text) | error.series(time_text)
+    return computed_row(task, run, drift.metrics() | error.metrics(), series, known.text)
+
+
+def computed_row(
+    task: Task, run: Trajectory, metrics: dict[str, Metric], series: dict[str, Series], against: str
+) -> Row:
+    precision = run.problem.precision
+    done = run.outcome is Outcome.SUCCESS
+    return Row(
+        case=task.name,
+        system=run.problem.system.name,
+        integrator=run.integrator,
+        precision=precision.name,
+        bits=precision.bits,
+        outcome=run.outcome.value,
+        horizon=time_text(task.times[-1]),
+        time_reached=time_text(task.times[-1] if done else run.time_reached),
+        steps=run.steps,
+        finite=done and not any(m.value in ("nan", "missing") for m in metrics.values()),
+        metrics=metrics,
+        measure=task.kind,
+        measured=f"computed: {run.integrator} in {precision.name}",
+        against=against,
+        order=run.order,
+        flags=run.flags,
+        input_rounding=decimal_text(input_rounding(task, run.problem), 3),
+        series=series,
+        seconds=run.seconds,
+    )
+
+
+def input_rounding(task: Task, problem: Problem) -> Fraction:
+    """The largest relative rounding of the data that the run was given: not charged to it, but said."""
+    case = case_of(task)
+    given = case.system.parameters(case.top, case.start)
+    pairs = zip(
+        (*given.inertia, *given.moment, Fraction(given.rotor), *case.start.flat),
+        (*problem.parameters.inertia, *problem.parameters.moment, problem.parameters.rotor, *problem.start.flat),
+        strict=True,
+    )
+    return max(abs(b - a) / abs(a) if a else Fraction(0) for a, b in pairs)

@@ -1,0 +1,42 @@
+"""What the measurements share: the parts of a task, times in reports."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from fractions import Fraction
+
+from heavytop.claims.ershkov import Branch, PartialCase
+from heavytop.measure.scalar import of_fraction
+from heavytop.precision import decimal_text
+from heavytop.records import Kind, Metric
+from heavytop.suite.cases import Case
+from heavytop.suite.task import Task
+
+
+def time_text(time: Fraction) -> str:
+    """A time in reports: exact where 20 digits suffice, else 20 digits."""
+    value = Decimal(decimal_text(time, 20))
+    return format(value.normalize(), "f") if value and abs(time) < 10**15 else str(value)
+
+
+def time_metric(time: Fraction | None, kind: Kind) -> Metric:
+    """A time as a metric; None is never."""
+    return Metric("never", None, kind) if time is None else of_fraction(abs(time), kind, time_text(abs(time)))
+
+
+def case_of(task: Task) -> Case:
+    """The case of a task that has one."""
+    assert task.case is not None
+    return task.case
+
+
+def claim_of(task: Task) -> PartialCase:
+    """The claim of a task about one."""
+    claim = case_of(task).claim
+    assert claim is not None
+    return claim
+
+
+def branch_of(task: Task) -> Branch:
+    """The branch of the claim that a task is about."""
+    return "printed" if task.form == "printed" else "smooth"

@@ -1,0 +1,188 @@
+"""The tables `[[measure]]` of a plan: one kind of measurement each, and the tasks it expands to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Literal
+
+import msgspec
+
+from heavytop.errors import InputError
+from heavytop.precision import exact, parse, physical
+from heavytop.suite.cases import Case
+from heavytop.suite.task import Task
+
+_MAX_SAMPLES = 1_000_000
+Find = Callable[[str], Case]
+"""The case of a name; raises InputError for an unknown one."""
+
+
+class Strict(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
+    """A table of a plan; unknown keys are errors.  ``tasks`` raises InputError for an impossible value."""
+
+
+class ClaimModel(Strict, tag="claim_model"):
+    """The claim, exactly evaluated, against the true motion from its own data.
+
+    times: where the series is taken, t > 0; directions: forward, backward.  grid: the parting time is found on a
+    uniform grid of that many points up to the last time.
+    """
+
+    cases: list[str]
+    times: list[str]
+    grid: int = 200
+    directions: tuple[Literal["forward", "backward"], ...] = ("forward", "backward")
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        times = _positive(self.times, "times")
+        grid = [times[-1] * i / self.grid for i in range(1, _samples(self.grid) + 1)]
+        every = sorted({*times, *grid})
+        return [
+            Task(
+                "claim_model",
+                f"{each.name}/{direction}",
+                each,
+                "",
+                form,
+                _signed(every, direction),
+                _signed(times, direction),
+            )
+            for each in map(_claimed, map(find, self.cases))
+            for direction in self.directions
+            for form in (("smooth", "printed") if direction == "forward" else ("smooth",))
+        ]
+
+
+class ClaimEvaluation(Strict, tag="claim_evaluation"):
+    """The printed and the stable formulas, evaluated in a format, against themselves exactly evaluated.
+
+    rate_times: the values of k |t| at which they are evaluated.
+    """
+
+    cases: list[str]
+    precisions: list[str]
+    rate_times: list[str]
+    directions: tuple[Literal["forward", "backward"], ...] = ("forward", "backward")
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        times = _positive(self.rate_times, "rate_times")
+        return [
+            Task(
+                "claim_evaluation",
+                f"{each.name}/{direction}",
+                each,
+                parse(name).name,
+                form,
+                *[_signed(times, direction)] * 2,
+            )
+            for each in map(_claimed, map(find, self.cases))
+            for name in self.precisions
+            for direction in self.directions
+            for form in ("printed", "stable")
+        ]
+
+
+class Homoclinic(Strict, tag="homoclinic"):
+    """Integrators on a homoclinic motion, against its closed form, until they break away from it.
+
+    samples: samples in one unit of 1/rate.
+    """
+
+    cases: list[str]
+    precisions: list[str]
+    samples: int = 8
+    directions: tuple[Literal["forward", "backward"], ...] = ("forward", "backward")
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        tasks = []
+        for each in map(find, self.cases):
+            spacing = Fraction(round(64 / (_samples(self.samples) * each.rate)) or 1, 64)
+            for name in self.precisions:
+                precision = parse(name)
+                end = (1.1 * precision.bits * math.log(2) + 4) / each.rate
+                times = [spacing * i for i in range(1, int(end / spacing) + 1)]
+                keep = times[self.samples - 1 :: self.samples]
+                tasks += [
+                    Task("homoclinic", f"{each.name}/{d}", each, name, "", _signed(times, d), _signed(keep, d))
+                    for d in self.directions
+                ]
+        return tasks
+
+
+class Audit(Strict, tag="audit"):
+    """Every equation of a claim of the paper, proven or refuted, as a motion of each system."""
+
+    claims: list[Literal["ershkov-general", "ershkov-partial"]]
+    systems: list[Literal["heavy_top", "gyrostat"]]
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        return [Task("audit", claim, None, "", about) for claim in self.claims for about in self.systems]
+
+
+class Run(msgspec.Struct, forbid_unknown_fields=True):
+    """One format with its horizon; ``samples`` uniform samples."""
+
+    precision: str
+    horizon: str
+    samples: int = 1000
+
+
+class Drift(Strict, tag="drift"):
+    """Drift of every first integral that holds, over a horizon."""
+
+    cases: list[str]
+    runs: list[Run]
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        tasks = []
+        for each in map(find, self.cases):
+            for run in self.runs:
+                (horizon,) = _positive([run.horizon], "horizon")
+                count = _samples(run.samples)
+                times = tuple(horizon * i / count for i in range(1, count + 1))
+                keep = tuple(times[i - 1] for i in log_spaced(count))
+                tasks.append(Task("drift", each.name, each, parse(run.precision).name, "", times, keep))
+        return tasks
+
+
+def log_spaced(count: int, per_decade: int = 8) -> list[int]:
+    """About ``per_decade`` whole numbers a decade from 1 to ``count``, both included."""
+    wanted = {count}
+    i = 0
+    while (value := round(10 ** (i / per_decade))) < count:
+        wanted.add(value)
+        i += 1
+    return sorted(wanted)
+
+
+def _claimed(case: Case) -> Case:
+    if case.claim is None:
+        raise InputError(f"Nothing is claimed about the case {case.name}.", "Use a case such as ershkov-partial-2.")
+    return case
+
+
+def _positive(texts: list[str], what: str) -> list[Fraction]:
+    values = [physical(exact(text), what) for text in texts]
+    if not values or values != sorted(set(values)) or values[0] <= 0:
+        raise InputError(f"{what} = {texts}", "Give positive numbers in growing order, each once.")
+    return values
+
+
+def _samples(count: int) -> int:
+    if not 1 <= count <= _MAX_SAMPLES:
+        raise InputError(f"{count} samples cannot be taken.", f"Give a number from 1 to {_MAX_SAMPLES}.")
+    return count
+
+
+def _signed(times: list[Fraction], direction: str) -> tuple[Fraction, ...]:
+    return tuple(-time for time in times) if direction == "backward" else tuple(times)
+
+
+Table = Audit | ClaimModel | ClaimEvaluation | Homoclinic | Drift

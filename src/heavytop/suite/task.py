@@ -1,0 +1,43 @@
+"""A single measurement of a plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from heavytop.precision import parse
+from heavytop.suite.cases import Case
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One measurement, and the row it will fill.
+
+    name: as the row names its case.  case: None for an audit, whose ``form`` is the system.
+    times: exact, of the sign of the direction; for claim_evaluation they are values of k |t| with that sign.
+    keep: the times that go into the series.  precision: "" where no format is involved.
+    """
+
+    kind: str
+    name: str
+    case: Case | None
+    precision: str
+    form: str
+    times: tuple[Fraction, ...] = ()
+    keep: tuple[Fraction, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """For progress and messages."""
+        return " ".join(part for part in (self.kind, self.name, self.form, self.precision) if part)
+
+    @property
+    def cost(self) -> float:
+        """Seconds it may take, roughly: for the progress bar and for running long ones first."""
+        if not self.precision:
+            return 5.0
+        bits = parse(self.precision).bits
+        per_step = 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5
+        return (
+            (3.0 if self.kind == "drift" else 1.0) + float(abs(self.times[-1])) * 4 * per_step + len(self.times) * 1e-4
+        )
