@@ -25,6 +25,8 @@ from heavytop.precision import exact
 # steps between two looks near a sample; a look costs as much as about ten
 _WINDOW = 64
 _FAR = 2.0**1000
+# parameters and state of an idle lane: a bounded motion in either system
+_UNWATCHED = 1.0, numpy.linspace(0.1, 1.0, 9)
 _FAILED = heyoka.taylor_outcome.err_nf_state
 
 
@@ -133,18 +135,16 @@ class Lanes:
 
     def _load(self, lane: int) -> None:
         """Put the next problem into the lane; when there is none, a harmless motion that nobody watches."""
-        run: _Run | None = None
-        parameters, state = 1.0, numpy.linspace(0.1, 1.0, len(self.mover.state))
-        if taken := self.work.take():
-            parameters, state = arrays(taken[1])
-            run = _Run(*taken, parameters, perf_counter())
-            if self.work.times[0] == 0:
-                self._keep(run, state)
+        taken = self.work.take()
+        parameters, state = arrays(taken[1]) if taken else _UNWATCHED
+        run = _Run(*taken, parameters, perf_counter()) if taken else None
+        if run and self.work.times[0] == 0:
+            self._keep(run, state)
         high, low = (word.copy() for word in self.mover.dtime)
         high[lane] = low[lane] = 0.0
         self.mover.set_dtime(high, low)
         self.mover.pars[:, lane] = parameters
-        self.mover.state[:, lane] = state
+        self.mover.state[:, lane] = state[: len(self.mover.state)]
         self.runs[lane] = run
         self.steps[lane] = 0
         self.distance[lane] = abs(self.targets[0]) if run else numpy.inf
