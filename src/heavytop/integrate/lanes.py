@@ -110,6 +110,7 @@ class Lanes:
     def __init__(self, work: Work, mover: Any, sampler: Any) -> None:
         self.work = work
         self.mover = mover
+        mover.set_time(0.0)
         self.sampler = sampler
         self.lanes: int = mover.batch_size
         self.targets = [target for target in work.targets if target != 0]
@@ -209,6 +210,12 @@ class Lanes:
                 failed[lane] = Outcome.SUCCESS if rests else Outcome.NON_FINITE
             elif mover.time[lane] == before.high[lane]:
                 failed[lane] = Outcome.STEP_TOO_SMALL
+        if failed:
+            # heyoka accepts no times while one is NaN
+            high, low = (word.copy() for word in mover.dtime)
+            for lane in failed:
+                high[lane], low[lane] = before.high[lane], before.low[lane]
+            mover.set_dtime(high, low)
         return failed
 
     def _passed(self, lane: int, ahead: Any, before: _Ends) -> None:
