@@ -164,7 +164,7 @@ def test_a_step_that_does_not_move_the_time_ends_the_run(monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("name", [*HEAVY, "gyrostat"])
 def test_the_motion_is_the_true_one_to_rounding(name: str) -> None:
-    """Against the closed form or the enclosure, 500 eps for t up to 5 either way; the scalar integrator does as well."""
+    """Against the closed form or the enclosure: within 500 eps for t up to 5 either way, like the scalar integrator."""
     case = CASES[name]
     known = find(case.top, case.start, case.system)
     for times in ([1, 5], [-1, -5]):

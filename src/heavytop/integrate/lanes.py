@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
+from math import ulp
 from threading import Event, Lock
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -117,7 +118,7 @@ class Lanes:
         self.direction = 1.0 if self.targets[0] > 0 else -1.0
         self.runs: list[_Run | None] = [None] * self.lanes
         self.distance = numpy.empty(self.lanes)
-        self.limits = numpy.empty(self.lanes)
+        self.limits = None if work.step_limit is None else numpy.empty(self.lanes)
         self.steps = numpy.empty(self.lanes, int)
         self.samples: deque[_Sample] = deque()
         self.seconds_per_step = CHUNK_SECONDS
@@ -149,7 +150,8 @@ class Lanes:
         self.runs[lane] = run
         self.steps[lane] = 0
         self.distance[lane] = abs(self.targets[0]) if run else numpy.inf
-        self.limits[lane] = self.work.step_limit if run and self.work.step_limit is not None else numpy.inf
+        if self.limits is not None:
+            self.limits[lane] = self.work.step_limit if run else numpy.inf
         self.fresh = True
 
     def _advance(self) -> None:
@@ -169,14 +171,17 @@ class Lanes:
         self.fresh = False
         self.steps += count
         ahead = self.direction * mover.time
-        for lane in numpy.flatnonzero(ahead >= self.distance).tolist():
-            self._passed(lane, ahead[lane], before)
+        passed = ahead >= self.distance
+        if passed.any():
+            for lane in numpy.flatnonzero(passed).tolist():
+                self._passed(lane, ahead[lane], before)
         while len(self.samples) >= self.lanes:
             self._take_samples()
         for lane, outcome in failed.items():
             self._stop(lane, outcome, before.high[lane], before.steps[lane], before.states[:, lane])
-        for lane in numpy.flatnonzero(self.steps >= self.limits).tolist():
-            self._stop(lane, Outcome.STEP_LIMIT, mover.time[lane], self.steps[lane])
+        if self.limits is not None:
+            for lane in numpy.flatnonzero(self.steps >= self.limits).tolist():
+                self._stop(lane, Outcome.STEP_LIMIT, mover.time[lane], self.steps[lane])
 
     def _count(self) -> int:
         """How many steps to take at once: nearly as far as the nearest sample, a quarter of a second at the most."""
@@ -187,7 +192,9 @@ class Lanes:
         count = max(_WINDOW, min(short, CHUNK_SECONDS / self.seconds_per_step))
         if self.suspect:
             count = min(count, max(self.suspect // 2, 1))
-        return int(min(count, (self.limits - self.steps).min()))
+        if self.limits is not None:
+            count = min(count, (self.limits - self.steps).min())
+        return int(count)
 
     def _several(self, count: int) -> bool:
         """Many steps at once; False if in one of them a lane failed, or its time may not have moved."""
@@ -195,9 +202,8 @@ class Lanes:
         self.mover.propagate_until(self.direction * _FAR, max_steps=count)
         self.seconds_per_step = (perf_counter() - began) / count
         outcomes, smallest, *_ = zip(*self.mover.propagate_res, strict=True)
-        ahead = self.direction * self.mover.time
-        moved = (ahead < _FAR) & (2 * numpy.array(smallest) > numpy.spacing(ahead))
-        return _FAILED not in outcomes and bool(moved.all())
+        last = (self.direction * self.mover.time).max()
+        return _FAILED not in outcomes and last < _FAR and 2 * min(smallest) > ulp(last)
 
     def _single(self, before: _Ends) -> dict[int, Outcome]:
         """One step; the lanes that failed in it, with SUCCESS for those at rest."""
