@@ -190,7 +190,7 @@ def number(value: Fraction, precision: Precision) -> Any:
             result = numpy.float64(math.inf)
     else:
         result = _wide(*(_significand(value, precision.bits) if value else (0, 0)), precision)
-    if not numpy.isfinite(result) or (value != 0 and result == 0):
+    if not numpy.isfinite(result) or (result == 0 and value != 0):
         raise InputError(
             f"{decimal_text(value, 6)} is outside the exponent range of {precision.name}.",
             "Choose other units, or a format with a wider range such as real:237.",

@@ -6,7 +6,9 @@ steps and all later bits do not depend on which samples were asked for, nor on h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass, field
 from fractions import Fraction
 from time import perf_counter
@@ -26,17 +28,33 @@ heyoka.llvm_state.set_diskcache_enabled(False)
 
 Observer = Callable[[Fraction, Any], None]
 
-_CHUNK_SECONDS = 0.25
+CHUNK_SECONDS = 0.25
 _XI = ("xi1", "xi2", "xi3")
 
 
 @dataclass(slots=True)
 class Compiled:
-    """A compiled integrator of one system and format, used again for every top."""
+    """A compiled integrator of one system and format, used again for every top.
+
+    spare: copies for threads, which must not share an engine.
+    """
 
     engine: Any
     seconds: float
     flags: dict[str, str]
+    spare: list[Any] = field(default_factory=list)
+
+    @contextmanager
+    def lent(self) -> Iterator[Any]:
+        """A copy of the engine for one thread, given back at the end."""
+        try:
+            engine = self.spare.pop()
+        except IndexError:
+            engine = deepcopy(self.engine)
+        try:
+            yield engine
+        finally:
+            self.spare.append(engine)
 
 
 _compiled: dict[tuple[Any, ...], Compiled] = {}
@@ -65,15 +83,17 @@ def compiled(
     tolerance: Fraction | None = None,
     high_accuracy: bool = False,
     compact_mode: bool | None = None,
+    lanes: int | None = None,
 ) -> Compiled:
     """The integrator for this system and format, compiled at its first use.
 
+    lanes: that many motions at once in SIMD lanes, in double only; None for a scalar integrator, whose bits differ.
     tolerance: None for the format's eps.  compact_mode: None for off in double and extended (faster to run) and on in
     quad and real (else they take minutes to compile).
     """
     require(precision)
     compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
-    key = (system.name, precision, attitude, tolerance, high_accuracy, compact)
+    key = (system.name, precision, attitude, tolerance, high_accuracy, compact, lanes)
     if key not in _compiled:
         one, zero = number(Fraction(1), precision), number(Fraction(0), precision)
         size = 9 if attitude else 6
@@ -82,11 +102,12 @@ def compiled(
             options["tol"] = number(tolerance, precision)
         if precision.family == "real":
             options["prec"] = precision.bits
+        build, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))
         before = perf_counter()
-        engine = heyoka.taylor_adaptive(
+        engine = build(
             expressions(system, attitude),
-            [zero] * size,
-            pars=[one] * (4 if system is GYROSTAT else 6),
+            numpy.full((size, *shape), zero),
+            pars=numpy.full((4 if system is GYROSTAT else 6, *shape), one),
             fp_type=type(one),
             **options,
         )
@@ -109,22 +130,28 @@ def _flags(engine: Any) -> dict[str, str]:
         "code_cache": "none",
         "coefficients": "par",
     }
+    if hasattr(engine, "batch_size"):
+        values["batch_size"] = engine.batch_size
     return {name: str(value).lower() for name, value in values.items()}
 
 
 @dataclass(slots=True)
 class Stepper:
-    """One run of a compiled integrator, advanced step by step to wherever the next sample lies."""
+    """One run of a compiled integrator, advanced step by step to wherever the next sample lies.
+
+    between: called between chunks; it may raise to give the run up.
+    """
 
     engine: Any
     forwards: bool
     step_limit: int | None
     far: Any
+    between: Callable[[], None] | None = None
     steps: int = 0
     time: Any = 0
     _covers: bool = False
     _largest_step: float = 0.0
-    _seconds_per_step: float = field(default=_CHUNK_SECONDS)
+    _seconds_per_step: float = field(default=CHUNK_SECONDS)
     _one_by_one: bool = False
     _at_rest: Any = None
 
@@ -133,6 +160,8 @@ class Stepper:
         while self._at_rest is None and not (self._covers and self._beyond(target)):
             if self.step_limit is not None and self.steps >= self.step_limit:
                 return Outcome.STEP_LIMIT
+            if self.between is not None:
+                self.between()
             count = self._steps_short_of(target)
             outcome = self._single() if count < 2 else self._several(count, target)
             if outcome is not Outcome.SUCCESS:
@@ -150,7 +179,7 @@ class Stepper:
         # many steps average out; each of a few may be as long as the longest so far
         far = distance > 100 * self._largest_step
         count = 0.95 * distance * self.steps / abs(float(self.time)) if far else distance / self._largest_step
-        count = min(count, _CHUNK_SECONDS / self._seconds_per_step)
+        count = min(count, CHUNK_SECONDS / self._seconds_per_step)
         if self.step_limit is not None:
             count = min(count, self.step_limit - self.steps)
         return int(count)
@@ -161,8 +190,7 @@ class Stepper:
         self._seconds_per_step = perf_counter() - began
         self._covers = True
         if outcome == heyoka.taylor_outcome.err_nf_state or not numpy.isfinite(self.engine.time):
-            # at an equilibrium every Taylor coefficient is 0 and heyoka finds no step: the motion is constant
-            if not numpy.isfinite(state).all() or self.engine.tc[:, 1:].any():
+            if not at_rest(state, self.engine.tc):
                 return Outcome.NON_FINITE
             self._at_rest = state
             return Outcome.SUCCESS
@@ -229,17 +257,30 @@ def propagate(
     problem = Problem.of(top, start, precision, system, xi)
     targets = [number(time, precision) for time in check_times(times)]
     tool = compiled(system, precision, attitude=xi is not None, **options)
-    _load(tool.engine, problem)
-    forwards = not targets or targets[-1] >= 0
-    far = number(Fraction(2) ** 1000 * (1 if forwards else -1), precision)
-    stepper = Stepper(tool.engine, forwards, step_limit, far)
+    return follow(tool, tool.engine, problem, targets, step_limit, observer)
+
+
+def follow(
+    tool: Compiled,
+    engine: Any,
+    problem: Problem,
+    targets: Sequence[Any],
+    step_limit: int | None,
+    observer: Observer | None,
+    between: Callable[[], None] | None = None,
+) -> Trajectory:
+    """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
+    engine.pars[:], engine.state[:] = arrays(problem)
+    engine.time = number(Fraction(0), problem.precision)
+    forwards = bool(targets[-1] >= 0)
+    stepper = Stepper(engine, forwards, step_limit, far(forwards, problem.precision), between)
     kept_times: list[Fraction] = []
     kept_states: list[Any] = []
     outcome = Outcome.SUCCESS
     began = perf_counter()
     for target in targets:
         if target == 0:
-            state = tool.engine.state.copy()
+            state = engine.state.copy()
         else:
             outcome = stepper.reach(target)
             if outcome is not Outcome.SUCCESS:
@@ -258,15 +299,25 @@ def propagate(
         outcome,
         kept_times[-1] if outcome is Outcome.SUCCESS and kept_times else exact(stepper.time),
         stepper.steps,
-        tool.engine.order,
+        engine.order,
         {"compile": tool.seconds, "run": perf_counter() - began},
         tool.flags,
     )
 
 
-def _load(engine: Any, problem: Problem) -> None:
+def arrays(problem: Problem) -> tuple[Any, Any]:
+    """The parameters and the state that an engine is given, as native arrays."""
     p = problem.parameters
     numbers = [*p.inertia, p.rotor] if problem.system is GYROSTAT else [*p.inertia, *p.moment]
-    engine.pars[:] = numpy.array(problem.native(numbers))
-    engine.state[:] = numpy.array(problem.native([*problem.start.flat, *(problem.xi or ())]))
-    engine.time = number(Fraction(0), problem.precision)
+    start = [*problem.start.flat, *(problem.xi or ())]
+    return numpy.array(problem.native(numbers)), numpy.array(problem.native(start))
+
+
+def far(forwards: bool, precision: Precision) -> Any:
+    """A time beyond every other."""
+    return number(Fraction(2) ** 1000 * (1 if forwards else -1), precision)
+
+
+def at_rest(state: Any, coefficients: Any) -> bool:
+    """Whether a motion is constant: at an equilibrium every Taylor coefficient is 0 and heyoka finds no step."""
+    return bool(numpy.isfinite(state).all()) and not coefficients[:, 1:].any()

@@ -7,7 +7,7 @@ from enum import Enum
 from fractions import Fraction
 from typing import Any
 
-from heavytop.precision import Precision, native_text, number, rounded
+from heavytop.precision import Precision, exact, native_text, number, rounded
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -76,7 +76,7 @@ class Problem:
 
     def native(self, values: Any) -> list[Any]:
         """Exact numbers as numbers of the format."""
-        return [number(Fraction(value), self.precision) for value in values]
+        return [number(exact(value), self.precision) for value in values]
 
 
 @dataclass(frozen=True, slots=True)

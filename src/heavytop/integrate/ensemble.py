@@ -1,0 +1,106 @@
+"""Many starts at once: SIMD lanes in double, threads in every format."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+import numpy
+
+from heavytop.errors import InputError
+from heavytop.integrate.lanes import Lanes, StoppedError, Work
+from heavytop.integrate.taylor import compiled, follow
+from heavytop.integrate.trajectory import Problem, Trajectory
+from heavytop.precision import DOUBLE, exact, number
+from heavytop.top.times import check_times
+
+Observer = Callable[[int, Fraction, Any], None]
+
+
+def propagate_ensemble(
+    problems: Sequence[Problem],
+    times: Sequence[Any],
+    *,
+    observer: Observer | None = None,
+    threads: int | None = None,
+    lanes: int = 8,
+    step_limit: int | None = None,
+    **options: Any,
+) -> list[Trajectory]:
+    """The motions of ``problems`` at ``times``, computed by heyoka, in the order of the problems.
+
+    problems: all of one system and format, with an attitude all or none; their tops may differ.
+    times: exact numbers of one sign, strictly monotone away from 0 (0 itself may come first).
+    observer: called with (index of the problem, exact time, native state) in place of keeping the states; from one
+    thread or another, but one call at a time, the times of each problem in order.
+    threads: None for one per processor that this process may use.
+    lanes: motions side by side in a batch engine, in double; other formats have none, and give the bits of
+    :func:`heavytop.integrate.taylor.propagate`.
+    step_limit: for each motion; the times reached until then are returned.
+    options: tolerance, high_accuracy, compact_mode as in :func:`heavytop.integrate.taylor.compiled`.
+
+    Each motion has its own outcome; one that fails changes nothing in the others.  ``run`` of its seconds is the time
+    that it was under way, beside others.
+
+    Raises InputError for no problems, for problems of several kinds, for times out of order, for a format that the
+    platform lacks, and for fewer than 1 thread or 2 lanes.
+    """
+    first = _one_kind(problems)
+    exact_times = check_times(times)
+    targets = [number(time, first.precision) for time in exact_times]
+    threads = len(os.sched_getaffinity(0)) if threads is None else threads
+    if threads < 1 or lanes < 2:
+        raise InputError(f"{threads} threads and {lanes} lanes make no ensemble.", "Use 1 thread and 2 lanes or more.")
+    moves = targets[-1] != 0 and (step_limit is None or step_limit > 0)
+    batch = first.precision == DOUBLE and moves
+    width = lanes if batch else None
+    tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
+    work = Work(tool, targets, [exact(target) for target in targets], step_limit, observer, deque(enumerate(problems)))
+    threads = min(threads, -(-len(problems) // (lanes if batch else 1)))
+    with ThreadPoolExecutor(threads) as pool:
+        running = [pool.submit(_in_lanes if batch else _one_by_one, work) for _ in range(threads)]
+        try:
+            wait(running, return_when=FIRST_EXCEPTION)
+        finally:
+            work.stop.set()
+    for thread in running:
+        if not isinstance(thread.exception(), StoppedError):
+            thread.result()
+    return [work.done[index] for index in range(len(problems))]
+
+
+def _in_lanes(work: Work) -> None:
+    """One thread of a batch ensemble."""
+    with work.tool.lent() as mover, work.tool.lent() as sampler, numpy.errstate(all="ignore"):
+        Lanes(work, mover, sampler).run()
+
+
+def _one_by_one(work: Work) -> None:
+    """One thread of scalar runs."""
+    with work.tool.lent() as engine:
+        while taken := work.take():
+            index, problem = taken
+            observer = None if work.observer is None else partial(work.observe, index)
+            work.done[index] = follow(work.tool, engine, problem, work.targets, work.step_limit, observer, work.check)
+
+
+def _one_kind(problems: Sequence[Problem]) -> Problem:
+    """The first problem; raises InputError unless all are of its kind."""
+    if not problems:
+        raise InputError("An ensemble of no problems.", "Give one or more.")
+
+    def kind(problem: Problem) -> str:
+        attitude = "without" if problem.xi is None else "with"
+        return f"{problem.system.name} in {problem.precision.name} {attitude} attitude"
+
+    for index, problem in enumerate(problems):
+        if kind(problem) != kind(problems[0]):
+            raise InputError(
+                f"Problem 0 is {kind(problems[0])}, problem {index} is {kind(problem)}.", "Run each kind by itself."
+            )
+    return problems[0]
