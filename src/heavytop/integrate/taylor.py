@@ -17,7 +17,7 @@ from typing import Any
 import heyoka
 import numpy
 
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
 from heavytop.precision import Precision, exact, number, require
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, VARIABLES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -163,7 +163,7 @@ class Stepper:
             if self.between is not None:
                 self.between()
             count = self._steps_short_of(target)
-            outcome = self._single() if count < 2 else self._several(count, target)
+            outcome = self.single() if count < 2 else self._several(count, target)
             if outcome is not Outcome.SUCCESS:
                 return outcome
         return Outcome.SUCCESS
@@ -184,7 +184,8 @@ class Stepper:
             count = min(count, self.step_limit - self.steps)
         return int(count)
 
-    def _single(self) -> Outcome:
+    def single(self) -> Outcome:
+        """One step, whose polynomial is then at hand."""
         before, state, began = self.engine.time, self.engine.state.copy(), perf_counter()
         outcome, _ = (self.engine.step if self.forwards else self.engine.step_backward)(write_tc=True)
         self._seconds_per_step = perf_counter() - began
@@ -223,6 +224,10 @@ class Stepper:
         self._covers = False
         return Outcome.SUCCESS
 
+    def polynomial(self) -> Any:
+        """Taylor coefficients of the last step, a copy, shape (6 or 9, order + 1)."""
+        return self.engine.tc.copy()
+
     def sample(self, target: Any) -> Any:
         """The state at ``target``, inside the last step; a copy, shape (6,) or (9,)."""
         self._one_by_one = False
@@ -241,6 +246,7 @@ def propagate(
     xi: tuple[Fraction, ...] | None = None,
     step_limit: int | None = None,
     observer: Observer | None = None,
+    stepping: type[Stepper] = Stepper,
     **options: Any,
 ) -> Trajectory:
     """The motion from ``start`` at t = 0, at ``times``, computed by heyoka in ``precision``.
@@ -249,6 +255,7 @@ def propagate(
     xi: exact initial attitude vector, to ride along.
     step_limit: stop after that many steps; the times reached until then are returned.
     observer: called with (exact time, native state) at each sample in place of keeping the states.
+    stepping: how steps are taken; another than heyoka's own is for trying the detectors.
     options: tolerance, high_accuracy, compact_mode as in :func:`compiled`.
 
     Raises InputError for times out of order, a format that the platform lacks, data outside its exponent range, and a
@@ -257,7 +264,7 @@ def propagate(
     problem = Problem.of(top, start, precision, system, xi)
     targets = [number(time, precision) for time in check_times(times)]
     tool = compiled(system, precision, attitude=xi is not None, **options)
-    return follow(tool, tool.engine, problem, targets, step_limit, observer)
+    return follow(tool, tool.engine, problem, targets, step_limit, observer, stepping=stepping)
 
 
 def follow(
@@ -268,12 +275,12 @@ def follow(
     step_limit: int | None,
     observer: Observer | None,
     between: Callable[[], None] | None = None,
+    stepping: type[Stepper] = Stepper,
 ) -> Trajectory:
     """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
-    engine.pars[:], engine.state[:] = arrays(problem)
-    engine.time = number(Fraction(0), problem.precision)
+    load(engine, problem)
     forwards = bool(targets[-1] >= 0)
-    stepper = Stepper(engine, forwards, step_limit, far(forwards, problem.precision), between)
+    stepper = stepping(engine, forwards, step_limit, far(forwards, problem.precision), between)
     kept_times: list[Fraction] = []
     kept_states: list[Any] = []
     outcome = Outcome.SUCCESS
@@ -303,6 +310,55 @@ def follow(
         {"compile": tool.seconds, "run": perf_counter() - began},
         tool.flags,
     )
+
+
+def first_steps(
+    top: HeavyTop,
+    start: State,
+    count: int,
+    precision: Precision,
+    *,
+    system: System = HEAVY_TOP,
+    stepping: type[Stepper] = Stepper,
+    **options: Any,
+) -> tuple[Trajectory, list[TaylorStep]]:
+    """The first ``count`` steps of the motion, at their ends and as polynomials; fewer if it fails before.
+
+    stepping, options: as in :func:`propagate`.  Raises what that raises.
+    """
+    problem = Problem.of(top, start, precision, system)
+    tool = compiled(system, precision, **options)
+    load(tool.engine, problem)
+    stepper = stepping(tool.engine, True, None, None)
+    times: list[Fraction] = []
+    steps: list[TaylorStep] = []
+    outcome = Outcome.SUCCESS
+    began = perf_counter()
+    while len(steps) < count and outcome is Outcome.SUCCESS:
+        before = tool.engine.state.copy()
+        outcome = stepper.single()
+        if outcome is Outcome.SUCCESS:
+            after = tool.engine.state.copy()
+            steps.append(TaylorStep(before, tool.engine.last_h, stepper.polynomial(), after))
+            times.append(exact(tool.engine.time))
+    return Trajectory(
+        problem,
+        "heyoka",
+        tuple(times),
+        tuple(step.end for step in steps),
+        outcome,
+        times[-1] if times else Fraction(0),
+        len(steps),
+        tool.engine.order,
+        {"compile": tool.seconds, "run": perf_counter() - began},
+        tool.flags,
+    ), steps
+
+
+def load(engine: Any, problem: Problem) -> None:
+    """Set an engine to the beginning of a problem."""
+    engine.pars[:], engine.state[:] = arrays(problem)
+    engine.time = number(Fraction(0), problem.precision)
 
 
 def arrays(problem: Problem) -> tuple[Any, Any]:

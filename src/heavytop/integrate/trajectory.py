@@ -19,6 +19,7 @@ class Outcome(Enum):
     STEP_LIMIT = "step_limit"
     NON_FINITE = "non_finite"
     STEP_TOO_SMALL = "step_too_small"
+    INCOMPLETE = "incomplete"
 
     @property
     def message(self) -> str:
@@ -28,6 +29,7 @@ class Outcome(Enum):
             Outcome.STEP_LIMIT: "stopped at the step limit before the last time",
             Outcome.NON_FINITE: "stopped: the state was no longer finite",
             Outcome.STEP_TOO_SMALL: "stopped: the step no longer moves the time",
+            Outcome.INCOMPLETE: "said to have succeeded, but gave fewer times than were asked for",
         }[self]
 
 
@@ -104,3 +106,17 @@ class Trajectory:
     def texts(self) -> list[list[str]]:
         """The states as full-precision decimal strings."""
         return [[native_text(value, self.problem.precision) for value in state] for state in self.states]
+
+
+@dataclass(frozen=True, slots=True)
+class TaylorStep:
+    """One step of a Taylor method, in native numbers.
+
+    start: state at its beginning, shape (6,).  length: h.  coefficients: of τ^k, shape (6, order + 1); the polynomial
+    may be asked beyond h.  end: state at its end, as the integrator goes on from it.
+    """
+
+    start: Any
+    length: Any
+    coefficients: Any
+    end: Any

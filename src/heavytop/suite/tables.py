@@ -15,6 +15,7 @@ from heavytop.suite.cases import Case
 from heavytop.suite.task import Task
 
 _MAX_SAMPLES = 1_000_000
+_MAX_STEPS = 10_000
 Find = Callable[[str], Case]
 """The case of a name; raises InputError for an unknown one."""
 
@@ -77,7 +78,8 @@ class ClaimEvaluation(Strict, tag="claim_evaluation"):
                 each,
                 parse(name).name,
                 form,
-                *[_signed(times, direction)] * 2,
+                _signed(times, direction),
+                _signed(times, direction),
             )
             for each in map(_claimed, map(find, self.cases))
             for name in self.precisions
@@ -152,6 +154,24 @@ class Drift(Strict, tag="drift"):
         return tasks
 
 
+class LocalError(Strict, tag="local_error"):
+    """Error of single steps, and the order of the method as it shows beyond the step.  steps: that many, the first."""
+
+    cases: list[str]
+    precisions: list[str]
+    steps: int = 64
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        if not 1 <= self.steps <= _MAX_STEPS:
+            raise InputError(f"{self.steps} steps cannot be examined.", f"Give a number from 1 to {_MAX_STEPS}.")
+        return [
+            Task("local_error", each.name, each, parse(name).name, "", count=self.steps)
+            for each in map(find, self.cases)
+            for name in self.precisions
+        ]
+
+
 def log_spaced(count: int, per_decade: int = 8) -> list[int]:
     """About ``per_decade`` whole numbers a decade from 1 to ``count``, both included."""
     wanted = {count}
@@ -185,4 +205,4 @@ def _signed(times: list[Fraction], direction: str) -> tuple[Fraction, ...]:
     return tuple(-time for time in times) if direction == "backward" else tuple(times)
 
 
-Table = Audit | ClaimModel | ClaimEvaluation | Homoclinic | Drift
+Table = Audit | ClaimModel | ClaimEvaluation | Homoclinic | Drift | LocalError

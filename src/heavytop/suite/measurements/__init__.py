@@ -14,6 +14,7 @@ _MEASURES: dict[str, Callable[[Task], Row]] = {
     "claim_evaluation": claimed.claim_evaluation,
     "homoclinic": computed.homoclinic,
     "drift": computed.drift,
+    "local_error": computed.local_error,
 }
 
 

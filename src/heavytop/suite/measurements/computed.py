@@ -10,11 +10,12 @@ from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
 from heavytop.measure.known import certified, known_motion
+from heavytop.measure.local_error import LocalError
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.solution_error import SolutionError
 from heavytop.precision import decimal_text, exact, number, parse
 from heavytop.records import Metric, Row, Series
-from heavytop.suite.measurements.shared import case_of, time_metric, time_text
+from heavytop.suite.measurements.shared import case_of, integrator_of, time_metric, time_text
 from heavytop.suite.task import Task
 from heavytop.top.equations import Parameters
 from heavytop.top.integrals import holding
@@ -62,13 +63,14 @@ def _as_tuples(case: Any) -> Parameters:
 
 def drift(task: Task) -> Row:
     case, precision = case_of(task), parse(task.precision)
+    integrate = integrator_of(task).propagate
     problem = Problem.of(case.top, case.start, precision, case.system)
     # samples are taken at the rounded times, so the series must be asked for by these
     keep = [exact(number(time, precision)) for time in task.keep]
     drift = Drift(problem, holding(case.top, case.start, case.system), keep)
     known = known_motion(problem, exact(number(task.times[-1], precision)))
     if isinstance(known, str):
-        run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=drift)
+        run = integrate(case.top, case.start, task.times, precision, system=case.system, observer=drift)
         return computed_row(
             task, run, drift.metrics(), drift.series(time_text), f"its own first integrals; no reference: {known}"
         )
@@ -78,25 +80,39 @@ def drift(task: Task) -> Row:
         drift(time, state)
         error(time, state)
 
-    run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=observe)
+    run = integrate(case.top, case.start, task.times, precision, system=case.system, observer=observe)
     series = drift.series(time_text) | error.series(time_text)
     return computed_row(task, run, drift.metrics() | error.metrics(), series, known.text)
+
+
+def local_error(task: Task) -> Row:
+    case, precision = case_of(task), parse(task.precision)
+    asked = integrator_of(task).first_steps
+    run, steps = asked(case.top, case.start, task.count, precision, system=case.system)
+    error = LocalError(run.problem)
+    for time, step in zip(run.times, steps, strict=True):
+        error(time, step)
+    return computed_row(task, run, error.metrics(), {}, "known: validated enclosure of each step from where it starts")
 
 
 def computed_row(
     task: Task, run: Trajectory, metrics: dict[str, Metric], series: dict[str, Series], against: str
 ) -> Row:
     precision = run.problem.precision
-    done = run.outcome is Outcome.SUCCESS
+    outcome = run.outcome
+    if outcome is Outcome.SUCCESS and task.times and len(run.times) < len(task.times):
+        outcome = Outcome.INCOMPLETE
+    done = outcome is Outcome.SUCCESS
+    horizon = task.times[-1] if task.times else run.time_reached
     return Row(
         case=task.name,
         system=run.problem.system.name,
         integrator=run.integrator,
         precision=precision.name,
         bits=precision.bits,
-        outcome=run.outcome.value,
-        horizon=time_text(task.times[-1]),
-        time_reached=time_text(task.times[-1] if done else run.time_reached),
+        outcome=outcome.value,
+        horizon=time_text(horizon),
+        time_reached=time_text(horizon if done else run.time_reached),
         steps=run.steps,
         finite=done and not any(m.value in ("nan", "missing") for m in metrics.values()),
         metrics=metrics,

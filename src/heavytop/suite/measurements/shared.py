@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from decimal import Decimal
 from fractions import Fraction
+from typing import Any
 
 from heavytop.claims.ershkov import Branch, PartialCase
+from heavytop.integrate import taylor
+from heavytop.integrate.broken import INTEGRATORS
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import decimal_text
 from heavytop.records import Kind, Metric
@@ -40,3 +43,10 @@ def claim_of(task: Task) -> PartialCase:
 def branch_of(task: Task) -> Branch:
     """The branch of the claim that a task is about."""
     return "printed" if task.form == "printed" else "smooth"
+
+
+def integrator_of(task: Task) -> Any:
+    """What has the `propagate` and `first_steps` of :mod:`heavytop.integrate.taylor`: that, or a broken one."""
+    if task.integrator == "heyoka":
+        return taylor
+    return INTEGRATORS[task.integrator]

@@ -1,0 +1,162 @@
+"""Integrators that are deliberately wrong: heyoka with one planted fault each.
+
+They hide it: problem and flags that they return are the healthy ones.  :mod:`heavytop.report.selftest` tries the
+suite's detectors on them.  All are for the system `heavy_top` in double.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy
+
+from heavytop.errors import InputError
+from heavytop.integrate import taylor
+from heavytop.integrate.taylor import Observer, Stepper, compiled
+from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
+from heavytop.precision import DOUBLE, Precision
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+_HEALTHY: dict[str, Any] = {"high_accuracy": True}
+
+
+class _OneByOne(Stepper):
+    """Steps taken singly, each followed by what is wrong."""
+
+    def _steps_short_of(self, target: Any) -> int:
+        return 1
+
+    def single(self) -> Outcome:
+        outcome = super().single()
+        if outcome is Outcome.SUCCESS:
+            self.spoil()
+        return outcome
+
+    def spoil(self) -> None:
+        """Do something to the engine after a step."""
+
+
+class _OneOrderLess(_OneByOne):
+    """The last Taylor coefficient is dropped; the step stays as long as it was."""
+
+    def polynomial(self) -> Any:
+        return super().polynomial()[:, :-1]
+
+    def spoil(self) -> None:
+        self.engine.state[:] = self.sample(self.engine.time)
+
+    def sample(self, target: Any) -> Any:
+        tau = target - (self.engine.time - self.engine.last_h)
+        return numpy.polynomial.polynomial.polyval(tau, self.polynomial().T)
+
+
+class _ClockInOneWord(_OneByOne):
+    """The time is summed in one double, where heyoka keeps two."""
+
+    def spoil(self) -> None:
+        self.engine.time = self.engine.dtime[0]
+
+
+def _as_asked(top: HeavyTop) -> HeavyTop:
+    return top
+
+
+def _pulled_upwards(top: HeavyTop) -> HeavyTop:
+    a, b, c = top.centre
+    return HeavyTop(top.inertia, top.weight, (-a, -b, -c))
+
+
+def _off_by_1e_10(top: HeavyTop) -> HeavyTop:
+    a, b, c = top.inertia
+    return HeavyTop((a * (1 + Fraction(1, 10**10)), b, c), top.weight, top.centre)
+
+
+def _swapped(states: Sequence[Any]) -> list[Any]:
+    return [state[[1, 0, 2, 4, 3, 5]] for state in states]
+
+
+def _frozen(states: Sequence[Any]) -> list[Any]:
+    half = len(states) // 2
+    return [*states[:half], *[states[half]] * (len(states) - half)]
+
+
+def _not_a_number(states: Sequence[Any]) -> list[Any]:
+    return [*states[:-1], states[-1] * float("nan")]
+
+
+@dataclass(frozen=True, slots=True)
+class Integrator:
+    """heyoka in double with compensated summation, and what is wrong with it.
+
+    options: those of `taylor.compiled` that differ.  top: what is integrated in the place of the one asked for.
+    stepping: how steps are taken.  states: what is handed over in the place of the states.  stops: the part of the
+    samples that is reached; silent: the run says nothing of having stopped.  detectable: whether the suite's detectors
+    are known to see it.
+    """
+
+    about: str
+    options: dict[str, Any] = field(default_factory=dict)
+    top: Callable[[HeavyTop], HeavyTop] = _as_asked
+    stepping: type[Stepper] = Stepper
+    states: Callable[[Sequence[Any]], list[Any]] = list
+    stops: Fraction = Fraction(1)
+    silent: bool = False
+    detectable: bool = True
+
+    def propagate(
+        self,
+        top: HeavyTop,
+        start: State,
+        times: Sequence[Fraction],
+        precision: Precision = DOUBLE,
+        *,
+        system: System = HEAVY_TOP,
+        observer: Observer,
+    ) -> Trajectory:
+        """As :func:`heavytop.integrate.taylor.propagate`."""
+        reached = times[: int(len(times) * self.stops)]
+        run = taylor.propagate(self.top(top), start, reached, precision, **self._how(system))
+        for time, state in zip(run.times, self.states(run.states), strict=True):
+            observer(time, state)
+        outcome = run.outcome if self.stops == 1 or self.silent else Outcome.STEP_LIMIT
+        return self._disguised(replace(run, states=(), outcome=outcome), top, start)
+
+    def first_steps(
+        self, top: HeavyTop, start: State, count: int, precision: Precision = DOUBLE, *, system: System = HEAVY_TOP
+    ) -> tuple[Trajectory, list[TaylorStep]]:
+        """As :func:`heavytop.integrate.taylor.first_steps`; hands over what :meth:`propagate` does."""
+        run, steps = taylor.first_steps(self.top(top), start, count, precision, **self._how(system))
+        ends = self.states([step.end for step in steps])
+        steps = [replace(step, end=end) for step, end in zip(steps, ends, strict=True)]
+        return self._disguised(run, top, start), steps
+
+    def _how(self, system: System) -> dict[str, Any]:
+        if system is not HEAVY_TOP:
+            raise InputError(f"The planted faults are not for {system.name}.", "Use heavy_top.")
+        return _HEALTHY | self.options | {"stepping": self.stepping}
+
+    def _disguised(self, run: Trajectory, top: HeavyTop, start: State) -> Trajectory:
+        healthy = Problem.of(top, start, DOUBLE)
+        return replace(run, problem=healthy, flags=compiled(HEAVY_TOP, DOUBLE, **_HEALTHY).flags)
+
+
+HEALTHY = "healthy"
+INTEGRATORS = {
+    HEALTHY: Integrator("nothing"),
+    "sign": Integrator("P γ × r enters (1.1) with the other sign", top=_pulled_upwards),
+    "coefficient": Integrator("I1 is larger by 1e-10 of itself", top=_off_by_1e_10),
+    "tolerance": Integrator("tolerance 1e-9", options={"tolerance": Fraction(1, 10**9)}),
+    "order": Integrator("one order less, at heyoka's own step", stepping=_OneOrderLess),
+    "summation": Integrator("no compensated summation in a step", options={"high_accuracy": False}, detectable=False),
+    "clock": Integrator("time summed in one double", stepping=_ClockInOneWord),
+    "axes": Integrator("axes 1 and 2 swapped in what is handed over", states=_swapped),
+    "frozen": Integrator("the state stands still from the middle on", states=_frozen),
+    "nan": Integrator("the last state is NaN", states=_not_a_number),
+    "stop": Integrator("stops early and says so", stops=Fraction(3, 4)),
+    "silent stop": Integrator("stops early and says nothing", stops=Fraction(3, 4), silent=True),
+}
+"""The healthy integrator and each fault, by name."""

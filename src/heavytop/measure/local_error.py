@@ -1,0 +1,78 @@
+"""Error of single steps of a Taylor method, and the order it has in truth.
+
+Each step is held against the enclosure of the motion that starts exactly where the step starts: what earlier steps did
+wrong plays no part.  At heyoka's own step length the truncation error is far below rounding; so the order is seen by
+asking the step's polynomial beyond the step, at 2 h and 3 h, where its error is C τ^(p+1).
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import log
+from statistics import median
+
+from flint import arb
+
+from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.validated import Validated
+from heavytop.integrate.trajectory import Problem, TaylorStep
+from heavytop.measure.drift import Running
+from heavytop.measure.scalar import GUARD_BITS, largest, metric, resolved, to_ball
+from heavytop.precision import exact
+from heavytop.records import Metric
+from heavytop.top.heavy_top import State
+
+_NEAR, _FAR = 2, 3
+
+
+class LocalError:
+    """Local error in units of eps times the largest component of the state, and the observed order.
+
+    problem: the one that was integrated.  Takes in steps one by one.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.bits = problem.precision.bits + GUARD_BITS
+        self.running = Running()
+        self.orders: list[float] = []
+
+    def __call__(self, time: Fraction, step: TaylorStep) -> None:
+        """Take in one step that ends at ``time``."""
+        p = self.problem
+        begin = [exact(value) for value in step.start]
+        truth = Validated(p.top, State(tuple(begin[:3]), tuple(begin[3:6])), p.system, p.parameters.rotor)
+        length = exact(step.length)
+        with working_precision(self.bits):
+            scale = ball(p.precision.eps * max(map(abs, begin)))
+            self.running.add(
+                time, self._error([to_ball(value) for value in step.end], truth, length) / scale, keep=False
+            )
+            near, far = (self._error(_at(step, n * length), truth, n * length) for n in (_NEAR, _FAR))
+            if resolved(near) and resolved(far) and near > 0 and far > 0:
+                self.orders.append(float((far / near).log()) / log(_FAR / _NEAR) - 1)
+
+    def _error(self, state: list[arb], truth: Validated, time: Fraction) -> arb:
+        pairs = zip(state, truth.state(time, self.bits), strict=True)
+        return largest(value - true for value, true in pairs)
+
+    def metrics(self) -> dict[str, Metric]:
+        """``local_error_ulp_max``, ``_rms`` and ``observed_order``, the median over the steps as a whole number."""
+        found = {name: m for name, m in self.running.metrics("local_error_ulp").items() if not name.endswith("final")}
+        order = Metric("missing", None, "value")
+        if self.orders:
+            with working_precision(64):
+                order = metric(arb(round(median(self.orders))), "value")
+        return found | {"observed_order": order}
+
+
+def _at(step: TaylorStep, time: Fraction) -> list[arb]:
+    """The step's polynomial at ``time`` after its start, without further rounding errors."""
+    tau = ball(time)
+    result = []
+    for row in step.coefficients:
+        value = arb(0)
+        for coefficient in reversed(row):
+            value = value * tau + to_ball(coefficient)
+        result.append(value)
+    return result

@@ -1,0 +1,69 @@
+"""Errors of single steps: a healthy step is right to an ulp, and a method's order shows beyond its step."""
+
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy
+import pytest
+
+from heavytop.integrate.broken import HEALTHY, INTEGRATORS
+from heavytop.integrate.taylor import first_steps
+from heavytop.integrate.trajectory import Outcome
+from heavytop.measure.local_error import LocalError
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact
+from heavytop.suite.cases import CASES
+
+
+def examined(run, steps):
+    error = LocalError(run.problem)
+    for time, step in zip(run.times, steps, strict=True):
+        error(time, step)
+    return error.metrics()
+
+
+@pytest.mark.parametrize(("name", "precision"), [("kovalevskaya", DOUBLE), ("gyrostat", EXTENDED), ("euler", QUAD)])
+def test_a_step_is_right_to_an_ulp_and_of_the_order_that_heyoka_says(name, precision) -> None:
+    case = CASES[name]
+    run, steps = first_steps(case.top, case.start, 6, precision, system=case.system)
+    found = examined(run, steps)
+    assert run.outcome is Outcome.SUCCESS
+    assert 0 < float(found["local_error_ulp_rms"].value) <= float(found["local_error_ulp_max"].value) < 2
+    assert found["observed_order"].value == str(run.order)
+
+
+@pytest.mark.parametrize(("digits", "order"), [(6, 8), (12, 15)])
+def test_the_order_is_that_of_the_tolerance(digits, order) -> None:
+    case = CASES["lagrange"]
+    run, steps = first_steps(case.top, case.start, 8, DOUBLE, tolerance=Fraction(1, 10**digits))
+    assert run.order == order
+    assert examined(run, steps)["observed_order"].value == str(order)
+
+
+def test_a_step_that_is_off_by_ten_ulps_is_seen_as_that() -> None:
+    case = CASES["kovalevskaya"]
+    run, steps = first_steps(case.top, case.start, 1, DOUBLE)
+    (step,) = steps
+    off = step.end.copy()
+    off[4] += 10 * numpy.finfo(float).eps * abs(step.start).max()
+    good, bad = (
+        float(examined(run, [type(step)(step.start, step.length, step.coefficients, end)])["local_error_ulp_max"].value)
+        for end in (step.end, off)
+    )
+    assert 10 - good <= bad <= 10 + good
+
+
+def test_one_order_less_shows_in_the_order_alone() -> None:
+    case = CASES["generic"]
+    healthy, broken = (
+        examined(*INTEGRATORS[name].first_steps(case.top, case.start, 12)) for name in (HEALTHY, "order")
+    )
+    assert (healthy["observed_order"].value, broken["observed_order"].value) == ("20", "19")
+
+
+def test_steps_are_those_of_a_run() -> None:
+    case = CASES["euler"]
+    run, steps = first_steps(case.top, case.start, 5, DOUBLE)
+    lengths = [exact(step.length) for step in steps]
+    assert [float(time) for time in run.times] == pytest.approx([float(sum(lengths[: i + 1])) for i in range(5)])
+    for before, after in pairwise(steps):
+        assert (before.end == after.start).all()
