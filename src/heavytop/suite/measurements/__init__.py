@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from heavytop.records import Row
-from heavytop.suite.measurements import claimed, computed
+from heavytop.suite.measurements import claimed, computed, work_precision
 from heavytop.suite.task import Task
 
 _MEASURES: dict[str, Callable[[Task], Row]] = {
@@ -14,6 +14,7 @@ _MEASURES: dict[str, Callable[[Task], Row]] = {
     "claim_evaluation": claimed.claim_evaluation,
     "homoclinic": computed.homoclinic,
     "drift": computed.drift,
+    "work_precision": work_precision.work_precision,
 }
 
 
