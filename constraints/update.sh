@@ -9,5 +9,5 @@ lock() {
         --no-annotate "$@" pyproject.toml constraints/build.in -o "constraints/$name.txt" --upgrade
     sed -i '1i # Made by constraints/update.sh' "constraints/$name.txt"
 }
-lock test --extra test --extra peers --extra cluster
+lock test --extra test --extra peers --extra parquet --extra cluster
 lock run -c constraints/test.txt

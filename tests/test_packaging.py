@@ -24,7 +24,7 @@ def pinned(file: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize(
-    ("file", "extras"), [("run.txt", []), ("test.txt", ["test", "peers", "cluster"])], ids=["run", "test"]
+    ("file", "extras"), [("run.txt", []), ("test.txt", ["test", "peers", "parquet", "cluster"])], ids=["run", "test"]
 )
 def test_every_dependency_is_pinned_with_hashes_and_without_addresses(file: str, extras: list[str]) -> None:
     wanted = names(PROJECT["dependencies"]) | {"hatchling"}
