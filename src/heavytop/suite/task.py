@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from heavytop.precision import parse
@@ -25,6 +25,11 @@ class Task:
     form: str
     times: tuple[Fraction, ...] = ()
     keep: tuple[Fraction, ...] = ()
+
+    def of(self, case: Case) -> Task:
+        """The same measurement of another case."""
+        assert self.case is not None
+        return replace(self, name=case.name + self.name.removeprefix(self.case.name), case=case)
 
     @property
     def label(self) -> str:
