@@ -1,48 +1,139 @@
-"""The same rows from one process, from two, and from a Dask cluster on this machine."""
+"""The same rows from one process, from two, and from a Dask cluster on this machine; with workers killed too."""
 
+import os
+import signal
+import socket
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
+from multiprocessing import active_children
+from pathlib import Path
 
 import pytest
 
-from heavytop.errors import InputError
+from heavytop.errors import HeavyTopError, InputError
+from heavytop.suite import workers
 from heavytop.suite.plan import expand, load
+from heavytop.suite.task import Task
 from heavytop.suite.workers import rows
 
 PLAN = """name = "tiny"
 [[measure]]
 kind = "drift"
-cases = ["euler", "gyrostat"]
-runs = [{ precision = "double", horizon = "5", samples = 5 }]
+cases = ["euler", "gyrostat", "pendulum"]
+runs = [{ precision = "double", horizon = "5", samples = 5 }, { precision = "extended", horizon = "5", samples = 5 }]
 """
+
+
+def tasks_of(folder: Path, text: str):
+    file = folder / "tiny.toml"
+    file.write_text(text)
+    return expand(load(str(file))[0])
 
 
 @pytest.fixture(scope="module")
 def tasks(tmp_path_factory: pytest.TempPathFactory):
-    file = tmp_path_factory.mktemp("plan") / "tiny.toml"
-    file.write_text(PLAN)
-    return expand(load(str(file))[0])
+    return tasks_of(tmp_path_factory.mktemp("plan"), PLAN)
 
 
-def measured(tasks, workers: int, scheduler: str | None = None):
-    found = dict(rows(tasks, workers, scheduler))
-    for row in found.values():
+@pytest.fixture(scope="module")
+def expected(tasks):
+    return measured(tasks, 1)
+
+
+def measured(tasks, processes: int, scheduler: str | None = None, after_first: Callable[[], object] = lambda: None):
+    found = {}
+    for index, row in rows(tasks, processes, scheduler):
+        assert index not in found
+        if not found:
+            after_first()
+        found[index] = row
         row.seconds = {}
     return [found[index] for index in range(len(tasks))]
 
 
-@pytest.fixture
+class Poison:
+    """Ends the process that reads it."""
+
+    name = "poison"
+
+    def __reduce__(self):
+        return os._exit, (9,)
+
+
+def poisoned(tasks) -> list[Task]:
+    return [*tasks[:2], Task("drift", "poison", Poison(), "double", "", tasks[0].times), *tasks[2:4]]
+
+
+def kill(pid: int) -> None:
+    os.kill(pid, signal.SIGKILL)
+
+
+def test_two_processes_give_the_same_rows_as_one_even_if_one_of_them_is_killed(tasks, expected) -> None:
+    assert measured(tasks, 2, after_first=lambda: kill(active_children()[0].pid)) == expected
+
+
+def test_a_task_that_kills_its_worker_every_time_is_named_and_the_others_are_measured(tasks) -> None:
+    found = []
+    with pytest.raises(HeavyTopError, match="died 3 times during drift poison"):
+        found += rows(poisoned(tasks), 2, None)
+    assert not active_children()
+
+
+def test_rows_that_are_there_are_not_measured_again(tasks) -> None:
+    assert [index for index, _ in rows(tasks, 1, None, done=set(range(1, len(tasks))))] == [0]
+
+
+def test_only_a_few_tasks_are_under_way_at_a_time(tasks) -> None:
+    class Counting(list):
+        most = 0
+
+        def __getitem__(self, index):
+            Counting.most = max(Counting.most, index)
+            return super().__getitem__(index)
+
+    many = Counting(tasks[:1] * 10_000)
+    stream = rows(many, 2, None)
+    next(stream)
+    stream.close()
+    assert Counting.most < 4 * 2
+
+
+def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(
+        "from multiprocessing import active_children\n"
+        "from heavytop.suite.plan import expand, load\n"
+        "from heavytop.suite.workers import rows\n"
+        "if __name__ == '__main__':\n"
+        f"    tasks = expand(load({str(tmp_path / 'tiny.toml')!r})[0])\n"
+        "    stream = rows(tasks, 2, None)\n"
+        "    next(stream)\n"
+        "    print(*(child.pid for child in active_children()), flush=True)\n"
+        "    input()\n"
+    )
+    (tmp_path / "tiny.toml").write_text(PLAN)
+    with subprocess.Popen([sys.executable, script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as parent:
+        assert len(parent.stdout.readline().split()) == 2
+        parent.kill()
+        # its output ends when the last process that holds it has ended
+        assert parent.communicate(timeout=30)[0] == ""
+
+
+@pytest.fixture(scope="module")
 def cluster() -> Iterator[str]:
     pytest.importorskip("distributed")
-    address = "tcp://127.0.0.1:8797"
-    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
-    worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
-    processes = [subprocess.Popen([*dask, "--host", "127.0.0.1", "--port", "8797", "--no-dashboard"],
-                                  stderr=subprocess.DEVNULL)]  # fmt: skip
-    time.sleep(2)
-    processes.append(subprocess.Popen([*worker, "--host", "127.0.0.1"], stderr=subprocess.DEVNULL))
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    address = f"tcp://127.0.0.1:{port}"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    once = os.environ | {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
+    start = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", port]
+    join = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
+    processes = [subprocess.Popen([*start, "--no-dashboard"], env=once, **quiet)]
+    processes += [subprocess.Popen(join, **quiet) for _ in range(2)]
     try:
         yield address
     finally:
@@ -51,12 +142,55 @@ def cluster() -> Iterator[str]:
             process.wait(20)
 
 
-@pytest.mark.filterwarnings("default")
-def test_a_cluster_gives_the_same_rows_as_this_process(tasks, cluster: str) -> None:
-    assert measured(tasks, 1, cluster) == measured(tasks, 1)
+@pytest.fixture
+def worker_pids(cluster: str) -> Iterator[Callable[[], list[int]]]:
+    from distributed import Client
+
+    with Client(cluster, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=30)
+        yield lambda: list(client.run(os.getpid).values())
 
 
-@pytest.mark.filterwarnings("default")
+dask = pytest.mark.filterwarnings("default")
+
+
+@dask
+def test_a_cluster_gives_the_same_rows_as_this_process_even_if_a_worker_is_killed(
+    tasks, expected, cluster: str, worker_pids
+) -> None:
+    assert measured(tasks, 1, cluster) == expected
+    assert measured(tasks, 1, cluster, after_first=lambda: kill(worker_pids()[0])) == expected
+
+
+@dask
+def test_a_row_whose_workers_die_one_after_the_other_is_named(tmp_path: Path, cluster: str, worker_pids) -> None:
+    endless = tasks_of(tmp_path, PLAN.replace('"5"', '"1e9"').replace("samples = 5", "samples = 100"))[:1]
+    stop = threading.Event()
+
+    def keep_killing() -> None:
+        while not stop.wait(2):
+            for pid in worker_pids():
+                kill(pid)
+
+    killer = threading.Thread(target=keep_killing)
+    killer.start()
+    try:
+        with pytest.raises(HeavyTopError, match="2 workers died during drift euler double"):
+            measured(endless, 1, cluster)
+    finally:
+        stop.set()
+        killer.join()
+
+
+@dask
+def test_a_worker_with_other_versions_is_refused(tasks, cluster: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    here = workers.versions()
+    monkeypatch.setattr(workers, "versions", lambda: here | {"heyoka": "0.1"})
+    with pytest.raises(InputError, match=f"A worker has heyoka {here['heyoka']} instead of 0.1"):
+        measured(tasks, 1, cluster)
+
+
+@dask
 def test_a_scheduler_that_does_not_answer_is_a_clear_error(tasks) -> None:
     pytest.importorskip("distributed")
     for address in ("tcp://127.0.0.1:9", "nonsense"):

@@ -37,7 +37,7 @@ def run(
 def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, scheduler: str | None) -> int:
     from heavytop.precision import available, parse
 
-    missing = {t.precision for t in tasks if t.precision and available()[parse(t.precision).family]}
+    missing = {name for name in {task.precision for task in tasks} - {""} if available()[parse(name).family]}
     if missing:
         raise InputError(
             f"The plan needs {', '.join(sorted(missing))}, which this platform lacks.", "`heavytop list` says why."

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import platform
 import subprocess
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from heavytop.precision import available
-
-_PACKAGES = ("heavytop", "heyoka", "numpy", "mpmath", "gmpy2", "python-flint", "msgspec")
+from heavytop.suite.workers import versions
 
 
 def environment() -> dict[str, Any]:
@@ -20,7 +18,7 @@ def environment() -> dict[str, Any]:
     import numpy
 
     return {
-        "packages": {name: metadata.version(name) for name in _PACKAGES},
+        "packages": versions(),
         "flint": str(flint.__FLINT_VERSION__),
         "commit": _commit(),
         "python": platform.python_version(),

@@ -10,7 +10,7 @@ from heavytop.errors import InputError
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,3 +122,12 @@ def case(name: str, more: dict[str, Case] | None = None) -> Case:
     if name not in known:
         raise InputError(f"Unknown case {name[:60]!r}.", f"Known cases: {', '.join(known)}.")
     return known[name]
+
+
+def require_possible(case: Case) -> Case:
+    """The case; raises InputError for data that are too large, a gamma that is no unit vector, and a start that the
+    system does not admit.
+    """
+    require_physical(case.top, case.start.require_unit_gamma())
+    case.system.parameters(case.top, case.start)
+    return case

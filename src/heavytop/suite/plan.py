@@ -5,18 +5,24 @@ from __future__ import annotations
 import hashlib
 import re
 import tomllib
+from bisect import bisect_right
+from collections.abc import Sequence
 from importlib import resources
+from itertools import accumulate
 from pathlib import Path
 
 import msgspec
 
 from heavytop.errors import InputError
-from heavytop.suite.cases import CASES, Case, case
+from heavytop.suite.cases import CASES, Case, case, require_possible
+from heavytop.suite.sweeps import Lazy, Sweep
 from heavytop.suite.tables import Table
 from heavytop.suite.task import Task
 from heavytop.top.equations import system
-from heavytop.top.heavy_top import HeavyTop, State, require_physical
+from heavytop.top.heavy_top import HeavyTop, State
 
+_NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
+_RENAME = "Give it another name."
 BUILT_IN = ("smoke", "default", "long", "peers", "selftest")
 
 
@@ -38,6 +44,7 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True):
     name: str
     measure: list[Table]
     top: list[Top] = []
+    sweep: list[Sweep] = []
 
 
 def load(name: str) -> tuple[Plan, str]:
@@ -56,7 +63,7 @@ def load(name: str) -> tuple[Plan, str]:
         raise InputError(f"Unknown plan {name[:60]!r}.", f"Use {', '.join(BUILT_IN)} or a file ending in .toml.")
     try:
         plan = msgspec.convert(tomllib.loads(text), Plan)
-        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", plan.name):
+        if not re.fullmatch(_NAME, plan.name):
             raise msgspec.ValidationError(f"name {plan.name[:40]!r} is not letters, digits, '.', '_' and '-'")
     except RecursionError:
         raise InputError(f"The plan {name} is nested too deeply.", "The plans that ship show every key.") from None
@@ -65,28 +72,60 @@ def load(name: str) -> tuple[Plan, str]:
     return plan, hashlib.sha256(text.encode()).hexdigest()
 
 
-def expand(plan: Plan) -> list[Task]:
-    """The plan's measurements in its order; raises InputError for an unknown case or precision, an impossible value,
-    and two measurements that would fill the same row.
+def expand(plan: Plan) -> Sequence[Task]:
+    """The plan's measurements in its order; those over a sweep are made when asked for.
+
+    Raises InputError for an unknown case or precision, an impossible value, and two measurements that would fill the
+    same row.
     """
     own = {top.name: _own_case(top) for top in plan.top}
-    tasks = [task for table in plan.measure for task in table.tasks(lambda name: case(name, own))]
+    swept = _swept(plan)
+    known = own | {name: cases[0] for name, cases in swept.items()}
+    parts = [
+        (table.tasks(lambda name: case(name, known)), cases)
+        for whole in plan.measure
+        for table, cases in _parts(whole, swept)
+    ]
     seen: set[str] = set()
-    for task in tasks:
+    for task in (task for templates, _ in parts for task in templates):
         if task.label in seen:
             raise InputError(f"The plan {plan.name} measures {task.label} twice.", "Name each measurement once.")
         seen.add(task.label)
-    if not tasks:
+    if not seen:
         raise InputError(f"The plan {plan.name} measures nothing.", "Give it at least one [[measure]] with cases.")
-    return tasks
+    ends = list(accumulate(len(templates) * len(cases or (None,)) for templates, cases in parts))
+
+    def task_at(index: int) -> Task:
+        part = bisect_right(ends, index)
+        templates, cases = parts[part]
+        place, which = divmod(index - (ends[part - 1] if part else 0), len(templates))
+        return templates[which].of(cases[place]) if cases else templates[which]
+
+    return Lazy(ends[-1], task_at)
+
+
+def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
+    """The cases of each sweep, by the name under which tables ask for them."""
+    swept: dict[str, Sequence[Case]] = {}
+    for sweep in plan.sweep:
+        if not re.fullmatch(_NAME, sweep.name):
+            raise InputError(f"The sweep's name {sweep.name[:40]!r} is not letters, digits, '.', '_' and '-'.", _RENAME)
+        if f"sweep:{sweep.name}" in swept or any(top.name.startswith(f"{sweep.name}[") for top in plan.top):
+            raise InputError(f"The name {sweep.name} is that of another sweep, or of a [[top]].", _RENAME)
+        swept[f"sweep:{sweep.name}"] = sweep.cases()
+    return swept
+
+
+def _parts(table: Table, swept: dict[str, Sequence[Case]]) -> list[tuple[Table, Sequence[Case] | None]]:
+    """The table itself, or one for each of its cases where one is a sweep: then the table is of the sweep's first."""
+    names: list[str] = getattr(table, "cases", [])
+    if not swept.keys() & set(names):
+        return [(table, None)]
+    return [(msgspec.structs.replace(table, cases=[name]), swept.get(name)) for name in names]
 
 
 def _own_case(top: Top) -> Case:
     if top.name in CASES:
-        raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", "Give it another name.")
+        raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", _RENAME)
     body = HeavyTop(top.inertia, top.weight, top.centre)
-    start = State(top.omega, top.gamma).require_unit_gamma()
-    require_physical(body, start)
-    which = system(top.system)
-    which.parameters(body, start)
-    return Case(top.name, "from the plan", which, body, start)
+    return require_possible(Case(top.name, "from the plan", system(top.system), body, State(top.omega, top.gamma)))

@@ -25,10 +25,9 @@ def run(
     """
     for index in checkpoint.done:
         progress(tasks[index])
-    missing = [index for index in range(len(tasks)) if index not in checkpoint.done]
-    for position, row in rows([tasks[index] for index in missing], workers, scheduler):
-        checkpoint.add(missing[position], row)
-        progress(tasks[missing[position]])
+    for index, row in rows(tasks, workers, scheduler, checkpoint.done):
+        checkpoint.add(index, row)
+        progress(tasks[index])
     measured = [checkpoint.done[index] for index in range(len(tasks))]
     if any(row.measure == "homoclinic" for row in measured):
         from heavytop.suite.measurements.laws import break_away_law

@@ -144,15 +144,17 @@ class Drift(Strict, tag="drift"):
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
-        tasks = []
-        for each in map(find, self.cases):
-            for run in self.runs:
-                (horizon,) = _positive([run.horizon], "horizon")
-                count = _samples(run.samples)
-                times = tuple(horizon * i / count for i in range(1, count + 1))
-                keep = tuple(times[i - 1] for i in log_spaced(count))
-                tasks.append(Task("drift", each.name, each, parse(run.precision).name, "", times, keep))
-        return tasks
+        runs = []
+        for run in self.runs:
+            (horizon,) = _positive([run.horizon], "horizon")
+            count = _samples(run.samples)
+            times = tuple(horizon * i / count for i in range(1, count + 1))
+            runs.append((parse(run.precision).name, times, tuple(times[i - 1] for i in log_spaced(count))))
+        return [
+            Task("drift", each.name, each, precision, "", times, keep)
+            for each in map(find, self.cases)
+            for precision, times, keep in runs
+        ]
 
 
 class LocalError(Strict, tag="local_error"):

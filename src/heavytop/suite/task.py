@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from heavytop.precision import parse
@@ -28,6 +28,11 @@ class Task:
     keep: tuple[Fraction, ...] = ()
     count: int = 0
     integrator: str = "heyoka"
+
+    def of(self, case: Case) -> Task:
+        """The same measurement of another case."""
+        assert self.case is not None
+        return replace(self, name=case.name + self.name.removeprefix(self.case.name), case=case)
 
     @property
     def label(self) -> str:

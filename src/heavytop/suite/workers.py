@@ -1,21 +1,140 @@
-"""Where tasks run: in this process, in local processes, or on a Dask cluster.  The rows are the same."""
+"""Where tasks run: in this process, in local processes, or on a Dask cluster.  The rows are the same.
+
+At most four tasks a worker are under way at a time, so that a plan of any length takes no more memory than that.
+"""
 
 from __future__ import annotations
 
+import os
 import signal
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from collections import Counter, deque
+from collections.abc import Callable, Container, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
+from functools import cache, partial
+from importlib import metadata
+from multiprocessing import get_context, parent_process
+from threading import Thread
+from typing import Any
 
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.records import Row
 from heavytop.suite.task import Task
 
+_AHEAD = 4
+_PATIENCE = 30
+"""Seconds without any worker after which a cluster is given up."""
+_RESUME = "Finished rows are kept: run again with --resume"
+_PACKAGES = ("heavytop", "heyoka", "numpy", "mpmath", "gmpy2", "python-flint", "msgspec")
 
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+Versions = dict[str, str]
+Submit = Callable[[Task], Future[Row]]
+UnderWay = dict[Future[Row], int]
+
+
+@cache
+def versions() -> Versions:
+    """The versions of this program and of every package that rows depend on."""
+    return {name: metadata.version(name) for name in _PACKAGES}
+
+
+def rows(
+    tasks: Sequence[Task], workers: int, scheduler: str | None, done: Container[int] = ()
+) -> Iterator[tuple[int, Row]]:
+    """(index of the task, its row) as they finish, long ones started first; without those in ``done``.
+
+    A task whose worker died is run again, three times in all.
+    Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
+    InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
+    """
+    queue = _longest_first(tasks, done)
+    if scheduler is not None:
+        yield from _on_cluster(tasks, queue, scheduler)
+    elif workers > 1:
+        yield from _in_processes(tasks, queue, workers)
+    else:
+        for index in queue:
+            yield index, _measure(tasks[index])
+
+
+def _longest_first(tasks: Sequence[Task], done: Container[int]) -> deque[int]:
+    costs = {index: task.cost for index, task in enumerate(tasks) if index not in done}
+    return deque(sorted(costs, key=lambda index: -costs[index]))
+
+
+def _in_processes(tasks: Sequence[Task], queue: deque[int], workers: int) -> Iterator[tuple[int, Row]]:
+    deaths: Counter[int] = Counter()
+    under_way: UnderWay = {}
+
+    def submit(task: Task) -> Future[Row]:
+        return pool.submit(_measure, task)
+
+    def at_once() -> int:
+        # any task that was under way when a worker died may be to blame: fewer and fewer at once tell which
+        return (_AHEAD * workers, workers, 1)[max(deaths.values(), default=0)]
+
+    while queue:
+        try:
+            with _pool(workers) as pool:
+                for index, future in _windowed(tasks, queue, under_way, submit, at_once):
+                    row = future.result()
+                    deaths.pop(index, None)
+                    yield index, row
+        except BrokenProcessPool:
+            lost = list(under_way.values())
+            under_way.clear()
+            deaths.update(lost)
+            queue.extendleft(reversed(lost))
+            worst, times = deaths.most_common(1)[0]
+            if times > 2:
+                raise HeavyTopError(
+                    f"A worker process died {times} times during {tasks[worst].label}.",
+                    f"{_RESUME}, perhaps with fewer --workers.",
+                ) from None
+
+
+def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Iterator[tuple[int, Row]]:
+    with _client(scheduler) as client:
+        from distributed import KilledWorker
+
+        pool = client.get_executor(pure=False)
+        submit = partial(pool.submit, _measure_as, versions())
+
+        def at_once() -> int:
+            workers: int = sum(client.nthreads().values())
+            return _AHEAD * workers
+
+        try:
+            for index, future in _windowed(tasks, queue, {}, submit, at_once):
+                try:
+                    row = future.result()
+                except KilledWorker as error:
+                    raise HeavyTopError(
+                        f"{error.allowed_failures + 1} workers died during {tasks[index].label}.", f"{_RESUME}."
+                    ) from None
+                yield index, row
+        except (CancelledError, OSError) as error:
+            raise HeavyTopError(f"The scheduler {scheduler} was lost: {error}.", f"{_RESUME}.") from None
+        finally:
+            pool.shutdown(wait=False)
+
+
+def _windowed(
+    tasks: Sequence[Task], queue: deque[int], under_way: UnderWay, submit: Submit, at_once: Callable[[], int]
+) -> Iterator[tuple[int, Future[Row]]]:
+    """Indices as they finish, with up to ``at_once()`` tasks under way; it is 0 where there are no workers."""
+    while queue or under_way:
+        limit = at_once()
+        for _ in range(min(len(queue), max(limit, 1) - len(under_way))):
+            future = submit(tasks[queue[0]])
+            under_way[future] = queue.popleft()
+        finished = wait(under_way, timeout=_PATIENCE, return_when=FIRST_COMPLETED).done
+        if not finished and limit == 0:
+            raise HeavyTopError("The cluster has lost all its workers.", f"Start some.  {_RESUME}.")
+        for future in finished:
+            yield under_way[future], future
+            del under_way[future]
 
 
 def _measure(task: Task) -> Row:
@@ -24,25 +143,44 @@ def _measure(task: Task) -> Row:
     return measure(task)
 
 
-@contextmanager
-def executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
-    """Something to submit to: ``workers`` local processes, or the Dask cluster at ``scheduler``.
+def _measure_as(expected: Versions, task: Task) -> Row:
+    """The row of ``task``; raises InputError unless the versions here are those expected."""
+    here = versions()
+    other = [f"{name} {here[name]} instead of {expected[name]}" for name in expected if here[name] != expected[name]]
+    if other:
+        raise InputError(f"A worker has {', '.join(other)}.", "Install the same versions on every machine.")
+    return _measure(task)
 
-    Raises InputError where the extra `cluster` is not installed or no scheduler answers.
-    """
-    if scheduler is None:
-        # spawned, not forked: a forked child would share the state of heyoka's compiler and threads
-        with ProcessPoolExecutor(
-            workers, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_the_parent
-        ) as pool:
-            try:
-                yield pool
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                for process in list((pool._processes or {}).values()):
-                    process.terminate()
-                raise
-        return
+
+def _leave_interrupts_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_the_parent, daemon=True).start()
+
+
+def _end_with_the_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    # spawned, not forked: a forked child would share the state of heyoka's compiler and threads
+    context = get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts_to_the_parent) as pool:
+        try:
+            yield pool
+        except BaseException:
+            processes = list((pool._processes or {}).values())
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in processes:
+                process.terminate()
+            raise
+
+
+@contextmanager
+def _client(scheduler: str) -> Iterator[Any]:
     try:
         from distributed import Client
     except ImportError:
@@ -51,24 +189,11 @@ def executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
         client = Client(scheduler, timeout="10s")
     except (OSError, ValueError) as error:
         raise InputError(f"No scheduler answers at {scheduler}: {error}.", "Start one: `dask scheduler`.") from None
-    with client, client.get_executor(pure=False) as pool:
-        yield pool
-
-
-def rows(tasks: Sequence[Task], workers: int, scheduler: str | None) -> Iterator[tuple[int, Row]]:
-    """(index of the task, its row) as they finish, long ones started first."""
-    order = sorted(range(len(tasks)), key=lambda i: -tasks[i].cost)
-    if workers <= 1 and scheduler is None:
-        for index in order:
-            yield index, _measure(tasks[index])
-        return
-    with executor(workers, scheduler) as pool:
-        futures: dict[Future[Row], int] = {pool.submit(_measure, tasks[index]): index for index in order}
-        for future in as_completed(futures):
-            try:
-                yield futures[future], future.result()
-            except BrokenProcessPool:
-                raise HeavyTopError(
-                    f"A worker process died during {tasks[futures[future]].label}.",
-                    "Finished rows are kept: run again with --resume, perhaps with fewer --workers.",
-                ) from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=_PATIENCE)
+        except TimeoutError:
+            raise InputError(
+                f"No worker has joined {scheduler}.", f"Start one: `dask worker {scheduler} --nthreads 1`."
+            ) from None
+        yield client

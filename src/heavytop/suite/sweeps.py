@@ -1,0 +1,167 @@
+"""The tables `[[sweep]]` of a plan: many tops under one name, each made only when its turn comes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from math import prod
+from random import Random as Generator
+from typing import Any, Literal, TypeVar, overload
+
+import msgspec
+import numpy
+
+from heavytop.errors import InputError
+from heavytop.precision import exact
+from heavytop.suite.cases import Case, require_possible
+from heavytop.top.equations import HEAVY_TOP, system
+from heavytop.top.heavy_top import HeavyTop, State, vector
+
+_MOST = 1_000_000
+_T = TypeVar("_T")
+
+
+class Lazy(Sequence[_T]):
+    """``size`` things, each made by ``make`` from its index when it is asked for; none is kept."""
+
+    def __init__(self, size: int, make: Callable[[int], _T]) -> None:
+        self._indices = range(size)
+        self._make = make
+
+    def __len__(self) -> int:
+        return len(self._indices)
+
+    @overload
+    def __getitem__(self, index: int) -> _T: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[_T]: ...
+    def __getitem__(self, index: int | slice) -> _T | list[_T]:
+        picked = self._indices[index]
+        return self._make(picked) if isinstance(picked, int) else [self._make(each) for each in picked]
+
+
+class Strict(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
+    """A table of a plan; unknown keys are errors.  ``cases`` raises InputError for an impossible value."""
+
+    name: str
+
+
+class Grid(Strict, tag="grid"):
+    """Every combination of the values given; numbers as exact text.
+
+    inertia, weight, centre, omega, gamma: one value, or a list of values.  A point is called NAME[i,j,...] by its
+    places in those that are lists, from 0, in this order; the last one changes fastest.
+    """
+
+    inertia: list[str | list[str]]
+    weight: str | list[str]
+    centre: list[str | list[str]]
+    omega: list[str | list[str]]
+    gamma: list[str | list[str]]
+    system: str = "heavy_top"
+
+    def cases(self) -> Sequence[Case]:
+        """The points.  What is wrong with any of them is said now."""
+        which = system(self.system)
+        axes = [self._axis(what) for what in ("inertia", "weight", "centre", "omega", "gamma")]
+        shape = [len(axis) for axis in axes]
+        size = _bounded(self.name, prod(shape))
+        if not any(isinstance(axis, list) for axis in axes):
+            raise InputError(f"The sweep {self.name} varies nothing.", "Give a list of values, or use [[top]].")
+
+        def label(index: int) -> str:
+            place = zip(numpy.unravel_index(index, shape), axes, strict=True)
+            return f"{self.name}[{','.join(str(i) for i, axis in place if isinstance(axis, list))}]"
+
+        def point(index: int) -> Case:
+            place = numpy.unravel_index(index, shape)
+            inertia, weight, centre, omega, gamma = (axis[i] for axis, i in zip(axes, place, strict=True))
+            return Case(label(index), "from a grid", which, HeavyTop(inertia, weight, centre), State(omega, gamma))
+
+        # the gyrostat asks for more than that each value be possible
+        for index in _along_axes(shape) if which is HEAVY_TOP else range(size):
+            try:
+                for warning in require_possible(point(index)).top.warnings():
+                    raise InputError(warning, "Each moment is at most the sum of the other two.")
+            except InputError as error:
+                raise InputError(f"The sweep's {label(index)}: {error.cause}", error.remedy) from None
+        return Lazy(size, point)
+
+    def _axis(self, what: str) -> list[Any] | tuple[Any]:
+        """The values of one of the five: a list where the plan lists them, a tuple of one where it gives one."""
+        given = getattr(self, what)
+        try:
+            if what == "weight":
+                return [exact(value) for value in given] if isinstance(given, list) else (exact(given),)
+            if not given or all(isinstance(part, list) for part in given):
+                return [vector(value, what) for value in given]
+            if all(isinstance(part, str) for part in given):
+                return (vector(given, what),)
+        except InputError as error:
+            raise InputError(f"The sweep {self.name}: {error.cause}", error.remedy) from None
+        raise InputError(
+            f"The sweep {self.name}: {what} mixes numbers and lists.", "Give three numbers, or lists of three."
+        )
+
+
+class Random(Strict, tag="random"):
+    """``count`` heavy tops and starts drawn at random: NAME[0], NAME[1], ..., the same for one seed on every machine.
+
+    Moments of inertia that bodies can have: sums of two second moments, each from 1/2 to 5/2.  Weight from 1/2 to 5/2;
+    centre and omega uniform in the cube from -1 to 1; gamma uniform on the sphere.
+    family: of what kind the tops are.
+    """
+
+    seed: int
+    count: int
+    family: Literal["any", "euler", "lagrange", "kovalevskaya"] = "any"
+
+    def cases(self) -> Sequence[Case]:
+        """The tops; each depends on the seed and its own index alone."""
+        return Lazy(_bounded(self.name, self.count), self._case)
+
+    def _case(self, index: int) -> Case:
+        # of Python's generator, random() alone is promised to stay the same from version to version
+        draw = Generator(f"{self.seed}/{index}").random
+
+        def thousandths() -> int:
+            return 2 * int(1000 * draw()) - 999
+
+        x, y, z, weight = (1500 + thousandths() for _ in range(4))
+        a, b, c = (thousandths() for _ in range(3))
+        omega = [Fraction(thousandths(), 1000) for _ in range(3)]
+        if self.family == "euler":
+            a, b, c = 0, 0, 0
+        elif self.family == "lagrange":
+            y, a, b = x, 0, 0
+        elif self.family == "kovalevskaya":
+            y, z, c = x, 3 * x, 0
+        inertia = [Fraction(i, 1000) for i in (y + z, z + x, x + y)]
+        top = HeavyTop(inertia, Fraction(weight, 1000), [Fraction(i, 1000) for i in (a, b, c)])
+        return Case(f"{self.name}[{index}]", "drawn at random", HEAVY_TOP, top, State(omega, _direction(thousandths)))
+
+
+def _direction(draw: Callable[[], int]) -> list[Fraction]:
+    """A rational unit vector, uniform on the sphere: the last row of the rotation by a uniform quaternion."""
+    while True:
+        p, q, r, s = (draw() for _ in range(4))
+        norm = p * p + q * q + r * r + s * s
+        if norm < 1_000_000:
+            return [
+                Fraction(i, norm) for i in (2 * (q * s - p * r), 2 * (r * s + p * q), p * p + s * s - q * q - r * r)
+            ]
+
+
+Sweep = Grid | Random
+
+
+def _bounded(name: str, size: int) -> int:
+    if not 1 <= size <= _MOST:
+        raise InputError(f"The sweep {name} has {size} tops.", f"Give it 1 to {_MOST}.")
+    return size
+
+
+def _along_axes(shape: Sequence[int]) -> Iterator[int]:
+    """Indices of the points with at most one place that is not the first."""
+    for k, size in enumerate(shape):
+        yield from range(0, size * prod(shape[k + 1 :]), prod(shape[k + 1 :]))

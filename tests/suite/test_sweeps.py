@@ -1,0 +1,158 @@
+"""Sweeps: what they expand to, that nothing is made before its turn, what is refused."""
+
+import tracemalloc
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.exact.catalogue import find
+from heavytop.suite.plan import expand, load
+from heavytop.suite.sweeps import Random
+from heavytop.suite.workers import rows
+from heavytop.top.heavy_top import dot
+
+GRID = """[[sweep]]
+kind = "grid"
+name = "g"
+inertia = [["3", "2", "2"], ["3", "5/2", "3/2"]]
+weight = "3/2"
+centre = ["1/2", "1/3", "1/5"]
+omega = [["1/10", "2/5", "9/10"], ["1", "2", "3"], ["0", "0", "1"]]
+gamma = ["3/5", "0", "4/5"]
+"""
+RANDOM = '[[sweep]]\nkind = "random"\nname = "r"\nseed = 1\ncount = 3\n'
+MEASURE = """[[measure]]
+kind = "drift"
+cases = ["euler", "sweep:g", "sweep:r"]
+runs = [{ precision = "double", horizon = "2", samples = 2 }, { precision = "quad", horizon = "1", samples = 1 }]
+"""
+
+
+def plan_of(tmp_path: Path, text: str):
+    file = tmp_path / "plan.toml"
+    file.write_text(f"name = 'x'\n{text}", "utf-8")
+    return expand(load(str(file))[0])
+
+
+def test_a_grid_is_the_cartesian_product_with_places_for_names(tmp_path: Path) -> None:
+    tasks = plan_of(tmp_path, GRID + RANDOM + MEASURE)
+    grid = [f"g[{i},{j}]" for i in range(2) for j in range(3)]
+    names = ["euler", *grid, "r[0]", "r[1]", "r[2]"]
+    assert [(t.name, t.precision) for t in tasks] == [(n, p) for n in names for p in ("double", "quad")]
+    assert all(task.case.name == task.name for task in tasks)
+    assert len(tasks) == 20
+    place = tasks[2 * 5]
+    assert place.name == "g[1,1]"
+    assert place.case.top.inertia == (3, Fraction(5, 2), Fraction(3, 2))
+    assert place.case.start.omega == (1, 2, 3)
+    assert [task.label for task in tasks[-2:]] == ["drift r[2] double", "drift r[2] quad"]
+    with pytest.raises(IndexError):
+        tasks[20]
+
+
+def test_weights_are_an_axis_too(tmp_path: Path) -> None:
+    grid = GRID.replace('"3/2"\n', '["1", "2", "4"]\n')
+    tasks = plan_of(tmp_path, grid + MEASURE.replace('"euler", ', "").replace(', "sweep:r"', ""))
+    assert tasks[2 * (1 * 9 + 2 * 3 + 1)].name == "g[1,2,1]"
+    assert tasks[2 * (1 * 9 + 2 * 3 + 1)].case.top.weight == 4
+
+
+@pytest.mark.parametrize("family", ["any", "euler", "lagrange", "kovalevskaya"])
+def test_random_tops_are_bodies_of_their_family_with_unit_gamma(family: str) -> None:
+    cases = Random("r", seed=7, count=200, family=family).cases()
+    for case in cases:
+        assert not case.top.warnings()
+        assert dot(case.start.gamma, case.start.gamma) == 1
+        assert all(-1 <= each <= 1 for each in (*case.top.centre, *case.start.omega))
+    first, second, third = cases[0].top.inertia
+    if family == "kovalevskaya":
+        assert first == second == 2 * third
+        assert cases[0].top.centre[2] == 0
+    if family in ("euler", "lagrange"):
+        assert find(cases[0].top, cases[0].start).method.startswith(f"closed form: {family.title()}")
+    # uniform on the sphere: each coordinate has mean 0 and mean square 1/3, within four standard deviations
+    for k in range(3):
+        values = [float(case.start.gamma[k]) for case in cases]
+        assert abs(sum(values) / 200) < 4 * (1 / 3 / 200) ** 0.5
+        assert abs(sum(v * v for v in values) / 200 - 1 / 3) < 4 * (4 / 45 / 200) ** 0.5
+
+
+def test_random_tops_depend_on_seed_and_index_alone() -> None:
+    one, more, other = (Random("r", seed=s, count=n).cases() for s, n in ((1, 3), (1, 10**6), (2, 3)))
+    assert list(one) == more[:3]
+    assert one[0].top != other[0].top
+    assert len({case.start for case in more[:100]}) == 100
+    # the same on every machine: these stand in reports
+    assert one[0].top.inertia == (Fraction(1321, 500), Fraction(923, 250), Fraction(447, 125))
+    assert one[0].start.gamma == (Fraction(31266, 176071), Fraction(167523, 176071), Fraction(-44266, 176071))
+
+
+def test_a_million_rows_are_planned_without_making_them(tmp_path: Path) -> None:
+    plan = RANDOM.replace("count = 3", "count = 1_000_000") + MEASURE.replace('"sweep:g", ', "")
+    tracemalloc.start()
+    try:
+        tasks = plan_of(tmp_path, plan)
+        assert len(tasks) == 2_000_002
+        assert tasks[-1].name == "r[999999]"
+        assert tracemalloc.get_traced_memory()[1] < 2**20
+    finally:
+        tracemalloc.stop()
+
+
+def test_swept_tasks_share_their_times_and_are_measured_under_their_names(tmp_path: Path) -> None:
+    tasks = plan_of(tmp_path, RANDOM + MEASURE.replace('"euler", "sweep:g", ', ""))
+    assert tasks[0].times is tasks[2].times
+    found = dict(rows(tasks[:2], 1, None))
+    assert [found[i].key for i in range(2)] == [
+        ("drift", "r[0]", "heavy_top", "heyoka", precision) for precision in ("double", "quad")
+    ]
+    assert all(row.outcome == "success" for row in found.values())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('["3", "2", "2"]', '["3", "1", "1"]', "g[0,0]: I1 = 3 exceeds the sum"),
+        ('["3", "5/2", "3/2"]', '["3", "5/2", "9"]', "g[1,0]: I3 = 9 exceeds the sum"),
+        ('["3", "5/2", "3/2"]', '["3", "5/2", "-1"]', "g[1,0]: The principal moment I3"),
+        ('["0", "0", "1"]', '["0", "0", "1e200"]', "g[0,2]: omega"),
+        ('gamma = ["3/5", "0", "4/5"]', 'gamma = ["1", "1", "1"]', "g[0,0]: gamma is not a unit vector"),
+        ('["0", "0", "1"]', '["0", "0"]', "The sweep g: omega has 2 numbers"),
+        ('["0", "0", "1"]', '"0"', "omega mixes numbers and lists"),
+        ('weight = "3/2"', 'weight = "x"', "The sweep g: 'x' is not"),
+        ('weight = "3/2"', "weight = []", "The sweep g has 0 tops"),
+        ('weight = "3/2"', f"weight = {['1'] * 200_000}", "The sweep g has 1200000 tops"),
+        ("count = 3", "count = 1_000_001", "The sweep r has 1000001 tops"),
+        ("count = 3", "count = 0", "The sweep r has 0 tops"),
+        ("count = 3", "count = 3\nspare = 1", "unknown field `spare`"),
+        ('name = "r"', 'name = "g"', "another sweep"),
+        ('name = "r"', 'name = "r[0]"', "letters, digits"),
+        ('"euler"', '"sweep:h"', "Unknown case 'sweep:h'"),
+        ('"euler"', '"sweep:g"', "measures drift g[0,0] double twice"),
+        ('kind = "drift"', 'kind = "homoclinic"', "unknown field `runs`"),
+        ('name = "g"', 'name = "g"\nsystem = "gyrostat"', "g[0,0]: The gyrostat needs the centre of mass on axis 2"),
+    ],
+)
+def test_what_is_impossible_is_refused_and_named(tmp_path: Path, old: str, new: str, message: str) -> None:
+    whole = GRID + RANDOM + MEASURE
+    assert old in whole
+    with pytest.raises(InputError) as error:
+        plan_of(tmp_path, whole.replace(old, new, 1))
+    assert message in str(error.value).replace("\n", " ")
+
+
+def test_a_grid_of_one_point_and_a_sweep_where_a_claim_is_needed_are_refused(tmp_path: Path) -> None:
+    one = RANDOM.replace('"random"', '"grid"').replace("seed = 1\ncount = 3\n", "")
+    one += (
+        'inertia = ["3","2","2"]\nweight = "1"\ncentre = ["0","0","1"]\nomega = ["0","0","1"]\ngamma = ["0","0","1"]\n'
+    )
+    with pytest.raises(InputError, match="varies nothing"):
+        plan_of(tmp_path, one + MEASURE)
+    claim = '[[measure]]\nkind = "claim_model"\ncases = ["sweep:r"]\ntimes = ["1"]\n'
+    with pytest.raises(InputError, match=r"Nothing is claimed about the case r\[0\]"):
+        plan_of(tmp_path, RANDOM + claim)
+    taken = '[[top]]\nname = "r[1]"\n' + one.partition('name = "r"\n')[2]
+    with pytest.raises(InputError, match=r"or of a \[\[top\]\]"):
+        plan_of(tmp_path, RANDOM + taken + MEASURE)
