@@ -53,7 +53,11 @@ def alone(problem: Problem, times=TIMES, **options):
 
 
 @pytest.mark.parametrize("times", [TIMES, [-time for time in TIMES]], ids=["forwards", "backwards"])
-@pytest.mark.parametrize("options", [{}, {"high_accuracy": True}, {"tolerance": Fraction(1, 10**9)}], ids=str)
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"high_accuracy": True}, {"compact_mode": True}, {"tolerance": Fraction(1, 10**9)}],
+    ids=lambda options: "".join(options) or "usual",
+)
 def test_together_is_as_alone(times, options) -> None:
     """21 starts: the lanes are refilled, and the last are not all taken."""
     given = problems(21)
@@ -127,6 +131,39 @@ def test_lanes_that_fail_or_rest_spoil_no_other(sign: int) -> None:
     scalar = propagate(*SLEEPING, times, DOUBLE)
     assert [list(state) for state in runs[4].states] == [list(state) for state in scalar.states]
     assert (runs[4].time_reached, runs[4].steps) == (scalar.time_reached, scalar.steps)
+
+
+@pytest.mark.parametrize(
+    ("put", "outcome"),
+    [([0, 0, 3, 0, 0, 1], Outcome.SUCCESS), ([1e200, 1e200, 3, 0, 0, 1], Outcome.NON_FINITE)],
+    ids=["comes to rest", "overflows"],
+)
+def test_what_happens_on_the_way_ends_that_lane_alone(monkeypatch: pytest.MonkeyPatch, put, outcome) -> None:
+    """A lane is put into another state after its first steps, amid a chunk that is then gone over again by halves."""
+    given = problems(10)
+    given[2] = Problem.of(SLEEPING[0], State((0, "1/9", 3), (0, 0, 1)), DOUBLE)
+    usual, several, calls = propagate_ensemble(given, TIMES, threads=1), Lanes._several, []
+
+    def meddling(self: Lanes, count: int) -> bool:
+        good = several(self, count)
+        if not calls:
+            self.mover.state[:, 2] = put
+        calls.append(good)
+        return good
+
+    monkeypatch.setattr(lanes, "_WINDOW", 20)
+    monkeypatch.setattr(Lanes, "_several", meddling)
+    runs = propagate_ensemble(given, TIMES, threads=1)
+    assert False in calls
+    assert runs[2].outcome is outcome
+    assert 0 < runs[2].steps < usual[2].steps
+    if outcome is Outcome.SUCCESS:
+        assert runs[2].time_reached == TIMES[-1]
+        assert list(runs[2].states[-1]) == put
+    else:
+        assert runs[2].times == tuple(TIMES[: len(runs[2].times)]) != tuple(TIMES)
+        assert 0 < runs[2].time_reached < TIMES[-1]
+    assert all(same(one, two) for index, (one, two) in enumerate(zip(runs, usual, strict=True)) if index != 2)
 
 
 @pytest.mark.parametrize("limit", [0, 1, 30, 150, 10**9])

@@ -53,7 +53,7 @@ def propagate_ensemble(
     first = _one_kind(problems)
     exact_times = check_times(times)
     targets = [number(time, first.precision) for time in exact_times]
-    threads = len(os.sched_getaffinity(0)) if threads is None else threads
+    threads = _processors() if threads is None else threads
     if threads < 1 or lanes < 2:
         raise InputError(f"{threads} threads and {lanes} lanes make no ensemble.", "Use 1 thread and 2 lanes or more.")
     moves = targets[-1] != 0 and (step_limit is None or step_limit > 0)
@@ -72,6 +72,11 @@ def propagate_ensemble(
         if not isinstance(thread.exception(), StoppedError):
             thread.result()
     return [work.done[index] for index in range(len(problems))]
+
+
+def _processors() -> int:
+    """How many processors this process may use, where the platform tells; else how many there are."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _in_lanes(work: Work) -> None:

@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import ulp
 from threading import Event, Lock
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -202,8 +201,9 @@ class Lanes:
         self.mover.propagate_until(self.direction * _FAR, max_steps=count)
         self.seconds_per_step = (perf_counter() - began) / count
         outcomes, smallest, *_ = zip(*self.mover.propagate_res, strict=True)
-        last = (self.direction * self.mover.time).max()
-        return _FAILED not in outcomes and last < _FAR and 2 * min(smallest) > ulp(last)
+        ahead = self.direction * self.mover.time
+        moved = (ahead < _FAR) & (2 * numpy.array(smallest) > numpy.spacing(ahead))
+        return _FAILED not in outcomes and bool(moved.all())
 
     def _single(self, before: _Ends) -> dict[int, Outcome]:
         """One step; the lanes that failed in it, with SUCCESS for those at rest."""
