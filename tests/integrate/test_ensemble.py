@@ -5,6 +5,7 @@ import signal
 from collections import defaultdict
 from fractions import Fraction
 from threading import Lock
+from time import sleep
 
 import numpy
 import pytest
@@ -240,6 +241,7 @@ def test_an_observer_is_given_all_samples_in_order_one_at_a_time_and_nothing_is_
 
     def observer(index: int, time: Fraction, state) -> None:
         assert busy.acquire(blocking=False)
+        sleep(1e-3)  # the other threads would come in here
         seen[index].append((time, list(state)))
         busy.release()
 

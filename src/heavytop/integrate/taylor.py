@@ -1,4 +1,4 @@
-"""heyoka's Taylor integrators: the only file that imports heyoka for propagation.
+"""heyoka's Taylor integrators: the only file that builds its engines.
 
 Runs are cut by steps, never by times: a sample is taken from the Taylor polynomial of the step that covers it, so the
 steps and all later bits do not depend on which samples were asked for, nor on how often the run gave way to Ctrl-C.
