@@ -1,7 +1,7 @@
 """Does a run take time in proportion to its horizon, and no more memory for a longer one?
 
 Run on a quiet machine: LARGEST_HORIZON=100000000 python -m pytest benchmarks/bench_horizon.py --benchmark-enable
-Without LARGEST_HORIZON up to 10^6.  To 10^8 one trajectory takes about five minutes, 64 starts about an hour.
+Without LARGEST_HORIZON up to 10^6.  To 10^8 one trajectory takes about five minutes, 64 starts an hour.
 """
 
 import json
@@ -77,10 +77,14 @@ def test_memory_does_not_grow_with_the_horizon(benchmark, count: int) -> None:
 
 
 def test_time_is_in_proportion_to_the_horizon(benchmark) -> None:
-    """Slope of log processor time against log T, one trajectory, from 1e5 up by factors of √10."""
+    """Slope of log processor time against log T, one trajectory, from 1e5 up by factors of √10; best of three runs."""
     horizons = [round(10 ** (k / 2)) for k in range(10, 2 * len(str(LARGEST)) - 1)]
-    found = [measured(horizon, 1) for horizon in horizons[:-1]]
-    found.append(benchmark.pedantic(measured, (horizons[-1], 1), rounds=1))
+
+    def best(horizon: int) -> dict:
+        return min((measured(horizon, 1) for _ in range(3)), key=lambda one: one["seconds"])
+
+    found = [best(horizon) for horizon in horizons[:-1]]
+    found.append(benchmark.pedantic(best, (horizons[-1],), rounds=1))
     for name in ("seconds", "steps"):
         slope = numpy.polyfit(numpy.log(horizons), numpy.log([one[name] for one in found]), 1)[0]
         benchmark.extra_info[f"slope_of_the_{name}"] = f"{slope:.4f} from {horizons[0]:.0e} to {horizons[-1]:.0e}"
