@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy
 
 from heavytop.errors import InputError
-from heavytop.integrate.lanes import Lanes, StoppedError, Work
+from heavytop.integrate.lanes import Lanes, Work
 from heavytop.integrate.taylor import compiled, follow
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.precision import DOUBLE, exact, number
@@ -36,8 +36,8 @@ def propagate_ensemble(
 
     problems: all of one system and format, with an attitude all or none; their tops may differ.
     times: exact numbers of one sign, strictly monotone away from 0 (0 itself may come first).
-    observer: called with (index of the problem, exact time, native state) in place of keeping the states; from one
-    thread or another, but one call at a time, the times of each problem in order.
+    observer: called with (index of the problem, exact time, native state) in place of keeping the states; by the thread
+    that calls this, the times of each problem in order, the problems mixed.
     threads: None for one per processor that this process may use.
     lanes: motions side by side in a batch engine, in double; other formats have none, and give the bits of
     :func:`heavytop.integrate.taylor.propagate`.
@@ -60,17 +60,23 @@ def propagate_ensemble(
     batch = first.precision == DOUBLE and moves
     width = lanes if batch else None
     tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
-    work = Work(tool, targets, [exact(target) for target in targets], step_limit, observer, deque(enumerate(problems)))
+    pending = deque(enumerate(problems))
+    work = Work(tool, targets, [exact(target) for target in targets], step_limit, observer is not None, pending)
     threads = min(threads, -(-len(problems) // (lanes if batch else 1)))
     with ThreadPoolExecutor(threads) as pool:
-        running = [pool.submit(_in_lanes if batch else _one_by_one, work) for _ in range(threads)]
         try:
-            wait(running, return_when=FIRST_EXCEPTION)
+            for _ in range(threads):
+                pool.submit(_in_lanes if batch else _one_by_one, work).add_done_callback(work.inbox.put)
+            while threads:
+                item = work.inbox.get()
+                if isinstance(item, Future):
+                    item.result()
+                    threads -= 1
+                elif observer is not None:
+                    work.room.release()
+                    observer(*item)
         finally:
             work.stop.set()
-    for thread in running:
-        if not isinstance(thread.exception(), StoppedError):
-            thread.result()
     return [work.done[index] for index in range(len(problems))]
 
 
@@ -90,7 +96,7 @@ def _one_by_one(work: Work) -> None:
     with work.tool.lent() as engine:
         while taken := work.take():
             index, problem = taken
-            observer = None if work.observer is None else partial(work.observe, index)
+            observer = partial(work.observe, index) if work.observed else None
             work.done[index] = follow(work.tool, engine, problem, work.targets, work.step_limit, observer, work.check)
 
 

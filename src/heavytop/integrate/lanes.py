@@ -8,10 +8,10 @@ So no bit depends on the samples, on how many steps are taken between two looks,
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from threading import Event, Lock
+from queue import SimpleQueue
+from threading import Event, Semaphore
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -24,6 +24,8 @@ from heavytop.precision import exact
 
 # steps between two looks near a sample; a look costs as much as about ten
 _WINDOW = 64
+# samples that may wait for the observer
+_ROOM = 1000
 _FAR = 2.0**1000
 # parameters and state of an idle lane: a bounded motion in either system
 _UNWATCHED = 1.0, numpy.linspace(0.1, 1.0, 9)
@@ -39,17 +41,19 @@ class Work:
     """What the threads of an ensemble share.
 
     targets: native times in order; times: their exact values.  pending: problems that no thread has taken yet.
+    inbox: samples on their way to the observer, at most as many as there is room for, and threads that ended.
     """
 
     tool: Compiled
     targets: list[Any]
     times: list[Fraction]
     step_limit: int | None
-    observer: Callable[[int, Fraction, Any], None] | None
+    observed: bool
     pending: deque[tuple[int, Problem]]
     done: dict[int, Trajectory] = field(default_factory=dict)
     stop: Event = field(default_factory=Event)
-    observing: Lock = field(default_factory=Lock)
+    inbox: SimpleQueue[Any] = field(default_factory=SimpleQueue)
+    room: Semaphore = field(default_factory=lambda: Semaphore(_ROOM))
 
     def take(self) -> tuple[int, Problem] | None:
         """A problem that no thread has taken yet."""
@@ -59,10 +63,10 @@ class Work:
             return None
 
     def observe(self, index: int, time: Fraction, state: Any) -> None:
-        """Give one sample to the observer, one thread at a time."""
-        assert self.observer is not None
-        with self.observing:
-            self.observer(index, time, state)
+        """Send one sample to the observer; wait for it if it is far behind."""
+        while not self.room.acquire(timeout=CHUNK_SECONDS):
+            self.check()
+        self.inbox.put((index, time, state))
 
     def check(self) -> None:
         """Raise StoppedError if the ensemble was given up."""
@@ -266,13 +270,13 @@ class Lanes:
         self._load(lane)
 
     def _keep(self, run: _Run, state: Any) -> None:
-        """Give the run's next sample to the observer, or keep it."""
+        """Send the run's next sample to the observer, or keep it."""
         time = self.work.times[len(run.times)]
         run.times.append(time)
-        if self.work.observer is None:
-            run.states.append(state)
-        else:
+        if self.work.observed:
             self.work.observe(run.index, time, state)
+        else:
+            run.states.append(state)
 
     def _finish(self, run: _Run, outcome: Outcome, reached: Fraction, steps: int) -> None:
         tool = self.work.tool
