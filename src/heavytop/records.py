@@ -67,6 +67,7 @@ class Row(msgspec.Struct):
 
     measured: what is held (known, claimed or computed); against: what it is held against, with method and radius.
     outcome, time_reached, steps, finite travel with every number.  seconds: timings, not compared.
+    evaluations: of the field, where the integrator counts them.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     """
 
@@ -91,6 +92,7 @@ class Row(msgspec.Struct):
     starts: int = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, float] = {}
+    evaluations: int | None = None
 
     @property
     def key(self) -> tuple[str, ...]:

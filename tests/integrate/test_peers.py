@@ -1,17 +1,27 @@
 """Other integrators behind the same call: they agree with heyoka, from whose code they take nothing."""
 
+import importlib
+import subprocess
+import sys
 from fractions import Fraction
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.integrate.peers import mpmath_odefun, scipy_dop853
+from heavytop.integrate import peers
+from heavytop.integrate.peers.double import Solved, double_peer, rates
+from heavytop.integrate.peers.mpmath_taylor import odefun
 from heavytop.integrate.taylor import propagate
-from heavytop.integrate.trajectory import Outcome
+from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, QUAD, exact, real
 from heavytop.suite.cases import CASES
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
 
-TIMES = [Fraction(1, 3), Fraction(5)]
+TIMES = [Fraction(1, 3), Fraction(2), Fraction(5)]
+FINE = Fraction(1, 10**12)
+PEERS = [name for name in peers.BUILT_IN if name not in ("heyoka", "mpmath:odefun")]
 
 
 def distance(one, other) -> Fraction:
@@ -19,12 +29,104 @@ def distance(one, other) -> Fraction:
     return max(abs(exact(a) - exact(b)) for first, second in pairs for a, b in zip(first, second, strict=True))
 
 
-@pytest.mark.parametrize("name", ["euler", "lagrange", "kovalevskaya", "generic", "gyrostat"])
-def test_dop853_and_heyoka_agree_to_the_tolerance(name: str) -> None:
+def setting_of(name: str) -> tuple[str, Fraction]:
+    if name.startswith("splitting"):
+        return "step", Fraction(1, 1 << {"2": 17, "4": 9, "8": 5}[name[-1]])
+    return "tolerance", Fraction(1, 10**8) if name == "scipy:Radau" else FINE
+
+
+def need(name: str) -> None:
+    """Skip where the peer's package is not there; a broken adapter fails."""
+    module = {"cyrk": "CyRK", "sundials": "sksundae", "diffrax": "diffrax"}.get(name.partition(":")[0])
+    if module:
+        pytest.importorskip(module)
+
+
+@pytest.mark.parametrize(
+    ("name", "case"),
+    [(name, "generic") for name in PEERS] + [(name, "gyrostat") for name in PEERS if not name.startswith("diffrax")],
+)
+def test_every_peer_and_heyoka_agree_to_the_tolerance(name: str, case: str) -> None:
+    need(name)
+    given = CASES[case]
+    ours = propagate(given.top, given.start, TIMES, DOUBLE, system=given.system)
+    many = peers.run(name, given.top, given.start, TIMES, DOUBLE, system=given.system, setting=setting_of(name))
+    alone = peers.run(name, given.top, given.start, TIMES[-1:], DOUBLE, system=given.system, setting=setting_of(name))
+    assert many.outcome is alone.outcome is Outcome.SUCCESS
+    assert many.integrator == name
+    assert distance(many, ours) < (Fraction(1, 10**7) if name == "scipy:Radau" else Fraction(1, 10**9))
+    np.testing.assert_allclose(many.states[-1], alone.states[-1], rtol=0, atol=1e-9)
+    assert alone.steps > 5
+    assert alone.seconds["run"] > 0
+    assert alone.seconds["compile"] >= 0
+
+
+@pytest.mark.parametrize("name", ["scipy:DOP853", "cyrk:DOP853", "sundials:CVODE", "diffrax:Dopri8", "splitting:4"])
+def test_backwards_is_forwards_of_the_reversed_motion(name: str) -> None:
+    need(name)
+    case = CASES["generic"]
+    knob = setting_of(name)
+    back = peers.run(name, case.top, case.start, [-t for t in TIMES], setting=knob)
+    turned = type(case.start)([-w for w in case.start.omega], case.start.gamma)
+    forth = peers.run(name, case.top, turned, TIMES, setting=knob)
+    signs = np.array([-1, -1, -1, 1, 1, 1])
+    for one, other in zip(back.states, forth.states, strict=True):
+        np.testing.assert_allclose(one, signs * other, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda s: s.name)
+def test_the_compiled_field_is_the_field(system) -> None:
+    generator = np.random.default_rng(7)
+    for _ in range(20):
+        numbers, y = generator.uniform(0.5, 2, 7), generator.normal(size=6)
+        exactly = Parameters(
+            *(tuple(map(Fraction, part)) for part in (numbers[:3], numbers[3:6])), Fraction(numbers[6])
+        )
+        expected = [float(v) for v in system.field(exactly, [Fraction(v) for v in y])]
+        np.testing.assert_allclose(rates(system)(0.0, y, numbers), expected, rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize(("order", "step"), [(2, 64), (4, 8), (8, 2)])
+@pytest.mark.parametrize("name", ["lagrange", "gyrostat"])
+def test_half_the_step_of_a_splitting_has_its_order(order: int, step: int, name: str) -> None:
     case = CASES[name]
-    peer = scipy_dop853(case.top, case.start, TIMES, system=case.system)
-    assert peer.outcome is Outcome.SUCCESS
-    assert distance(peer, propagate(case.top, case.start, TIMES, DOUBLE, system=case.system)) < Fraction(1, 10**11)
+    ours = propagate(case.top, case.start, [Fraction(8)], DOUBLE, system=case.system)
+    errors = [
+        distance(
+            peers.run(
+                f"splitting:{order}",
+                case.top,
+                case.start,
+                [Fraction(8)],
+                system=case.system,
+                setting=("step", Fraction(1, step * n)),
+            ),
+            ours,
+        )
+        for n in (1, 2)
+    ]
+    assert 0.8 * 2**order < errors[0] / errors[1] < 1.6 * 2**order
+
+
+def test_a_splitting_keeps_the_casimirs_and_bounds_the_energy() -> None:
+    case = CASES["generic"]
+    times = [Fraction(i) for i in range(1, 301)]
+    problem = Problem.of(case.top, case.start, DOUBLE)
+    inertia, moment = (np.array([float(v) for v in part]) for part in problem.parameters[:2])
+    worst = {}
+    for step in (Fraction(1, 4), Fraction(1, 8)):
+        run = peers.run("splitting:4", case.top, case.start, times, setting=("step", step))
+        y = np.array([[float(v) for v in problem.start.flat], *run.states])
+        omega, gamma = y[:, :3], y[:, 3:]
+        momentum = inertia * omega
+        for casimir in ((gamma**2).sum(axis=1), (momentum * gamma).sum(axis=1)):
+            assert np.abs(casimir - casimir[0]).max() < 2e-13
+        energy = (omega * momentum).sum(axis=1) / 2 + gamma @ moment
+        drift = np.abs(energy - energy[0])
+        first, last = (np.sqrt(np.mean(part**2)) for part in (drift[:100], drift[-100:]))
+        assert 0.5 < last / first < 2, "it does not grow"
+        worst[step] = drift.max()
+    assert 10 < worst[Fraction(1, 4)] / worst[Fraction(1, 8)] < 25
 
 
 @pytest.mark.parametrize("name", ["kovalevskaya", "gyrostat"])
@@ -32,14 +134,132 @@ def test_dop853_and_heyoka_agree_to_the_tolerance(name: str) -> None:
 def test_odefun_and_heyoka_agree_to_the_format(name: str, precision) -> None:
     case = CASES[name]
     times = [Fraction(1, 2), Fraction(2)]
-    peer = mpmath_odefun(case.top, case.start, times, precision, system=case.system)
+    peer = odefun(case.top, case.start, times, precision, system=case.system)
     ours = propagate(case.top, case.start, times, precision, system=case.system)
     assert distance(peer, ours) < 1000 * precision.eps
+    assert peer.evaluations
+
+
+def test_a_run_that_gives_up_says_where(capfd) -> None:
+    pytest.importorskip("sksundae")
+    case = CASES["lagrange"]
+    times = [Fraction(5), Fraction(10), Fraction(20)]
+    finer = ("tolerance", Fraction(1, 10**16))
+    run = peers.run("sundials:CVODE", case.top, case.start, times, setting=finer)
+    assert run.outcome is Outcome.STEP_TOO_SMALL
+    assert run.times == (5,)
+    assert len(run.states) == 1
+    assert 5 < run.time_reached < 10
+    alone = peers.run("sundials:CVODE", case.top, case.start, times[-1:], setting=finer)
+    assert alone.outcome is Outcome.STEP_TOO_SMALL
+    assert not alone.states
+    assert 5 < alone.time_reached < 10
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("states", "outcome", "count"),
+    [
+        ([[0.0] * 6, [float("nan")] * 6, [0.0] * 6], Outcome.NON_FINITE, 1),
+        ([[0.0] * 6, [float("inf")] * 6], Outcome.NON_FINITE, 1),
+        ([[0.0] * 6], Outcome.STEP_LIMIT, 1),
+        ([], Outcome.STEP_LIMIT, 0),
+        ([[0.0] * 6] * 3, Outcome.SUCCESS, 3),
+    ],
+)
+def test_what_a_library_gives_back_is_judged(states, outcome: Outcome, count: int) -> None:
+    fake = double_peer("fake", 1, lambda given: Solved(states, 0.5, 1, outcome=Outcome.STEP_LIMIT))
+    run = fake(CASES["euler"].top, CASES["euler"].start, TIMES, DOUBLE)
+    assert run.outcome is outcome
+    assert len(run.states) == len(run.times) == count
+    assert run.time_reached == (5 if outcome is Outcome.SUCCESS else Fraction(1, 2))
 
 
 def test_what_a_peer_cannot_do_is_refused() -> None:
     case = CASES["euler"]
-    with pytest.raises(InputError, match="no quad"):
-        scipy_dop853(case.top, case.start, TIMES, QUAD)
-    with pytest.raises(InputError, match="forwards only"):
-        mpmath_odefun(case.top, case.start, [Fraction(-1)], QUAD)
+    both = case.top, case.start
+    for call, message in (
+        (lambda: peers.run("scipy:DOP853", *both, TIMES, QUAD), "scipy:DOP853 has no quad"),
+        (lambda: odefun(*both, [Fraction(-1)], QUAD), "forwards only"),
+        (lambda: peers.run("rk4", *both, TIMES, DOUBLE), "Unknown integrator 'rk4'"),
+        (lambda: peers.run("heyoka", *both, TIMES, DOUBLE, setting=("step", FINE)), "heyoka has no step"),
+        (lambda: peers.run("splitting:2", *both, TIMES, DOUBLE, setting=("tolerance", FINE)), "has no tolerance"),
+        (lambda: peers.run("scipy:LSODA", *both, TIMES, DOUBLE, setting=("tolerance", Fraction(0))), "between 0 and 1"),
+        (lambda: peers.run("scipy:LSODA", *both, [2, 1], DOUBLE), "does not come after"),
+    ):
+        with pytest.raises(InputError, match=message):
+            call()
+
+
+ADAPTER = """
+from heavytop.integrate.peers.double import Solved, double_peer
+
+def _solve(given):
+    field = lambda y: given.system.field(given.parameters, y)
+    state, time, steps, states = given.start.copy(), 0.0, 0, []
+    for end in given.times:
+        count = max(1, round(abs(end - time) / given.setting))
+        h = (end - time) / count
+        for _ in range(count):
+            half = state + [h / 2 * k for k in field(state)]
+            state = state + [h * k for k in field(half)]
+        time, steps = end, steps + count
+        states.append(state)
+    return Solved(states, time, steps, 2 * steps)
+
+midpoint = double_peer("mine:midpoint", 2, _solve, "step")
+not_callable = 3
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another package with peers of its own, good and bad."""
+    (tmp_path / "mine.py").write_text(ADAPTER)
+    (tmp_path / "broken.py").write_text("raise RuntimeError('no licence')")
+    info = tmp_path / "mine-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[heavytop.peers]\nmine:midpoint = mine:midpoint\nmine:broken = broken:x\nmine:absent = nowhere:x\n"
+        "mine:three = mine:not_callable\nheyoka = mine:midpoint\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    importlib.invalidate_caches()
+
+
+@pytest.mark.usefixtures("package")
+def test_another_package_adds_peers_and_replaces_none() -> None:
+    case = CASES["generic"]
+    assert peers.available()["mine:midpoint"] is None
+    coarse, fine = (
+        peers.run("mine:midpoint", case.top, case.start, TIMES, setting=("step", Fraction(1, n))) for n in (50, 100)
+    )
+    ours = peers.run("heyoka", case.top, case.start, TIMES, DOUBLE)
+    assert ours.integrator == "heyoka"
+    assert 3.5 < distance(coarse, ours) / distance(fine, ours) < 4.5
+
+
+@pytest.mark.usefixtures("package")
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("mine:broken", "is broken: RuntimeError: no licence"),
+        ("mine:absent", "is not available: No module named 'nowhere'"),
+        ("mine:three", "is not callable"),
+    ],
+)
+def test_a_broken_peer_is_an_error_in_words(name: str, cause: str) -> None:
+    with pytest.raises(InputError, match=cause) as caught:
+        peers.peer(name)
+    assert "repair or remove that package" in caught.value.remedy
+    assert cause in str(peers.available()[name])
+
+
+def test_nothing_is_imported_before_it_is_used() -> None:
+    code = (
+        "import sys, heavytop.integrate.peers as p; p.known();"
+        "print([m for m in ('numba', 'jax', 'scipy', 'CyRK', 'sksundae', 'heyoka') if m in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout == "[]\n"

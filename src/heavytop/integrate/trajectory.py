@@ -90,6 +90,7 @@ class Trajectory:
     time_reached: exact time of the last finite step end, or the last time asked for.
     seconds: ``compile`` and ``run`` apart.
     flags: everything that can change bits, as text.
+    evaluations: of the field, where the engine counts them.
     """
 
     problem: Problem
@@ -102,6 +103,7 @@ class Trajectory:
     order: int
     seconds: dict[str, float] = field(default_factory=dict)
     flags: dict[str, str] = field(default_factory=dict)
+    evaluations: int | None = None
 
     def texts(self) -> list[list[str]]:
         """The states as full-precision decimal strings."""

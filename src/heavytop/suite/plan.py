@@ -17,7 +17,7 @@ from heavytop.suite.task import Task
 from heavytop.top.equations import system
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
-BUILT_IN = ("smoke", "default", "long", "selftest")
+BUILT_IN = ("smoke", "default", "long", "peers", "selftest")
 
 
 class Top(msgspec.Struct, forbid_unknown_fields=True):

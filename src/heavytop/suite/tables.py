@@ -10,6 +10,7 @@ from typing import Literal
 import msgspec
 
 from heavytop.errors import InputError
+from heavytop.integrate import peers
 from heavytop.precision import exact, parse, physical
 from heavytop.suite.cases import Case
 from heavytop.suite.task import Task
@@ -172,6 +173,55 @@ class LocalError(Strict, tag="local_error"):
         ]
 
 
+class Ladder(msgspec.Struct, forbid_unknown_fields=True):
+    """One integrator in one format; ``tolerances``, of which "eps" is the finest it offers, or ``steps`` if fixed."""
+
+    integrator: str
+    precision: str = "double"
+    tolerances: list[str] = []
+    steps: list[str] = []
+
+
+class WorkPrecision(Strict, tag="work_precision"):
+    """Seconds against error: each rung of each ladder over the same horizon; ``samples`` uniform samples."""
+
+    cases: list[str]
+    horizon: str
+    ladders: list[Ladder]
+    samples: int = 100
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row; raises InputError also for an integrator that is not there."""
+        (horizon,) = _positive([self.horizon], "horizon")
+        count = _samples(self.samples)
+        times = tuple(horizon * i / count for i in range(1, count + 1))
+        keep = tuple(times[i - 1] for i in log_spaced(count))
+        for ladder in self.ladders:
+            peers.peer(ladder.integrator)
+            if not ladder.tolerances and not ladder.steps:
+                raise InputError(f"The ladder of {ladder.integrator} is empty.", "Give it tolerances, or steps.")
+            for text in ladder.tolerances + ladder.steps:
+                if text != "eps" and not 0 < exact(text) <= 1:
+                    raise InputError(f"A tolerance or step of {text[:60]!r}.", "Give numbers above 0, up to 1.")
+        return [
+            Task(
+                "work_precision",
+                f"{name}/T={self.horizon}",
+                find(name),
+                parse(ladder.precision).name,
+                form,
+                times,
+                keep,
+            )
+            for name in self.cases
+            for ladder in self.ladders
+            for form in (
+                *(f"{ladder.integrator} tolerance={text}" for text in ladder.tolerances),
+                *(f"{ladder.integrator} step={text}" for text in ladder.steps),
+            )
+        ]
+
+
 def log_spaced(count: int, per_decade: int = 8) -> list[int]:
     """About ``per_decade`` whole numbers a decade from 1 to ``count``, both included."""
     wanted = {count}
@@ -205,4 +255,4 @@ def _signed(times: list[Fraction], direction: str) -> tuple[Fraction, ...]:
     return tuple(-time for time in times) if direction == "backward" else tuple(times)
 
 
-Table = Audit | ClaimModel | ClaimEvaluation | Homoclinic | Drift | LocalError
+Table = Audit | ClaimModel | ClaimEvaluation | Homoclinic | Drift | LocalError | WorkPrecision

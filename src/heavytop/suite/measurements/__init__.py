@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from heavytop.records import Row
-from heavytop.suite.measurements import claimed, computed
+from heavytop.suite.measurements import claimed, computed, work_precision
 from heavytop.suite.task import Task
 
 _MEASURES: dict[str, Callable[[Task], Row]] = {
@@ -15,6 +15,7 @@ _MEASURES: dict[str, Callable[[Task], Row]] = {
     "homoclinic": computed.homoclinic,
     "drift": computed.drift,
     "local_error": computed.local_error,
+    "work_precision": work_precision.work_precision,
 }
 
 

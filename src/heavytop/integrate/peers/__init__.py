@@ -1,0 +1,99 @@
+"""Integrators that a user might pick instead of heyoka, behind the same call; each is imported when it is first used.
+
+A peer is a callable
+
+    peer(top, start, times, precision, *, system, tolerance) -> Trajectory
+
+with the arguments of :func:`heavytop.integrate.taylor.propagate`; ``tolerance`` is exact, relative and absolute, None
+for the best that the peer offers; a peer with fixed steps takes ``step`` in its place.  A run that does not reach the
+last time is a Trajectory whose outcome says so; InputError is for what the peer cannot be asked at all.
+
+Other packages add theirs under the entry point ``heavytop.peers`` (see docs/peers.md).
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from fractions import Fraction
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.integrate.trajectory import Trajectory
+
+GROUP = "heavytop.peers"
+HERE = "heavytop.integrate.peers"
+_REMEDY = "Install the peers with: pip install 'heavytop[peers]'"
+
+Peer = Callable[..., Trajectory]
+
+BUILT_IN = {
+    "heyoka": f"{HERE}.heyoka_taylor:heyoka",
+    "scipy:DOP853": f"{HERE}.scipy_ivp:dop853",
+    "scipy:LSODA": f"{HERE}.scipy_ivp:lsoda",
+    "scipy:Radau": f"{HERE}.scipy_ivp:radau",
+    "cyrk:DOP853": f"{HERE}.cyrk:dop853",
+    "cyrk:Vern8": f"{HERE}.cyrk:vern8",
+    "sundials:CVODE": f"{HERE}.sundials:cvode",
+    "diffrax:Dopri8": f"{HERE}.diffrax_dopri8:dopri8",
+    "mpmath:odefun": f"{HERE}.mpmath_taylor:odefun",
+    "splitting:2": f"{HERE}.splitting:order2",
+    "splitting:4": f"{HERE}.splitting:order4",
+    "splitting:8": f"{HERE}.splitting:order8",
+}
+
+
+def known() -> dict[str, EntryPoint]:
+    """Every peer by name, not yet imported: the built-in ones, then those of other packages, which replace none."""
+    found = {name: EntryPoint(name, place, GROUP) for name, place in BUILT_IN.items()}
+    for entry in entry_points(group=GROUP):
+        found.setdefault(entry.name, entry)
+    return found
+
+
+def peer(name: str) -> Peer:
+    """The peer of that name, imported; raises InputError for an unknown one and for one that cannot be imported."""
+    entry = known().get(name)
+    if entry is None:
+        raise InputError(f"Unknown integrator {name[:60]!r}.", f"Known: {', '.join(known())}.")
+    try:
+        loaded: Any = entry.load()
+    except ImportError as error:
+        raise InputError(f"The integrator {name} is not available: {error}.", _remedy(entry)) from error
+    except Exception as error:  # whatever another package's module does when it is imported
+        raise InputError(
+            f"The integrator {name} is broken: {type(error).__name__}: {error}.", _remedy(entry)
+        ) from error
+    if not callable(loaded):
+        raise InputError(f"The integrator {name} is broken: {entry.value} is not callable.", _remedy(entry))
+    return loaded  # type: ignore[no-any-return]
+
+
+def run(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
+    """``peer(name)(*problem, **options)`` with ``setting``, ("tolerance", 1e-9) or ("step", 1/50).
+
+    Raises InputError for a setting that this peer does not have.
+    """
+    chosen = peer(name)
+    if setting is None:
+        return chosen(*problem, **options)
+    if setting[0] not in inspect.signature(chosen).parameters:
+        raise InputError(f"The integrator {name} has no {setting[0]}.", "Fixed steps take a step, others a tolerance.")
+    return chosen(*problem, **options, **dict([setting]))
+
+
+def available() -> dict[str, str | None]:
+    """For each peer: None if it can be used here, else the reason why not."""
+    found: dict[str, str | None] = {}
+    for name in known():
+        try:
+            peer(name)
+            found[name] = None
+        except InputError as error:
+            found[name] = error.cause
+    return found
+
+
+def _remedy(entry: EntryPoint) -> str:
+    return _REMEDY if entry.name in BUILT_IN else f"It comes from {entry.value}: repair or remove that package."

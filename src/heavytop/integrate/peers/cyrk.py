@@ -1,0 +1,53 @@
+"""CyRK: Runge-Kutta methods in C++ with the field as machine code: DOP853, and Verner's pair of order 8."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy
+from CyRK import cyjit, nbsolve2_ivp
+
+from heavytop.integrate.peers.double import Given, Solve, Solved, double_peer, fill, timed
+from heavytop.top.equations import System
+
+
+@cache
+def _machine_code(system: System) -> Any:
+    return cyjit(fill(system))
+
+
+@cache
+def _warm(system: System, method: str) -> None:
+    """Compiles what a first call would compile."""
+    _call(Given(system, numpy.zeros(6), numpy.ones(1), numpy.ones(7), 1e-3), method).free()
+
+
+def _call(given: Given, method: str) -> Any:
+    return nbsolve2_ivp(
+        _machine_code(given.system).address,
+        (0.0, float(given.times[-1])),
+        given.start,
+        method,
+        given.times,
+        args=given.numbers,
+        rtol=given.setting,
+        atol=given.setting,
+    )
+
+
+def _solver(method: str) -> Solve:
+    def solve(given: Given) -> Solved:
+        _, seconds = timed(_warm, given.system, method)
+        run = _call(given, method)
+        try:
+            states = run.y.T.copy()
+            return Solved(states, run.t[-1] if len(states) else 0.0, run.steps_taken, None, seconds)
+        finally:
+            run.free()
+
+    return solve
+
+
+dop853 = double_peer("cyrk:DOP853", 8, _solver("DOP853"))
+vern8 = double_peer("cyrk:Vern8", 8, _solver("Vern8"))

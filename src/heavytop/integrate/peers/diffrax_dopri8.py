@@ -1,0 +1,59 @@
+"""diffrax's Dopri8 (Prince and Dormand, order 8) compiled by JAX for the processor, in double."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import diffrax
+import jax
+import jax.numpy as jnp
+
+from heavytop.integrate.peers.double import Given, Solved, double_peer, timed
+from heavytop.integrate.trajectory import Outcome
+from heavytop.top.equations import Parameters, System
+
+jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_platforms", "cpu")
+
+_MOST_STEPS = 2**24
+
+
+@cache
+def _compiled(system: System, count: int) -> Callable[..., Any]:
+    """The integration to ``count`` times as machine code."""
+
+    def field(_time: Any, y: Any, n: Any) -> Any:
+        return jnp.stack(system.field(Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), n[6]), y))
+
+    def integrate(start: Any, times: Any, numbers: Any, tolerance: Any) -> Any:
+        return diffrax.diffeqsolve(
+            diffrax.ODETerm(field),
+            diffrax.Dopri8(),
+            0.0,
+            times[-1],
+            None,
+            start,
+            numbers,
+            saveat=diffrax.SaveAt(ts=times),
+            stepsize_controller=diffrax.PIDController(rtol=tolerance, atol=tolerance),
+            max_steps=_MOST_STEPS,
+            throw=False,
+        )
+
+    shapes = [jax.ShapeDtypeStruct(shape, float) for shape in ((6,), (count,), (7,), ())]
+    return jax.jit(integrate).lower(*shapes).compile()
+
+
+def _solve(given: Given) -> Solved:
+    code, seconds = timed(_compiled, given.system, len(given.times))
+    run = code(given.start, given.times, given.numbers, given.setting)
+    states = jax.block_until_ready(run.ys)
+    # diffrax fills what it did not reach with infinities
+    limit = bool(run.result == diffrax.RESULTS.max_steps_reached)
+    outcome = Outcome.STEP_LIMIT if limit else Outcome.STEP_TOO_SMALL
+    return Solved(states, 0.0, int(run.stats["num_steps"]), None, seconds, outcome)
+
+
+dopri8 = double_peer("diffrax:Dopri8", 8, _solve)

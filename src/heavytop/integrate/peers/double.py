@@ -1,0 +1,192 @@
+"""What libraries for doubles need: the problem as arrays, the field as compiled code, the result as a Trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from time import perf_counter
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.precision import DOUBLE, Precision, exact, number
+from heavytop.top import heavy_top
+from heavytop.top.equations import HEAVY_TOP, Parameters, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.times import check_times
+
+FINEST = Fraction(1, 10**15)
+"""The tolerance of a peer where none is asked for: below about 4 eps most refuse."""
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A problem in double.
+
+    start: shape (6,).  times: shape (n,), strictly monotone away from 0.  numbers: shape (7,), the parameters I, n, λ.
+    setting: the tolerance, or the step of a method with fixed steps.
+    """
+
+    system: System
+    start: Any
+    times: Any
+    numbers: Any
+    setting: float
+
+    @property
+    def parameters(self) -> Parameters:
+        """The numbers as ``system.field`` takes them."""
+        n = self.numbers
+        return Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), n[6])
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """What a library gave back.
+
+    states: shape (m, 6), one for each of the first m <= n times.  reached: the last time it stood at.
+    evaluations: of the field.  compile: seconds of the run that went into compiling.
+    outcome: how a run that did not come to the end failed; :func:`double_peer` sees by itself to the rest.
+    """
+
+    states: Any
+    reached: float
+    steps: int
+    evaluations: int | None = None
+    compile: float = 0.0
+    outcome: Outcome = Outcome.STEP_TOO_SMALL
+
+
+Solve = Callable[[Given], Solved]
+
+
+def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") -> Callable[..., Trajectory]:
+    """``solve`` as a peer.  knob: tolerance, or step for a method with fixed steps.
+
+    The peer raises InputError for a format other than double, for times out of order and for a setting out of range.
+    """
+
+    def integrate(
+        top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision, system: System, setting: Fraction
+    ) -> Trajectory:
+        import numpy
+
+        if precision != DOUBLE:
+            raise InputError(f"{name} has no {precision.name}.", "Use double.")
+        if not 0 < setting <= 1:
+            raise InputError(f"{name} cannot use the {knob} {float(setting):.6g}.", "Give one between 0 and 1.")
+        problem = Problem.of(top, start, precision, system)
+        grid = numpy.array([number(time, precision) for time in check_times(times)])
+        p = problem.parameters
+        numbers = numpy.array(problem.native([*p.inertia, *p.moment, p.rotor]), dtype=float)
+        given = Given(system, numpy.array(problem.native(problem.start.flat)), grid, numbers, float(setting))
+        began = perf_counter()
+        solved = solve(given)
+        seconds = perf_counter() - began - solved.compile
+        states = numpy.asarray(solved.states, dtype=float).reshape(-1, 6)[: len(grid)]
+        finite = numpy.isfinite(states).all(axis=1)
+        count = len(states) if finite.all() else int(finite.argmin())
+        reached = grid[-1] if count == len(grid) else solved.reached
+        outcome = solved.outcome if count == len(states) and numpy.isfinite(reached) else Outcome.NON_FINITE
+        return Trajectory(
+            problem,
+            name,
+            tuple(exact(time) for time in grid[:count]),
+            tuple(states[:count]),
+            Outcome.SUCCESS if count == len(grid) else outcome,
+            exact(reached if numpy.isfinite(reached) else grid[count - 1] if count else 0.0),
+            solved.steps,
+            order,
+            {"compile": solved.compile, "run": seconds},
+            {knob: repr(float(setting)), "field": field_kind()},
+            solved.evaluations,
+        )
+
+    if knob == "step":
+
+        def with_step(
+            top: HeavyTop,
+            start: State,
+            times: Sequence[Fraction],
+            precision: Precision = DOUBLE,
+            *,
+            system: System = HEAVY_TOP,
+            step: Fraction = Fraction(1, 100),
+        ) -> Trajectory:
+            return integrate(top, start, times, precision, system, step)
+
+        return with_step
+
+    def with_tolerance(
+        top: HeavyTop,
+        start: State,
+        times: Sequence[Fraction],
+        precision: Precision = DOUBLE,
+        *,
+        system: System = HEAVY_TOP,
+        tolerance: Fraction | None = None,
+    ) -> Trajectory:
+        return integrate(top, start, times, precision, system, FINEST if tolerance is None else tolerance)
+
+    return with_tolerance
+
+
+@cache
+def compiler() -> Callable[[Any], Any]:
+    """numba's ``njit``, taught the vector product of this program; the identity where numba is not installed."""
+    try:
+        import numba
+        from numba.extending import overload
+    except ImportError:
+        return lambda function: function
+    product = heavy_top.cross
+    overload(product, strict=False)(lambda a, b: product)
+    return numba.njit
+
+
+def field_kind() -> str:
+    """How the field is evaluated: the flag of a row."""
+    return "python" if compiler().__module__ == __name__ else "numba"
+
+
+@cache
+def fill(system: System) -> Callable[..., None]:
+    """(rates, t, y, numbers): writes the field at y into ``rates``.
+
+    All but ``t`` are arrays, or pointers in machine code.
+    """
+    field = compiler()(system.field)
+
+    def write(rates: Any, _time: float, y: Any, numbers: Any) -> None:
+        p = Parameters((numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4], numbers[5]), numbers[6])
+        values = field(p, (y[0], y[1], y[2], y[3], y[4], y[5]))
+        for i in range(6):
+            rates[i] = values[i]
+
+    return write
+
+
+@cache
+def rates(system: System) -> Callable[..., Any]:
+    """(t, y, numbers) -> the field at y as a new array; machine code where numba is installed."""
+    import numpy
+
+    write = compiler()(fill(system))
+
+    def rates(time: float, y: Any, numbers: Any) -> Any:
+        result = numpy.empty(6)
+        write(result, time, y, numbers)
+        return result
+
+    compiled = compiler()(rates)
+    compiled(0.0, numpy.zeros(6), numpy.ones(7))
+    return compiled  # type: ignore[no-any-return]
+
+
+def timed(make: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
+    """``make(*arguments)`` and the seconds it took: what compiles something at its first call."""
+    began = perf_counter()
+    made = make(*arguments)
+    return made, perf_counter() - began

@@ -1,0 +1,42 @@
+"""SciPy's ``solve_ivp``: DOP853 (Hairer, Nørsett, Wanner), LSODA (Petzold) and Radau IIA of order 5.
+
+A relative tolerance below 100 eps is raised to that, as SciPy would do with a warning.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+from heavytop.integrate.peers.double import Given, Solve, Solved, double_peer, rates, timed
+
+_FINEST = 100 * 2.0**-52
+
+
+def _solver(method: str) -> Solve:
+    def solve(given: Given) -> Solved:
+        from scipy.integrate import solve_ivp
+
+        field, seconds = timed(rates, given.system)
+        dense = len(given.times) > 1
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what they say is in the outcome
+            run = solve_ivp(
+                field,
+                (0.0, given.times[-1]),
+                given.start,
+                method=method,
+                args=(given.numbers,),
+                rtol=max(given.setting, _FINEST),
+                atol=given.setting,
+                dense_output=dense,
+            )
+        covered = given.times[abs(given.times) <= abs(run.t[-1])]
+        states = run.sol(covered).T if dense else run.y.T[-1:] if run.success else []
+        return Solved(states, run.t[-1], len(run.t) - 1, run.nfev, seconds)
+
+    return solve
+
+
+dop853 = double_peer("scipy:DOP853", 8, _solver("DOP853"))
+lsoda = double_peer("scipy:LSODA", 12, _solver("LSODA"))
+radau = double_peer("scipy:Radau", 5, _solver("Radau"))

@@ -1,0 +1,42 @@
+"""SUNDIALS' CVODE through scikit-sundae: Adams-Moulton of variable order up to 12, for problems that are not stiff."""
+
+from __future__ import annotations
+
+import io
+from contextlib import redirect_stdout
+from functools import cache
+from typing import Any
+
+import numpy
+from sksundae.cvode import CVODE
+
+from heavytop.integrate.peers.double import Given, Solved, compiler, double_peer, fill, timed
+from heavytop.top.equations import System
+
+_MOST_STEPS = 10**8
+
+
+@cache
+def _machine_code(system: System) -> Any:
+    write = compiler()(fill(system))
+    write(numpy.empty(6), 0.0, numpy.zeros(6), numpy.ones(7))
+    return write
+
+
+def _solve(given: Given) -> Solved:
+    write, seconds = timed(_machine_code, given.system)
+
+    def rates(time: float, y: Any, result: Any) -> None:
+        write(result, time, y, given.numbers)
+
+    solver = CVODE(rates, method="Adams", rtol=given.setting, atol=given.setting, max_num_steps=_MOST_STEPS)
+    with redirect_stdout(io.StringIO()):  # CVODE prints why it gives up: the outcome says so
+        run = solver.solve(numpy.concatenate([[0.0], given.times]), given.start)
+    if len(given.times) == 1:
+        # two times are a span: CVODE gives every step in between
+        return Solved(run.y[-1:] if run.success else [], run.t[-1], len(run.t) - 1, run.nfev, seconds)
+    reached = abs(given.times) <= abs(run.t[-1])
+    return Solved(run.y[1:][reached[: len(run.t) - 1]], run.t[-1], 0, run.nfev, seconds)
+
+
+cvode = double_peer("sundials:CVODE", 12, _solve)
