@@ -277,7 +277,7 @@ def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130() -> None:
 def test_help_lists_the_commands_and_loads_nothing_heavy() -> None:
     done = run("--help")
     assert done.returncode == 0
-    for name in ("run", "propagate", "compare", "show", "list"):
+    for name in ("run", "propagate", "compare", "score", "show", "list"):
         assert name in done.stdout
     code = "import sys; sys.argv = ['heavytop', '--help']\nfrom heavytop.__main__ import main\ntry: main()\nexcept SystemExit: pass\nprint([m for m in ('heyoka', 'numpy', 'flint', 'matplotlib', 'sympy', 'distributed') if m in sys.modules], file=sys.stderr)"  # noqa: E501
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -287,7 +287,7 @@ def test_help_lists_the_commands_and_loads_nothing_heavy() -> None:
 def test_list_names_cases_plans_systems_and_formats() -> None:
     done = run("list")
     assert done.returncode == 0
-    for word in ("ershkov-partial-6", "kovalevskaya", "default", "gyrostat", "real:BITS", "113 bits"):
+    for word in ("ershkov-partial-6", "kovalevskaya", "default", "gyrostat", "real:BITS", "113 bits", "scipy:DOP853"):
         assert word in done.stdout
 
 

@@ -1,6 +1,7 @@
 """Other integrators behind the same call: they agree with heyoka, from whose code they take nothing."""
 
 import importlib
+import re
 import subprocess
 import sys
 from fractions import Fraction
@@ -191,31 +192,14 @@ def test_what_a_peer_cannot_do_is_refused() -> None:
             call()
 
 
-ADAPTER = """
-from heavytop.integrate.peers.double import Solved, double_peer
-
-def _solve(given):
-    field = lambda y: given.system.field(given.parameters, y)
-    state, time, steps, states = given.start.copy(), 0.0, 0, []
-    for end in given.times:
-        count = max(1, round(abs(end - time) / given.setting))
-        h = (end - time) / count
-        for _ in range(count):
-            half = state + [h / 2 * k for k in field(state)]
-            state = state + [h * k for k in field(half)]
-        time, steps = end, steps + count
-        states.append(state)
-    return Solved(states, time, steps, 2 * steps)
-
-midpoint = double_peer("mine:midpoint", 2, _solve, "step")
-not_callable = 3
-"""
+DOCS = (Path(__file__).parents[2] / "docs" / "peers.md").read_text("utf-8")
 
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another package with peers of its own, good and bad."""
-    (tmp_path / "mine.py").write_text(ADAPTER)
+    """Another package with the peer of the documentation, and with bad ones."""
+    adapter = re.search(r"```python\n(.*?)```", DOCS, re.S)[1]
+    (tmp_path / "mine.py").write_text(adapter + "\nnot_callable = 3\n")
     (tmp_path / "broken.py").write_text("raise RuntimeError('no licence')")
     info = tmp_path / "mine-1.0.dist-info"
     info.mkdir()

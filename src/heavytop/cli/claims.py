@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from heavytop.cli.app import Json, command, print_json, show_on_terminal
+from heavytop.cli.app import Json, command, print_json, require_new, show_on_terminal
 from heavytop.errors import InputError
 
 
@@ -39,8 +39,7 @@ def figures(out: Annotated[Path, typer.Option(help="Folder for the pictures.")])
     """Draw Figs 2-8 of the paper, and the same with the true motion beside the claim, as SVG and PNG."""
     from heavytop.report.figures import draw_figures
 
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"{out} already holds other content.", "Give a new folder with --out.")
+    require_new(out)
     try:
         files = draw_figures(out)
     except OSError as error:

@@ -28,8 +28,10 @@ _MOST_DENSE = 200_000
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A trajectory at the times asked for, with drift, and on request ξ and continuous Euler angles as text."""
+    """A trajectory from an exact start, with drift, and on request ξ and continuous Euler angles as text."""
 
+    top: HeavyTop
+    start: State
     trajectory: Trajectory
     states: list[list[str]]
     drift: dict[str, Metric]
@@ -54,6 +56,11 @@ class Motion:
             "states": self.states,
             "time_reached": decimal_text(run.time_reached, precision.digits),
             "order": run.order,
+            "inertia": [str(value) for value in self.top.inertia],
+            "weight": str(self.top.weight),
+            "centre": [str(value) for value in self.top.centre],
+            "omega": [str(value) for value in self.start.omega],
+            "gamma": [str(value) for value in self.start.gamma],
             "integrator": run.integrator,
             "flags": run.flags,
             "seconds": run.seconds,
@@ -112,7 +119,7 @@ def compute(
     texts = run.texts()
     angles = [_angles(state, followed, precision) for _, state, followed in watcher.kept] if attitude else None
     attitudes = [line[6:] for line in texts] if attitude else None
-    return Motion(run, [line[:6] for line in texts], watcher.drift.metrics(), attitudes, angles)
+    return Motion(top, start, run, [line[:6] for line in texts], watcher.drift.metrics(), attitudes, angles)
 
 
 def _dense(problem: Problem, times: Sequence[Fraction]) -> list[Fraction]:

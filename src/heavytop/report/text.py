@@ -16,6 +16,7 @@ from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import decimal_text, exact
 from heavytop.records import Report, Row
 from heavytop.report.compare import Comparison, Verdict
+from heavytop.report.work_precision import leads, panels
 
 
 def short(value: str, digits: int = 3) -> str:
@@ -45,10 +46,11 @@ def summary(report: Report) -> RenderableType:
         ("homoclinic", _homoclinic),
         ("break_away_law", _laws),
         ("drift", _drift),
+        ("work_precision", _work_precision),
     ):
         if name in by_measure:
             parts += [Text(), *section(by_measure[name])]
-    failed = [row for row in report.rows if row.outcome != "success"]
+    failed = [row for row in report.rows if row.outcome != "success" and row.measure != "work_precision"]
     if failed:
         parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
         parts += [
@@ -227,6 +229,22 @@ def _drift(rows: Sequence[Row]) -> list[RenderableType]:
         Text("  Both absolute and largest on the way: an invariant that holds is no proof that the motion is right."),
         table,
     ]
+
+
+def _work_precision(rows: Sequence[Row]) -> list[RenderableType]:
+    parts: list[RenderableType] = [_title("Work against precision: seconds that an error takes, whole horizon")]
+    for case, lines in panels(rows).items():
+        cells = []
+        for line in lines:
+            best = line.best
+            found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", f"{best.seconds:.2g} s"]
+            at = (line.seconds_at(log10) for log10 in (-6.0, -10.0, -14.0))
+            found += ["-" if seconds is None else f"{seconds:.2g} s" for seconds in at]
+            cells.append([line.label, *found, str(len(line.failures) or "")])
+        columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "gave up"]
+        parts += [_table(columns, cells), Text()]
+    parts += [Text(f"  {lead.text}", style="bold") for lead in leads(rows)]
+    return parts
 
 
 _STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}

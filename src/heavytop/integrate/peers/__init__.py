@@ -30,6 +30,7 @@ Peer = Callable[..., Trajectory]
 
 BUILT_IN = {
     "heyoka": f"{HERE}.heyoka_taylor:heyoka",
+    "heyoka:lanes": f"{HERE}.heyoka_taylor:lanes",
     "scipy:DOP853": f"{HERE}.scipy_ivp:dop853",
     "scipy:LSODA": f"{HERE}.scipy_ivp:lsoda",
     "scipy:Radau": f"{HERE}.scipy_ivp:radau",

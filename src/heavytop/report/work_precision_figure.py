@@ -1,0 +1,154 @@
+"""Pictures of work against precision, and of the laws by which errors of different methods grow."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+from heavytop.records import Report, Row
+from heavytop.report.work_precision import Line, leads, panels
+
+# Okabe and Ito's colours, one a family; markers and dashes tell its members apart
+_COLOURS = {
+    "heyoka": "#0072B2",
+    "cyrk": "#D55E00",
+    "diffrax": "#E69F00",
+    "scipy": "#009E73",
+    "sundials": "#CC79A7",
+    "splitting": "#000000",
+    "mpmath": "#8A6D00",
+}
+_OTHER = "#777777"
+_MARKERS = "osD^v<>pP*Xh"
+_DASHES = ("-", "--", ":", "-.")
+_CROSS: dict[str, Any] = {"linestyle": "", "marker": "x", "markersize": 9, "markeredgewidth": 2}
+_GROWTH = ("heyoka", "cyrk:DOP853", "splitting:4")
+_GROWTH_LOG10 = -5.0
+
+
+def work_precision_axes(axes: Any, lines: Sequence[Line]) -> None:
+    """Draw seconds against error on ``axes``; a run that gave up is a cross on the right edge, at the time it took."""
+    members: dict[str, int] = {}
+    for line in lines:
+        family = line.integrator.partition(":")[0]
+        member = members.setdefault(family, 0)
+        members[family] += 1
+        points = sorted(line.points, key=lambda point: point.log10)
+        style: dict[str, Any] = {"color": _COLOURS.get(family, _OTHER)}
+        axes.plot(
+            [10**point.log10 for point in points],
+            [point.seconds for point in points],
+            marker=_MARKERS[member % len(_MARKERS)],
+            linestyle=_DASHES[member % len(_DASHES)],
+            linewidth=2.2 if line.integrator == "heyoka" else 1.2,
+            markersize=4,
+            label=line.label,
+            **style,
+        )
+        if line.failures:
+            edge = axes.get_yaxis_transform()
+            count = [1.0] * len(line.failures)
+            axes.plot(
+                count, line.failures, "x", transform=edge, clip_on=False, markersize=9, markeredgewidth=2, **style
+            )
+    axes.set(xscale="log", yscale="log", xlabel="largest error of a component on the way", ylabel="seconds")
+    axes.grid(True, color="#dddddd")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def work_precision_figure(report: Report, metric: str = "error_max") -> Any:
+    """A matplotlib figure: one panel a case, with the lead of heyoka in its title; None without such rows."""
+    cases = panels(report.rows, metric)
+    if not cases:
+        return None
+    lead = {each.case: each for each in leads(report.rows)}
+    rows = -(-len(cases) // 2)
+    figure = _figure(11, 4.4 * rows + 1.2)
+    grid = figure.subplots(rows, 2, squeeze=False).ravel()
+    labels: dict[str, Any] = {}
+    for axes, (case, lines) in zip(grid, cases.items(), strict=False):
+        work_precision_axes(axes, lines)
+        found = lead.get(case)
+        note = (
+            "" if found is None or found.ratio is None else f"\nat 1e-10: {found.ratio:.1f} × as fast as {found.peer}"
+        )
+        axes.set_title(case.replace("/T=", ", up to t = ") + note, fontsize=10)
+        handles, names = axes.get_legend_handles_labels()
+        labels |= dict(zip(names, handles, strict=True))
+    for axes in grid[len(cases) :]:
+        axes.set_visible(False)
+    if any(line.failures for lines in cases.values() for line in lines):
+        labels["× gave up before the end"] = grid[0].plot([], [], color=_OTHER, **_CROSS)[0]
+    figure.legend(labels.values(), labels.keys(), loc="outside lower center", ncols=5, fontsize=8, frameon=False)
+    return figure
+
+
+def growth_figure(report: Report) -> Any:
+    """Energy drift and error over time of three methods at about the same accuracy; None without such rows.
+
+    A splitting bounds the energy and its error grows like t; of the others both grow.
+    """
+    chosen = _alike(report.rows)
+    if len(chosen) < 2:
+        return None
+    figure = _figure(11, 4.2)
+    pair = figure.subplots(1, 2)
+    for axes, series, label in zip(
+        pair, ("drift_energy", "solution_error_along"), ("energy drift", "error along the flow (phase)"), strict=True
+    ):
+        for marker, row in zip(_MARKERS, chosen, strict=False):
+            held = row.series[series]
+            values = [(float(t), float(v)) for t, v in zip(held.times, held.values, strict=True) if _positive(v)]
+            colour = _COLOURS.get(row.integrator.partition(" ")[0].partition(":")[0], _OTHER)
+            axes.plot(*zip(*values, strict=True), marker=marker, markersize=4, color=colour, label=row.integrator)
+        axes.set(xscale="log", yscale="log", xlabel="t", ylabel=label)
+        axes.grid(True, color="#dddddd")
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(fontsize=8, frameon=False)
+    figure.suptitle(chosen[0].case.replace("/T=", ", up to t = "), fontsize=10)
+    return figure
+
+
+def _alike(rows: Sequence[Row]) -> list[Row]:
+    """On the first case that has them, of each method the rung whose error is nearest to 1e-5."""
+    wanted = [row for row in rows if row.measure == "work_precision" and "drift_energy" in row.series]
+    for case in dict.fromkeys(row.case for row in wanted):
+        found: list[Row] = []
+        for name in _GROWTH:
+            rungs = [
+                (abs(log10 - _GROWTH_LOG10), index, row)
+                for index, row in enumerate(wanted)
+                if (row.case, row.integrator.partition(" ")[0], row.precision) == (case, name, "double")
+                and row.outcome == "success"
+                and "error_max" in row.metrics
+                and (log10 := row.metrics["error_max"].log10) is not None
+            ]
+            if rungs:
+                found.append(min(rungs)[2])
+        if len(found) == len(_GROWTH):
+            return found
+    return []
+
+
+def svg(figure: Any) -> str:
+    """The figure as SVG text, the same for the same report."""
+    import matplotlib
+
+    out = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": "heavytop"}):
+        figure.savefig(out, format="svg", metadata={"Date": None, "Creator": "heavytop"})
+    return out.getvalue()
+
+
+def _figure(width: float, height: float) -> Any:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _positive(value: str) -> bool:
+    try:
+        return float(value) > 0
+    except ValueError:
+        return False

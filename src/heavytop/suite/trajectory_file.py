@@ -1,0 +1,232 @@
+"""Trajectories that another program wrote, as JSON or CSV, read exactly and with suspicion."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import math
+import re
+import sys
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.integrate.trajectory import Outcome
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, exact, parse, real, round_to, shown
+from heavytop.top.equations import VARIABLES, System, system
+from heavytop.top.heavy_top import HeavyTop, State, dot, require_physical
+from heavytop.top.times import check_times
+
+_REMEDY = "docs/score.md shows both forms of the file."
+_HEX = re.compile(r"([+-]?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)\.?([0-9a-fA-F]*)(?:[pP]([+-]?[0-9]{1,6}))?")
+_NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
+_COLUMNS = ("t", *VARIABLES)
+_VECTORS = ("inertia", "centre", "omega", "gamma")
+_NAME = 200
+_MOST = 100_000
+_SLACK = 8
+"""γ may be off the unit sphere by so many bits of rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A trajectory as it was given.
+
+    times: exact, as written.  states: six exact numbers each, rounded to the format; None for a state that is not
+    finite.  name, integrator: as the row will call them.  flags: what else the file says.  sha256: of the file.
+    """
+
+    name: str
+    integrator: str
+    top: HeavyTop
+    start: State
+    system: System
+    precision: Precision
+    times: list[Fraction]
+    states: list[tuple[Fraction, ...] | None]
+    outcome: Outcome
+    steps: int
+    flags: dict[str, str]
+    sha256: str
+
+
+def read(path: Path) -> Given:
+    """The trajectory in a ``.json`` or ``.csv`` file, or ``-`` for either on standard input.
+
+    Raises InputError for a file that cannot be read or is neither, for a key or column that is missing, a number that
+    is none, times out of order, states of another shape or count, and data that no heavy top has.
+    """
+    shown_path = str(path)[:_NAME]
+    piped = str(path) == "-"
+    try:
+        content = sys.stdin.buffer.read() if piped else path.read_bytes()
+        text = content.decode("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"The trajectory {shown_path} cannot be read: {error}.", _REMEDY) from None
+    suffix = (".json" if text.lstrip().startswith("{") else ".csv") if piped else path.suffix.lower()
+    if suffix not in (".json", ".csv"):
+        raise InputError(f"{shown_path} is neither .json nor .csv.", _REMEDY)
+    try:
+        document = _json(text) if suffix == ".json" else _csv(text)
+        return _given(document, "given" if piped else path.stem, hashlib.sha256(content).hexdigest())
+    except InputError as error:
+        raise InputError(f"{shown_path}: {error.cause}", error.remedy or _REMEDY) from None
+
+
+def _json(text: str) -> dict[str, Any]:
+    """The document, every number as the text it is written as."""
+    try:
+        document = json.loads(text, parse_float=str, parse_int=str, parse_constant=str)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"This is not JSON: {error}.", _REMEDY) from None
+    if not isinstance(document, dict):
+        raise InputError("The document is not an object.", _REMEDY)
+    return document
+
+
+def _csv(text: str) -> dict[str, Any]:
+    """The comment lines ``# key: value`` and the columns, as the JSON document would hold them."""
+    lines = text.splitlines()
+    document: dict[str, Any] = {}
+    for line in lines:
+        if line.startswith("#"):
+            key, _, value = line[1:].partition(":")
+            key, value = key.strip(), value.strip()
+            document[key] = [part.strip() for part in value.split(",")] if key in _VECTORS else value
+    body = [line for line in lines if line.strip() and not line.startswith("#")]
+    try:
+        rows = list(csv.reader(body))
+    except csv.Error as error:
+        raise InputError(f"This is not CSV: {error}.", _REMEDY) from None
+    if not rows or tuple(name.strip() for name in rows[0]) != _COLUMNS:
+        raise InputError(f"The first line is not {','.join(_COLUMNS)}.", _REMEDY)
+    for index, row in enumerate(rows[1:], 1):
+        if len(row) != len(_COLUMNS):
+            raise InputError(f"Row {index} has {len(row)} columns, not {len(_COLUMNS)}.", _REMEDY)
+    return document | {"times": [row[0] for row in rows[1:]], "states": [row[1:] for row in rows[1:]]}
+
+
+def _given(document: dict[str, Any], stem: str, sha256: str) -> Given:
+    vectors = {key: _list(document, key, 3) for key in _VECTORS}
+    top = HeavyTop(vectors["inertia"], _text(document, "weight"), vectors["centre"])
+    start = State(vectors["omega"], vectors["gamma"])
+    require_physical(top, start)
+    which = system(_text(document, "system", "heavy_top"))
+    which.parameters(top, start)
+    times = check_times([_finite(value, "a time") for value in _list(document, "times")])
+    rows = _list(document, "states")
+    if len(rows) != len(times):
+        raise InputError(f"There are {len(times)} times and {len(rows)} states.", "Give one state for each time.")
+    if len(times) > _MOST:
+        raise InputError(f"{len(times)} states are too many to score.", f"Give at most {_MOST} of them.")
+    texts = [_list({"state": row}, "state", 6) for row in rows]
+    precision = _precision(document, texts)
+    off = abs(dot(start.gamma, start.gamma) - 1)
+    if off > 2**_SLACK * precision.eps:
+        raise InputError(f"gamma is not a unit vector: |gamma|^2 is off 1 by {float(off):.3g}.", "Give it in full.")
+    states = [_state(row, precision) for row in texts]
+    word = _text(document, "outcome", "success")
+    if word not in [outcome.value for outcome in Outcome]:
+        raise InputError(f"Unknown outcome {word[:60]!r}.", f"Use {', '.join(outcome.value for outcome in Outcome)}.")
+    steps = _integer(document.get("steps", "0"), "steps")
+    return Given(
+        _name(_text(document, "name", stem), "name"),
+        _name(_text(document, "integrator", "given"), "integrator"),
+        top,
+        start,
+        which,
+        precision,
+        times,
+        states,
+        Outcome.NON_FINITE if None in states else Outcome(word),
+        steps,
+        {key: _name(_text(document, key), key) for key in ("language", "tolerance", "step") if key in document},
+        sha256,
+    )
+
+
+def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:
+    value = document.get(key)
+    if value is None:
+        raise InputError(f"The key {key} is missing.", _REMEDY)
+    if not isinstance(value, list) or (count is not None and len(value) != count):
+        what = f"has {len(value)} numbers" if isinstance(value, list) else "is not a list"
+        raise InputError(f"{key} {what}.", f"Give {count} numbers." if count else "Give a list.")
+    return value
+
+
+def _text(document: dict[str, Any], key: str, default: str | None = None) -> str:
+    value = document.get(key, default)
+    if value is None:
+        raise InputError(f"The key {key} is missing.", _REMEDY)
+    if not isinstance(value, str):
+        raise InputError(f"{key} is a {type(value).__name__}.", "Give text or a number.")
+    return value
+
+
+def _name(text: str, what: str) -> str:
+    if len(text) > _NAME or not text.isprintable():
+        raise InputError(
+            f"The {what} of {len(text)} characters begins {text[:40]!r}.", f"Use at most {_NAME} printable characters."
+        )
+    return text
+
+
+def _number(value: Any, what: str) -> Fraction | None:
+    """An exact number out of decimal or hexadecimal text; None for NaN and infinities; InputError for anything else."""
+    if not isinstance(value, str):
+        raise InputError(f"{what} is a {type(value).__name__}, not a number.", _REMEDY)
+    text = value.strip()
+    if _NOT_FINITE.fullmatch(text):
+        return None
+    hexadecimal = _HEX.fullmatch(text)
+    if hexadecimal is None:
+        return exact(text)
+    sign, whole, part, power = hexadecimal.groups()
+    magnitude = Fraction(int(whole + part, 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
+    return -magnitude if sign == "-" else magnitude
+
+
+def _finite(value: Any, what: str) -> Fraction:
+    number = _number(value, what)
+    if number is None:
+        raise InputError(f"{what} is {value.strip()}.", "Give a finite number.")
+    return number
+
+
+def _integer(value: Any, what: str) -> int:
+    number = _finite(value, what)
+    if number < 0 or number.denominator != 1:
+        raise InputError(f"{what} = {shown(number)} is not a count.", "Give an integer that is not negative.")
+    return int(number)
+
+
+def _state(row: list[Any], precision: Precision) -> tuple[Fraction, ...] | None:
+    values = [_number(value, "a component of a state") for value in row]
+    return None if None in values else tuple(round_to(value, precision.bits) for value in values if value is not None)
+
+
+def _precision(document: dict[str, Any], rows: list[list[Any]]) -> Precision:
+    """The format that the file names, or the narrowest that holds every state as it is written."""
+    if "precision" in document:
+        return parse(_text(document, "precision"))
+    formats = DOUBLE, EXTENDED, QUAD
+    if "bits" in document:
+        bits = _integer(document["bits"], "bits")
+        return next((form for form in formats if bits == form.bits), None) or real(bits)
+    wanted = max(_bits(str(value)) for row in rows for value in row)
+    return next((form for form in formats if wanted <= form.bits), None) or real(wanted)
+
+
+def _bits(text: str) -> int:
+    """Bits that a number was written from: its own if it is hexadecimal, else as many as its decimal digits name."""
+    value = _number(text, "a component of a state")
+    if _HEX.fullmatch(text.strip()) and value:
+        return (value.numerator // (value.numerator & -value.numerator)).bit_length()
+    digits = len(re.sub(r"[eE].*|[^0-9]", "", text).lstrip("0"))
+    return next((form.bits for form in (DOUBLE, EXTENDED, QUAD) if digits <= form.digits), 0) or int(
+        (digits - 1) / math.log10(2)
+    )

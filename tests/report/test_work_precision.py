@@ -1,0 +1,125 @@
+"""What is read off work against precision, on rows whose answers are known."""
+
+import pytest
+
+from heavytop.records import SCHEMA, Metric, Report, Row, Series
+from heavytop.report.text import summary
+from heavytop.report.work_precision import Line, Point, leads, panels
+from heavytop.report.work_precision_figure import growth_figure, svg, work_precision_figure
+
+
+def row(integrator: str, log10: float | None, seconds: float, *, case="top/T=9", precision="double", outcome="success"):
+    metrics = {"error_max": Metric("1", log10) if log10 is not None else Metric("missing", None)}
+    metrics["error_final"] = Metric("1", None if log10 is None else log10 - 1)
+    series = Series(["1", "2"], ["1e-9", "unresolved"])
+    return Row(
+        case, "heavy_top", integrator, precision, 53, outcome, "9", "9", 5, True, metrics, "work_precision",
+        seconds={"run": 99.0, "least": seconds}, series={"drift_energy": series, "solution_error_along": series},
+    )  # fmt: skip
+
+
+OURS = [row("heyoka tolerance=1e-8", -8, 1.0), row("heyoka tolerance=1e-12", -12, 4.0)]
+CYRK = [row("cyrk:DOP853 tolerance=1e-8", -9, 3.0), row("cyrk:DOP853 tolerance=1e-12", -11, 27.0)]
+SPLITTING = [row("splitting:4 step=1/4", -5, 0.5)]
+FAILED = [row("sundials:CVODE tolerance=1e-16", None, 0.1, outcome="step_too_small")]
+LANES = [row("heyoka:lanes tolerance=eps", -13, 0.001)]
+ALL = OURS + CYRK + SPLITTING + FAILED + LANES
+
+
+def test_between_rungs_a_straight_line_on_logarithmic_axes() -> None:
+    line = Line("x", "double", [Point(-8, 1.0, ""), Point(-12, 100.0, "")])
+    assert line.seconds_at(-10) == pytest.approx(10)
+    assert line.seconds_at(-6) == 1
+    assert line.seconds_at(-12) == pytest.approx(100)
+    assert line.seconds_at(-13) is None
+
+
+def test_a_line_that_turns_back_takes_the_least_time() -> None:
+    line = Line("x", "double", [Point(-8, 1.0, ""), Point(-12, 4.0, ""), Point(-9, 50.0, "")])
+    assert line.seconds_at(-10) == pytest.approx(2)
+    assert line.best == Point(-12, 4.0, "")
+
+
+def test_the_lead_is_over_the_best_peer_that_gets_there() -> None:
+    (lead,) = leads(ALL)
+    assert (lead.case, lead.peer) == ("top/T=9", "cyrk:DOP853")
+    assert lead.ours == pytest.approx(2)
+    assert lead.ratio == pytest.approx(4.5)
+    expected = "is 4.5 times faster than the best peer that gets there, cyrk:DOP853 (2 s against 9 s)"
+    assert expected in lead.text
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        (OURS + SPLITTING, "takes 2 s; no peer gets there"),
+        (OURS + FAILED, "no peer gets there"),
+        (OURS[:1] + CYRK, "not reached"),
+        ([*OURS, row("fast:x tolerance=1", -11, 0.5)], "4.0 times slower than the best peer that gets there, fast:x"),
+    ],
+)
+def test_a_lead_that_is_none_is_not_claimed(rows: list, words: str) -> None:
+    (lead,) = leads(rows)
+    assert words in lead.text
+
+
+def test_cases_formats_and_failures_are_kept_apart() -> None:
+    other = [
+        row("heyoka tolerance=eps", -30, 9.0, precision="quad"),
+        row("heyoka tolerance=1e-3", -3, 9.0, case="b/T=1"),
+    ]
+    found = panels(ALL + other)
+    assert {case: [line.label for line in lines] for case, lines in found.items()} == {
+        "top/T=9": ["heyoka double", "cyrk:DOP853", "splitting:4", "sundials:CVODE", "heyoka:lanes", "heyoka quad"],
+        "b/T=1": ["heyoka double"],
+    }
+    failed = found["top/T=9"][3]
+    assert (failed.points, failed.failures) == ([], [0.1])
+    assert panels(ALL, "error_final")["top/T=9"][0].points[0].log10 == -9
+    assert not panels([row("heyoka tolerance=1e-3", -3, 9.0)], "return_error")["top/T=9"][0].points
+
+
+def test_the_summary_says_it() -> None:
+    from rich.console import Console
+
+    console = Console(width=160)
+    with console.capture() as capture:
+        console.print(summary(Report(SCHEMA, {"name": "peers"}, {}, ALL)))
+    text = capture.get()
+    assert "4.5 times faster than the best peer that gets there, cyrk:DOP853" in text
+    assert "did not reach their horizon" not in text
+    (line,) = [line for line in text.splitlines() if "sundials:CVODE" in line]
+    assert line.split() == ["sundials:CVODE", "-", "-", "-", "-", "-", "1"]
+
+
+def test_the_picture_shows_every_line_and_each_failure_as_a_cross_on_the_edge() -> None:
+    report = Report(SCHEMA, {"name": "peers"}, {}, ALL)
+    figure = work_precision_figure(report)
+    axes = figure.axes[0]
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert axes.get_xlabel()
+    assert "seconds" in axes.get_ylabel()
+    drawn = {line.get_label(): line for line in axes.get_lines()}
+    assert list(drawn["heyoka double"].get_ydata()) == [4.0, 1.0]
+    assert list(drawn["sundials:CVODE"].get_xdata()) == []
+    (cross,) = [line for line in axes.get_lines() if line.get_marker() == "x" and len(line.get_xdata())]
+    assert (list(cross.get_xdata()), list(cross.get_ydata())) == ([1.0], [0.1])
+    looks = [(line.get_color(), line.get_marker(), line.get_linestyle()) for line in drawn.values()]
+    assert len(set(looks)) == len(looks)
+    assert "4.5 × as fast as cyrk:DOP853" in axes.get_title()
+    assert svg(figure) == svg(work_precision_figure(report))
+    assert svg(growth_figure(report)).count("<svg") == 1
+
+
+def test_without_such_rows_there_is_no_picture() -> None:
+    empty = Report(SCHEMA, {"name": "x"}, {}, [])
+    assert work_precision_figure(empty) is None
+    assert growth_figure(empty) is None
+    assert leads([]) == []
+
+
+def test_a_hostile_name_is_text() -> None:
+    rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{')]
+    drawn = svg(work_precision_figure(Report(SCHEMA, {"name": "x"}, {}, rows)))
+    assert "<script" not in drawn
+    assert "<b>" not in drawn

@@ -1,0 +1,231 @@
+"""Motions computed elsewhere: scored like our own, read with suspicion."""
+
+import json
+import re
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.integrate.taylor import propagate
+from heavytop.measure.motion import compute
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, real
+from heavytop.suite.cases import CASES
+from heavytop.suite.score import digits_kept, score
+from heavytop.suite.trajectory_file import read
+from heavytop.top.equations import HEAVY_TOP
+
+DOCS = Path(__file__).parents[2] / "docs"
+LAGRANGE = CASES["lagrange"]
+TIMES = [Fraction(1, 3), Fraction(2), Fraction(7)]
+HEADER = "t,omega1,omega2,omega3,gamma1,gamma2,gamma3"
+
+
+def document(precision=DOUBLE, case=LAGRANGE, times=TIMES) -> dict:
+    return json.loads(json.dumps(compute(case.top, case.start, times, precision, case.system).to_json()))
+
+
+def written(tmp_path: Path, given: dict, name: str = "motion.json") -> Path:
+    file = tmp_path / name
+    file.write_text(json.dumps(given), "utf-8")
+    return file
+
+
+def as_csv(given: dict, number=str) -> str:
+    keys = ("precision", "system", "integrator", "weight", "steps")
+    lines = [f"# {key}: {given[key]}" for key in keys if key in given]
+    lines += [f"# {key}: {', '.join(given[key])}" for key in ("inertia", "centre", "omega", "gamma")]
+    rows = zip(given["times"], given["states"], strict=True)
+    return "\n".join([*lines, HEADER, *(",".join([t, *map(number, state)]) for t, state in rows)]) + "\n"
+
+
+def command(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-m", "heavytop", *arguments]
+    return subprocess.run(line, capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(160)], ids=lambda p: p.name)
+def test_our_own_motion_scores_as_it_scored_itself(precision, tmp_path: Path) -> None:
+    given = document(precision)
+    row = score(read(written(tmp_path, given)))
+    ours = {name: metric["value"] for name, metric in given["metrics"].items()}
+    assert ours == {name: m.value for name, m in row.metrics.items() if name.startswith("drift_")}
+    assert (row.outcome, row.precision, row.steps) == ("success", precision.name, given["steps"])
+    error = exact(row.metrics["solution_error_omega_max"].value)
+    assert precision.eps / 100 < error < 100 * precision.eps
+    assert "Lagrange" in row.against
+    assert digits_kept(row) > 0.9 * precision.bits * 0.301 - 1
+
+
+def test_a_known_mistake_is_measured(tmp_path: Path) -> None:
+    given = document(QUAD)
+    off = exact(given["states"][1][3]) + Fraction(1, 10**9)
+    given["states"][1][3] = str(float(off))
+    row = score(read(written(tmp_path, given)))
+    np.testing.assert_allclose(float(row.metrics["solution_error_gamma_max"].value), 1e-9, rtol=1e-5)
+    assert float(row.metrics["solution_error_gamma_final"].value) < 1e-30
+    assert digits_kept(row) == 9
+
+
+@pytest.mark.parametrize("number", [str, lambda text: float(text).hex(), lambda text: repr(float(text))])
+def test_csv_and_json_decimal_and_hexadecimal_say_the_same(number, tmp_path: Path) -> None:
+    given = document()
+    (tmp_path / "motion.csv").write_text(as_csv(given, number), "utf-8")
+    one, two = score(read(tmp_path / "motion.csv")), score(read(written(tmp_path, given)))
+    assert one == two
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(237)], ids=lambda p: p.name)
+def test_the_format_is_inferred_from_what_is_written(precision, tmp_path: Path) -> None:
+    given = document(precision)
+    del given["precision"], given["bits"]
+    inferred = read(written(tmp_path, given)).precision
+    assert inferred.digits == precision.digits
+    assert inferred.bits == precision.bits or precision.family == "real"
+    assert read(written(tmp_path, given | {"bits": precision.bits})).precision.bits == precision.bits
+
+
+def test_hexadecimal_floats_are_exact(tmp_path: Path) -> None:
+    states = [["0x1.8p+1", "-0X.8", "0xA.8P-2", "0x0p+0", "0x1p-1074", "0x1.fffffffffffffp+0"]]
+    given = document(times=[Fraction(1)]) | {"states": states}
+    values = read(written(tmp_path, given)).states[0]
+    expected = [float.fromhex(text) for text in states[0]]
+    assert values == tuple(map(Fraction, expected))
+
+
+@pytest.mark.parametrize("word", ["nan", "NaN", "inf", "-Infinity"])
+def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
+    given = document()
+    given["states"][1][4] = word
+    row = score(read(written(tmp_path, given)))
+    first = score(read(written(tmp_path, given | {"times": given["times"][:1], "states": given["states"][:1]})))
+    assert (row.outcome, row.finite) == ("non_finite", False)
+    assert (row.time_reached, row.horizon) == (first.horizon, "7")
+    assert row.metrics["solution_error_omega_max"] == first.metrics["solution_error_omega_max"]
+    given["states"][0][0] = word
+    none = score(read(written(tmp_path, given)))
+    assert none.time_reached == "0"
+    assert {metric.value for metric in none.metrics.values()} == {"missing"}
+    assert digits_kept(none) is None
+
+
+def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
+    given = document(case=CASES["generic"], times=[Fraction(200)])
+    row = score(read(written(tmp_path, given)))
+    assert "no reference" in row.against
+    assert "drift_energy_max" in row.metrics
+    assert digits_kept(row) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"times": None}, "The key times is missing"),
+        ({"gamma": None}, "The key gamma is missing"),
+        ({"weight": None}, "The key weight is missing"),
+        ({"times": []}, "No times were given"),
+        ({"times": ["1", "2"]}, "2 times and 3 states"),
+        ({"times": ["2", "1", "3"]}, "does not come after"),
+        ({"times": ["1", "-2", "3"]}, "different signs"),
+        ({"times": ["1", "nan", "3"]}, "a time is nan"),
+        ({"times": "1,2,3"}, "times is not a list"),
+        ({"states": [["1"] * 5] * 3}, "state has 5 numbers"),
+        ({"states": [["1"] * 6, "x", ["1"] * 6]}, "state is not a list"),
+        ({"states": [["1", "2", "three", "4", "5", "6"]] * 3}, "'three' is not a finite number"),
+        ({"states": [[None] * 6] * 3}, "a component of a state is a NoneType"),
+        ({"states": [[True] * 6] * 3}, "a component of a state is a bool"),
+        ({"states": [["0x"] * 6] * 3}, "'0x' is not a finite number"),
+        ({"inertia": ["1", "2"]}, "inertia has 2 numbers"),
+        ({"inertia": ["1", "2", "-3"]}, "not positive"),
+        ({"inertia": ["1", "2", "nan"]}, "not a finite number"),
+        ({"omega": [["1"], "2", "3"]}, "A list is not a number"),
+        ({"gamma": ["1", "1", "1"]}, "not a unit vector"),
+        ({"system": "pendulum"}, "Unknown system"),
+        ({"system": "gyrostat"}, "gyrostat needs"),
+        ({"precision": "single"}, "Unknown precision"),
+        ({"precision": 53}, "Unknown precision"),
+        ({"precision": None, "bits": "1.5"}, "is not a count"),
+        ({"precision": None, "bits": 10**6}, "not a format"),
+        ({"outcome": "fine"}, "Unknown outcome"),
+        ({"steps": -1}, "not a count"),
+        ({"name": "x" * 10_000}, "The name of 10000 characters"),
+        ({"integrator": "a\x1b[31m"}, "The integrator of 6 characters"),
+        ({"name": {}}, "name is a dict"),
+    ],
+)
+def test_a_file_that_cannot_be_scored_is_refused_in_words(change: dict, message: str, tmp_path: Path) -> None:
+    given = {key: value for key, value in (document() | change).items() if value is not None}
+    with pytest.raises(InputError, match=re.escape(message)) as caught:
+        read(written(tmp_path, given))
+    assert caught.value.remedy
+    assert len(caught.value.cause) < 1000
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.json", "{", "This is not JSON"),
+        ("a.json", "[1]", "not an object"),
+        ("a.json", "[" * 100_000, "This is not JSON"),
+        ("a.json", '{"a": "\xff"}'.encode("latin-1"), "cannot be read"),
+        ("a.csv", "", "The first line is not t,omega1"),
+        ("a.csv", "t,omega1\n1,2\n", "The first line is not t,omega1"),
+        ("a.csv", f"{HEADER}\n1,2,3\n", "Row 1 has 3 columns, not 7"),
+        ("a.csv", f"{HEADER}\n1,2,3,4,5,6,7\n", "The key inertia is missing"),
+        ("a.txt", "", "neither .json nor .csv"),
+        ("x" * 100 + ".json", None, "cannot be read"),
+    ],
+)
+def test_a_file_that_is_none_is_refused_in_words(name: str, content, message: str, tmp_path: Path) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(InputError, match=message):
+        read(tmp_path / name)
+
+
+def test_the_command_scores_writes_a_report_and_pipes(tmp_path: Path) -> None:
+    options = ["--inertia", "5/2,5/2,3/2", "--weight", "2", "--centre", "0,0,3/4", "--omega", "1/5,-1/3,7/4"]
+    options += ["--gamma", "2/7,3/7,6/7", "--times", "1,5", "--json"]
+    made = command("propagate", *options)
+    piped = command("score", "-", "--json", input=made.stdout)
+    assert piped.returncode == 0, piped.stderr
+    assert json.loads(piped.stdout)["digits_kept"] > 14
+    file = tmp_path / "motion.json"
+    file.write_text(made.stdout)
+    done = command("score", str(file), "--out", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stderr
+    assert "Digits kept: 1" in done.stdout
+    same = command("compare", str(tmp_path / "out"), str(tmp_path / "out"))
+    assert same.returncode == 0
+    spoilt = json.loads(made.stdout)
+    spoilt["states"][1][0] = str(exact(spoilt["states"][1][0]) * (1 + Fraction(1, 10**9)) * 10**20 // 1) + "e-20"
+    file.write_text(json.dumps(spoilt))
+    assert command("score", str(file), "--out", str(tmp_path / "worse")).returncode == 0
+    assert command("compare", str(tmp_path / "out"), str(tmp_path / "worse")).returncode == 1
+    again = command("score", str(file), "--out", str(tmp_path / "worse"))
+    assert again.returncode == 2
+    assert "already holds" in again.stderr
+    file.write_text(made.stdout.replace('"0.', '"nan0.', 1))
+    assert command("score", str(file)).returncode == 2
+    spoilt["states"][1][0] = "nan"
+    file.write_text(json.dumps(spoilt))
+    lost = command("score", str(file))
+    assert (lost.returncode, "non_finite" in lost.stdout) == (3, True)
+
+
+@pytest.mark.parametrize("kind", ["json", "csv"])
+def test_the_examples_of_the_documentation_can_be_scored(kind: str, tmp_path: Path) -> None:
+    text = (DOCS / "score.md").read_text("utf-8")
+    (tmp_path / f"motion.{kind}").write_text(re.search(rf"```{kind}\n(.*?)```", text, re.S)[1], "utf-8")
+    given = read(tmp_path / f"motion.{kind}")
+    assert (given.name, given.integrator, given.flags) == ("lagrange", "rk4.f90", {"step": "0.001"})
+    row = score(given)
+    assert row.outcome == "success"
+    assert 0 < digits_kept(row) < 3
+    truth = propagate(given.top, given.start, given.times, DOUBLE, system=HEAVY_TOP)
+    off = max(abs(exact(a) - b) for a, b in zip(truth.states[-1][:3], given.states[-1][:3], strict=True))
+    np.testing.assert_allclose(float(off), float(row.metrics["solution_error_omega_final"].value), rtol=1e-6)
