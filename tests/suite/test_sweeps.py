@@ -52,6 +52,13 @@ def test_a_grid_is_the_cartesian_product_with_places_for_names(tmp_path: Path) -
         tasks[20]
 
 
+def test_names_that_say_more_than_the_case_keep_what_they_say(tmp_path: Path) -> None:
+    work = 'kind = "work_precision"\nhorizon = "5"\nladders = [{ integrator = "heyoka", tolerances = ["1e-6"] }]\n'
+    tasks = plan_of(tmp_path, RANDOM + '[[measure]]\ncases = ["sweep:r", "euler"]\n' + work)
+    assert [task.name for task in tasks] == ["r[0]/T=5", "r[1]/T=5", "r[2]/T=5", "euler/T=5"]
+    assert [task.case.name for task in tasks] == ["r[0]", "r[1]", "r[2]", "euler"]
+
+
 def test_weights_are_an_axis_too(tmp_path: Path) -> None:
     grid = GRID.replace('"3/2"\n', '["1", "2", "4"]\n')
     tasks = plan_of(tmp_path, grid + MEASURE.replace('"euler", ', "").replace(', "sweep:r"', ""))
