@@ -27,6 +27,7 @@ _AHEAD = 4
 _PATIENCE = 30
 """Seconds without any worker after which a cluster is given up."""
 _RESUME = "Finished rows are kept: run again with --resume"
+_SAME = "Install the same versions on every machine."
 _PACKAGES = ("heavytop", "heyoka", "numpy", "mpmath", "gmpy2", "python-flint", "msgspec")
 
 Versions = dict[str, str]
@@ -118,11 +119,17 @@ def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Ite
                     raise HeavyTopError(
                         f"{error.allowed_failures + 1} workers died during {tasks[index].label}.", f"{_RESUME}."
                     ) from None
+                except RuntimeError as error:
+                    if "deserialization" in str(error):
+                        raise InputError(f"The scheduler {scheduler} has no such heavytop.", _SAME) from None
+                    raise
                 yield index, row
-        except (CancelledError, OSError) as error:
-            raise HeavyTopError(f"The scheduler {scheduler} was lost: {error}.", f"{_RESUME}.") from None
-        finally:
+            pool.shutdown()
+        except (CancelledError, OSError):
+            raise HeavyTopError(f"The scheduler {scheduler} was lost.", f"{_RESUME}.") from None
+        except BaseException:
             pool.shutdown(wait=False)
+            raise
 
 
 def _windowed(
@@ -136,7 +143,9 @@ def _windowed(
             under_way[future] = queue.popleft()
         finished = wait(under_way, timeout=_PATIENCE, return_when=FIRST_COMPLETED).done
         if not finished and limit == 0:
-            raise HeavyTopError("The cluster has lost all its workers.", f"Start some.  {_RESUME}.")
+            raise HeavyTopError(
+                "The cluster has lost all its workers.", f"Start some where heavytop is installed.  {_RESUME}."
+            )
         for future in finished:
             yield under_way[future], future
             del under_way[future]
@@ -153,7 +162,7 @@ def _measure_as(expected: Versions, task: Task) -> Row:
     here = versions()
     other = [f"{name} {here[name]} instead of {expected[name]}" for name in expected if here[name] != expected[name]]
     if other:
-        raise InputError(f"A worker has {', '.join(other)}.", "Install the same versions on every machine.")
+        raise InputError(f"A worker has {', '.join(other)}.", _SAME)
     return _measure(task)
 
 
@@ -189,6 +198,10 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 @contextmanager
 def _client(scheduler: str) -> Iterator[Any]:
     try:
+        import dask
+
+        # what goes wrong is said once, by the errors raised here
+        dask.config.set({"logging": {"distributed": "critical", "distributed.client": "critical"}})
         from distributed import Client
     except ImportError:
         raise InputError("--scheduler needs Dask.", "Install it with: pip install 'heavytop[cluster]'") from None
