@@ -48,7 +48,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("tiny")
     (folder / "tiny.toml").write_text(TINY)
     for name in ("one", "two"):
-        done = run("run", "--plan", "tiny.toml", "--out", name, "--workers", "1" if name == "one" else "2", cwd=folder)
+        options = ["--workers", "1"] if name == "one" else ["--workers", "2", "--parquet"]
+        done = run("run", "--plan", "tiny.toml", "--out", name, *options, cwd=folder)
         assert done.returncode == 0, done.stderr
         assert f"{name}/report.json" in done.stdout
         assert "Traceback" not in done.stderr
@@ -185,6 +186,26 @@ def test_a_missing_row_is_incomparable_with_exit_3(finished: Path) -> None:
     (finished / "less.json").write_text(json.dumps(report))
     assert run("compare", "one", "less.json", cwd=finished).returncode == 3
     assert run("compare", "less.json", "one", cwd=finished).returncode == 0
+
+
+def test_rows_as_parquet_come_with_the_run_or_from_its_report(finished: Path, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    done = run("show", str(finished / "one"), "--parquet", "one.parquet", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "one.parquet").read_bytes() == (finished / "two" / "rows.parquet").read_bytes()
+    assert not (finished / "one" / "rows.parquet").exists()
+    refused = run("show", str(finished / "one"), "--parquet", "report.json", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "ends in .parquet" in refused.stderr
+
+
+def test_parquet_without_pyarrow_is_refused_before_anything_runs(tmp_path: Path) -> None:
+    script = "import sys; sys.modules['pyarrow'] = None; from heavytop.__main__ import main; sys.exit(main())"
+    command = [sys.executable, "-c", script, "run", "--plan", "smoke", "--out", "out", "--parquet"]
+    refused = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False)
+    assert refused.returncode == 2
+    assert "pip install 'heavytop[parquet]'" in refused.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_compare_and_show_refuse_what_is_no_report(finished: Path) -> None:

@@ -1,8 +1,10 @@
 """Sweeps: what they expand to, that nothing is made before its turn, what is refused."""
 
+import re
 import tracemalloc
 from fractions import Fraction
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -10,6 +12,7 @@ from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
 from heavytop.suite.plan import expand, load
 from heavytop.suite.sweeps import Random
+from heavytop.suite.tables import Table
 from heavytop.suite.workers import rows
 from heavytop.top.heavy_top import dot
 
@@ -50,6 +53,24 @@ def test_a_grid_is_the_cartesian_product_with_places_for_names(tmp_path: Path) -
     assert [task.label for task in tasks[-2:]] == ["drift r[2] double", "drift r[2] quad"]
     with pytest.raises(IndexError):
         tasks[20]
+
+
+def test_names_that_say_more_than_the_case_keep_what_they_say(tmp_path: Path) -> None:
+    work = 'kind = "work_precision"\nhorizon = "5"\nladders = [{ integrator = "heyoka", tolerances = ["1e-6"] }]\n'
+    tasks = plan_of(tmp_path, RANDOM + '[[measure]]\ncases = ["sweep:r", "euler"]\n' + work)
+    assert [task.name for task in tasks] == ["r[0]/T=5", "r[1]/T=5", "r[2]/T=5", "euler/T=5"]
+    assert [task.case.name for task in tasks] == ["r[0]", "r[1]", "r[2]", "euler"]
+
+
+def test_the_plan_in_the_documentation_is_one_and_every_kind_is_there(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "plans.md").read_text("utf-8")
+    (example,) = re.findall(r"```toml\n(.*?)```", text, re.S)
+    (tmp_path / "plan.toml").write_text(example, "utf-8")
+    tasks = expand(load(str(tmp_path / "plan.toml"))[0])
+    assert len(tasks) == 2 * (1 + 1 + 6 + 100)
+    assert {"mine", "faster[1,2]", "many[99]"} <= {task.name for task in tasks}
+    kinds = {kind.__struct_config__.tag for kind in get_args(Table)}
+    assert kinds == set(re.findall(r"^\| `(\w+)` \|", text, re.M))
 
 
 def test_weights_are_an_axis_too(tmp_path: Path) -> None:

@@ -79,9 +79,18 @@ def compare(
 
 
 @command
-def show(report: Annotated[Path, typer.Argument(help="Report or its folder.")]) -> int:
+def show(
+    report: Annotated[Path, typer.Argument(help="Report or its folder.")],
+    parquet: Annotated[Path | None, typer.Option(help="Write its rows to this file too.")] = None,
+) -> int:
     """Print the summary of a report."""
+    from heavytop.report import parquet as tables
     from heavytop.report import store, text
 
-    show_on_terminal(text.summary(store.read(report)))
+    if parquet is not None:
+        tables.check_name(parquet)
+    found = store.read(report)
+    if parquet is not None:
+        tables.write(parquet, found.rows, found.plan)
+    show_on_terminal(text.summary(found))
     return 0

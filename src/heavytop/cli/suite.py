@@ -20,9 +20,14 @@ def run(
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the rows that --out already holds.")] = False,
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on instead.")] = None,
+    parquet: Annotated[bool, typer.Option("--parquet", help="Write DIR/rows.parquet too.")] = False,
 ) -> int:
     """Run a plan of measurements and write DIR/report.json."""
+    from heavytop.report.parquet import require_pyarrow
     from heavytop.suite.plan import expand, load
+
+    if parquet:
+        require_pyarrow()
 
     loaded, digest = load(plan)
     tasks = expand(loaded)
@@ -31,10 +36,11 @@ def run(
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
     directory = _fresh(out, loaded.name, resume)
-    return _run(tasks, {"name": loaded.name, "sha256": digest}, directory, workers or os.cpu_count() or 1, scheduler)
+    identity = {"name": loaded.name, "sha256": digest}
+    return _run(tasks, identity, directory, workers or os.cpu_count() or 1, scheduler, parquet)
 
 
-def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, scheduler: str | None) -> int:
+def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, scheduler: str | None, parquet: bool) -> int:
     from heavytop.precision import available, parse
 
     missing = {name for name in {task.precision for task in tasks} - {""} if available()[parse(name).family]}
@@ -46,6 +52,8 @@ def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, schedu
     from heavytop.records import SCHEMA, Report
     from heavytop.report import store, text
     from heavytop.report.environment import environment
+    from heavytop.report.parquet import FILE as PARQUET
+    from heavytop.report.parquet import write as write_parquet
     from heavytop.suite.checkpoint import Checkpoint
     from heavytop.suite.run import run as run_tasks
 
@@ -57,6 +65,8 @@ def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, schedu
         with Checkpoint(directory, identity) as checkpoint, _progress(tasks) as advance:
             rows = run_tasks(tasks, checkpoint, advance, min(workers, len(tasks)), scheduler)
             report = Report(SCHEMA, plan, surroundings, rows)
+            if parquet:
+                write_parquet(directory / PARQUET, report.rows, plan)
             path = store.write(report, directory)
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {error}.", "Choose a writable --out with space.") from None

@@ -208,14 +208,14 @@ class WorkPrecision(Strict, tag="work_precision"):
         return [
             Task(
                 "work_precision",
-                f"{name}/T={self.horizon}",
-                find(name),
+                f"{each.name}/T={self.horizon}",
+                each,
                 parse(ladder.precision).name,
                 form,
                 times,
                 keep,
             )
-            for name in self.cases
+            for each in map(find, self.cases)
             for ladder in self.ladders
             for form in (
                 *(f"{ladder.integrator} tolerance={text}" for text in ladder.tolerances),

@@ -12,9 +12,10 @@ from collections.abc import Callable, Container, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache
 from importlib import metadata
 from multiprocessing import get_context, parent_process
+from operator import itemgetter
 from threading import Thread
 from typing import Any
 
@@ -26,10 +27,11 @@ _AHEAD = 4
 _PATIENCE = 30
 """Seconds without any worker after which a cluster is given up."""
 _RESUME = "Finished rows are kept: run again with --resume"
+_SAME = "Install the same versions on every machine."
 _PACKAGES = ("heavytop", "heyoka", "numpy", "mpmath", "gmpy2", "python-flint", "msgspec")
 
 Versions = dict[str, str]
-Submit = Callable[[Task], Future[Row]]
+Submit = Callable[[int], Future[Row]]
 UnderWay = dict[Future[Row], int]
 
 
@@ -67,8 +69,8 @@ def _in_processes(tasks: Sequence[Task], queue: deque[int], workers: int) -> Ite
     deaths: Counter[int] = Counter()
     under_way: UnderWay = {}
 
-    def submit(task: Task) -> Future[Row]:
-        return pool.submit(_measure, task)
+    def submit(index: int) -> Future[Row]:
+        return pool.submit(_measure, tasks[index])
 
     def at_once() -> int:
         # any task that was under way when a worker died may be to blame: fewer and fewer at once tell which
@@ -77,7 +79,7 @@ def _in_processes(tasks: Sequence[Task], queue: deque[int], workers: int) -> Ite
     while queue:
         try:
             with _pool(workers) as pool:
-                for index, future in _windowed(tasks, queue, under_way, submit, at_once):
+                for index, future in _windowed(queue, under_way, submit, at_once):
                     row = future.result()
                     deaths.pop(index, None)
                     yield index, row
@@ -86,7 +88,7 @@ def _in_processes(tasks: Sequence[Task], queue: deque[int], workers: int) -> Ite
             under_way.clear()
             deaths.update(lost)
             queue.extendleft(reversed(lost))
-            worst, times = deaths.most_common(1)[0]
+            worst, times = max(deaths.items(), key=itemgetter(1), default=(0, 0))
             if times > 2:
                 raise HeavyTopError(
                     f"A worker process died {times} times during {tasks[worst].label}.",
@@ -99,39 +101,51 @@ def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Ite
         from distributed import KilledWorker
 
         pool = client.get_executor(pure=False)
-        submit = partial(pool.submit, _measure_as, versions())
+        same = versions()
+
+        def submit(index: int) -> Future[Row]:
+            future: Future[Row] = pool.submit(_measure_as, same, tasks[index])
+            return future
 
         def at_once() -> int:
             workers: int = sum(client.nthreads().values())
             return _AHEAD * workers
 
         try:
-            for index, future in _windowed(tasks, queue, {}, submit, at_once):
+            for index, future in _windowed(queue, {}, submit, at_once):
                 try:
                     row = future.result()
                 except KilledWorker as error:
                     raise HeavyTopError(
                         f"{error.allowed_failures + 1} workers died during {tasks[index].label}.", f"{_RESUME}."
                     ) from None
+                except RuntimeError as error:
+                    if "deserialization" in str(error):
+                        raise InputError(f"The scheduler {scheduler} has no such heavytop.", _SAME) from None
+                    raise
                 yield index, row
-        except (CancelledError, OSError) as error:
-            raise HeavyTopError(f"The scheduler {scheduler} was lost: {error}.", f"{_RESUME}.") from None
-        finally:
+            pool.shutdown()
+        except (CancelledError, OSError):
+            raise HeavyTopError(f"The scheduler {scheduler} was lost.", f"{_RESUME}.") from None
+        except BaseException:
             pool.shutdown(wait=False)
+            raise
 
 
 def _windowed(
-    tasks: Sequence[Task], queue: deque[int], under_way: UnderWay, submit: Submit, at_once: Callable[[], int]
+    queue: deque[int], under_way: UnderWay, submit: Submit, at_once: Callable[[], int]
 ) -> Iterator[tuple[int, Future[Row]]]:
     """Indices as they finish, with up to ``at_once()`` tasks under way; it is 0 where there are no workers."""
     while queue or under_way:
         limit = at_once()
         for _ in range(min(len(queue), max(limit, 1) - len(under_way))):
-            future = submit(tasks[queue[0]])
+            future = submit(queue[0])
             under_way[future] = queue.popleft()
         finished = wait(under_way, timeout=_PATIENCE, return_when=FIRST_COMPLETED).done
         if not finished and limit == 0:
-            raise HeavyTopError("The cluster has lost all its workers.", f"Start some.  {_RESUME}.")
+            raise HeavyTopError(
+                "The cluster has lost all its workers.", f"Start some where heavytop is installed.  {_RESUME}."
+            )
         for future in finished:
             yield under_way[future], future
             del under_way[future]
@@ -148,7 +162,7 @@ def _measure_as(expected: Versions, task: Task) -> Row:
     here = versions()
     other = [f"{name} {here[name]} instead of {expected[name]}" for name in expected if here[name] != expected[name]]
     if other:
-        raise InputError(f"A worker has {', '.join(other)}.", "Install the same versions on every machine.")
+        raise InputError(f"A worker has {', '.join(other)}.", _SAME)
     return _measure(task)
 
 
@@ -171,6 +185,8 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts_to_the_parent) as pool:
         try:
             yield pool
+        except BrokenProcessPool:
+            raise  # the pool ends its own processes then
         except BaseException:
             processes = list((pool._processes or {}).values())
             pool.shutdown(wait=False, cancel_futures=True)
@@ -182,6 +198,10 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 @contextmanager
 def _client(scheduler: str) -> Iterator[Any]:
     try:
+        import dask
+
+        # what goes wrong is said once, by the errors raised here
+        dask.config.set({"logging": {"distributed": "critical", "distributed.client": "critical"}})
         from distributed import Client
     except ImportError:
         raise InputError("--scheduler needs Dask.", "Install it with: pip install 'heavytop[cluster]'") from None

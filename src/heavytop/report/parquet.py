@@ -1,0 +1,105 @@
+"""Rows as Parquet, one line a metric: for pandas, duckdb and whatever else reads tables."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from importlib.util import find_spec
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.records import SCHEMA, Row
+
+FILE = "rows.parquet"
+_GROUP = 1 << 15
+"""Lines in a row group, which is what is held in memory."""
+
+_OF_ROW = {
+    "measure": "string",
+    "case": "string",
+    "system": "string",
+    "integrator": "string",
+    "precision": "string",
+    "bits": "int32",
+    "outcome": "string",
+    "horizon": "string",
+    "time_reached": "string",
+    "steps": "int64",
+    "finite": "bool_",
+    "measured": "string",
+    "against": "string",
+    "starts": "int32",
+}
+_OF_METRIC = {"kind": "string", "value": "string", "log10": "float64", "bound": "string", "band": "float64"}
+_OF_LAW = {
+    "exponent": "float64",
+    "low": "float64",
+    "high": "float64",
+    "first": "string",
+    "last": "string",
+    "detects": "string",
+    "lost_at": "string",
+}
+COLUMNS = _OF_ROW | {"metric": "string"} | _OF_METRIC | _OF_LAW
+"""Column -> type.  Numbers that measure something are text, as in the report, with log10 beside them.
+
+A growth law is a line of kind "law" whose metric is the name of its series and whose value is its class; a row that has
+neither metric nor law is one line without them.
+"""
+
+
+def require_pyarrow() -> None:
+    """Raises InputError where pyarrow is not installed."""
+    if find_spec("pyarrow") is None:
+        raise InputError("Parquet needs pyarrow.", "Install it with: pip install 'heavytop[parquet]'")
+
+
+def check_name(path: Path) -> None:
+    """Raises InputError unless the file may hold Parquet, and pyarrow is installed."""
+    require_pyarrow()
+    if path.suffix != ".parquet":
+        raise InputError(f"{path} is not named as Parquet.", "Give a file that ends in .parquet.")
+
+
+def write(path: Path, rows: Iterable[Row], plan: dict[str, str]) -> None:
+    """Write the file whole or not at all; of the rows only one row group is held.  The plan goes into its metadata.
+
+    Raises InputError where it cannot be written.
+    """
+    import pyarrow
+    from pyarrow.parquet import ParquetWriter
+
+    about = {"heavytop.schema": SCHEMA} | {f"heavytop.plan.{key}": value for key, value in plan.items()}
+    schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in COLUMNS.items()], about)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    lines = _lines(rows)
+    try:
+        with temporary.open("wb") as file:
+            with ParquetWriter(file, schema, compression="zstd") as writer:
+                while group := list(islice(lines, _GROUP)):
+                    columns = [pyarrow.array(c, f.type) for c, f in zip(zip(*group, strict=True), schema, strict=True)]
+                    writer.write_batch(pyarrow.record_batch(columns, schema=schema))
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be written: {error.strerror}.", "Choose a writable place with space."
+        ) from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _lines(rows: Iterable[Row]) -> Iterator[tuple[Any, ...]]:
+    no_metric, no_law = [None] * len(_OF_METRIC), [None] * len(_OF_LAW)
+    for row in rows:
+        *same, starts = (getattr(row, name) for name in _OF_ROW)
+        for name, metric in row.metrics.items():
+            yield *same, starts, name, *(getattr(metric, each) for each in _OF_METRIC), *no_law
+        for name, law in row.laws.items():
+            as_metric = "law", law.growth, None, None, None
+            yield *same, law.starts, name, *as_metric, *(getattr(law, each) for each in _OF_LAW)
+        if not (row.metrics or row.laws):
+            yield *same, starts, None, *no_metric, *no_law
