@@ -5,8 +5,7 @@ The working precision of FLINT is global, so every evaluation stands inside :fun
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from decimal import MAX_EMAX, MIN_EMIN, ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from types import SimpleNamespace
@@ -29,17 +28,23 @@ FUNCTIONS = SimpleNamespace(
     atan2=lambda y, x: arb.atan2(y, x),
 )
 _MAX_BITS = 1 << 22
+_HALF = arb(0.5)
 
 
-@contextmanager
-def working_precision(bits: int) -> Iterator[None]:
+class working_precision:  # noqa: N801 - reads as a verb
     """FLINT's working precision set to ``bits`` within the block."""
-    before = ctx.prec
-    ctx.prec = bits
-    try:
-        yield
-    finally:
-        ctx.prec = before
+
+    __slots__ = ("before", "bits")
+
+    def __init__(self, bits: int) -> None:
+        self.bits = bits
+
+    def __enter__(self) -> None:
+        self.before = ctx.prec
+        ctx.prec = self.bits
+
+    def __exit__(self, *_: object) -> None:
+        ctx.prec = self.before
 
 
 def ball(value: Fraction | int) -> arb:
@@ -72,14 +77,14 @@ def value_text(value: arb, digits: int) -> tuple[str, str]:
     return text, radius_text(radius(value) + abs(Fraction(text) - midpoint(value)))
 
 
+def whole(value: arb) -> int:
+    """The whole number nearest to the middle of a ball; 0 if it is not finite."""
+    return int((value + _HALF).mid().floor().unique_fmpz()) if value.is_finite() else 0
+
+
 def relative_bits(value: arb) -> int:
     """Bits that a ball of size about 1 or larger has right; absolute below 1; -1 if it is not finite."""
-    if not value.is_finite():
-        return -1
-    if value.is_exact():
-        return _MAX_BITS
-    # exponents only: values like exp(-1e9) have no fraction that fits into memory
-    return min(_MAX_BITS, max(0, max(0, _size(value.mid()) - 1) - _size(value.rad())))
+    return max(0, min(_MAX_BITS, value.rel_one_accuracy_bits())) if value.is_finite() else -1
 
 
 def _size(value: arb) -> int:
@@ -93,7 +98,9 @@ def _graspable(value: arb, smallest: int) -> arb:
 
     Near a saddle components fall like e^(−t): at t = 10^6 their exact midpoints have a million bits.
     """
-    if (value.is_exact() and value == 0) or max(_size(value.mid()), _size(value.rad())) > smallest:
+    if value.rel_one_accuracy_bits() < -smallest or value.is_zero():
+        return value
+    if max(_size(value.mid()), _size(value.rad())) > smallest:
         return value
     return arb(0, arb(2) ** (smallest + 1))
 

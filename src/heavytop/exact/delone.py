@@ -28,9 +28,8 @@ Source: Delone's class is Kovalevskaya's of the first degenerate kind, Appelrot;
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
 from flint import arb, arb_series, ctx
@@ -38,6 +37,7 @@ from flint import arb, arb_series, ctx
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, balls, instant, series_length, tanh_sech
+from heavytop.exact.motion import kept
 from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, System
@@ -55,6 +55,7 @@ class Delone(ClosedForm):
     start: State
     method: str = "closed form: Delone class of the Kovalevskaya top, Weierstrass functions"
     system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
@@ -108,7 +109,7 @@ def _constants(case: Delone) -> tuple[Fraction, Fraction, Fraction, Fraction]:
     return n1 * n1 + n2 * n2, n1 * w1 + n2 * w2, n1 * w2 - n2 * w1, w1 * w1 + w2 * w2
 
 
-@lru_cache(maxsize=64)
+@kept
 def _prepared(case: Delone, _bits: int) -> PreparedMotion:
     square, along, across, weight = _constants(case)
     spin, lift = case.start.omega[2], case.start.gamma[2] / case.top.inertia[2]
@@ -170,7 +171,7 @@ class DeloneHomoclinic(ClosedForm):
 
         def evaluate(_working: int) -> list[arb]:
             with series_length(1):
-                sin_phi, cos_phi, sin_theta, cos_theta = (part[0] for part in self._sines(time))
+                sin_phi, cos_phi, sin_theta, cos_theta = self._sines(time)
             phi = arb.pi() + arb.atan2(-sin_phi, -cos_phi)
             return [phi, arb.atan2(sin_theta, cos_theta), ball(self.alpha * time)]
 

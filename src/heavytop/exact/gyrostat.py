@@ -21,7 +21,7 @@ Z2 = i (M3 Z1 − M1 Z3)/m.  Valid for every start; λ = 0 is Euler's free top.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
@@ -29,7 +29,7 @@ from typing import Any
 from flint import arb, arb_series
 
 from heavytop.exact.balls import ball, to_bits, working_precision
-from heavytop.exact.motion import enough_bits, initial_xi, rotate, series_at, taylor, turned
+from heavytop.exact.motion import enough_bits, initial_xi, kept, rotate, series_at, taylor, turned
 from heavytop.exact.quartic import Companion, PreparedMotion, QuarticMotion, Winding
 from heavytop.exact.weierstrass import Point, imag, real
 from heavytop.top.equations import GYROSTAT, Parameters, System, gyrostat, rotor
@@ -48,6 +48,7 @@ class Gyrostat:
     rotor: Fraction
     method: str = "closed form: gyrostat, Weierstrass functions of M2"
     system: System = GYROSTAT
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
     def of(cls, top: HeavyTop, start: State) -> Gyrostat:
@@ -173,7 +174,7 @@ class _Prepared:
     momentum: tuple[Companion, Companion]
 
 
-@lru_cache(maxsize=64)
+@kept
 def _prepared(motion: Gyrostat, bits: int) -> _Prepared:
     prepared = motion.quartic().prepared()
     winding = Winding(motion.root(), Fraction(0), Fraction(0), Fraction(1))

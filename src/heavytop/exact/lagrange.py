@@ -22,7 +22,7 @@ spherical pendulum (L = 0) and the motions asymptotic to a sleeping top are star
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
@@ -31,7 +31,7 @@ from flint import acb, arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits, working_precision
-from heavytop.exact.motion import enough_bits, initial_xi, rotate, series_at, taylor, turned
+from heavytop.exact.motion import enough_bits, initial_xi, kept, rotate, series_at, taylor, turned
 from heavytop.exact.quartic import Companion, PreparedMotion, QuarticMotion, Winding
 from heavytop.exact.weierstrass import imag, real
 from heavytop.top.equations import HEAVY_TOP, Parameters, System, heavy_top
@@ -51,6 +51,7 @@ class Lagrange:
     start: State
     method: str = "closed form: Lagrange, Weierstrass functions of gamma3"
     system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         i1, i2, _ = self.top.inertia
@@ -193,7 +194,7 @@ class _Prepared:
     omega: Companion
 
 
-@lru_cache(maxsize=64)
+@kept
 def _prepared(motion: Lagrange, bits: int) -> _Prepared:
     prepared, winding = motion.quartic().prepared(), motion.winding()
     rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)

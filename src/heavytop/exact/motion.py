@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import wraps
 from math import factorial, isqrt
 from typing import Any
 
@@ -20,9 +21,25 @@ _GUARD = 40
 _STEP = 64
 
 
+def kept(make: Callable[[Any, int], Any]) -> Callable[[Any, int], Any]:
+    """``make(motion, bits)`` once for each motion and precision: kept in the motion's ``made``.
+
+    A cache of functools would hash a dozen Fractions at each look-up, longer than many a state takes.
+    """
+
+    @wraps(make)
+    def look_up(motion: Any, bits: int) -> Any:
+        found = motion.made.get((make, bits), motion)
+        if found is motion:
+            found = motion.made[make, bits] = make(motion, bits)
+        return found
+
+    return look_up
+
+
 def enough_bits(working: int, time: Fraction) -> int:
     """The precision inside an evaluation: time costs its own bits, twice; in steps, so that lattices are made once."""
-    return -(-(working + _GUARD + 2 * int(abs(time)).bit_length()) // _STEP) * _STEP
+    return -(-(working + _GUARD + 2 * (abs(time.numerator) // time.denominator).bit_length()) // _STEP) * _STEP
 
 
 def series_at(evaluate: Callable[[int, int], list[arb_series]], length: int, bits: int) -> list[arb_series]:

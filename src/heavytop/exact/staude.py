@@ -44,7 +44,7 @@ class Staude(WithAttitude):
                 "`staude_rotations` finds those of a top.",
             )
 
-    def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         parameters = self.system.parameters(self.top, self.start)
         exact = self.system.angular_velocity(parameters, self.start.flat)
