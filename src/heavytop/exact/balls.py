@@ -98,9 +98,7 @@ def _graspable(value: arb, smallest: int) -> arb:
 
     Near a saddle components fall like e^(−t): at t = 10^6 their exact midpoints have a million bits.
     """
-    if value.rel_one_accuracy_bits() < -smallest or value.is_zero():
-        return value
-    if max(_size(value.mid()), _size(value.rad())) > smallest:
+    if value.is_zero() or max(_size(value.mid()), _size(value.rad())) > smallest:
         return value
     return arb(0, arb(2) ** (smallest + 1))
 
@@ -116,9 +114,11 @@ def to_bits(evaluate: Callable[[int], list[arb]], bits: int) -> list[arb]:
     while working <= 16 * bits + 4096:
         with working_precision(working):
             values = evaluate(working)
-        reached = min(relative_bits(value) for value in values)
-        if reached >= bits:
-            return [_graspable(value, -16 * bits - 4096) for value in values]
+        right = [value.rel_one_accuracy_bits() for value in values]
+        if min(right) >= bits and all([value.is_finite() for value in values]):
+            smallest = -16 * bits - 4096
+            return [v if r < -smallest else _graspable(v, smallest) for v, r in zip(values, right, strict=True)]
+        reached = min(map(relative_bits, values))
         working += max(bits - reached, working // 2) if reached >= 0 else working
     raise OutOfReach(
         f"Only {max(reached, 0)} of {bits} bits could be proven.", "Ask for fewer digits or an earlier time."

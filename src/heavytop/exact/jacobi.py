@@ -1,14 +1,14 @@
 """Jacobi's elliptic functions by theta quotients, for every parameter 0 ≤ m ≤ 1, both ends included.
 
-With K(m), K' = K(1 − m) and nome q = exp(−π K'/K), for m ≤ 1/2, z = u/(2K):
+With K(m), K' = K(1 − m) and nome q = exp(−π K'/K), for m ≤ 0.9, z = u/(2K):
 
     sn u = θ3 θ1(z)/(θ2 θ4(z)),   cn u = θ4 θ2(z)/(θ2 θ4(z)),   dn u = θ4 θ3(z)/(θ3 θ4(z))
 
-and for m > 1/2, by Jacobi's imaginary transformation, with the complementary nome and z = iu/(2K'):
+and for larger m, by Jacobi's imaginary transformation, with the complementary nome and z = iu/(2K'):
 
     sn u = −i θ3 θ1(z)/(θ4 θ2(z)),  cn u = θ2 θ4(z)/(θ4 θ2(z)),  dn u = θ2 θ3(z)/(θ3 θ2(z))
 
-So the nome never exceeds exp(−π).  Where it is 0 the thetas are sin πz, cos πz, 1, 1 (the common factor 2 q^(1/4)
+So the nome never exceeds 0.15.  Where it is 0 the thetas are sin πz, cos πz, 1, 1 (the common factor 2 q^(1/4)
 of θ1 and θ2 cancels everywhere): circular functions at m = 0, hyperbolic ones at m = 1.
 There arguments are reduced modulo 2K before anything is evaluated.  DLMF 22.2, 20.7(viii).
 Numbers are put into the series of :mod:`heavytop.exact.theta`, power series into FLINT's own theta functions.
@@ -16,7 +16,7 @@ Numbers are put into the series of :mod:`heavytop.exact.theta`, power series int
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from flint import acb, acb_poly, acb_series, arb, arb_poly, arb_series, ctx
@@ -27,7 +27,8 @@ from heavytop.exact.theta import Theta
 from heavytop.exact.weierstrass import real
 
 _I = acb(0, 1)
-_REACH = arb(1.25)  # in quarter periods: how far beyond half a period a reduced argument may lie
+_REACH = arb(1.25)  # quarter periods: the largest reduced argument
+_LARGE = arb("0.9")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,8 @@ class Jacobi:
     scale: z = scale · u.
     tau: the ratio of the periods for the theta functions; None where the nome is 0.
     null: θ2, θ3, θ4 at 0.
-    theta: their series for numbers, hyperbolic for m > 1/2.  parts: the polynomials of sn, cn, dn and of what they are
+    period: 2K and the reach of a reduced argument; None where none needs reducing.
+    theta: their series for numbers, hyperbolic for large m.  parts: the polynomials of sn, cn, dn and of what they are
     divided by, the null values among the coefficients.
     """
 
@@ -49,16 +51,17 @@ class Jacobi:
     scale: acb
     tau: acb | None
     null: tuple[acb, acb, acb]
+    period: tuple[arb, arb] | None
     theta: Theta
     parts: tuple[arb_poly, arb_poly, arb_poly, arb_poly]
 
     def reduced(self, u: Any) -> tuple[Any, int]:
         """(u − 2nK, n) with |u − 2nK| at most about K; n = 0 where no series needs it."""
-        if self.quarter is None or not self.theta.hyperbolic:
+        if self.period is None:
             return u, 0
-        turns = whole(constant(u) / (2 * self.quarter))
-        rest = u - 2 * turns * self.quarter
-        return (rest, turns) if abs(constant(rest)) < self.quarter * _REACH else (arb("nan"), 0)
+        turns = whole(constant(u) / self.period[0])
+        rest = u - turns * self.period[0]
+        return (rest, turns) if abs(constant(rest)) < self.period[1] else (arb("nan"), 0)
 
     def thetas(self, u: Any) -> tuple[acb_series, ...]:
         """θ1, θ2, θ3, θ4 at z = scale · u, for a real or complex series u."""
@@ -95,13 +98,14 @@ class Wave:
 
     Its logarithm has the derivative of an elliptic function with simple poles of residue ± 1/2 at ∓ i·shift, up to a
     constant and a real part.  Made by :func:`wave`.
-    sine, cosine: the polynomials of θ1.  period: the argument of the factor, of modulus 1, that it takes over 2K.
+    real, imaginary: the polynomials of θ1 that go with cos x and sin x.  period: the argument of the factor, of
+    modulus 1, that it takes over 2K.
     """
 
     functions: Jacobi
     shift: arb
-    sine: acb_poly
-    cosine: acb_poly
+    real: arb_poly
+    imaginary: arb_poly
     period: arb
 
     def at(self, u: Any) -> tuple[Any, arb]:
@@ -110,11 +114,13 @@ class Wave:
         return self._number(rest) if isinstance(rest, arb) else self._series(rest), turns * self.period
 
     def _number(self, u: arb) -> acb:
-        functions = self.functions
-        s, c, double = functions.theta.angles(u)
-        point, below = acb(double), functions.parts[3](double)
-        value = self.cosine(point) * c - self.sine(point) * s
-        return value / (below * c if functions.theta.hyperbolic else below)
+        theta, below = self.functions.theta, self.functions.parts[3]
+        s, c, double = theta.angles(u)
+        if theta.hyperbolic:
+            inverse = 1 / below(double)
+            return acb(self.real(double) * inverse, self.imaginary(double) * inverse * s / c)
+        inverse = 1 / below(double)
+        return acb(self.real(double) * c * inverse, self.imaginary(double) * s * inverse)
 
     def _series(self, u: arb_series) -> acb_series:
         functions = self.functions
@@ -122,7 +128,7 @@ class Wave:
         _, second, _, fourth = functions.thetas(u)
         if functions.theta.hyperbolic:
             return -above / second
-        return -above / (functions.null[0] / functions.theta.odd()[1](arb(1)) * fourth)
+        return _I * above / (functions.null[0] / functions.theta.odd()[1](arb(1)) * fourth)
 
     def rate(self) -> arb:
         """The derivative of its argument at u = 0."""
@@ -134,13 +140,17 @@ class Wave:
 def wave(functions: Jacobi, shift: arb) -> Wave:
     """:class:`Wave` at the working precision, |shift| ≤ K(1 − m)."""
     sine, cosine = functions.theta.odd(-functions.scale * _I * shift)
-    made = Wave(functions, shift, sine, cosine, arb(0))
+    # one of them is real, the other imaginary
+    if functions.theta.hyperbolic:
+        made = Wave(functions, shift, _reals(cosine), _reals(_I * sine), arb(0))
+    else:
+        made = Wave(functions, shift, _reals(-_I * cosine), _reals(sine), arb(0))
     if functions.quarter is None or not functions.theta.hyperbolic:
         return made
     factor = made._number(functions.quarter) / made._number(-functions.quarter)
     # away from the cut of the argument
     period = (-factor).arg() + arb.pi() if factor.real < 0 else factor.arg()
-    return Wave(functions, shift, sine, cosine, period)
+    return replace(made, period=period)
 
 
 def legendre_f(sine2: arb, cosine2: arb, delta2: arb) -> arb:
@@ -160,18 +170,25 @@ def jacobi(parameter: arb, complement: arb) -> Jacobi:
     along: Any
     quarter = None if complement.is_zero() else half_pi / arb(1).agm(complement.sqrt())
     other = None if parameter.is_zero() else half_pi / arb(1).agm(parameter.sqrt())
-    hyperbolic = quarter is None or bool(parameter.mid() > arb(0.5))
+    hyperbolic = quarter is None or bool(parameter.mid() > _LARGE)
     across, along = (quarter, other) if hyperbolic else (other, quarter)
     scale = (acb(0, 1) if hyperbolic else acb(1)) / (2 * along)
     tau = None if across is None else acb(0, across / along)
     nome = arb(0) if across is None else (-arb.pi() * across / along).exp()
     rate = half_pi / along
-    growth = (2 * rate * quarter * _REACH).exp().upper() if hyperbolic and quarter is not None else arb(1)
+    period, growth = None, arb(1)
+    if hyperbolic and quarter is not None:
+        period = 2 * quarter, quarter * _REACH
+        growth = (2 * rate * period[1]).exp().upper()
     theta = Theta(nome * nome, rate, hyperbolic, growth)
     with series_length(1):
         _, t2, t3, t4 = _thetas(acb_series([0], prec=1), tau)
     null = t2[0], t3[0], t4[0]
-    return Jacobi(parameter, complement, quarter, scale, tau, null, theta, _parts(theta))
+    return Jacobi(parameter, complement, quarter, scale, tau, null, period, theta, _parts(theta))
+
+
+def _reals(poly: acb_poly) -> arb_poly:
+    return arb_poly([c.real for c in poly.coeffs()])
 
 
 def _parts(theta: Theta) -> tuple[arb_poly, arb_poly, arb_poly, arb_poly]:
