@@ -29,6 +29,7 @@ FUNCTIONS = SimpleNamespace(
 )
 _MAX_BITS = 1 << 22
 _HALF = arb(0.5)
+_GUARD, _STEP = 16, 64
 
 
 class working_precision:  # noqa: N801 - reads as a verb
@@ -103,21 +104,26 @@ def _graspable(value: arb, smallest: int) -> arb:
     return arb(0, arb(2) ** (smallest + 1))
 
 
-def to_bits(evaluate: Callable[[int], list[arb]], bits: int) -> list[arb]:
+def to_bits(evaluate: Callable[[int], list[arb]], bits: int, time: Fraction | None = None) -> list[arb]:
     """``evaluate(working bits)`` repeated at growing working precision until every ball has ``bits`` bits.
 
-    Bits count relative to a value above 1 and absolutely below it.  Raises OutOfReach where even a precision of
-    16 times the asked bits plus 4096 does not give them.
+    Bits count relative to a value above 1 and absolutely below it.  time: what it is evaluated at; it costs its own
+    bits, and the precision then comes in steps, so that lattices are made once.  Raises OutOfReach where even a
+    precision of 16 times the asked bits plus 4096 does not give them.
     """
-    working = bits + 32
-    reached = -1
-    while working <= 16 * bits + 4096:
-        with working_precision(working):
-            values = evaluate(working)
+    extra = -1 if time is None else _GUARD + (abs(time.numerator) // time.denominator).bit_length()
+    working, smallest = bits + 32, -16 * bits - 4096
+    while working <= -smallest:
+        inside = working if extra < 0 else -(-(working + extra) // _STEP) * _STEP
+        with working_precision(inside):
+            values = evaluate(inside)
         right = [value.rel_one_accuracy_bits() for value in values]
-        if min(right) >= bits and all([value.is_finite() for value in values]):
-            smallest = -16 * bits - 4096
-            return [v if r < -smallest else _graspable(v, smallest) for v, r in zip(values, right, strict=True)]
+        if min(right) >= bits:
+            # only exact, infinite and very small values have more bits right than that
+            if max(right) < -smallest:
+                return values
+            if all(value.is_finite() for value in values):
+                return [v if r < -smallest else _graspable(v, smallest) for v, r in zip(values, right, strict=True)]
         reached = min(map(relative_bits, values))
         working += max(bits - reached, working // 2) if reached >= 0 else working
     raise OutOfReach(

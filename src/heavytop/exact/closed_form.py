@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from flint import acb, acb_series, arb, arb_series, ctx
 
-from heavytop.exact.balls import ball, to_bits, working_precision
-from heavytop.exact.motion import enough_bits, initial_xi
+from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.motion import initial_xi
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
@@ -109,25 +109,21 @@ class ClosedForm:
         omega, carry = self.motion(instant(time))
         return [*omega, *carry(balls(self.start.gamma))]
 
-    def _at(self, time: Fraction, working: int) -> list[Any]:
-        with working_precision(enough_bits(working, time)):
-            return self.evaluate(time)
-
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         with series_length(1):
-            return to_bits(lambda working: [constant(part) for part in self._at(time, working)], bits)
+            return to_bits(lambda _working: self.evaluate(time), bits, time)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         found: list[arb_series] = []
 
-        def evaluate(working: int) -> list[arb]:
-            found[:] = [arb_series(part, prec=length) for part in self._at(time, working)]
+        def evaluate(_working: int) -> list[arb]:
+            found[:] = [arb_series(part, prec=length) for part in self.evaluate(time)]
             return [part[0] for part in found]
 
         with series_length(length):
-            to_bits(evaluate, bits)
+            to_bits(evaluate, bits, time)
         return found
 
 
@@ -142,14 +138,12 @@ class WithAttitude(ClosedForm):
         ``initial``: ξ at t = 0; :func:`heavytop.exact.motion.initial_xi` of γ if not given.
         """
 
-        def evaluate(working: int) -> list[arb]:
-            with working_precision(enough_bits(working, time)):
-                xi = initial_xi(self.start.gamma) if initial is None else balls(initial)
-                _, carry = self.motion(instant(time))
-                return [constant(part) for part in carry(xi)]
+        def evaluate(_working: int) -> list[arb]:
+            xi = initial_xi(self.start.gamma) if initial is None else balls(initial)
+            return self.motion(instant(time))[1](xi)
 
         with series_length(1):
-            return to_bits(evaluate, bits)
+            return to_bits(evaluate, bits, time)
 
 
 def constant(value: Any) -> arb:

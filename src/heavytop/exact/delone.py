@@ -36,7 +36,7 @@ from flint import arb, arb_series, ctx
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
-from heavytop.exact.closed_form import ClosedForm, balls, instant, series_length, tanh_sech
+from heavytop.exact.closed_form import ClosedForm, balls, constant, instant, series_length, tanh_sech
 from heavytop.exact.motion import kept
 from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.top.angles import attitude_from_angles
@@ -90,7 +90,7 @@ class Delone(ClosedForm):
             i3 / square * (n1 * imaginary - n2 * real),
             g3 * cosine + i3 * weight * sine,
         ]
-        return [arb_series(part, prec=length) for part in state]
+        return state if length > 1 else [constant(part) for part in state]
 
     def _turn(self, time: Fraction) -> tuple[Any, Any]:
         """cos b and sin b/|n|."""

@@ -28,9 +28,9 @@ from typing import Any
 
 from flint import arb, arb_series
 
-from heavytop.exact.balls import ball, to_bits, working_precision
-from heavytop.exact.motion import enough_bits, initial_xi, kept, rotate, series_at, taylor, turned
-from heavytop.exact.quartic import Companion, PreparedMotion, QuarticMotion, Winding
+from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
+from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion, Winding
 from heavytop.exact.weierstrass import Point, imag, real
 from heavytop.top.equations import GYROSTAT, Parameters, System, gyrostat, rotor
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
@@ -78,33 +78,29 @@ class Gyrostat:
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return to_bits(lambda working: self._evaluate(time, 0, working), bits)
+        return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return series_at(lambda working, count: self._evaluate(time, count, working), length, bits)
+        return series_at(lambda working, count: self._evaluate(time, count, working), length, bits, time)
 
     def attitude(self, time: Fraction, bits: int, xi: Vector | None = None) -> list[arb]:
         """ξ at ``time``; at t = 0 it is ``xi`` (any vector fixed in space) or the default one ⟂ γ."""
 
-        def evaluate(working: int) -> list[arb]:
-            inside = enough_bits(working, time)
-            with working_precision(inside):
-                if xi is not None:
-                    return self._carried(xi, time, 0, inside)
-                images = [self._carried(unit, time, 0, inside) for unit in _UNITS]
-                start = initial_xi(self.start.gamma)
-                return [dot(start, [image[axis] for image in images]) for axis in range(3)]
+        def evaluate(inside: int) -> list[arb]:
+            if xi is not None:
+                return self._carried(xi, time, 0, inside)
+            images = [self._carried(unit, time, 0, inside) for unit in _UNITS]
+            start = initial_xi(self.start.gamma)
+            return [dot(start, [image[axis] for image in images]) for axis in range(3)]
 
-        return to_bits(evaluate, bits)
+        return to_bits(evaluate, bits, time)
 
-    def _evaluate(self, time: Fraction, length: int, working: int) -> list[Any]:
-        bits = enough_bits(working, time)
-        with working_precision(bits):
-            momentum, point, denominator = self._momentum(time, length, bits)
-            omega = [m * (1 / ball(i)) for m, i in zip(momentum, self.top.inertia, strict=True)]
-            gamma = self._fixed(self.start.gamma, momentum, point, denominator, bits)
-            return [*omega, *gamma]
+    def _evaluate(self, time: Fraction, length: int, bits: int) -> list[Any]:
+        momentum, point, denominator = self._momentum(time, length, bits)
+        omega = [m * (1 / ball(i)) for m, i in zip(momentum, self.top.inertia, strict=True)]
+        gamma = self._fixed(self.start.gamma, momentum, point, denominator, bits)
+        return [*omega, *gamma]
 
     def _carried(self, vector: Vector, time: Fraction, length: int, bits: int) -> list[Any]:
         momentum, point, denominator = self._momentum(time, length, bits)
@@ -116,7 +112,7 @@ class Gyrostat:
         if self.permanent:
             return [point.time * 0 + ball(m) for m in self.momentum], point, None
         denominator = prepared.motion.denominator(point)
-        first, third = (real(companion.at(point, denominator)) for companion in prepared.momentum)
+        first, third = map(real, prepared.momentum.at(point, denominator))
         return [first, prepared.motion.position(point, denominator), third], point, denominator
 
     def _fixed(self, vector: Vector, momentum: list[Any], point: Point, denominator: Any, bits: int) -> list[Any]:
@@ -129,7 +125,7 @@ class Gyrostat:
         if not any(cross(vector, self.momentum)):
             return along
         m = ball(square).sqrt()
-        first, third = (c.at(point, denominator) for c in _companions(self, vector, bits))
+        first, third = _companions(self, vector, bits).at(point, denominator)
         second = real(first) * momentum[2] - real(third) * momentum[0]
         across = (imag(first) * (-1 / m), second * (-1 / ball(square)), imag(third) * (-1 / m))
         return [a + b for a, b in zip(along, across, strict=True)]
@@ -171,7 +167,7 @@ class Gyrostat:
 @dataclass(frozen=True, slots=True)
 class _Prepared:
     motion: PreparedMotion
-    momentum: tuple[Companion, Companion]
+    momentum: Companions
 
 
 @kept
@@ -179,15 +175,12 @@ def _prepared(motion: Gyrostat, bits: int) -> _Prepared:
     prepared = motion.quartic().prepared()
     winding = Winding(motion.root(), Fraction(0), Fraction(0), Fraction(1))
     rows = taylor(gyrostat, motion.parameters, motion.start.flat, 4)
-    first, third = (
-        prepared.companion(winding, [(motion.top.inertia[axis] * c, Fraction(0)) for c in rows[axis]])
-        for axis in (0, 2)
-    )
-    return _Prepared(prepared, (first, third))
+    both = ([(motion.top.inertia[axis] * c, Fraction(0)) for c in rows[axis]] for axis in (0, 2))
+    return _Prepared(prepared, prepared.companions(winding, *both))
 
 
 @lru_cache(maxsize=64)
-def _companions(motion: Gyrostat, vector: Vector, bits: int) -> tuple[Companion, Companion]:
+def _companions(motion: Gyrostat, vector: Vector, bits: int) -> Companions:
     """Z1 and Z3 of a vector fixed in space."""
     prepared, winding, m = _prepared(motion, bits).motion, motion.winding(), motion.momentum
     share = dot(vector, m) / winding.square
@@ -196,8 +189,5 @@ def _companions(motion: Gyrostat, vector: Vector, bits: int) -> tuple[Companion,
         taylor(gyrostat, motion.parameters, (*motion.start.omega, *fixed), 4)[3:]
         for fixed in (cross(m, across), across)
     ]
-    first, third = (
-        prepared.companion(winding, turned(products[0][axis], [-c for c in products[1][axis]], winding))
-        for axis in (0, 2)
-    )
-    return first, third
+    both = (turned(products[0][axis], [-c for c in products[1][axis]], winding) for axis in (0, 2))
+    return prepared.companions(winding, *both)

@@ -75,7 +75,8 @@ class Jacobi:
 
     def _numbers(self, u: arb) -> tuple[arb, arb, arb]:
         sine, cosine, c = self.theta.angles(u)
-        sn, cn, dn, below = (part(c) for part in self.parts)
+        first, second, third, fourth = self.parts
+        sn, cn, dn, below = first(c), second(c), third(c), fourth(c)
         if self.theta.hyperbolic:
             inverse = 1 / (below * cosine)
             return sine * sn * inverse, cn * inverse, dn * inverse

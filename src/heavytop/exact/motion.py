@@ -17,9 +17,6 @@ from heavytop.top.angles import perpendicular
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import Vector, dot
 
-_GUARD = 40
-_STEP = 64
-
 
 def kept(make: Callable[[Any, int], Any]) -> Callable[[Any, int], Any]:
     """``make(motion, bits)`` once for each motion and precision: kept in the motion's ``made``.
@@ -37,12 +34,9 @@ def kept(make: Callable[[Any, int], Any]) -> Callable[[Any, int], Any]:
     return look_up
 
 
-def enough_bits(working: int, time: Fraction) -> int:
-    """The precision inside an evaluation: time costs its own bits, twice; in steps, so that lattices are made once."""
-    return -(-(working + _GUARD + 2 * (abs(time.numerator) // time.denominator).bit_length()) // _STEP) * _STEP
-
-
-def series_at(evaluate: Callable[[int, int], list[arb_series]], length: int, bits: int) -> list[arb_series]:
+def series_at(
+    evaluate: Callable[[int, int], list[arb_series]], length: int, bits: int, time: Fraction
+) -> list[arb_series]:
     """``evaluate(working bits, length)`` with the ε^0 coefficients certain to ``bits`` bits (:func:`to_bits`)."""
     found: list[list[arb_series]] = []
     before = ctx.cap
@@ -53,7 +47,7 @@ def series_at(evaluate: Callable[[int, int], list[arb_series]], length: int, bit
         return [component[0] for component in found[-1]]
 
     try:
-        to_bits(leading, bits)
+        to_bits(leading, bits, time)
     finally:
         ctx.cap = before
     return found[-1]
