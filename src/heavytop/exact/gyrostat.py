@@ -89,46 +89,35 @@ class Gyrostat:
 
         def evaluate(inside: int) -> list[arb]:
             if xi is not None:
-                return self._carried(xi, time, 0, inside)
-            images = [self._carried(unit, time, 0, inside) for unit in _UNITS]
+                return self._carried(xi, time, inside)
+            images = [self._carried(unit, time, inside) for unit in _UNITS]
             start = initial_xi(self.start.gamma)
             return [dot(start, [image[axis] for image in images]) for axis in range(3)]
 
         return to_bits(evaluate, bits, time)
 
     def _evaluate(self, time: Fraction, length: int, bits: int) -> list[Any]:
+        prepared = _prepared(self, bits)
         momentum, point, denominator = self._momentum(time, length, bits)
-        omega = [m * (1 / ball(i)) for m, i in zip(momentum, self.top.inertia, strict=True)]
-        gamma = self._fixed(self.start.gamma, momentum, point, denominator, bits)
-        return [*omega, *gamma]
+        omega = [m * inverse for m, inverse in zip(momentum, prepared.inverses, strict=True)]
+        if prepared.gamma is None:
+            return [*omega, *rotate(self.start.gamma, self.angular_velocity, point.time)]
+        return [*omega, *prepared.gamma.at(momentum, point, denominator)]
 
-    def _carried(self, vector: Vector, time: Fraction, length: int, bits: int) -> list[Any]:
-        momentum, point, denominator = self._momentum(time, length, bits)
-        return self._fixed(vector, momentum, point, denominator, bits)
+    def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[Any]:
+        momentum, point, denominator = self._momentum(time, 0, bits)
+        if self.permanent:
+            return rotate(vector, self.angular_velocity, point.time)
+        return _held(self, vector, bits).at(momentum, point, denominator)
 
     def _momentum(self, time: Fraction, length: int, bits: int) -> tuple[list[Any], Point, Any]:
         prepared = _prepared(self, bits)
         point = prepared.motion.lattice.point(time, length)
-        if self.permanent:
+        if prepared.gamma is None:
             return [point.time * 0 + ball(m) for m in self.momentum], point, None
         denominator = prepared.motion.denominator(point)
         first, third = map(real, prepared.momentum.at(point, denominator))
         return [first, prepared.motion.position(point, denominator), third], point, denominator
-
-    def _fixed(self, vector: Vector, momentum: list[Any], point: Point, denominator: Any, bits: int) -> list[Any]:
-        """A vector fixed in space, in body components at the point."""
-        if self.permanent:
-            return rotate(vector, self.angular_velocity, point.time)
-        square = dot(self.momentum, self.momentum)
-        share = dot(vector, self.momentum) / square
-        along = [m * ball(share) for m in momentum]
-        if not any(cross(vector, self.momentum)):
-            return along
-        m = ball(square).sqrt()
-        first, third = _companions(self, vector, bits).at(point, denominator)
-        second = real(first) * momentum[2] - real(third) * momentum[0]
-        across = (imag(first) * (-1 / m), second * (-1 / ball(square)), imag(third) * (-1 / m))
-        return [a + b for a, b in zip(along, across, strict=True)]
 
     def factors(self) -> tuple[tuple[Fraction, Fraction, Fraction], tuple[Fraction, Fraction, Fraction]]:
         """q1 and q3, each as the coefficients of 1, x, x²."""
@@ -165,9 +154,35 @@ class Gyrostat:
 
 
 @dataclass(frozen=True, slots=True)
+class _Fixed:
+    """A vector fixed in space: share M plus the part across M with Z1 and Z3 = waves (None where there is no such part).
+
+    turn, square: −1/m and −1/m².
+    """
+
+    share: arb
+    waves: Companions | None
+    turn: arb
+    square: arb
+
+    def at(self, momentum: list[Any], point: Point, denominator: Any) -> list[Any]:
+        """In body components at the point."""
+        along = [m * self.share for m in momentum]
+        if self.waves is None:
+            return along
+        first, third = self.waves.at(point, denominator)
+        second = (real(first) * momentum[2] - real(third) * momentum[0]) * self.square
+        return [along[0] + imag(first) * self.turn, along[1] + second, along[2] + imag(third) * self.turn]
+
+
+@dataclass(frozen=True, slots=True)
 class _Prepared:
+    """inverses: 1/I.  gamma: None where M is at rest in the body."""
+
     motion: PreparedMotion
     momentum: Companions
+    inverses: list[arb]
+    gamma: _Fixed | None
 
 
 @kept
@@ -176,18 +191,27 @@ def _prepared(motion: Gyrostat, bits: int) -> _Prepared:
     winding = Winding(motion.root(), Fraction(0), Fraction(0), Fraction(1))
     rows = taylor(gyrostat, motion.parameters, motion.start.flat, 4)
     both = ([(motion.top.inertia[axis] * c, Fraction(0)) for c in rows[axis]] for axis in (0, 2))
-    return _Prepared(prepared, prepared.companions(winding, *both))
+    gamma = None if motion.permanent else _fixed(motion, prepared, motion.start.gamma)
+    inverses = [ball(1 / i) for i in motion.top.inertia]
+    return _Prepared(prepared, prepared.companions(winding, *both), inverses, gamma)
 
 
 @lru_cache(maxsize=64)
-def _companions(motion: Gyrostat, vector: Vector, bits: int) -> Companions:
-    """Z1 and Z3 of a vector fixed in space."""
-    prepared, winding, m = _prepared(motion, bits).motion, motion.winding(), motion.momentum
-    share = dot(vector, m) / winding.square
+def _held(motion: Gyrostat, vector: Vector, bits: int) -> _Fixed:
+    return _fixed(motion, _prepared(motion, bits).motion, vector)
+
+
+def _fixed(motion: Gyrostat, prepared: PreparedMotion, vector: Vector) -> _Fixed:
+    m, square = motion.momentum, dot(motion.momentum, motion.momentum)
+    share = dot(vector, m) / square
     across = tuple(v - share * c for v, c in zip(vector, m, strict=True))
-    products = [
-        taylor(gyrostat, motion.parameters, (*motion.start.omega, *fixed), 4)[3:]
-        for fixed in (cross(m, across), across)
-    ]
-    both = (turned(products[0][axis], [-c for c in products[1][axis]], winding) for axis in (0, 2))
-    return prepared.companions(winding, *both)
+    waves = None
+    if any(across):
+        winding = motion.winding()
+        products = [
+            taylor(gyrostat, motion.parameters, (*motion.start.omega, *fixed), 4)[3:]
+            for fixed in (cross(m, across), across)
+        ]
+        both = (turned(products[0][axis], [-c for c in products[1][axis]], winding) for axis in (0, 2))
+        waves = prepared.companions(winding, *both)
+    return _Fixed(ball(share), waves, -1 / ball(square).sqrt(), ball(-1 / square))

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from flint import acb, acb_series, arb, arb_poly
+from flint import acb, acb_series, arb, arb_poly, arb_series
 
 from heavytop.exact.balls import ball, midpoint
 from heavytop.exact.weierstrass import (
@@ -167,21 +167,25 @@ class PreparedMotion:
     def companions(self, winding: Winding, *taylors: Sequence[Pair]) -> Companions:
         """Several F of the second theorem with the same winding; taylors: f0..f3, each as (real, imaginary/√square)."""
         wave = second_kind(self.lattice, winding)
-        return Companions(wave, tuple(self._companion(winding, taylor) for taylor in taylors))
+        still = not any(part for taylor in taylors for pair in taylor for part in pair)
+        return Companions(wave, tuple(self._factors(winding, taylor) for taylor in taylors), still)
 
-    def _companion(self, winding: Winding, taylor: Sequence[Pair]) -> Companion:
+    def _factors(self, winding: Winding, taylor: Sequence[Pair]) -> Factors:
         if isinstance(self.lattice, DegenerateLattice):
             return self._elementary(self.lattice, winding, taylor)
         root = ball(winding.square).sqrt()
         f0, f1, f2, f3 = (acb(ball(a), ball(b) * root) for a, b in taylor)
         centre, value = as_ball(self.centre), ball(winding.value)
-        return Companion(
-            (f3 / 3 - 4 * centre * f1 + value * f1, 2 * f1, -2 * f0 / 3),
-            (4 * centre * f0 - f2 - value * f0 / 3, -2 * f0 / 3),
-            not any(part for pair in taylor for part in pair),
+        factors = (
+            f3 / 3 - 4 * centre * f1 + value * f1,
+            2 * f1,
+            -2 * f0 / 3,
+            4 * centre * f0 - f2 - value * f0 / 3,
+            -2 * f0 / 3,
         )
+        return tuple(factor.real if factor.imag.is_zero() else factor for factor in factors)
 
-    def _elementary(self, lattice: DegenerateLattice, winding: Winding, taylor: Sequence[Pair]) -> Companion:
+    def _elementary(self, lattice: DegenerateLattice, winding: Winding, taylor: Sequence[Pair]) -> Factors:
         """The same on discriminant 0, in powers of T; what cancels at large T cancels here, exactly."""
         double: Any = lattice.double
         centre: Any = self.centre
@@ -196,8 +200,7 @@ class PreparedMotion:
         )
         cubic = (phi[0] - winding.square * rate * slope[1], phi[1] + rate * slope[0])
         f0, f1, cube, second = (acb(ball(a), ball(b) * root) for a, b in (*taylor[:2], cubic, slope))
-        nothing = not any(part for pair in taylor for part in pair)
-        return Companion((cube, 2 * f1, -2 * f0 / 3), (second, -2 * f0 / 3), nothing)
+        return cube, 2 * f1, -2 * f0 / 3, second, -2 * f0 / 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +223,7 @@ class SecondKind:
 
     def at(self, point: Point) -> tuple[Any, Any]:
         """(Φ T, Φ' T²) e^(iκt), complex."""
-        factor = _exponential(point.time, self.rate)
+        factor: Any = 1 if self.rate.is_zero() else _exponential(point.time, self.rate)
         if not isinstance(self.lattice, Lattice):
             return self._degenerate(point, factor)
         if self.index is not None:
@@ -296,46 +299,39 @@ def _imaginary_argument(lattice: Lattice, winding: Winding) -> acb:
     return acb(lattice.half_period if beside else 0, height)
 
 
-@dataclass(frozen=True, slots=True)
-class Companion:
-    """F of the second theorem: the factors of Φ T times (T³, ℘T³, ℘'T³) and of Φ' T² times (T², ℘T²)."""
-
-    of_phi: tuple[acb, acb, acb]
-    of_slope: tuple[acb, acb]
-    zero: bool
+Factors = tuple[Any, ...]
+"""What Φ T times (T³, ℘T³, ℘'T³) and Φ' T² times (T², ℘T²) are multiplied by in an F of the second theorem."""
 
 
 @dataclass(frozen=True, slots=True)
 class Companions:
-    """Several F with the same winding, ready for evaluation."""
+    """Several F with the same winding, ready for evaluation.  still: all are 0."""
 
     wave: SecondKind
-    members: tuple[Companion, ...]
+    factors: tuple[Factors, ...]
+    still: bool
 
     def at(self, point: Point, denominator: Any) -> list[Any]:
         """Each F at the point, complex."""
-        if all(member.zero for member in self.members):
-            nothing = acb_series(point.scale) * 0 if not isinstance(point.scale, arb) else acb(0)
-            return [nothing] * len(self.members)
-        phi, slope = (value / lift(denominator) for value in self.wave.at(point))
-        square, low, steep = lift(point.square), lift(point.scale) * phi, lift(point.slope) * phi
+        if self.still:
+            return [lift(point.scale * 0)] * len(self.factors)
+        phi, slope = map(lift, self.wave.at(point))
+        whole = 1 / lift(denominator)
+        phi, slope, square = phi * whole, slope * whole, lift(point.square)
+        low, steep = lift(point.scale) * phi, lift(point.slope) * phi
         if isinstance(self.wave.lattice, DegenerateLattice):
             rest = slope
             if self.wave.index is None:
-                rest = -_exponential(point.time, self.wave.rate) / lift(denominator)
+                rest = -_exponential(point.time, self.wave.rate) * whole
             # Φ' T² = K T ΦT − e: its K T ΦT stands in the cubic coefficient
             parts = low * square, low, steep, square * rest, slope
         else:
-            p = lift(point.above(0))
+            p = lift(point.high + point.root * point.square)
             parts = low * square, low * p, steep, square * slope, p * slope
-        return [_sum(parts, (*member.of_phi, *member.of_slope)) for member in self.members]
-
-
-def _sum(parts: Sequence[Any], factors: Sequence[acb]) -> Any:
-    (a, b, c, d, e), (f, g, h, i, j) = parts, factors
-    return a * f + b * g + c * h + d * i + e * j
+        a, b, c, d, e = parts
+        return [a * f + b * g + c * h + d * i + e * j for f, g, h, i, j in self.factors]
 
 
 def lift(value: Any) -> Any:
-    """A real series as a complex one; a number as it is."""
-    return value if isinstance(value, arb) else acb_series(value)
+    """A series as a complex one; a number as it is."""
+    return acb_series(value) if isinstance(value, arb_series) else value

@@ -55,6 +55,8 @@ class Point:
 
     def above(self, value: Scalar) -> Any:
         """(℘ − value) T²; the difference of exact roots and values is exact."""
+        if isinstance(value, arb) and isinstance(self.root, arb):
+            return self.high + (self.root - value) * self.square
         return self.high + as_ball(difference(self.root, value)) * self.square
 
 
@@ -213,14 +215,14 @@ def real(value: Any) -> Any:
     """The real part of a ball or of a power series in a real variable."""
     if isinstance(value, acb_series):
         return arb_series([value[i].real for i in range(value.prec)], value.prec)
-    return value.real
+    return value if isinstance(value, arb) else value.real
 
 
 def imag(value: Any) -> Any:
     """The imaginary part of a ball or of a power series in a real variable."""
     if isinstance(value, acb_series):
         return arb_series([value[i].imag for i in range(value.prec)], value.prec)
-    return value.imag
+    return value * 0 if isinstance(value, arb) else value.imag
 
 
 def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
