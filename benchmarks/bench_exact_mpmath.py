@@ -42,7 +42,7 @@ START = State((F(1, 3), 1, 2), (F(3, 5), 0, F(4, 5)))
 MOTIONS = {
     "pendulum": Pendulum(CASES["pendulum"].top, CASES["pendulum"].start),
     "euler": Euler(HeavyTop((3, 2, 1), 1, (0, 0, 0)), START),
-    "lagrange": Lagrange(HeavyTop((2, 2, 1), 1, (0, 0, 1)), START),
+    "lagrange": Lagrange(HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((F(1, 3), 1, 3), START.gamma)),
     "gyrostat": Gyrostat(HeavyTop((3, 2, 1), 1, (0, 1, 0)), START, F(1, 3)),
 }
 
@@ -166,7 +166,7 @@ class Wave:
         wave = companions.wave
         self.index, self.shift, self.rate = wave.index, number(wave.shift), number(wave.rate)
         self.value, self.slope = number(wave.value), number(wave.slope)
-        self.members = [[number(f) for f in (*m.of_phi, *m.of_slope)] for m in companions.members]
+        self.members = [[number(f) for f in factors] for factors in companions.factors]
 
     def at(self, lattice, time, point, below):
         scale, ratios, slope, z = point

@@ -99,7 +99,7 @@ def _graspable(value: arb, smallest: int) -> arb:
 
     Near a saddle components fall like e^(−t): at t = 10^6 their exact midpoints have a million bits.
     """
-    if value.is_zero() or max(_size(value.mid()), _size(value.rad())) > smallest:
+    if float(value) or value.is_zero() or max(_size(value.mid()), _size(value.rad())) > smallest:
         return value
     return arb(0, arb(2) ** (smallest + 1))
 

@@ -250,7 +250,7 @@ class SecondKind:
 
 
 def _exponential(time: Any, rate: acb) -> Any:
-    return (acb_series(time) * rate).exp() if not isinstance(time, arb) else (time * rate).exp()
+    return (acb_series(time) * rate).exp() if not isinstance(time, arb) else (rate * time).exp()
 
 
 def second_kind(lattice: AnyLattice, winding: Winding) -> SecondKind:
@@ -318,16 +318,17 @@ class Companions:
         phi, slope = map(lift, self.wave.at(point))
         whole = 1 / lift(denominator)
         phi, slope, square = phi * whole, slope * whole, lift(point.square)
-        low, steep = lift(point.scale) * phi, lift(point.slope) * phi
+        # a complex ball times a real one is quick in this order only
+        low, steep = phi * lift(point.scale), phi * lift(point.slope)
         if isinstance(self.wave.lattice, DegenerateLattice):
             rest = slope
             if self.wave.index is None:
                 rest = -_exponential(point.time, self.wave.rate) * whole
             # Φ' T² = K T ΦT − e: its K T ΦT stands in the cubic coefficient
-            parts = low * square, low, steep, square * rest, slope
+            parts = low * square, low, steep, rest * square, slope
         else:
             p = lift(point.high + point.root * point.square)
-            parts = low * square, low * p, steep, square * slope, p * slope
+            parts = low * square, low * p, steep, slope * square, slope * p
         a, b, c, d, e = parts
         return [a * f + b * g + c * h + d * i + e * j for f, g, h, i, j in self.factors]
 
