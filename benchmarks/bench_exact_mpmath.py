@@ -20,7 +20,6 @@ from fractions import Fraction
 from statistics import median
 from time import process_time
 
-import mpmath
 import pytest
 from flint import acb, arb
 from mpmath import mp
@@ -127,7 +126,9 @@ class OnEuler:
         self.third = mp.sqrt(square) * (energy - square / inertia) / (self.rate * lost)
         self.factor = began / self._turning(mp.zero, self.origin, *self.functions.all(self.origin))
         if user != "thetas":
-            self.factor /= mp.sqrt(sum(self.shares[k] ** 2 * number(motion.start.omega[k]) ** 2 for k in self._others()))
+            self.factor /= mp.sqrt(
+                sum(self.shares[k] ** 2 * number(motion.start.omega[k]) ** 2 for k in self._others())
+            )
 
     def _others(self):
         return (self.axes[1] + 1) % 3, (self.axes[1] + 2) % 3
@@ -228,7 +229,7 @@ class OnLagrange:
         with working_precision(bits):
             made = lagrange._prepared.__wrapped__(motion, bits)
         self.lattice, self.spin, self.user = OnLattice(made, [made.horizontal], user), number(made.spin), user
-        n, self.momentum, self.area, energy, square = map(number, motion.constants)
+        n, self.momentum, self.area, _, square = map(number, motion.constants)
         i1 = self.i1 = number(motion.top.inertia[0])
         self.size = s = mp.sqrt(square)
         cubic = [number(c) for c in reversed(motion.quartic().coefficients)]

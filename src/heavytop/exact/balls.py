@@ -80,7 +80,8 @@ def value_text(value: arb, digits: int) -> tuple[str, str]:
 
 def whole(value: arb) -> int:
     """The whole number nearest to the middle of a ball; 0 if it is not finite."""
-    return int((value + _HALF).mid().floor().unique_fmpz()) if value.is_finite() else 0
+    found = (value + _HALF).mid().floor().unique_fmpz()
+    return 0 if found is None else int(found)
 
 
 def relative_bits(value: arb) -> int:

@@ -32,7 +32,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import arb, arb_series, ctx
+from flint import arb, ctx
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
@@ -69,7 +69,7 @@ class Delone(ClosedForm):
         if any(xi):
             raise NotInClass(f"Delone needs xi = 0, but xi = {xi[0]} + i ({xi[1]}).", remedy)
 
-    def evaluate(self, time: Fraction) -> list[arb_series]:
+    def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         length = ctx.cap
         with series_length(length + 1):
@@ -159,7 +159,7 @@ class DeloneHomoclinic(ClosedForm):
         # 1 - sinθ = 2 S²/d, so the root is exact and odd in t
         return -arb(8).sqrt() * (tanh * sech) / d, 2 * sin_theta - 1, sin_theta, cos_theta
 
-    def evaluate(self, time: Fraction) -> list[arb_series]:
+    def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         alpha = ball(self.alpha)
         sin_phi, cos_phi, sin_theta, cos_theta = self._sines(time)

@@ -155,7 +155,7 @@ class Gyrostat:
 
 @dataclass(frozen=True, slots=True)
 class _Fixed:
-    """A vector fixed in space: share M plus the part across M with Z1 and Z3 = waves (None where there is no such part).
+    """A vector fixed in space: share M plus the part across M, of which waves are Z1 and Z3; None where it is 0.
 
     turn, square: −1/m and −1/m².
     """

@@ -123,7 +123,7 @@ class Wave:
         inverse = 1 / below(double)
         return acb(self.real(double) * c * inverse, self.imaginary(double) * s * inverse)
 
-    def _series(self, u: arb_series) -> acb_series:
+    def _series(self, u: arb_series) -> Any:
         functions = self.functions
         above = functions.thetas(acb_series(u, prec=ctx.cap) + _I * self.shift)[0]
         _, second, _, fourth = functions.thetas(u)
@@ -135,7 +135,7 @@ class Wave:
         """The derivative of its argument at u = 0."""
         with series_length(2):
             value = self.at(arb_series([0, 1], prec=2))[0]
-            return (value[1] / value[0]).imag
+            return arb((value[1] / value[0]).imag)
 
 
 def wave(functions: Jacobi, shift: arb) -> Wave:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import wraps
 from math import factorial, isqrt
-from typing import Any
+from typing import Any, TypeVar
 
 from flint import arb, arb_series, ctx, fmpq, fmpq_series
 
@@ -17,19 +17,21 @@ from heavytop.top.angles import perpendicular
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import Vector, dot
 
+Made = TypeVar("Made")
 
-def kept(make: Callable[[Any, int], Any]) -> Callable[[Any, int], Any]:
+
+def kept(make: Callable[[Any, int], Made]) -> Callable[[Any, int], Made]:
     """``make(motion, bits)`` once for each motion and precision: kept in the motion's ``made``.
 
     A cache of functools would hash a dozen Fractions at each look-up, longer than many a state takes.
     """
 
     @wraps(make)
-    def look_up(motion: Any, bits: int) -> Any:
-        found = motion.made.get((make, bits), motion)
-        if found is motion:
-            found = motion.made[make, bits] = make(motion, bits)
-        return found
+    def look_up(motion: Any, bits: int) -> Made:
+        made: dict[Any, Made] = motion.made
+        if (make, bits) not in made:
+            made[make, bits] = make(motion, bits)
+        return made[make, bits]
 
     return look_up
 

@@ -61,12 +61,12 @@ class Theta:
         cosine = self._sum(lambda n: acb((-1) ** n * self._power(n) * ((2 * n + 1) * angle).sin()), -1, wide)
         return sine, cosine
 
-    def even(self, sign: int) -> arb_poly:
+    def even(self, sign: int) -> Any:
         """θ3 (sign +1) or θ4 (−1), as a polynomial in c; q² > 0."""
         nome = self.square.sqrt()
         return self._sum(lambda n: 2 * sign**n * nome ** (n * n) if n else arb(1), 0, 2)
 
-    def both(self) -> arb_poly:
+    def both(self) -> Any:
         """θ3 θ4/θ4(0|2τ) = θ4(2z|2τ), as a polynomial in c."""
         double = Theta(self.square * self.square, self.rate, self.hyperbolic, self.growth * self.growth)
         inner = double._sum(lambda n: 2 * (-1) ** n * self.square ** (n * n) if n else arb(1), 0, 2)
