@@ -1,7 +1,7 @@
 """The gyrostat: M' = M × ω, γ' = γ × ω, ω = Ω + λ e2, for any inertia, rotor and start.
 
 What the paper's (2.1)-(2.4) solve exactly, with λ = P b/(M·γ) and γ = M/C0 (Zhukovsky 1885, Volterra 1899; Wittenburg,
-Dynamics of Multibody Systems, 3.2).  Integrals m² = |M|² and h = ½ M·Ω + λ M2.  With k = 1/I1 − 1/I3 and x = M2,
+Dynamics of Multibody Systems).  Integrals m² = |M|² and h = ½ M·Ω + λ M2.  With k = 1/I1 − 1/I3 and x = M2,
 (2.4) and (2.2) read k M1² = q1(x), k M3² = q3(x), and (2.3) is x'² = q1 q3, inverted by Biermann-Weierstrass:
 
     q1 = 2h − m²/I3 − 2λ x − (1/I2 − 1/I3) x²,    q3 = −[2h − m²/I1 − 2λ x − (1/I2 − 1/I1) x²],    x' = k M1 M3
@@ -98,26 +98,26 @@ class Gyrostat:
 
     def _evaluate(self, time: Fraction, length: int, bits: int) -> list[Any]:
         prepared = _prepared(self, bits)
-        momentum, point, denominator = self._momentum(time, length, bits)
+        momentum, point, inverse = self._momentum(time, length, bits)
         omega = [m * inverse for m, inverse in zip(momentum, prepared.inverses, strict=True)]
         if prepared.gamma is None:
             return [*omega, *rotate(self.start.gamma, self.angular_velocity, point.time)]
-        return [*omega, *prepared.gamma.at(momentum, point, denominator)]
+        return [*omega, *prepared.gamma.at(momentum, point, inverse)]
 
     def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[Any]:
-        momentum, point, denominator = self._momentum(time, 0, bits)
+        momentum, point, inverse = self._momentum(time, 0, bits)
         if self.permanent:
             return rotate(vector, self.angular_velocity, point.time)
-        return _held(self, vector, bits).at(momentum, point, denominator)
+        return _held(self, vector, bits).at(momentum, point, inverse)
 
     def _momentum(self, time: Fraction, length: int, bits: int) -> tuple[list[Any], Point, Any]:
         prepared = _prepared(self, bits)
         point = prepared.motion.lattice.point(time, length)
         if prepared.gamma is None:
             return [point.time * 0 + ball(m) for m in self.momentum], point, None
-        denominator = prepared.motion.denominator(point)
-        first, third = map(real, prepared.momentum.at(point, denominator))
-        return [first, prepared.motion.position(point, denominator), third], point, denominator
+        inverse = 1 / prepared.motion.denominator(point)
+        first, third = map(real, prepared.momentum.at(point, inverse))
+        return [first, prepared.motion.position(point, inverse), third], point, inverse
 
     def factors(self) -> tuple[tuple[Fraction, Fraction, Fraction], tuple[Fraction, Fraction, Fraction]]:
         """q1 and q3, each as the coefficients of 1, x, x²."""
@@ -165,12 +165,12 @@ class _Fixed:
     turn: arb
     square: arb
 
-    def at(self, momentum: list[Any], point: Point, denominator: Any) -> list[Any]:
+    def at(self, momentum: list[Any], point: Point, inverse: Any) -> list[Any]:
         """In body components at the point."""
         along = [m * self.share for m in momentum]
         if self.waves is None:
             return along
-        first, third = self.waves.at(point, denominator)
+        first, third = self.waves.at(point, inverse)
         second = (real(first) * momentum[2] - real(third) * momentum[0]) * self.square
         return [along[0] + imag(first) * self.turn, along[1] + second, along[2] + imag(third) * self.turn]
 

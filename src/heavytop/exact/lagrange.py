@@ -1,8 +1,8 @@
 """Lagrange's top: I1 = I2, a = b = 0, for every start.
 
 Data: n = P c, L = I3 Ω3, C0 = M·γ, E = ½ I1 (Ω1² + Ω2²) + n γ3, s = |γ|.  x = γ3 moves on a cubic
-(Whittaker, Analytical Dynamics, 71; Klein & Sommerfeld, Theorie des Kreisels; Hermite, Sur quelques applications des
-fonctions elliptiques):
+(Whittaker, Analytical Dynamics, chapter VI; Klein and Sommerfeld, The Theory of the Top, volume II; Hermite, Sur
+quelques applications des fonctions elliptiques):
 
     x'² = (2/I1)(E − n x)(s² − x²) − ((C0 − L x)/I1)²,    x' = Ω2 γ1 − Ω1 γ2
 
@@ -80,10 +80,10 @@ class Lagrange:
     def _evaluate(self, time: Fraction, length: int, bits: int) -> list[Any]:
         prepared = _prepared(self, bits)
         point = prepared.motion.lattice.point(time, length)
-        denominator = prepared.motion.denominator(point)
-        g, w = prepared.horizontal.at(point, denominator)
+        inverse = 1 / prepared.motion.denominator(point)
+        g, w = prepared.horizontal.at(point, inverse)
         spin = prepared.spin if not length else arb_series([prepared.spin], length)
-        x = prepared.motion.position(point, denominator)
+        x = prepared.motion.position(point, inverse)
         return [real(w), imag(w), spin, real(g), imag(g), x]
 
     @property
@@ -158,9 +158,9 @@ class Lagrange:
         prepared = _prepared(self, bits)
         axis = _axis(self, vector, bits)
         point = prepared.motion.lattice.point(time, 2)
-        denominator = prepared.motion.denominator(point)
-        (h,), (g, w) = (c.at(point, denominator) for c in (axis, prepared.horizontal))
-        x, size = prepared.motion.position(point, denominator)[0], ball(self.constants[4]).sqrt()
+        inverse = 1 / prepared.motion.denominator(point)
+        (h,), (g, w) = (c.at(point, inverse) for c in (axis, prepared.horizontal))
+        x, size = prepared.motion.position(point, inverse)[0], ball(self.constants[4]).sqrt()
         plus, minus = _sides(h[0], h[1], g[0], w[0], x, size)
         return [((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real, h[0].real]
 

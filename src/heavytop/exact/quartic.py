@@ -160,9 +160,9 @@ class PreparedMotion:
         inner = (square * as_ball(lead) + above * as_ball(even)) * point.scale + point.slope * as_ball(odd)
         return inner * point.scale
 
-    def position(self, point: Point, denominator: Any) -> Any:
-        """x at the point."""
-        return self.numerator(point) / denominator + self.start
+    def position(self, point: Point, inverse: Any) -> Any:
+        """x at the point; inverse: 1/:meth:`denominator`."""
+        return self.numerator(point) * inverse + self.start
 
     def companions(self, winding: Winding, *taylors: Sequence[Pair]) -> Companions:
         """Several F of the second theorem with the same winding; taylors: f0..f3, each as (real, imaginary/√square)."""
@@ -311,12 +311,12 @@ class Companions:
     factors: tuple[Factors, ...]
     still: bool
 
-    def at(self, point: Point, denominator: Any) -> list[Any]:
-        """Each F at the point, complex."""
+    def at(self, point: Point, inverse: Any) -> list[Any]:
+        """Each F at the point, complex where it is not real; inverse: 1/:meth:`PreparedMotion.denominator`."""
         if self.still:
             return [lift(point.scale * 0)] * len(self.factors)
         phi, slope = map(lift, self.wave.at(point))
-        whole = 1 / lift(denominator)
+        whole = lift(inverse)
         phi, slope, square = phi * whole, slope * whole, lift(point.square)
         # a complex ball times a real one is quick in this order only
         low, steep = phi * lift(point.scale), phi * lift(point.slope)

@@ -29,10 +29,10 @@ from heavytop.exact.theta import Theta
 
 Exact = Fraction | int
 Scalar = Fraction | int | arb
-_LARGE = 0.3  # the largest nome whose series are quick and lose no digits
+_LARGE = 0.6  # the largest nome whose series are short and lose no more than a few bits
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # frozen ones take ten times as long to make
 class Point:
     """A lattice's functions at a real time, without poles; numbers or power series in the time.
 
