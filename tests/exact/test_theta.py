@@ -6,7 +6,6 @@ from fractions import Fraction
 import pytest
 from flint import acb, arb, arb_series, ctx
 
-from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, radius, working_precision
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.jacobi import jacobi, wave
@@ -92,9 +91,10 @@ def test_the_tail_alone_makes_up_for_what_is_left_out(hyperbolic):
             assert radius(value) < Fraction(1, 2**32)
 
 
-def test_a_nome_of_one_is_refused_not_summed_for_ever():
-    with pytest.raises(OutOfReach, match="does not end"):
-        Theta(arb(1), arb(1), False, arb(1)).odd()
+@pytest.mark.parametrize("nome", [arb("nan"), arb(0.5, 1)])
+def test_a_nome_that_is_not_known_gives_balls_that_are_not_finite(nome):
+    for part in (*Theta(nome, arb(1), False, arb(1)).odd(), Theta(nome, arb(1), False, arb(1)).both()):
+        assert not part(arb(0.3)).is_finite()
 
 
 def test_the_working_precision_comes_back_after_an_error():

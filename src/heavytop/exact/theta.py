@@ -14,15 +14,16 @@ q^(n²) w^n, the terms from n = N on are below b_N = (2N + 1) q^(N²) (g w)^N an
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, cycle, repeat
 from typing import Any
 
 from flint import acb, acb_poly, arb, arb_poly, ctx, fmpz_poly
 
-from heavytop.errors import OutOfReach
+from heavytop.exact.balls import working_precision
 
-_MOST = 400
+_MOST = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,42 +54,60 @@ class Theta:
         With a shift v, θ1(v − z) over 2q^(1/4) is C(c) cos x − S(c) sin x, with S times i where ``hyperbolic``.
         """
         if shift is None:
-            return self._sum(lambda n: (-1) ** n * self._power(n), 1, 1), self._sum(self._power, -1, 1)
+            return self._sum(self.square, 1, _signs(-1), 1, 1), self._sum(self.square, 1, repeat(1), -1, 1)
         angle = shift * arb.pi()
-        wide = (2 * abs(angle.imag)).exp().upper()
+        wide, turn = (2 * abs(angle.imag)).exp().upper(), -2 * (2 * angle).cos()
+        sine, cosine = angle.sin_cos()
         unit = acb(0, 1) if self.hyperbolic else acb(1)
-        sine = self._sum(lambda n: unit * (-1) ** n * self._power(n) * ((2 * n + 1) * angle).cos(), 1, wide)
-        cosine = self._sum(lambda n: acb((-1) ** n * self._power(n) * ((2 * n + 1) * angle).sin()), -1, wide)
-        return sine, cosine
+        # (−1)^n times the cosines and sines of (2n + 1) angle
+        cosines, sines = _recurrent(turn, -unit * cosine, unit * cosine), _recurrent(turn, sine, sine)
+        return self._sum(self.square, 1, cosines, 1, wide), self._sum(self.square, 1, sines, -1, wide)
 
     def even(self, sign: int) -> Any:
         """θ3 (sign +1) or θ4 (−1), as a polynomial in c; q² > 0."""
-        nome = self.square.sqrt()
-        return self._sum(lambda n: 2 * sign**n * nome ** (n * n) if n else arb(1), 0, 2)
+        return self._sum(self.square.sqrt(), 2, _doubled(sign), 0, 2)
 
     def both(self) -> Any:
         """θ3 θ4/θ4(0|2τ) = θ4(2z|2τ), as a polynomial in c."""
         double = Theta(self.square * self.square, self.rate, self.hyperbolic, self.growth * self.growth)
-        inner = double._sum(lambda n: 2 * (-1) ** n * self.square ** (n * n) if n else arb(1), 0, 2)
-        return inner(arb_poly([-1, 0, 2]))
+        return double._sum(self.square, 2, _doubled(-1), 0, 2)(arb_poly([-1, 0, 2]))
 
-    def _power(self, n: int) -> arb:
-        return self.square ** (n * (n + 1) // 2)
-
-    def _sum(self, weight: Callable[[int], Any], kind: int, wide: Any) -> Any:
-        """Σ weight(n) C_n with C_n = T_n (kind 0) or U_n + kind U_(n−1)."""
-        nome, growth = abs(self.square).sqrt(), self.growth * wide
-        total, n = weight(0) * arb_poly([1]), 1
-        while True:
-            term = (2 * n + 1) * nome ** (n * n) * growth**n
-            if term < arb(2) ** (-ctx.prec - 8) and nome ** (2 * n + 1) * growth < arb(1) / 6:
-                break
-            if n == _MOST:
-                raise OutOfReach("A theta series does not end.", "Ask for more digits.")
-            total += weight(n) * arb_poly(_chebyshev(n, kind))
-            n += 1
-        tail = arb(0, (2 * wide * term).upper())
+    def _sum(self, base: arb, step: int, factors: Iterator[Any], kind: int, wide: Any) -> Any:
+        """Σ base^(n + step n (n − 1)/2) factor_n C_n with C_n = T_n (kind 0) or U_n + kind U_(n−1)."""
+        taken, tail = self._enough(wide)
+        total, power, ratio = next(factors) * arb_poly([1]), arb(1), base
+        for n in range(1, taken):
+            power, ratio = power * ratio, ratio * base**step
+            total += power * next(factors) * arb_poly(_chebyshev(n, kind))
         return total + (acb_poly([acb(tail, tail)]) if isinstance(total, acb_poly) else arb_poly([tail]))
+
+    def _enough(self, wide: Any) -> tuple[int, arb]:
+        """N, and the ball around 0 with the sum of all terms from n = N on; not finite where nothing is known."""
+        smallest = arb(2) ** (-ctx.prec - 8)
+        with working_precision(64):
+            nome, growth = abs(self.square).sqrt(), self.growth * wide
+            for n in range(1, _MOST):
+                term = (2 * n + 1) * nome ** (n * n) * growth**n
+                if term < smallest and nome ** (2 * n + 1) * growth < arb(1) / 6:
+                    return n, arb(0, (2 * wide * term).upper())
+                if not term.is_finite():
+                    break
+        return 1, arb(0, "inf")
+
+
+def _signs(sign: int) -> Iterator[int]:
+    return cycle((1, sign))
+
+
+def _doubled(sign: int) -> Iterator[int]:
+    return chain((1,), (2 * s for s in cycle((sign, 1))))
+
+
+def _recurrent(turn: acb, before: acb, first: acb) -> Iterator[acb]:
+    """x_(n+1) = turn x_n − x_(n−1)."""
+    while True:
+        yield first
+        before, first = first, turn * first - before
 
 
 def _chebyshev(n: int, kind: int) -> Any:
