@@ -1,8 +1,7 @@
-"""How long does one state of a motion in Jacobi functions take, the lattice made, and the same formulas in mpmath?"""
+"""How long does one state of a motion in Jacobi functions take, the lattice made?"""
 
 from fractions import Fraction
 
-import mpmath
 import pytest
 
 from heavytop.exact import euler, pendulum
@@ -42,28 +41,3 @@ def test_making_the_lattice(benchmark, room):
 
     lattice = benchmark(make)
     benchmark.extra_info["radius"] = radius_text(radius(lattice.rate))
-
-
-def test_the_same_state_of_euler_in_mpmath(benchmark):
-    """sn, cn, dn and the phase θ1/|θ1| from the same constants at 60 digits; Ω must agree to 50."""
-    motion = MOTIONS["euler"]
-    with working_precision(320):
-        lattice = euler._lattice.__wrapped__(motion, 320)
-        a, b, c = lattice.axes
-        jacobi = lattice.functions
-    with mpmath.workdps(70):
-        number = lambda ball: mpmath.mpf(ball.str(75, radius=False))  # noqa: E731
-        rate, origin, m = number(lattice.rate), number(lattice.origin), number(jacobi.parameter)
-        quarter, pole = number(jacobi.quarter), number(lattice.pole)
-        amplitude = {axis: number(value) for axis, value in lattice.amplitudes.items()}
-        nome = mpmath.qfrom(m=m)
-
-        def state():
-            u = mpmath.fmod(rate * 10**6 + origin, 4 * quarter)
-            sn, cn, dn = (mpmath.ellipfun(kind, u, m=m) for kind in ("sn", "cn", "dn"))
-            theta = mpmath.jtheta(1, mpmath.pi * (u + 1j * pole) / (2 * quarter), nome)
-            return {a: amplitude[a] * dn, b: amplitude[b] * cn, c: amplitude[c] * sn}, theta / abs(theta)
-
-        omega, _ = benchmark(state)
-        for axis, value in enumerate(motion.state(TIME, 170)[:3]):
-            assert abs(number(value) - omega[axis]) < mpmath.mpf("1e-50")

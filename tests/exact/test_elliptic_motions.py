@@ -154,6 +154,37 @@ def test_general_motions_keep_fifty_digits_at_large_times_and_solve_the_equation
             assert_solves_its_equations(motion, motion.parameters, time)
 
 
+@pytest.mark.parametrize("family", [random_gyrostat, paper_gyrostat, random_lagrange])
+def test_a_state_is_the_first_coefficient_of_its_series(family):
+    """Numbers go through polynomials, series through FLINT's theta functions."""
+    motions = [family(seed) for seed in range(12)]
+    motions += [motion for motion in EDGES.values() if isinstance(motion, type(motions[0]))]
+    for motion in motions:
+        for time in (F(-40), F(1, 3), F(10**6)):
+            for value, series in zip(motion.state(time, 200), motion.series(time, 2, 200), strict=True):
+                assert value.overlaps(series[0]), (motion, time)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_gyrostat_carries_a_given_vector_whatever_its_gamma_is(seed):
+    motion = random_gyrostat(500 + seed)
+    rng = random.Random(seed)
+    xi, time = vector(rng), F(2 + seed, 3)
+    assert dot(motion.start.gamma, motion.start.gamma) != 1
+    enclosed = Validated(motion.top, motion.start, motion.system, rotor=motion.rotor, xi=xi)
+    assert_same(motion.attitude(time, 200, xi), enclosed.attitude(time, 200))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lagrange_carries_a_given_vector_across_gamma(seed):
+    motion = random_lagrange(500 + seed)
+    rng = random.Random(seed)
+    across = cross(motion.start.gamma, vector(rng))
+    time = F(-2 - seed, 3)
+    enclosed = Validated(motion.top, motion.start, motion.system, xi=across)
+    assert_same(motion.attitude(time, 200, across), enclosed.attitude(time, 200))
+
+
 def test_exact_separatrices_have_no_lattice_and_their_neighbours_have():
     for name, kind in (
         ("homoclinic", DegenerateLattice),

@@ -5,8 +5,7 @@ The working precision of FLINT is global, so every evaluation stands inside :fun
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from decimal import MAX_EMAX, MIN_EMIN, ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from types import SimpleNamespace
@@ -29,17 +28,24 @@ FUNCTIONS = SimpleNamespace(
     atan2=lambda y, x: arb.atan2(y, x),
 )
 _MAX_BITS = 1 << 22
+_HALF = arb(0.5)
+_GUARD, _STEP = 16, 64
 
 
-@contextmanager
-def working_precision(bits: int) -> Iterator[None]:
+class working_precision:  # noqa: N801 - reads as a verb
     """FLINT's working precision set to ``bits`` within the block."""
-    before = ctx.prec
-    ctx.prec = bits
-    try:
-        yield
-    finally:
-        ctx.prec = before
+
+    __slots__ = ("before", "bits")
+
+    def __init__(self, bits: int) -> None:
+        self.bits = bits
+
+    def __enter__(self) -> None:
+        self.before = ctx.prec
+        ctx.prec = self.bits
+
+    def __exit__(self, *_: object) -> None:
+        ctx.prec = self.before
 
 
 def ball(value: Fraction | int) -> arb:
@@ -72,14 +78,15 @@ def value_text(value: arb, digits: int) -> tuple[str, str]:
     return text, radius_text(radius(value) + abs(Fraction(text) - midpoint(value)))
 
 
+def whole(value: arb) -> int:
+    """The whole number nearest to the middle of a ball; 0 if it is not finite."""
+    found = (value + _HALF).mid().floor().unique_fmpz()
+    return 0 if found is None else int(found)
+
+
 def relative_bits(value: arb) -> int:
     """Bits that a ball of size about 1 or larger has right; absolute below 1; -1 if it is not finite."""
-    if not value.is_finite():
-        return -1
-    if value.is_exact():
-        return _MAX_BITS
-    # exponents only: values like exp(-1e9) have no fraction that fits into memory
-    return min(_MAX_BITS, max(0, max(0, _size(value.mid()) - 1) - _size(value.rad())))
+    return max(0, min(_MAX_BITS, value.rel_one_accuracy_bits())) if value.is_finite() else -1
 
 
 def _size(value: arb) -> int:
@@ -93,25 +100,32 @@ def _graspable(value: arb, smallest: int) -> arb:
 
     Near a saddle components fall like e^(−t): at t = 10^6 their exact midpoints have a million bits.
     """
-    if (value.is_exact() and value == 0) or max(_size(value.mid()), _size(value.rad())) > smallest:
+    if float(value) or value.is_zero() or max(_size(value.mid()), _size(value.rad())) > smallest:
         return value
     return arb(0, arb(2) ** (smallest + 1))
 
 
-def to_bits(evaluate: Callable[[int], list[arb]], bits: int) -> list[arb]:
+def to_bits(evaluate: Callable[[int], list[arb]], bits: int, time: Fraction | None = None) -> list[arb]:
     """``evaluate(working bits)`` repeated at growing working precision until every ball has ``bits`` bits.
 
-    Bits count relative to a value above 1 and absolutely below it.  Raises OutOfReach where even a precision of
-    16 times the asked bits plus 4096 does not give them.
+    Bits count relative to a value above 1 and absolutely below it.  time: what it is evaluated at; it costs its own
+    bits, and the precision then comes in steps, so that lattices are made once.  Raises OutOfReach where even a
+    precision of 16 times the asked bits plus 4096 does not give them.
     """
-    working = bits + 32
-    reached = -1
-    while working <= 16 * bits + 4096:
-        with working_precision(working):
-            values = evaluate(working)
-        reached = min(relative_bits(value) for value in values)
-        if reached >= bits:
-            return [_graspable(value, -16 * bits - 4096) for value in values]
+    extra = -1 if time is None else _GUARD + (abs(time.numerator) // time.denominator).bit_length()
+    working, smallest = bits + 32, -16 * bits - 4096
+    while working <= -smallest:
+        inside = working if extra < 0 else -(-(working + extra) // _STEP) * _STEP
+        with working_precision(inside):
+            values = evaluate(inside)
+        right = [value.rel_one_accuracy_bits() for value in values]
+        if min(right) >= bits:
+            # only exact, infinite and very small values have more bits right than that
+            if max(right) < -smallest:
+                return values
+            if all(value.is_finite() for value in values):
+                return [v if r < -smallest else _graspable(v, smallest) for v, r in zip(values, right, strict=True)]
+        reached = min(map(relative_bits, values))
         working += max(bits - reached, working // 2) if reached >= 0 else working
     raise OutOfReach(
         f"Only {max(reached, 0)} of {bits} bits could be proven.", "Ask for fewer digits or an earlier time."

@@ -15,17 +15,17 @@ Source: Leimanis, The General Problem of the Motion of Coupled Rigid Bodies abou
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
-from flint import arb, arb_series, ctx
+from flint import arb, ctx
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm, balls, half_angle, instant, sign
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
+from heavytop.exact.motion import kept
 from heavytop.top.equations import HEAVY_TOP, System, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
 
@@ -38,6 +38,7 @@ class BobylevSteklov(ClosedForm):
     start: State
     method: str = "closed form: Bobylev-Steklov, Jacobi functions"
     system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         (i1, _, i3), n = self.top.inertia, self.top.moment
@@ -53,34 +54,38 @@ class BobylevSteklov(ClosedForm):
         if off != 0:
             raise NotInClass(f"P a gamma3 - I3 Omega1 Omega3 = {off}, not 0.", remedy)
 
-    def evaluate(self, time: Fraction) -> list[arb_series]:
+    def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        field = heavy_top(self.system.parameters(self.top, self.start), self.start.flat)
-        if not any(field):
-            return [arb_series([value], prec=ctx.cap) for value in balls(self.start.flat)]
-        x, slope = _lattice(self, ctx.prec).motion(instant(time))
-        p, n1, i3 = ball(self.start.omega[0]), ball(self.top.moment[0]), ball(self.top.inertia[2])
-        constant = arb_series([p], prec=ctx.cap)
-        gamma1 = (ball(_height(self)) - i3 / 2 * (x * x)) / n1
-        return [constant, arb_series([0], prec=ctx.cap), x, gamma1, -i3 / n1 * slope, i3 * p / n1 * x]
+        lattice = _lattice(self, ctx.prec)
+        if lattice is None:
+            return balls(self.start.flat)
+        x, slope = lattice.motion(instant(time))
+        p, top, bend, across, up = lattice.shares
+        return [p, arb(0), x, top + bend * (x * x), across * slope, up * x]
 
 
 @dataclass(frozen=True, slots=True)
 class _Lattice:
-    """All that does not depend on the time: amplitude = σ√α, crossing where x goes through 0 (cn, not dn)."""
+    """All that does not depend on the time.
+
+    amplitude: σ√α.  steep: the factor of x'.  crossing: where x goes through 0 (cn, not dn).
+    shares: p, and the constant and the factors of x², x' and x in γ.
+    """
 
     functions: Jacobi
     rate: arb
     origin: arb
     amplitude: arb
+    steep: arb
     crossing: bool
+    shares: tuple[arb, arb, arb, arb, arb]
 
-    def motion(self, time: arb_series) -> tuple[Any, Any]:
+    def motion(self, time: Any) -> tuple[Any, Any]:
         """(x, x')."""
         sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
         if self.crossing:
-            return self.amplitude * cn, -self.amplitude * self.rate * (sn * dn)
-        return self.amplitude * dn, -self.amplitude * self.rate * self.functions.parameter * (sn * cn)
+            return self.amplitude * cn, self.steep * (sn * dn)
+        return self.amplitude * dn, self.steep * (sn * cn)
 
 
 def _height(case: BobylevSteklov) -> Fraction:
@@ -88,8 +93,11 @@ def _height(case: BobylevSteklov) -> Fraction:
     return case.top.moment[0] * case.start.gamma[0] + case.top.inertia[2] * case.start.omega[2] ** 2 / 2
 
 
-@lru_cache(maxsize=64)
-def _lattice(case: BobylevSteklov, _bits: int) -> _Lattice:
+@kept
+def _lattice(case: BobylevSteklov, _bits: int) -> _Lattice | None:
+    """None where nothing moves."""
+    if not any(heavy_top(case.system.parameters(case.top, case.start), case.start.flat)):
+        return None
     i3, n1, (p, _, x), gamma = case.top.inertia[2], case.top.moment[0], case.start.omega, case.start.gamma
     h, speed, square = _height(case), -n1 * gamma[1] / i3, x * x
     b, c = h / i3 - p * p, (dot(gamma, gamma) * n1 * n1 - h * h) / i3**2
@@ -110,7 +118,10 @@ def _lattice(case: BobylevSteklov, _bits: int) -> _Lattice:
         rate = alpha.sqrt() / 2
         origin = legendre_f(above / (2 * spread), below / (2 * spread), ball(square) / alpha)
     side = sign(x)
-    return _Lattice(functions, rate, sign(-speed) * side * origin, side * alpha.sqrt(), crossing)
+    amplitude = side * alpha.sqrt()
+    steep = -amplitude * rate * (1 if crossing else functions.parameter)
+    shares = ball(p), ball(h / n1), ball(-i3 / (2 * n1)), ball(-i3 / n1), ball(i3 * p / n1)
+    return _Lattice(functions, rate, sign(-speed) * side * origin, amplitude, steep, crossing, shares)
 
 
 def bobylev_steklov_motion(

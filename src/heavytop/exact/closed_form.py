@@ -6,15 +6,14 @@ are the series whose residual proves the form.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from flint import acb_series, arb, arb_series, ctx
+from flint import acb, acb_series, arb, arb_series, ctx
 
-from heavytop.exact.balls import ball, to_bits, working_precision
-from heavytop.exact.motion import enough_bits, initial_xi
+from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.motion import initial_xi
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
@@ -22,30 +21,33 @@ Carry = Callable[[Sequence[Any]], list[Any]]
 """Takes the body components at t = 0 of a vector fixed in space to those at the time in question."""
 
 
-@contextmanager
-def series_length(length: int) -> Iterator[None]:
+class series_length:  # noqa: N801 - reads as a verb
     """FLINT's cap on the length of power series set to ``length`` within the block."""
-    before = ctx.cap
-    ctx.cap = length
-    try:
-        yield
-    finally:
-        ctx.cap = before
+
+    __slots__ = ("before", "length")
+
+    def __init__(self, length: int) -> None:
+        self.length = length
+
+    def __enter__(self) -> None:
+        self.before = ctx.cap
+        ctx.cap = self.length
+
+    def __exit__(self, *_: object) -> None:
+        ctx.cap = self.before
 
 
-def instant(time: Fraction) -> arb_series:
-    """The power series t + ε, of the length set by :func:`series_length`."""
-    return arb_series([ball(time), 1], prec=ctx.cap)
+def instant(time: Fraction) -> Any:
+    """The power series t + ε, of the length set by :func:`series_length`; the number t for length 1."""
+    return ball(time) if ctx.cap == 1 else arb_series([ball(time), 1], prec=ctx.cap)
 
 
-def real_part(series: acb_series) -> arb_series:
-    """The series of the real parts of the coefficients."""
-    return arb_series([c.real for c in series.coeffs()], prec=ctx.cap)
-
-
-def imaginary_part(series: acb_series) -> arb_series:
-    """The series of the imaginary parts of the coefficients."""
-    return arb_series([c.imag for c in series.coeffs()], prec=ctx.cap)
+def unit(angle: Any) -> Any:
+    """e^(i angle) of a number or series."""
+    sine, cosine = angle.sin_cos()
+    if isinstance(angle, arb):
+        return acb(cosine, sine)
+    return acb_series(cosine, prec=ctx.cap) + acb(0, 1) * acb_series(sine, prec=ctx.cap)
 
 
 def balls(vector: Sequence[Fraction]) -> list[arb]:
@@ -64,18 +66,18 @@ def half_angle(tangent: Fraction) -> tuple[Fraction, Fraction]:
     return (1 - square) / (1 + square), 2 * Fraction(tangent) / (1 + square)
 
 
-def turned(vector: Sequence[Any], omega: Sequence[arb], rate: arb, time: arb_series) -> list[Any]:
+def turned(vector: Sequence[Any], omega: Sequence[arb], rate: arb, time: Any) -> list[Any]:
     """The solution of v' = v × Ω for a constant Ω of length ``rate`` > 0, at ``time``."""
-    sine, cosine = arb_series.sin_cos(rate * time)
+    sine, cosine = (rate * time).sin_cos()
     axis = [component / rate for component in omega]
     along = dot(axis, vector)
     across = cross(vector, axis)
     return [along * n + cosine * (v - along * n) + sine * w for n, v, w in zip(axis, vector, across, strict=True)]
 
 
-def tanh_sech(argument: arb_series) -> tuple[arb_series, arb_series]:
-    """(tanh, sech) of a series; nothing grows, whatever the sign and size of its first coefficient."""
-    side = -1 if argument[0] < 0 else 1
+def tanh_sech(argument: Any) -> tuple[Any, Any]:
+    """(tanh, sech) of a number or series; nothing grows, whatever its sign and size."""
+    side = -1 if constant(argument) < 0 else 1
     decay = (-side * argument).exp()
     total = 1 + decay * decay
     return side * (1 - decay * decay) / total, 2 * decay / total
@@ -98,34 +100,30 @@ class ClosedForm:
         @property
         def start(self) -> State: ...
 
-    def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
-        """Ω at the series ``time``, and what carries vectors fixed in space there, at FLINT's working precision."""
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+        """Ω at the number or series ``time``, and what carries vectors fixed in space there."""
         raise NotImplementedError
 
-    def evaluate(self, time: Fraction) -> list[arb_series]:
+    def evaluate(self, time: Fraction) -> list[Any]:
         """The six components at ``time`` + ε, at FLINT's working precision and length of series."""
         omega, carry = self.motion(instant(time))
         return [*omega, *carry(balls(self.start.gamma))]
 
-    def _at(self, time: Fraction, working: int) -> list[arb_series]:
-        with working_precision(enough_bits(working, time)):
-            return self.evaluate(time)
-
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         with series_length(1):
-            return to_bits(lambda working: [constant(part) for part in self._at(time, working)], bits)
+            return to_bits(lambda _working: self.evaluate(time), bits, time)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         found: list[arb_series] = []
 
-        def evaluate(working: int) -> list[arb]:
-            found[:] = [arb_series(part, prec=length) for part in self._at(time, working)]
+        def evaluate(_working: int) -> list[arb]:
+            found[:] = [arb_series(part, prec=length) for part in self.evaluate(time)]
             return [part[0] for part in found]
 
         with series_length(length):
-            to_bits(evaluate, bits)
+            to_bits(evaluate, bits, time)
         return found
 
 
@@ -140,14 +138,12 @@ class WithAttitude(ClosedForm):
         ``initial``: ξ at t = 0; :func:`heavytop.exact.motion.initial_xi` of γ if not given.
         """
 
-        def evaluate(working: int) -> list[arb]:
-            with working_precision(enough_bits(working, time)):
-                xi = initial_xi(self.start.gamma) if initial is None else balls(initial)
-                _, carry = self.motion(instant(time))
-                return [constant(part) for part in carry(xi)]
+        def evaluate(_working: int) -> list[arb]:
+            xi = initial_xi(self.start.gamma) if initial is None else balls(initial)
+            return self.motion(instant(time))[1](xi)
 
         with series_length(1):
-            return to_bits(evaluate, bits)
+            return to_bits(evaluate, bits, time)
 
 
 def constant(value: Any) -> arb:

@@ -28,16 +28,16 @@ Source: Delone's class is Kovalevskaya's of the first degenerate kind, Appelrot;
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
-from flint import arb, arb_series, ctx
+from flint import arb, ctx
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
-from heavytop.exact.closed_form import ClosedForm, balls, instant, series_length, tanh_sech
+from heavytop.exact.closed_form import ClosedForm, balls, constant, instant, series_length, tanh_sech
+from heavytop.exact.motion import kept
 from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, System
@@ -55,6 +55,7 @@ class Delone(ClosedForm):
     start: State
     method: str = "closed form: Delone class of the Kovalevskaya top, Weierstrass functions"
     system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
@@ -68,7 +69,7 @@ class Delone(ClosedForm):
         if any(xi):
             raise NotInClass(f"Delone needs xi = 0, but xi = {xi[0]} + i ({xi[1]}).", remedy)
 
-    def evaluate(self, time: Fraction) -> list[arb_series]:
+    def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         length = ctx.cap
         with series_length(length + 1):
@@ -89,7 +90,7 @@ class Delone(ClosedForm):
             i3 / square * (n1 * imaginary - n2 * real),
             g3 * cosine + i3 * weight * sine,
         ]
-        return [arb_series(part, prec=length) for part in state]
+        return state if length > 1 else [constant(part) for part in state]
 
     def _turn(self, time: Fraction) -> tuple[Any, Any]:
         """cos b and sin b/|n|."""
@@ -108,7 +109,7 @@ def _constants(case: Delone) -> tuple[Fraction, Fraction, Fraction, Fraction]:
     return n1 * n1 + n2 * n2, n1 * w1 + n2 * w2, n1 * w2 - n2 * w1, w1 * w1 + w2 * w2
 
 
-@lru_cache(maxsize=64)
+@kept
 def _prepared(case: Delone, _bits: int) -> PreparedMotion:
     square, along, across, weight = _constants(case)
     spin, lift = case.start.omega[2], case.start.gamma[2] / case.top.inertia[2]
@@ -158,7 +159,7 @@ class DeloneHomoclinic(ClosedForm):
         # 1 - sinθ = 2 S²/d, so the root is exact and odd in t
         return -arb(8).sqrt() * (tanh * sech) / d, 2 * sin_theta - 1, sin_theta, cos_theta
 
-    def evaluate(self, time: Fraction) -> list[arb_series]:
+    def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         alpha = ball(self.alpha)
         sin_phi, cos_phi, sin_theta, cos_theta = self._sines(time)
@@ -170,7 +171,7 @@ class DeloneHomoclinic(ClosedForm):
 
         def evaluate(_working: int) -> list[arb]:
             with series_length(1):
-                sin_phi, cos_phi, sin_theta, cos_theta = (part[0] for part in self._sines(time))
+                sin_phi, cos_phi, sin_theta, cos_theta = self._sines(time)
             phi = arb.pi() + arb.atan2(-sin_phi, -cos_phi)
             return [phi, arb.atan2(sin_theta, cos_theta), ball(self.alpha * time)]
 

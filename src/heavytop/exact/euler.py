@@ -18,23 +18,24 @@ Attitude (Jacobi): the projection of e_b across M, which never vanishes, turns a
 and μ from ψ' at u = 0.  Every vector fixed in space, γ among them, keeps its components on M, on that projection
 turned back by ψ, and across both.  Where Ω × M = 0 the rotation is steady and space turns about Ω at the rate |Ω|.
 
-Sources: Whittaker, Analytical Dynamics, §69; Landau and Lifshitz, Mechanics, §37; DLMF 22.19(iv).
+Sources: Whittaker, Analytical Dynamics, chapter VI; Landau and Lifshitz, Mechanics, §37; DLMF 22.19(iv).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
-from flint import acb, acb_series, arb, arb_series, ctx
+from flint import acb, arb, ctx
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball
-from heavytop.exact.closed_form import Carry, WithAttitude, balls, imaginary_part, real_part, sign, turned
-from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign, turned, unit
+from heavytop.exact.jacobi import Jacobi, Wave, jacobi, legendre_f, wave
+from heavytop.exact.motion import kept
+from heavytop.exact.weierstrass import imag, real
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
@@ -49,6 +50,7 @@ class Euler(WithAttitude):
     start: State
     method: str = "closed form: Euler-Poinsot, Jacobi functions"
     system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if any(self.top.moment):
@@ -63,11 +65,20 @@ class Euler(WithAttitude):
         omega = self.start.omega
         return not any(cross(omega, self.top.angular_momentum(omega)))
 
-    def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        lattice = _lattice(self, ctx.prec)
+        if lattice is None:
+            return WithAttitude.evaluate(self, time)
+        omega, place = lattice.motion(instant(time))
+        return [*omega, *place(lattice.gamma)]
+
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         lattice = _lattice(self, ctx.prec)
         if lattice is not None:
-            return lattice.motion(time)
+            omega, place = lattice.motion(time)
+            return omega, lambda vector: place(lattice.held(vector))
         omega = balls(self.start.omega)
         if not any(self.start.omega):
             return omega, list
@@ -79,50 +90,54 @@ class Euler(WithAttitude):
 class _Lattice:
     """All that does not depend on the time, at one working precision.
 
-    axes: (a, b, c).  amplitudes: A by axis.  rate: p.  origin: u0.  pole: y.  drift: μ, per unit of time.
-    momentum: L.  frame: M/L, the projection of e_b and their cross product at t = 0.  phase: e^{iψ} at t = 0 but for
-    its constant.  period: its factor over 2K.
+    axes: (a, b, c).  shares: I/L.  amplitudes: A by axis.  rate: p.  origin: u0.  wave: the theta quotient of e^{iψ}.
+    drift: μ, per unit of time.  frame: M/L, the projection of e_b across it and their cross product at t = 0.
+    turn: the length of that projection over the wave at t = 0.  gamma: what :meth:`held` says of γ.
     """
 
     axes: tuple[int, int, int]
-    inertia: list[arb]
+    shares: list[arb]
     amplitudes: dict[int, arb]
     functions: Jacobi
     rate: arb
     origin: arb
-    pole: arb
+    wave: Wave
     drift: arb
-    momentum: arb
     frame: tuple[Sequence[Any], ...]
-    phase: acb
-    period: acb
+    turn: acb
+    gamma: tuple[arb, acb]
 
-    def motion(self, time: arb_series) -> tuple[list[arb_series], Carry]:
+    def motion(self, time: Any) -> tuple[list[Any], Callable[[tuple[arb, acb]], list[Any]]]:
+        """Ω, and what takes :meth:`held` of a vector to its components."""
         a, b, c = self.axes
         u = self.rate * time + self.origin
         sn, cn, dn = self.functions.functions(u)
         by_axis = {a: self.amplitudes[a] * dn, b: self.amplitudes[b] * cn, c: self.amplitudes[c] * sn}
         omega = [by_axis[axis] for axis in range(3)]
-        along, projection, across = _frame([i * w for i, w in zip(self.inertia, omega, strict=True)], self.momentum, b)
-        sine, cosine = arb_series.sin_cos(self.drift * time)
-        turn = (acb_series(cosine, prec=ctx.cap) + acb(0, 1) * acb_series(sine, prec=ctx.cap)) * (
-            self.functions.phase(u, self.pole, self.period) / self.phase
-        )
-        cosine, sine = real_part(turn), imaginary_part(turn)
-        space = (
-            along,
-            [cosine * q - sine * r for q, r in zip(projection, across, strict=True)],
-            [sine * q + cosine * r for q, r in zip(projection, across, strict=True)],
-        )
+        value, angle = self.wave.at(u)
+        turning = value * unit(self.drift * time + angle)
+        i, j = (b + 1) % 3, (b + 2) % 3
+        along = [share * w for share, w in zip(self.shares, omega, strict=True)]
+        square = along[i] * along[i] + along[j] * along[j]
 
-        def carry(vector: Sequence[Any]) -> list[Any]:
-            parts = [dot(vector, axis) for axis in self.frame]
-            return [sum(part * axis[k] for part, axis in zip(parts, space, strict=True)) for k in range(3)]
+        def place(held: tuple[arb, acb]) -> list[Any]:
+            part, across = held
+            turned = across * turning
+            x, y = real(turned), imag(turned) / square
+            rest = part - x * along[b] / square
+            result = [x + part * along[b]] * 3
+            result[i], result[j] = along[i] * rest - along[j] * y, along[j] * rest + along[i] * y
+            return result
 
-        return omega, carry
+        return omega, place
+
+    def held(self, vector: Sequence[Any]) -> tuple[arb, acb]:
+        """What stays of a vector fixed in space: its part along M, and the one across as a factor of the wave."""
+        along, projection, across = (dot(vector, axis) for axis in self.frame)
+        return along, acb(projection, -across) * self.turn
 
 
-@lru_cache(maxsize=64)
+@kept
 def _lattice(case: Euler, _bits: int) -> _Lattice | None:
     """None for a steady rotation."""
     if case.steady:
@@ -146,23 +161,25 @@ def _lattice(case: Euler, _bits: int) -> _Lattice | None:
     complement = (roots[a] - roots[b]) / rate2
     # y is measured in u: the pole of ψ' nearest to the real line
     pole = sign(ia - ic) * legendre_f(*balls((sine2, ib * ib * ab / square, 1 - complement * sine2)))
-    period = functions.phase_period(pole)
+    waved = wave(functions, pole)
     length, rate = ball(square).sqrt(), ball(rate2).sqrt()
-    drift = length * ball((energy - ib * ab) / (square - ib * ib * ab)) - rate * functions.phase_rate(pole)
-    return _Lattice(
+    drift = length * ball((energy - ib * ab) / (square - ib * ib * ab)) - rate * waved.rate()
+    frame = _frame(balls(momentum), length, b)
+    value, angle = waved.at(origin)
+    made = _Lattice(
         axes=(a, b, c),
-        inertia=balls(inertia),
+        shares=[i / length for i in balls(inertia)],
         amplitudes={a: sign_a * ball(aa).sqrt(), b: sign_b * ball(ab).sqrt(), c: sign_c * ball(ac).sqrt()},
         functions=functions,
         rate=rate,
         origin=origin,
-        pole=pole,
+        wave=waved,
         drift=drift,
-        momentum=length,
-        frame=_frame(balls(momentum), length, b),
-        phase=functions.phase(origin, pole, period)[0],
-        period=period,
+        frame=frame,
+        turn=frame[1][b] / (value * unit(angle)),
+        gamma=(arb(0), acb(0)),
     )
+    return replace(made, gamma=made.held(balls(case.start.gamma)))
 
 
 def _rotate(values: Sequence[Fraction], axis: int) -> tuple[Fraction, Fraction, Fraction]:

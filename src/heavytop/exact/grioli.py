@@ -19,8 +19,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from flint import arb_series
-
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, half_angle
@@ -54,7 +52,7 @@ class Grioli(WithAttitude):
         if any(off):
             raise NotInClass(f"gamma is off Grioli's by ({', '.join(map(str, off))}).", remedy)
 
-    def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         n = self.top.moment
         length = ball(dot(n, n)).sqrt()
@@ -62,7 +60,7 @@ class Grioli(WithAttitude):
         rate = ball(dot(self.start.omega, n)) / length
         u0 = [w / rate - r for w, r in zip(balls(self.start.omega), axis, strict=True)]
         w0 = cross(u0, axis)
-        sine, cosine = arb_series.sin_cos(rate * time)
+        sine, cosine = (rate * time).sin_cos()
         u = [cosine * a + sine * b for a, b in zip(u0, w0, strict=True)]
         w = [cosine * b - sine * a for a, b in zip(u0, w0, strict=True)]
         space = (

@@ -1,7 +1,7 @@
 """The gyrostat: M' = M × ω, γ' = γ × ω, ω = Ω + λ e2, for any inertia, rotor and start.
 
 What the paper's (2.1)-(2.4) solve exactly, with λ = P b/(M·γ) and γ = M/C0 (Zhukovsky 1885, Volterra 1899; Wittenburg,
-Dynamics of Multibody Systems, 3.2).  Integrals m² = |M|² and h = ½ M·Ω + λ M2.  With k = 1/I1 − 1/I3 and x = M2,
+Dynamics of Multibody Systems).  Integrals m² = |M|² and h = ½ M·Ω + λ M2.  With k = 1/I1 − 1/I3 and x = M2,
 (2.4) and (2.2) read k M1² = q1(x), k M3² = q3(x), and (2.3) is x'² = q1 q3, inverted by Biermann-Weierstrass:
 
     q1 = 2h − m²/I3 − 2λ x − (1/I2 − 1/I3) x²,    q3 = −[2h − m²/I1 − 2λ x − (1/I2 − 1/I1) x²],    x' = k M1 M3
@@ -21,16 +21,16 @@ Z2 = i (M3 Z1 − M1 Z3)/m.  Valid for every start; λ = 0 is Euler's free top.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
 from flint import arb, arb_series
 
-from heavytop.exact.balls import ball, to_bits, working_precision
-from heavytop.exact.motion import enough_bits, initial_xi, rotate, series_at, taylor, turned
-from heavytop.exact.quartic import Companion, PreparedMotion, QuarticMotion, Winding
+from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
+from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion, Winding
 from heavytop.exact.weierstrass import Point, imag, real
 from heavytop.top.equations import GYROSTAT, Parameters, System, gyrostat, rotor
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
@@ -48,6 +48,7 @@ class Gyrostat:
     rotor: Fraction
     method: str = "closed form: gyrostat, Weierstrass functions of M2"
     system: System = GYROSTAT
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
     def of(cls, top: HeavyTop, start: State) -> Gyrostat:
@@ -77,61 +78,46 @@ class Gyrostat:
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return to_bits(lambda working: self._evaluate(time, 0, working), bits)
+        return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return series_at(lambda working, count: self._evaluate(time, count, working), length, bits)
+        return series_at(lambda working, count: self._evaluate(time, count, working), length, bits, time)
 
     def attitude(self, time: Fraction, bits: int, xi: Vector | None = None) -> list[arb]:
         """ξ at ``time``; at t = 0 it is ``xi`` (any vector fixed in space) or the default one ⟂ γ."""
 
-        def evaluate(working: int) -> list[arb]:
-            inside = enough_bits(working, time)
-            with working_precision(inside):
-                if xi is not None:
-                    return self._carried(xi, time, 0, inside)
-                images = [self._carried(unit, time, 0, inside) for unit in _UNITS]
-                start = initial_xi(self.start.gamma)
-                return [dot(start, [image[axis] for image in images]) for axis in range(3)]
+        def evaluate(inside: int) -> list[arb]:
+            if xi is not None:
+                return self._carried(xi, time, inside)
+            images = [self._carried(unit, time, inside) for unit in _UNITS]
+            start = initial_xi(self.start.gamma)
+            return [dot(start, [image[axis] for image in images]) for axis in range(3)]
 
-        return to_bits(evaluate, bits)
+        return to_bits(evaluate, bits, time)
 
-    def _evaluate(self, time: Fraction, length: int, working: int) -> list[Any]:
-        bits = enough_bits(working, time)
-        with working_precision(bits):
-            momentum, point, denominator = self._momentum(time, length, bits)
-            omega = [m * (1 / ball(i)) for m, i in zip(momentum, self.top.inertia, strict=True)]
-            gamma = self._fixed(self.start.gamma, momentum, point, denominator, bits)
-            return [*omega, *gamma]
+    def _evaluate(self, time: Fraction, length: int, bits: int) -> list[Any]:
+        prepared = _prepared(self, bits)
+        momentum, point, inverse = self._momentum(time, length, bits)
+        omega = [m * inverse for m, inverse in zip(momentum, prepared.inverses, strict=True)]
+        if prepared.gamma is None:
+            return [*omega, *rotate(self.start.gamma, self.angular_velocity, point.time)]
+        return [*omega, *prepared.gamma.at(momentum, point, inverse)]
 
-    def _carried(self, vector: Vector, time: Fraction, length: int, bits: int) -> list[Any]:
-        momentum, point, denominator = self._momentum(time, length, bits)
-        return self._fixed(vector, momentum, point, denominator, bits)
+    def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[Any]:
+        momentum, point, inverse = self._momentum(time, 0, bits)
+        if self.permanent:
+            return rotate(vector, self.angular_velocity, point.time)
+        return _held(self, vector, bits).at(momentum, point, inverse)
 
     def _momentum(self, time: Fraction, length: int, bits: int) -> tuple[list[Any], Point, Any]:
         prepared = _prepared(self, bits)
         point = prepared.motion.lattice.point(time, length)
-        if self.permanent:
+        if prepared.gamma is None:
             return [point.time * 0 + ball(m) for m in self.momentum], point, None
-        denominator = prepared.motion.denominator(point)
-        first, third = (real(companion.at(point, denominator)) for companion in prepared.momentum)
-        return [first, prepared.motion.position(point, denominator), third], point, denominator
-
-    def _fixed(self, vector: Vector, momentum: list[Any], point: Point, denominator: Any, bits: int) -> list[Any]:
-        """A vector fixed in space, in body components at the point."""
-        if self.permanent:
-            return rotate(vector, self.angular_velocity, point.time)
-        square = dot(self.momentum, self.momentum)
-        share = dot(vector, self.momentum) / square
-        along = [m * ball(share) for m in momentum]
-        if not any(cross(vector, self.momentum)):
-            return along
-        m = ball(square).sqrt()
-        first, third = (c.at(point, denominator) for c in _companions(self, vector, bits))
-        second = real(first) * momentum[2] - real(third) * momentum[0]
-        across = (imag(first) * (-1 / m), second * (-1 / ball(square)), imag(third) * (-1 / m))
-        return [a + b for a, b in zip(along, across, strict=True)]
+        inverse = 1 / prepared.motion.denominator(point)
+        first, third = map(real, prepared.momentum.at(point, inverse))
+        return [first, prepared.motion.position(point, inverse), third], point, inverse
 
     def factors(self) -> tuple[tuple[Fraction, Fraction, Fraction], tuple[Fraction, Fraction, Fraction]]:
         """q1 and q3, each as the coefficients of 1, x, x²."""
@@ -168,35 +154,64 @@ class Gyrostat:
 
 
 @dataclass(frozen=True, slots=True)
+class _Fixed:
+    """A vector fixed in space: share M plus the part across M, of which waves are Z1 and Z3; None where it is 0.
+
+    turn, square: −1/m and −1/m².
+    """
+
+    share: arb
+    waves: Companions | None
+    turn: arb
+    square: arb
+
+    def at(self, momentum: list[Any], point: Point, inverse: Any) -> list[Any]:
+        """In body components at the point."""
+        along = [m * self.share for m in momentum]
+        if self.waves is None:
+            return along
+        first, third = self.waves.at(point, inverse)
+        second = (real(first) * momentum[2] - real(third) * momentum[0]) * self.square
+        return [along[0] + imag(first) * self.turn, along[1] + second, along[2] + imag(third) * self.turn]
+
+
+@dataclass(frozen=True, slots=True)
 class _Prepared:
+    """inverses: 1/I.  gamma: None where M is at rest in the body."""
+
     motion: PreparedMotion
-    momentum: tuple[Companion, Companion]
+    momentum: Companions
+    inverses: list[arb]
+    gamma: _Fixed | None
 
 
-@lru_cache(maxsize=64)
+@kept
 def _prepared(motion: Gyrostat, bits: int) -> _Prepared:
     prepared = motion.quartic().prepared()
     winding = Winding(motion.root(), Fraction(0), Fraction(0), Fraction(1))
     rows = taylor(gyrostat, motion.parameters, motion.start.flat, 4)
-    first, third = (
-        prepared.companion(winding, [(motion.top.inertia[axis] * c, Fraction(0)) for c in rows[axis]])
-        for axis in (0, 2)
-    )
-    return _Prepared(prepared, (first, third))
+    both = ([(motion.top.inertia[axis] * c, Fraction(0)) for c in rows[axis]] for axis in (0, 2))
+    gamma = None if motion.permanent else _fixed(motion, prepared, motion.start.gamma)
+    inverses = [ball(1 / i) for i in motion.top.inertia]
+    return _Prepared(prepared, prepared.companions(winding, *both), inverses, gamma)
 
 
 @lru_cache(maxsize=64)
-def _companions(motion: Gyrostat, vector: Vector, bits: int) -> tuple[Companion, Companion]:
-    """Z1 and Z3 of a vector fixed in space."""
-    prepared, winding, m = _prepared(motion, bits).motion, motion.winding(), motion.momentum
-    share = dot(vector, m) / winding.square
+def _held(motion: Gyrostat, vector: Vector, bits: int) -> _Fixed:
+    return _fixed(motion, _prepared(motion, bits).motion, vector)
+
+
+def _fixed(motion: Gyrostat, prepared: PreparedMotion, vector: Vector) -> _Fixed:
+    m, square = motion.momentum, dot(motion.momentum, motion.momentum)
+    share = dot(vector, m) / square
     across = tuple(v - share * c for v, c in zip(vector, m, strict=True))
-    products = [
-        taylor(gyrostat, motion.parameters, (*motion.start.omega, *fixed), 4)[3:]
-        for fixed in (cross(m, across), across)
-    ]
-    first, third = (
-        prepared.companion(winding, turned(products[0][axis], [-c for c in products[1][axis]], winding))
-        for axis in (0, 2)
-    )
-    return first, third
+    waves = None
+    if any(across):
+        winding = motion.winding()
+        products = [
+            taylor(gyrostat, motion.parameters, (*motion.start.omega, *fixed), 4)[3:]
+            for fixed in (cross(m, across), across)
+        ]
+        both = (turned(products[0][axis], [-c for c in products[1][axis]], winding) for axis in (0, 2))
+        waves = prepared.companions(winding, *both)
+    return _Fixed(ball(share), waves, -1 / ball(square).sqrt(), ball(-1 / square))

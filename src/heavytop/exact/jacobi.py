@@ -1,29 +1,34 @@
 """Jacobi's elliptic functions by theta quotients, for every parameter 0 ≤ m ≤ 1, both ends included.
 
-With K(m), K' = K(1 − m) and nome q = exp(−π K'/K), for m ≤ 1/2, z = u/(2K):
+With K(m), K' = K(1 − m) and nome q = exp(−π K'/K), for m ≤ 0.9, z = u/(2K):
 
     sn u = θ3 θ1(z)/(θ2 θ4(z)),   cn u = θ4 θ2(z)/(θ2 θ4(z)),   dn u = θ4 θ3(z)/(θ3 θ4(z))
 
-and for m > 1/2, by Jacobi's imaginary transformation, with the complementary nome and z = u/(2iK'):
+and for larger m, by Jacobi's imaginary transformation, with the complementary nome and z = iu/(2K'):
 
-    sn u = i θ3 θ1(z)/(θ4 θ2(z)),  cn u = θ2 θ4(z)/(θ4 θ2(z)),  dn u = θ2 θ3(z)/(θ3 θ2(z))
+    sn u = −i θ3 θ1(z)/(θ4 θ2(z)),  cn u = θ2 θ4(z)/(θ4 θ2(z)),  dn u = θ2 θ3(z)/(θ3 θ2(z))
 
-So the nome never exceeds exp(−π).  Where it is 0 the thetas are sin πz, cos πz, 1, 1 (the common factor 2 q^(1/4)
+So the nome never exceeds 0.15.  Where it is 0 the thetas are sin πz, cos πz, 1, 1 (the common factor 2 q^(1/4)
 of θ1 and θ2 cancels everywhere): circular functions at m = 0, hyperbolic ones at m = 1.
-Arguments are reduced modulo 2K before anything is evaluated.  DLMF 22.2, 20.7.
+For larger m arguments are reduced modulo 2K before anything is evaluated.  DLMF 22.2, 20.7(viii).
+Numbers are put into the series of :mod:`heavytop.exact.theta`, power series into FLINT's own theta functions.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from flint import acb, acb_series, arb, arb_series, ctx
+from flint import acb, acb_poly, acb_series, arb, arb_poly, arb_series, ctx
 
-from heavytop.exact.balls import midpoint
-from heavytop.exact.closed_form import real_part, series_length
+from heavytop.exact.balls import whole
+from heavytop.exact.closed_form import constant, series_length
+from heavytop.exact.theta import Theta
+from heavytop.exact.weierstrass import real
 
 _I = acb(0, 1)
+_REACH = arb(1.25)  # quarter periods: the largest reduced argument
+_LARGE = arb("0.9")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +40,9 @@ class Jacobi:
     scale: z = scale · u.
     tau: the ratio of the periods for the theta functions; None where the nome is 0.
     null: θ2, θ3, θ4 at 0.
+    period: 2K and the reach of a reduced argument; None where none needs reducing.
+    theta: their series for numbers, hyperbolic for large m.  parts: the polynomials of sn, cn, dn and of what they are
+    divided by, the null values among the coefficients.
     """
 
     parameter: arb
@@ -43,59 +51,107 @@ class Jacobi:
     scale: acb
     tau: acb | None
     null: tuple[acb, acb, acb]
-    hyperbolic: bool
+    period: tuple[arb, arb] | None
+    theta: Theta
+    parts: tuple[arb_poly, arb_poly, arb_poly, arb_poly]
 
     def reduced(self, u: Any) -> tuple[Any, int]:
-        """(u − 2nK, n) with |u − 2nK| at most about K; n = 0 without a period."""
-        if self.quarter is None:
+        """(u − 2nK, n) with |u − 2nK| at most about K; n = 0 where no series needs it."""
+        if self.period is None:
             return u, 0
-        head = u[0] if isinstance(u, arb_series) else u
-        turns = round(midpoint(head / (2 * self.quarter))) if head.is_finite() else 0
-        return u - 2 * turns * self.quarter, turns
+        turns = whole(constant(u) / self.period[0])
+        rest = u - turns * self.period[0]
+        return (rest, turns) if abs(constant(rest)) < self.period[1] else (arb("nan"), 0)
 
     def thetas(self, u: Any) -> tuple[acb_series, ...]:
         """θ1, θ2, θ3, θ4 at z = scale · u, for a real or complex series u."""
         return _thetas(self.scale * acb_series(u, prec=ctx.cap), self.tau)
 
-    def functions(self, u: arb_series) -> tuple[arb_series, arb_series, arb_series]:
-        """(sn, cn, dn) at the series u."""
+    def functions(self, u: Any) -> tuple[Any, Any, Any]:
+        """(sn, cn, dn) at the number or series u."""
         u, turns = self.reduced(u)
+        sn, cn, dn = self._numbers(u) if isinstance(u, arb) else self._series(u)
+        return (-sn, -cn, dn) if turns % 2 else (sn, cn, dn)
+
+    def _numbers(self, u: arb) -> tuple[arb, arb, arb]:
+        sine, cosine, c = self.theta.angles(u)
+        first, second, third, fourth = self.parts
+        sn, cn, dn, below = first(c), second(c), third(c), fourth(c)
+        if self.theta.hyperbolic:
+            inverse = 1 / (below * cosine)
+            return sine * sn * inverse, cn * inverse, dn * inverse
+        inverse = 1 / below
+        return sine * sn * inverse, cosine * cn * inverse, dn * inverse
+
+    def _series(self, u: arb_series) -> tuple[arb_series, arb_series, arb_series]:
         t1, t2, t3, t4 = self.thetas(u)
         n2, n3, n4 = self.null
-        if self.hyperbolic:
-            sn, cn, dn = _I * n3 / n4 * (t1 / t2), n2 / n4 * (t4 / t2), n2 / n3 * (t3 / t2)
+        if self.theta.hyperbolic:
+            sn, cn, dn = _I * -n3 / n4 * (t1 / t2), n2 / n4 * (t4 / t2), n2 / n3 * (t3 / t2)
         else:
             sn, cn, dn = n3 / n2 * (t1 / t4), n4 / n2 * (t2 / t4), n4 / n3 * (t3 / t4)
-        flip = -1 if turns % 2 else 1
-        return flip * real_part(sn), flip * real_part(cn), real_part(dn)
+        return real(sn), real(cn), real(dn)
 
-    def phase(self, u: Any, shift: arb, period: acb) -> acb_series:
-        """θ1/|θ1| at u + i·shift for real u: a function of modulus 1, without poles on the real line.
 
-        Its logarithm has the derivative of an elliptic function with simple poles of residue ± 1/2 at ∓ i·shift,
-        up to a constant.  period: :meth:`phase_period`.
-        """
-        rest, turns = self.reduced(u)
-        value = self._phase(rest, shift)
-        return period**turns * value if turns else value
+@dataclass(frozen=True, slots=True)
+class Wave:
+    """θ1(u + i·shift) over the denominator of sn, for real u, up to a constant: it has no pole there, and no zero.
 
-    def phase_period(self, shift: arb) -> acb:
-        """What :meth:`phase` is multiplied by over 2K: the direction of a factor of θ1 that does not depend on u."""
-        if self.quarter is None:
-            return acb(1)
-        with series_length(1):
-            return (self._phase(self.quarter, shift) / self._phase(-self.quarter, shift))[0]
+    Its logarithm has the derivative of an elliptic function with simple poles of residue ± 1/2 at ∓ i·shift, up to a
+    constant and a real part.  Made by :func:`wave`.
+    real, imaginary: the polynomials of θ1 that go with cos x and sin x.  period: the argument of the factor, of
+    modulus 1, that it takes over 2K.
+    """
 
-    def _phase(self, u: Any, shift: arb) -> acb_series:
-        theta = self.thetas(acb_series(u, prec=ctx.cap) + _I * shift)[0]
-        conjugate = acb_series([c.conjugate() for c in theta.coeffs()], prec=ctx.cap)
-        return theta / acb_series(real_part(theta * conjugate).sqrt(), prec=ctx.cap)
+    functions: Jacobi
+    shift: arb
+    real: arb_poly
+    imaginary: arb_poly
+    period: arb
 
-    def phase_rate(self, shift: arb) -> arb:
-        """The derivative of arg :meth:`phase` at u = 0."""
+    def at(self, u: Any) -> tuple[Any, arb]:
+        """The value at u reduced by n periods, a number or a series, and the angle n · period it is to be turned by."""
+        rest, turns = self.functions.reduced(u)
+        return self._number(rest) if isinstance(rest, arb) else self._series(rest), turns * self.period
+
+    def _number(self, u: arb) -> acb:
+        theta, below = self.functions.theta, self.functions.parts[3]
+        s, c, double = theta.angles(u)
+        if theta.hyperbolic:
+            inverse = 1 / below(double)
+            return acb(self.real(double) * inverse, self.imaginary(double) * inverse * s / c)
+        inverse = 1 / below(double)
+        return acb(self.real(double) * c * inverse, self.imaginary(double) * s * inverse)
+
+    def _series(self, u: arb_series) -> Any:
+        functions = self.functions
+        above = functions.thetas(acb_series(u, prec=ctx.cap) + _I * self.shift)[0]
+        _, second, _, fourth = functions.thetas(u)
+        if functions.theta.hyperbolic:
+            return -above / second
+        return _I * above / (functions.null[0] / functions.theta.odd()[1](arb(1)) * fourth)
+
+    def rate(self) -> arb:
+        """The derivative of its argument at u = 0."""
         with series_length(2):
-            theta = self.thetas(arb_series([0, 1], prec=2) + _I * shift)[0]
-            return (theta[1] / theta[0]).imag
+            value = self.at(arb_series([0, 1], prec=2))[0]
+            return arb((value[1] / value[0]).imag)
+
+
+def wave(functions: Jacobi, shift: arb) -> Wave:
+    """:class:`Wave` at the working precision, |shift| ≤ K(1 − m)."""
+    sine, cosine = functions.theta.odd(-functions.scale * _I * shift)
+    # one of them is real, the other imaginary
+    if functions.theta.hyperbolic:
+        made = Wave(functions, shift, _reals(cosine), _reals(_I * sine), arb(0))
+    else:
+        made = Wave(functions, shift, _reals(-_I * cosine), _reals(sine), arb(0))
+    if functions.quarter is None or not functions.theta.hyperbolic:
+        return made
+    factor = made._number(functions.quarter) / made._number(-functions.quarter)
+    # away from the cut of the argument
+    period = (-factor).arg() + arb.pi() if factor.real < 0 else factor.arg()
+    return replace(made, period=period)
 
 
 def legendre_f(sine2: arb, cosine2: arb, delta2: arb) -> arb:
@@ -115,13 +171,34 @@ def jacobi(parameter: arb, complement: arb) -> Jacobi:
     along: Any
     quarter = None if complement.is_zero() else half_pi / arb(1).agm(complement.sqrt())
     other = None if parameter.is_zero() else half_pi / arb(1).agm(parameter.sqrt())
-    hyperbolic = quarter is None or bool(parameter.mid() > arb(0.5))
+    hyperbolic = quarter is None or bool(parameter.mid() > _LARGE)
     across, along = (quarter, other) if hyperbolic else (other, quarter)
-    scale = (acb(0, -1) if hyperbolic else acb(1)) / (2 * along)
+    scale = (acb(0, 1) if hyperbolic else acb(1)) / (2 * along)
     tau = None if across is None else acb(0, across / along)
+    nome = arb(0) if across is None else (-arb.pi() * across / along).exp()
+    rate = half_pi / along
+    period, growth = None, arb(1)
+    if hyperbolic and quarter is not None:
+        period = 2 * quarter, quarter * _REACH
+        growth = (2 * rate * period[1]).exp().upper()
+    theta = Theta(nome * nome, rate, hyperbolic, growth)
     with series_length(1):
         _, t2, t3, t4 = _thetas(acb_series([0], prec=1), tau)
-    return Jacobi(parameter, complement, quarter, scale, tau, (t2[0], t3[0], t4[0]), hyperbolic)
+    null = t2[0], t3[0], t4[0]
+    return Jacobi(parameter, complement, quarter, scale, tau, null, period, theta, _parts(theta))
+
+
+def _reals(poly: acb_poly) -> arb_poly:
+    return arb_poly([c.real for c in poly.coeffs()])
+
+
+def _parts(theta: Theta) -> tuple[arb_poly, arb_poly, arb_poly, arb_poly]:
+    (first, second), third, fourth = theta.odd(), theta.even(1), theta.even(-1)
+    one = arb(1)
+    n2, n3, n4 = second(one), third(one), fourth(one)
+    if theta.hyperbolic:
+        return first * (n3 / n4), fourth * (n2 / n4), third * (n2 / n3), second
+    return first * (n3 / n2), second * (n4 / n2), third * (n4 / n3), fourth
 
 
 def _thetas(z: acb_series, tau: acb | None) -> tuple[acb_series, ...]:

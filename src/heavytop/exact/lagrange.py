@@ -1,8 +1,8 @@
 """Lagrange's top: I1 = I2, a = b = 0, for every start.
 
 Data: n = P c, L = I3 Ω3, C0 = M·γ, E = ½ I1 (Ω1² + Ω2²) + n γ3, s = |γ|.  x = γ3 moves on a cubic
-(Whittaker, Analytical Dynamics, 71; Klein & Sommerfeld, Theorie des Kreisels; Hermite, Sur quelques applications des
-fonctions elliptiques):
+(Whittaker, Analytical Dynamics, chapter VI; Klein and Sommerfeld, The Theory of the Top, volume II; Hermite, Sur
+quelques applications des fonctions elliptiques):
 
     x'² = (2/I1)(E − n x)(s² − x²) − ((C0 − L x)/I1)²,    x' = Ω2 γ1 − Ω1 γ2
 
@@ -22,7 +22,7 @@ spherical pendulum (L = 0) and the motions asymptotic to a sleeping top are star
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
@@ -30,9 +30,9 @@ from typing import Any
 from flint import acb, arb, arb_series
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import ball, to_bits, working_precision
-from heavytop.exact.motion import enough_bits, initial_xi, rotate, series_at, taylor, turned
-from heavytop.exact.quartic import Companion, PreparedMotion, QuarticMotion, Winding
+from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
+from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion, Winding
 from heavytop.exact.weierstrass import imag, real
 from heavytop.top.equations import HEAVY_TOP, Parameters, System, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
@@ -51,6 +51,7 @@ class Lagrange:
     start: State
     method: str = "closed form: Lagrange, Weierstrass functions of gamma3"
     system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         i1, i2, _ = self.top.inertia
@@ -70,22 +71,20 @@ class Lagrange:
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return to_bits(lambda working: self._evaluate(time, 0, working), bits)
+        return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return series_at(lambda working, count: self._evaluate(time, count, working), length, bits)
+        return series_at(lambda working, count: self._evaluate(time, count, working), length, bits, time)
 
-    def _evaluate(self, time: Fraction, length: int, working: int) -> list[Any]:
-        bits = enough_bits(working, time)
-        with working_precision(bits):
-            prepared = _prepared(self, bits)
-            point = prepared.motion.lattice.point(time, length)
-            denominator = prepared.motion.denominator(point)
-            g, w = (companion.at(point, denominator) for companion in (prepared.gamma, prepared.omega))
-            spin = point.time * 0 + ball(self.start.omega[2])
-            x = prepared.motion.position(point, denominator)
-            return [real(w), imag(w), spin, real(g), imag(g), x]
+    def _evaluate(self, time: Fraction, length: int, bits: int) -> list[Any]:
+        prepared = _prepared(self, bits)
+        point = prepared.motion.lattice.point(time, length)
+        inverse = 1 / prepared.motion.denominator(point)
+        g, w = prepared.horizontal.at(point, inverse)
+        spin = prepared.spin if not length else arb_series([prepared.spin], length)
+        x = prepared.motion.position(point, inverse)
+        return [real(w), imag(w), spin, real(g), imag(g), x]
 
     @property
     def constants(self) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
@@ -130,25 +129,23 @@ class Lagrange:
         that the angle about it is lost at any sensible precision.
         """
 
-        def evaluate(working: int) -> list[arb]:
-            inside = enough_bits(working, time)
-            with working_precision(inside):
-                start = [ball(c) for c in xi] if xi is not None else initial_xi(self.start.gamma)
-                if time == 0:
-                    return start
-                # the default ξ need not be rational: carry one exact vector ⟂ γ and its companion across it
-                basis = _across(self.start.gamma)
-                first = self._carried(basis, time, inside)
-                size = ball(dot(self.start.gamma, self.start.gamma)).sqrt()
-                gamma = [g / size for g in self._evaluate(time, 0, working)[3:]]
-                second = cross(gamma, first)
-                unit = [ball(g) / size for g in self.start.gamma]
-                exact = [ball(c) for c in basis]
-                norm = ball(dot(basis, basis))
-                cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
-                return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
+        def evaluate(inside: int) -> list[arb]:
+            start = [ball(c) for c in xi] if xi is not None else initial_xi(self.start.gamma)
+            if time == 0:
+                return start
+            # the default ξ need not be rational: carry one exact vector ⟂ γ and its companion across it
+            basis = _across(self.start.gamma)
+            first = self._carried(basis, time, inside)
+            size = ball(dot(self.start.gamma, self.start.gamma)).sqrt()
+            gamma = [g / size for g in self._evaluate(time, 0, inside)[3:]]
+            second = cross(gamma, first)
+            unit = [ball(g) / size for g in self.start.gamma]
+            exact = [ball(c) for c in basis]
+            norm = ball(dot(basis, basis))
+            cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
+            return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
 
-        return to_bits(evaluate, bits)
+        return to_bits(evaluate, bits, time)
 
     def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[arb]:
         """A vector ⟂ γ, fixed in space, at ``time``.
@@ -161,9 +158,9 @@ class Lagrange:
         prepared = _prepared(self, bits)
         axis = _axis(self, vector, bits)
         point = prepared.motion.lattice.point(time, 2)
-        denominator = prepared.motion.denominator(point)
-        h, g, w = (c.at(point, denominator) for c in (axis, prepared.gamma, prepared.omega))
-        x, size = prepared.motion.position(point, denominator)[0], ball(self.constants[4]).sqrt()
+        inverse = 1 / prepared.motion.denominator(point)
+        (h,), (g, w) = (c.at(point, inverse) for c in (axis, prepared.horizontal))
+        x, size = prepared.motion.position(point, inverse)[0], ball(self.constants[4]).sqrt()
         plus, minus = _sides(h[0], h[1], g[0], w[0], x, size)
         return [((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real, h[0].real]
 
@@ -189,26 +186,26 @@ def _across(gamma: Vector) -> Vector:
 @dataclass(frozen=True, slots=True)
 class _Prepared:
     motion: PreparedMotion
-    gamma: Companion
-    omega: Companion
+    horizontal: Companions
+    spin: arb
 
 
-@lru_cache(maxsize=64)
+@kept
 def _prepared(motion: Lagrange, bits: int) -> _Prepared:
     prepared, winding = motion.quartic().prepared(), motion.winding()
     rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)
-    gamma, omega = (prepared.companion(winding, turned(rows[axis], rows[axis + 1], winding)) for axis in (3, 0))
-    return _Prepared(prepared, gamma, omega)
+    both = (turned(rows[axis], rows[axis + 1], winding) for axis in (3, 0))
+    return _Prepared(prepared, prepared.companions(winding, *both), ball(motion.start.omega[2]))
 
 
 @lru_cache(maxsize=64)
-def _axis(motion: Lagrange, vector: Vector, bits: int) -> Companion:
+def _axis(motion: Lagrange, vector: Vector, bits: int) -> Companions:
     """h = Z3 of Z = ξ + iη, η = γ × ξ/s, for a vector ξ ⟂ γ fixed in space."""
     winding, square = motion.axis_winding(), dot(motion.start.gamma, motion.start.gamma)
     # s Z = s ξ + i γ × ξ, so Z = ξ + i s (γ × ξ/s²)
     normal = tuple(c / square for c in cross(motion.start.gamma, vector))
     first, second = (_derivatives(motion, fixed) for fixed in (vector, normal))
-    return _prepared(motion, bits).motion.companion(winding, turned(first, second, winding))
+    return _prepared(motion, bits).motion.companions(winding, turned(first, second, winding))
 
 
 def _derivatives(motion: Lagrange, fixed: tuple[Fraction, ...]) -> list[Fraction]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import wraps
 from math import factorial, isqrt
-from typing import Any
+from typing import Any, TypeVar
 
 from flint import arb, arb_series, ctx, fmpq, fmpq_series
 
@@ -16,16 +17,28 @@ from heavytop.top.angles import perpendicular
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import Vector, dot
 
-_GUARD = 40
-_STEP = 64
+Made = TypeVar("Made")
 
 
-def enough_bits(working: int, time: Fraction) -> int:
-    """The precision inside an evaluation: time costs its own bits, twice; in steps, so that lattices are made once."""
-    return -(-(working + _GUARD + 2 * int(abs(time)).bit_length()) // _STEP) * _STEP
+def kept(make: Callable[[Any, int], Made]) -> Callable[[Any, int], Made]:
+    """``make(motion, bits)`` once for each motion and precision: kept in the motion's ``made``.
+
+    A cache of functools would hash a dozen Fractions at each look-up, longer than many a state takes.
+    """
+
+    @wraps(make)
+    def look_up(motion: Any, bits: int) -> Made:
+        made: dict[Any, Made] = motion.made
+        if (make, bits) not in made:
+            made[make, bits] = make(motion, bits)
+        return made[make, bits]
+
+    return look_up
 
 
-def series_at(evaluate: Callable[[int, int], list[arb_series]], length: int, bits: int) -> list[arb_series]:
+def series_at(
+    evaluate: Callable[[int, int], list[arb_series]], length: int, bits: int, time: Fraction
+) -> list[arb_series]:
     """``evaluate(working bits, length)`` with the ε^0 coefficients certain to ``bits`` bits (:func:`to_bits`)."""
     found: list[list[arb_series]] = []
     before = ctx.cap
@@ -36,7 +49,7 @@ def series_at(evaluate: Callable[[int, int], list[arb_series]], length: int, bit
         return [component[0] for component in found[-1]]
 
     try:
-        to_bits(leading, bits)
+        to_bits(leading, bits, time)
     finally:
         ctx.cap = before
     return found[-1]

@@ -10,23 +10,23 @@ With N = |n||γ| and x the angle of γ from −n in the plane (i, j, k cyclic), 
     h > N:  sin(x/2) = σ sn u,     cos(x/2) = cn u,  x' = 2σ ω dn u,     m = 2N/(h + N),    ω² = (h + N)/(2 I_k)
 
 u = ω t + u0, and σ is the sign of x' at t = 0; h = N is the separatrix, m = 1.  Every vector fixed in space turns
-about e_k through x(t) − x(0).  Source: Whittaker, Analytical Dynamics, §44; DLMF 22.19(i).
+about e_k through x(t) − x(0).  Source: Whittaker, Analytical Dynamics, chapter IV; DLMF 22.19(i).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
-from flint import arb, arb_series, ctx
+from flint import arb, ctx
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball
-from heavytop.exact.closed_form import Carry, WithAttitude, sign
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
+from heavytop.exact.motion import kept
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
 
@@ -43,6 +43,7 @@ class Pendulum(WithAttitude):
     start: State
     method: str = "closed form: physical pendulum, Jacobi functions"
     system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not any(self.top.moment) or not any(self.start.gamma):
@@ -68,18 +69,54 @@ class Pendulum(WithAttitude):
         """The principal axis k (0, 1 or 2) it turns about."""
         return _axes(self.top, self.start)[0]
 
-    def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
+    @property
+    def steady(self) -> bool:
+        """It stands still: at rest where no torque acts."""
+        k, n, gamma = self.axis, self.top.moment, self.start.gamma
+        return self.start.omega[k] == 0 and n[(k + 1) % 3] * gamma[(k + 2) % 3] == n[(k + 2) % 3] * gamma[(k + 1) % 3]
+
+    def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        lattice = _lattice(self, ctx.prec)
+        if lattice is None:
+            return WithAttitude.evaluate(self, time)
+        omega, carry = lattice.motion(instant(time))
+        return [*omega, *carry(lattice.gamma)]
+
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        lattice = _lattice(self, ctx.prec)
+        return ([arb(0)] * 3, list) if lattice is None else lattice.motion(time)
+
+
+@dataclass(frozen=True, slots=True)
+class _Lattice:
+    """All that does not depend on the time.
+
+    axis: k.  amplitude: σ√m (libration) or σ.  speed: 2ω times it.  half: (cos, sin) of x(0)/2.
+    """
+
+    axis: int
+    functions: Jacobi
+    rate: arb
+    origin: arb
+    amplitude: arb
+    speed: arb
+    rotating: bool
+    half: tuple[arb, arb]
+    gamma: list[arb]
+
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+        sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
+        cosine, speed = (cn, dn) if self.rotating else (dn, cn)
+        sine = self.amplitude * sn
+        cosine0, sine0 = self.half
+        c, s = cosine * cosine0 + sine * sine0, sine * cosine0 - cosine * sine0
+        cosine, sine = c * c - s * s, 2 * c * s
         k = self.axis
         i, j = (k + 1) % 3, (k + 2) % 3
-        n, gamma = self.top.moment, self.start.gamma
-        if self.start.omega[k] == 0 and n[i] * gamma[j] == n[j] * gamma[i]:
-            return [arb(0)] * 3, list
-        lattice = _lattice(self, ctx.prec)
-        rate, half_cosine, half_sine = lattice.motion(time)
-        cosine, sine = half_cosine * half_cosine - half_sine * half_sine, 2 * half_cosine * half_sine
-        omega: list[Any] = [arb_series([0], prec=ctx.cap)] * 3
-        omega[k] = -rate
+        omega: list[Any] = [arb(0)] * 3
+        omega[k] = -(self.speed * speed)
 
         def carry(vector: Sequence[Any]) -> list[Any]:
             result = list(vector)
@@ -90,32 +127,11 @@ class Pendulum(WithAttitude):
         return omega, carry
 
 
-@dataclass(frozen=True, slots=True)
-class _Lattice:
-    """All that does not depend on the time: amplitude = σ√m (libration) or σ, half = (cos, sin) of x(0)/2."""
-
-    functions: Jacobi
-    rate: arb
-    origin: arb
-    amplitude: arb
-    rotating: bool
-    half: tuple[arb, arb]
-
-    def motion(self, time: arb_series) -> tuple[arb_series, arb_series, arb_series]:
-        """(x', cos, sin) with the cosine and sine of (x − x(0))/2."""
-        sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
-        cosine, speed = (cn, dn) if self.rotating else (dn, cn)
-        sine = self.amplitude * sn
-        cosine0, sine0 = self.half
-        return (
-            2 * self.rate * self.amplitude * speed,
-            cosine * cosine0 + sine * sine0,
-            sine * cosine0 - cosine * sine0,
-        )
-
-
-@lru_cache(maxsize=64)
-def _lattice(case: Pendulum, _bits: int) -> _Lattice:
+@kept
+def _lattice(case: Pendulum, _bits: int) -> _Lattice | None:
+    """None where it stands still."""
+    if case.steady:
+        return None
     k = case.axis
     i, j = (k + 1) % 3, (k + 2) % 3
     n, gamma, inertia = case.top.moment, case.start.gamma, case.top.inertia[k]
@@ -140,7 +156,8 @@ def _lattice(case: Pendulum, _bits: int) -> _Lattice:
         origin = legendre_f(below / over, ball(kinetic) / over, above / (2 * largest))
         rate, amplitude = (largest / ball(inertia)).sqrt(), direction * parameter.sqrt()
     half = (cosine, side * direction * sine)
-    return _Lattice(functions, rate, side * origin, amplitude, rotating, half)
+    speed = 2 * rate * amplitude
+    return _Lattice(k, functions, rate, side * origin, amplitude, speed, rotating, half, balls(gamma))
 
 
 def _sum(square: Fraction, value: Fraction, product: Fraction) -> arb:

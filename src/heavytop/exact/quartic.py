@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from flint import acb, acb_series, arb
+from flint import acb, acb_series, arb, arb_poly, arb_series
 
 from heavytop.exact.balls import ball, midpoint
 from heavytop.exact.weierstrass import (
@@ -110,20 +110,24 @@ class QuarticMotion:
     def prepared(self) -> PreparedMotion:
         """Everything that does not depend on time, at the working precision."""
         value, first, second, third, fourth = self.derivatives()
-        centre = second / 24
+        centre, lattice = second / 24, self.lattice()
+        number: Any = as_ball if isinstance(lattice, Lattice) else lambda exact: exact
         return PreparedMotion(
-            self.lattice(),
-            centre,
-            value * fourth / 48,
+            lattice,
+            number(centre),
+            number(value * fourth / 48),
             as_ball(self.start),
-            (value * third / 24, first / 2, -self.speed),
+            (number(value * third / 24), number(first / 2), number(-self.speed)),
             self.at_rest,
         )
 
 
 @dataclass(frozen=True, slots=True)
 class PreparedMotion:
-    """A :class:`QuarticMotion` at one working precision: lattice, c, f f''''/48, x0 and its numerators."""
+    """A :class:`QuarticMotion` at one working precision: lattice, c, f f''''/48, x0 and its numerators.
+
+    On discriminant 0 the numbers stay as exact as they were.
+    """
 
     lattice: AnyLattice
     centre: Scalar
@@ -134,7 +138,7 @@ class PreparedMotion:
 
     def denominator(self, point: Point) -> Any:
         """D T⁴; on discriminant 0 by its exact coefficients, of which the first vanishes where f is a square."""
-        square = point.scale * point.scale
+        square = point.square
         if isinstance(self.lattice, DegenerateLattice):
             off: Any = difference(self.lattice.double, self.centre)
             lead = 2 * off * off - self.offset
@@ -147,7 +151,7 @@ class PreparedMotion:
         if self.at_rest:
             return point.scale * 0
         constant, even, odd = self.numerators
-        square = point.scale * point.scale
+        square = point.square
         lead: Any = constant
         above = point.above(self.centre)
         if isinstance(self.lattice, DegenerateLattice):
@@ -156,26 +160,32 @@ class PreparedMotion:
         inner = (square * as_ball(lead) + above * as_ball(even)) * point.scale + point.slope * as_ball(odd)
         return inner * point.scale
 
-    def position(self, point: Point, denominator: Any) -> Any:
-        """x at the point."""
-        return self.numerator(point) / denominator + self.start
+    def position(self, point: Point, inverse: Any) -> Any:
+        """x at the point; inverse: 1/:meth:`denominator`."""
+        return self.numerator(point) * inverse + self.start
 
-    def companion(self, winding: Winding, taylor: Sequence[Pair]) -> Companion:
-        """F of the second theorem; taylor: f0..f3, each as (real, imaginary/√square)."""
+    def companions(self, winding: Winding, *taylors: Sequence[Pair]) -> Companions:
+        """Several F of the second theorem with the same winding; taylors: f0..f3, each as (real, imaginary/√square)."""
+        wave = second_kind(self.lattice, winding)
+        still = not any(part for taylor in taylors for pair in taylor for part in pair)
+        return Companions(wave, tuple(self._factors(winding, taylor) for taylor in taylors), still)
+
+    def _factors(self, winding: Winding, taylor: Sequence[Pair]) -> Factors:
         if isinstance(self.lattice, DegenerateLattice):
             return self._elementary(self.lattice, winding, taylor)
         root = ball(winding.square).sqrt()
         f0, f1, f2, f3 = (acb(ball(a), ball(b) * root) for a, b in taylor)
         centre, value = as_ball(self.centre), ball(winding.value)
-        wave = second_kind(self.lattice, winding)
-        return Companion(
-            wave,
-            (f3 / 3 - 4 * centre * f1 + value * f1, 2 * f1, -2 * f0 / 3),
-            (4 * centre * f0 - f2 - value * f0 / 3, -2 * f0 / 3),
-            not any(part for pair in taylor for part in pair),
+        factors = (
+            f3 / 3 - 4 * centre * f1 + value * f1,
+            2 * f1,
+            -2 * f0 / 3,
+            4 * centre * f0 - f2 - value * f0 / 3,
+            -2 * f0 / 3,
         )
+        return tuple(factor.real if factor.imag.is_zero() else factor for factor in factors)
 
-    def _elementary(self, lattice: DegenerateLattice, winding: Winding, taylor: Sequence[Pair]) -> Companion:
+    def _elementary(self, lattice: DegenerateLattice, winding: Winding, taylor: Sequence[Pair]) -> Factors:
         """The same on discriminant 0, in powers of T; what cancels at large T cancels here, exactly."""
         double: Any = lattice.double
         centre: Any = self.centre
@@ -190,8 +200,7 @@ class PreparedMotion:
         )
         cubic = (phi[0] - winding.square * rate * slope[1], phi[1] + rate * slope[0])
         f0, f1, cube, second = (acb(ball(a), ball(b) * root) for a, b in (*taylor[:2], cubic, slope))
-        nothing = not any(part for pair in taylor for part in pair)
-        return Companion(second_kind(lattice, winding), (cube, 2 * f1, -2 * f0 / 3), (second, -2 * f0 / 3), nothing)
+        return cube, 2 * f1, -2 * f0 / 3, second, -2 * f0 / 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,29 +209,36 @@ class SecondKind:
 
     winding: its V and κ.  shift: V/(2ω).  unit: θ1(shift).  rate: θ1'/θ1(shift)/(2ω) + iκ, the whole exponent.
     index: of the half-period that V is, in the order of the lattice's roots, or None.
+    parts: the polynomials of θ1(shift − z)/unit for numbers, its real part over cos πz, its imaginary over sin πz.
     """
 
     lattice: AnyLattice
-    value: Fraction
+    value: Scalar
     slope: acb
     shift: acb
     unit: acb
     rate: acb
     index: int | None
+    parts: tuple[arb_poly, ...] = ()
 
     def at(self, point: Point) -> tuple[Any, Any]:
         """(Φ T, Φ' T²) e^(iκt), complex."""
-        factor = _exponential(point.time, self.rate)
+        factor: Any = 1 if self.rate.is_zero() else _exponential(point.time, self.rate)
         if not isinstance(self.lattice, Lattice):
             return self._degenerate(point, factor)
         if self.index is not None:
             sign, *others = point.thetas
             phi = others.pop(self.index) * (sign if self.index else 1)
             return factor * phi, factor * (others[0] * others[1] * (-sign if self.index else -1))
+        above = point.above(self.value) * 2
+        if isinstance(point.z, tuple):
+            sine, cosine, c = point.z
+            even, odd = self.parts
+            phi = acb(even(c) * cosine, odd(c) * sine) * factor
+            return phi, phi * acb(point.slope / above, point.scale * point.square * self.slope.imag / above)
         theta = thetas(self.shift - point.z, self.lattice.ratio)[0]
         phi = theta * (1 / self.unit) * factor
-        slope = (point.scale * point.scale * point.scale) * self.slope + point.slope
-        return phi, phi * slope / (point.above(self.value) * 2)
+        return phi, phi * ((point.scale * point.square) * self.slope + point.slope) / above
 
     def _degenerate(self, point: Point, factor: Any) -> tuple[Any, Any]:
         """Φ = e^(Kt) (κ coth κt − K), or κ/sinh κt where V is at infinity."""
@@ -234,7 +250,7 @@ class SecondKind:
 
 
 def _exponential(time: Any, rate: acb) -> Any:
-    return (acb_series(time) * rate).exp() if not isinstance(time, arb) else (time * rate).exp()
+    return (acb_series(time) * rate).exp() if not isinstance(time, arb) else (rate * time).exp()
 
 
 def second_kind(lattice: AnyLattice, winding: Winding) -> SecondKind:
@@ -255,7 +271,17 @@ def second_kind(lattice: AnyLattice, winding: Winding) -> SecondKind:
     unit = thetas(shift, lattice.ratio)[0]
     log_slope = thetas(shift, lattice.ratio, 1)[0] / unit / (2 * lattice.half_period)
     # θ1'/θ1 is imaginary there
-    return SecondKind(lattice, winding.value, slope, shift, unit, acb(0, log_slope.imag) + turning, None)
+    rate = acb(0, log_slope.imag) + turning
+    return SecondKind(lattice, ball(winding.value), slope, shift, unit, rate, None, _wave_parts(lattice, shift))
+
+
+def _wave_parts(lattice: Lattice, shift: acb) -> tuple[arb_poly, ...]:
+    if lattice.theta is None:
+        return ()
+    sine, cosine = lattice.theta.odd(shift)
+    first = 1 / cosine(acb(1))
+    # cosine/first is real and sine/first imaginary
+    return tuple(arb_poly([c.real for c in (p * w).coeffs()]) for p, w in ((cosine, first), (sine, first * acb(0, 1))))
 
 
 def _imaginary_argument(lattice: Lattice, winding: Winding) -> acb:
@@ -273,36 +299,40 @@ def _imaginary_argument(lattice: Lattice, winding: Winding) -> acb:
     return acb(lattice.half_period if beside else 0, height)
 
 
+Factors = tuple[Any, ...]
+"""What Φ T times (T³, ℘T³, ℘'T³) and Φ' T² times (T², ℘T²) are multiplied by in an F of the second theorem."""
+
+
 @dataclass(frozen=True, slots=True)
-class Companion:
-    """F of the second theorem, ready for evaluation: Φ T times (T², ℘T², ℘'T³) and Φ' T² times (T², ℘T²)."""
+class Companions:
+    """Several F with the same winding, ready for evaluation.  still: all are 0."""
 
     wave: SecondKind
-    of_phi: tuple[acb, acb, acb]
-    of_slope: tuple[acb, acb]
-    zero: bool
+    factors: tuple[Factors, ...]
+    still: bool
 
-    def at(self, point: Point, denominator: Any) -> Any:
-        """F at the point, complex."""
-        scale = point.scale
-        if self.zero:
-            return acb_series(scale) * 0 if not isinstance(scale, arb) else acb(0)
-        phi, slope = self.wave.at(point)
-        first, second, third = self.of_phi
-        square = lift(scale * scale)
+    def at(self, point: Point, inverse: Any) -> list[Any]:
+        """Each F at the point, complex where it is not real; inverse: 1/:meth:`PreparedMotion.denominator`."""
+        if self.still:
+            return [lift(point.scale * 0)] * len(self.factors)
+        phi, slope = map(lift, self.wave.at(point))
+        whole = lift(inverse)
+        phi, slope, square = phi * whole, slope * whole, lift(point.square)
+        # a complex ball times a real one is quick in this order only
+        low, steep = phi * lift(point.scale), phi * lift(point.slope)
         if isinstance(self.wave.lattice, DegenerateLattice):
+            rest = slope
+            if self.wave.index is None:
+                rest = -_exponential(point.time, self.wave.rate) * whole
             # Φ' T² = K T ΦT − e: its K T ΦT stands in the cubic coefficient
-            inner = (square * first + second) * lift(scale) * phi + lift(point.slope) * third * phi
-            return (inner + self._rest(point, slope, square)) / lift(denominator)
-        p = lift(point.above(0))
-        inner = (square * first + p * second) * lift(scale) + lift(point.slope) * third
-        return (inner * phi + (square * self.of_slope[0] + p * self.of_slope[1]) * slope) / lift(denominator)
-
-    def _rest(self, point: Point, slope: Any, square: Any) -> Any:
-        rest = slope if self.wave.index is not None else -_exponential(point.time, self.wave.rate)
-        return square * self.of_slope[0] * rest + slope * self.of_slope[1]
+            parts = low * square, low, steep, rest * square, slope
+        else:
+            p = lift(point.high + point.root * point.square)
+            parts = low * square, low * p, steep, slope * square, slope * p
+        a, b, c, d, e = parts
+        return [a * f + b * g + c * h + d * i + e * j for f, g, h, i, j in self.factors]
 
 
 def lift(value: Any) -> Any:
-    """A real number or series as a complex one."""
-    return acb(value) if isinstance(value, arb) else acb_series(value)
+    """A series as a complex one; a number as it is."""
+    return acb_series(value) if isinstance(value, arb_series) else value

@@ -18,7 +18,7 @@ from fractions import Fraction
 from math import gcd, isqrt
 from typing import Any
 
-from flint import arb, arb_series, ctx, fmpq, fmpq_mat, fmpq_poly
+from flint import arb, fmpq, fmpq_mat, fmpq_poly
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball, to_bits
@@ -44,7 +44,7 @@ class Staude(WithAttitude):
                 "`staude_rotations` finds those of a top.",
             )
 
-    def motion(self, time: arb_series) -> tuple[list[Any], Carry]:
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         parameters = self.system.parameters(self.top, self.start)
         exact = self.system.angular_velocity(parameters, self.start.flat)
@@ -53,9 +53,9 @@ class Staude(WithAttitude):
         omega, rate = balls(exact), ball(dot(exact, exact)).sqrt()
         return balls(self.start.omega), lambda fixed: turned(fixed, omega, rate, time)
 
-    def evaluate(self, _time: Fraction) -> list[arb_series]:
+    def evaluate(self, _time: Fraction) -> list[Any]:
         """The start, at every time."""
-        return [arb_series([value], prec=ctx.cap) for value in balls(self.start.flat)]
+        return balls(self.start.flat)
 
 
 def staude_rate_squared(top: HeavyTop, gamma: Vector) -> Fraction | None:

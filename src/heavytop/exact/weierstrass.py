@@ -21,26 +21,32 @@ from functools import lru_cache
 from math import lcm
 from typing import Any
 
-from flint import acb, acb_series, arb, arb_series, ctx, fmpz_poly
+from flint import acb, acb_series, arb, arb_poly, arb_series, ctx, fmpz_poly
 
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.theta import Theta
 
 Exact = Fraction | int
 Scalar = Fraction | int | arb
+_LARGE = 0.6  # the largest nome whose series are short and lose no more than a few bits
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # frozen ones take ten times as long to make
 class Point:
     """A lattice's functions at a real time, without poles; numbers or power series in the time.
 
-    scale: T, odd, ~ u.  raised: √((℘ − e) T²) for the root e = ``root`` of the lattice.  slope: ℘' T³.
-    thetas: (−1)^(whole periods) and θ_j(z)/θ_j(0), j = 2, 3, 4 (none on discriminant 0).
-    time, z: u and u/(2ω) reduced.
+    scale: T, odd, ~ u.  square: T².  raised: √((℘ − e) T²) for the root e = ``root`` of the lattice.  high: its square.
+    slope: ℘' T³.
+    thetas: (−1)^(whole periods) and θ_j(z)/θ_j(0), j = 2, 3, 4 (none on discriminant 0); where two roots are complex
+    and z is not reduced, the product of the last two and 1.
+    time, z: u and u/(2ω) reduced, or sin, cos and cos 2· of πz where nothing was reduced.
     """
 
     scale: Any
+    square: Any
     raised: Any
+    high: Any
     slope: Any
     root: Scalar
     thetas: tuple[Any, ...]
@@ -49,7 +55,9 @@ class Point:
 
     def above(self, value: Scalar) -> Any:
         """(℘ − value) T²; the difference of exact roots and values is exact."""
-        return self.raised * self.raised + as_ball(difference(self.root, value)) * (self.scale * self.scale)
+        if isinstance(value, arb) and isinstance(self.root, arb):
+            return self.high + (self.root - value) * self.square
+        return self.high + as_ball(difference(self.root, value)) * self.square
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +66,8 @@ class Lattice:
 
     roots: the values e of ℘ at z = 1/2, (1 + τ)/2, τ/2.  half_period: ω, the smallest positive real one.  ratio: τ.
     zero: θ1'(0), θ2(0), θ3(0), θ4(0).  quasi_period: η = ζ(ω).
+    theta: the series for numbers, None where the nome is large (a long real period: beside a double root).
+    parts: their polynomials, of T, raised and the last two thetas of :class:`Point`.
     """
 
     roots: tuple[acb, acb, acb]
@@ -65,6 +75,8 @@ class Lattice:
     ratio: acb
     zero: tuple[acb, ...]
     quasi_period: arb
+    theta: Theta | None
+    parts: tuple[arb_poly, ...]
 
     def reduced(self, u: acb) -> tuple[acb, int]:
         """(z − n, n): z = u/(2ω) moved by n whole real periods into |Re z| <= 1/2 (or just above)."""
@@ -74,6 +86,8 @@ class Lattice:
 
     def point(self, time: Exact, length: int = 0) -> Point:
         """:class:`Point` at a real time; with ``length``, power series in ε at time + ε, up to ε^(length − 1)."""
+        if self.theta is not None and not length:
+            return self._number(self.theta, ball(time))
         z, turns = self.reduced(acb(ball(time)))
         u: Any = ball(time)
         argument: Any = z
@@ -86,7 +100,18 @@ class Lattice:
         ratios = tuple(value * (1 / start) for value, start in zip(others, self.zero[1:], strict=True))
         slope = real(ratios[0] * ratios[1] * ratios[2]) * -2
         sign = -1 if turns % 2 else 1
-        return Point(scale, real(ratios[0]), slope, self.roots[0].real, (sign, *ratios), u, argument)
+        raised = real(ratios[0])
+        root, thetas_there = self.roots[0].real, (sign, *ratios)
+        return Point(scale, scale * scale, raised, raised * raised, slope, root, thetas_there, u, argument)
+
+    def _number(self, theta: Theta, u: arb) -> Point:
+        angles = theta.angles(u)
+        sine, cosine, c = angles
+        first, second, third, fourth = self.parts
+        scale, raised, three, four = sine * first(c), cosine * second(c), third(c), fourth(c)
+        slope = raised * three * four * -2
+        root, ratios = self.roots[0].real, (1, raised, three, four)
+        return Point(scale, scale * scale, raised, raised * raised, slope, root, ratios, u, angles)
 
     def p(self, u: acb) -> acb:
         """℘(u)."""
@@ -146,7 +171,8 @@ class DegenerateLattice:
         """As :meth:`Lattice.point`."""
         u: Any = arb_series([ball(time), 1], length) if length else ball(time)
         scale, cosine = self.functions(u)
-        return Point(scale, u * 0 + 1, cosine * -2, self.double, (), u, u)
+        one = u * 0 + 1
+        return Point(scale, scale * scale, one, one, cosine * -2, self.double, (), u, u)
 
     def p(self, u: acb) -> acb:
         """℘(u)."""
@@ -189,14 +215,14 @@ def real(value: Any) -> Any:
     """The real part of a ball or of a power series in a real variable."""
     if isinstance(value, acb_series):
         return arb_series([value[i].real for i in range(value.prec)], value.prec)
-    return value.real
+    return value if isinstance(value, arb) else value.real
 
 
 def imag(value: Any) -> Any:
     """The imaginary part of a ball or of a power series in a real variable."""
     if isinstance(value, acb_series):
         return arb_series([value[i].imag for i in range(value.prec)], value.prec)
-    return value.imag
+    return value * 0 if isinstance(value, arb) else value.imag
 
 
 def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
@@ -286,4 +312,13 @@ def _from_roots(roots: list[acb]) -> Lattice:
 def _with_thetas(roots: tuple[acb, acb, acb], half: arb, ratio: acb) -> Lattice:
     _, two, three, four = thetas(acb(0), ratio)
     first, third = (thetas(acb(0), ratio, order)[0] for order in (1, 3))
-    return Lattice(roots, half, ratio, (first, two, three, four), (-third / (12 * half * first)).real)
+    zero, quasi_period = (first, two, three, four), (-third / (12 * half * first)).real
+    nome = (-arb.pi() * ratio.imag).exp()
+    if not nome < _LARGE:
+        return Lattice(roots, half, ratio, zero, quasi_period, None, ())
+    square = nome * nome if ratio.real == 0 else -nome * nome
+    theta = Theta(square, arb.pi() / (2 * half), False, arb(1))
+    one, (odd, even) = arb(1), theta.odd()
+    rest = (theta.even(1), theta.even(-1)) if ratio.real == 0 else (theta.both(), arb_poly([1]))
+    parts = odd * (1 / (odd(one) * theta.rate)), *(poly * (1 / poly(one)) for poly in (even, *rest))
+    return Lattice(roots, half, ratio, zero, quasi_period, theta, parts)
