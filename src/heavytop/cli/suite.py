@@ -20,18 +20,20 @@ def run(
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the rows that --out already holds.")] = False,
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on instead.")] = None,
+    seed: Annotated[int, typer.Option(help="Measure the same motions with other roundings: 0 to 1000.")] = 0,
 ) -> int:
     """Run a plan of measurements and write DIR/report.json."""
     from heavytop.suite.plan import expand, load
 
     loaded, digest = load(plan)
-    tasks = expand(loaded)
+    tasks = expand(loaded, seed)
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
     directory = _fresh(out, loaded.name, resume)
-    return _run(tasks, {"name": loaded.name, "sha256": digest}, directory, workers or os.cpu_count() or 1, scheduler)
+    identity = {"name": loaded.name, "sha256": digest, "seed": str(seed)}
+    return _run(tasks, identity, directory, workers or os.cpu_count() or 1, scheduler)
 
 
 def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, scheduler: str | None) -> int:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 import re
 import tomllib
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
 import msgspec
 
 from heavytop.errors import InputError
+from heavytop.measure.luck import MOST_SEEDS
 from heavytop.suite.cases import CASES, Case, case
 from heavytop.suite.tables import Table
 from heavytop.suite.task import Task
@@ -65,12 +67,14 @@ def load(name: str) -> tuple[Plan, str]:
     return plan, hashlib.sha256(text.encode()).hexdigest()
 
 
-def expand(plan: Plan) -> list[Task]:
-    """The plan's measurements in its order; raises InputError for an unknown case or precision, an impossible value,
-    and two measurements that would fill the same row.
+def expand(plan: Plan, seed: int = 0) -> list[Task]:
+    """The plan's measurements in its order, with the roundings of a seed; raises InputError for an unknown case or
+    precision, an impossible value, and two measurements that would fill the same row.
     """
+    if not 0 <= seed <= MOST_SEEDS:
+        raise InputError(f"There is no seed {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
     own = {top.name: _own_case(top) for top in plan.top}
-    tasks = [task for table in plan.measure for task in table.tasks(lambda name: case(name, own))]
+    tasks = [replace(task, seed=seed) for table in plan.measure for task in table.tasks(lambda name: case(name, own))]
     seen: set[str] = set()
     for task in tasks:
         if task.label in seen:
