@@ -20,13 +20,15 @@ from heavytop.top.heavy_top import HeavyTop
 RERUNS = 15
 """Runs with other roundings, beside the row's own."""
 MOST_SEEDS = 1000
-_STEP = Fraction(1, 2**20)
+_BITS, _FACTORS, _STRIDE = 20, 2**14, 10125
+"""Factors are 1 + j/2^20 with j < 2^14, an odd stride apart so that those of one row differ in all their bits."""
 _CENTRAL = 0.95
 
 
 def factor(seed: int, rerun: int = 0) -> Fraction:
     """What inertia and weight are multiplied by; 1 for seed 0 and rerun 0."""
-    return 1 + _STEP * (seed * (RERUNS + 1) + rerun)
+    number = (seed * (RERUNS + 1) + rerun) * _STRIDE % _FACTORS
+    return 1 + Fraction(number, 2**_BITS)
 
 
 def reroll(top: HeavyTop, seed: int) -> HeavyTop:
@@ -43,10 +45,10 @@ def least(metrics: Mapping[str, Any], name: str) -> float:
 
 
 def bands(runs: Sequence[Mapping[str, Metric]], floor: float, own: Mapping[str, Metric]) -> dict[str, float]:
-    """The band of each error over runs that differ in their roundings alone: half-width in decades of its 95 % interval.
+    """The band of each error over runs that differ in their roundings alone: half its 95 % interval, in decades.
 
-    floor: log10 below which all errors are the same.  own: the run that the bands are for; it counts where it came out
-    no larger than the others, for luck must not hide what went wrong in it.
+    floor: log10 below which all errors are the same.  own: the run that the bands are for.  It counts where it came out
+    no larger than the others: good luck is luck, but luck must not excuse what went wrong.
     Metrics that some run has no number for have no band.
     """
     found = {}

@@ -17,7 +17,7 @@ from heavytop.report.verdicts import SAME, Judged, Verdict, judge, judge_law, ju
 
 AnyReport = Report | Brief
 AnyRow = Row | BriefRow
-_MACHINE = ("system", "machine", "processor", "cpu_features", "simd_width_double")
+_MACHINE = ("system", "machine", "processor", "simd_width_double", "cpu_features")
 
 
 class Finding(msgspec.Struct, frozen=True, gc=False):
@@ -97,16 +97,16 @@ def compare(baseline: AnyReport, candidate: AnyReport, policy: Policy) -> Compar
     Raises InputError where neither report has a row, or the policy leaves nothing to compare.
     """
     findings: list[Finding] = []
-    other = {row.key: row for row in candidate.rows}
     rows = _Rows(policy, _timed(policy, baseline.environment, candidate.environment))
+    others = _Others(candidate.rows)
     for row in baseline.rows:
         key = row.key
-        match = other.pop(key, None)
+        match = others.take(key)
         if match is None:
             findings.append(Finding(key, "", Verdict.MISSING, row.outcome, None, "the row is missing"))
         else:
             findings += rows.compare(key, row, match)
-    findings += [Finding(key, "", Verdict.NEW, None, row.outcome) for key, row in other.items()]
+    findings += [Finding(row.key, "", Verdict.NEW, None, row.outcome) for row in others.left()]
     if not findings:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     return Comparison(
@@ -114,6 +114,32 @@ def compare(baseline: AnyReport, candidate: AnyReport, policy: Policy) -> Compar
         _differences({"plan": baseline.plan}, {"plan": candidate.plan})
         + _differences(baseline.environment, candidate.environment),
     )
+
+
+class _Others:
+    """The rows of the candidate by their keys, taken as they come: two reports of one plan have the same order."""
+
+    def __init__(self, rows: Any) -> None:
+        self._rows = rows
+        self._coming = enumerate(rows)
+        self._passed: dict[tuple[str, ...], int] = {}
+
+    def take(self, key: tuple[str, ...]) -> AnyRow | None:
+        if key in self._passed:
+            row: AnyRow = self._rows[self._passed.pop(key)]
+            return row
+        for number, row in self._coming:
+            if row.key == key:
+                return row
+            self._passed[row.key] = number
+        return None
+
+    def left(self) -> Iterator[AnyRow]:
+        """Those that were not taken."""
+        for number in self._passed.values():
+            yield self._rows[number]
+        for _, row in self._coming:
+            yield row
 
 
 class _Rows:
@@ -171,7 +197,8 @@ class _Rows:
                 judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
             else:
                 judged = judge_law(a, b)
-            yield Finding(key, metric, judged[0], a and law_text(a), b and law_text(b), judged[1])
+            before, after = (None if law is None else law_text(law) for law in (a, b))
+            yield Finding(key, metric, judged[0], before, after, judged[1])
 
     def _incomparable(self, old: AnyRow, new: AnyRow) -> str:
         """Why two rows cannot be compared; empty where they can."""
@@ -213,5 +240,7 @@ def _flatten(block: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str
     for name, value in block.items():
         if isinstance(value, dict):
             yield from _flatten(value, f"{prefix}{name}.")
+        elif isinstance(value, list):
+            yield from ((f"{prefix}{name}.{part}", "present") for part in value)
         else:
             yield f"{prefix}{name}", str(value)

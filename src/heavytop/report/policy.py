@@ -58,7 +58,7 @@ class Rule(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         for pattern in (self.measure, self.case, self.metric):
-            _glob(pattern)
+            glob(pattern)
         if self.limit is not None:
             _not_negative("limit", self.limit)
 
@@ -92,7 +92,7 @@ class Policy(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
     value: str | float | None = 1e-6
     suspicious_digits: float = 3
     flags: Literal["incomparable", "ignore"] = "incomparable"
-    timings: Timings = Timings()
+    timings: Timings = msgspec.field(default_factory=Timings)
     rule: tuple[Rule, ...] = ()
 
     def __post_init__(self) -> None:
@@ -119,7 +119,7 @@ class Lookup:
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
-        self._patterns = [(_glob(r.measure), _glob(r.case), _glob(r.metric)) for r in policy.rule]
+        self._patterns = [(glob(r.measure), glob(r.case), glob(r.metric)) for r in policy.rule]
         self._of_rule = [_limits(rule, policy) for rule in policy.rule]
         self._of_rest = _limits(Rule(), policy)
         self._found: dict[tuple[tuple[int, ...], str], Limits] = {}
@@ -153,6 +153,15 @@ def load(path: Path) -> Policy:
         raise InputError(f"The policy {path} is not valid: {error}.", _REMEDY) from None
 
 
+def adjusted(policy: Policy, floor: str | None = None, loss_bits: str | None = None) -> Policy:
+    """The policy with another floor or loss for what no rule is about; raises InputError for a negative one."""
+    if floor is not None:
+        policy = msgspec.structs.replace(policy, floor=floor)
+    if loss_bits is not None:
+        policy = msgspec.structs.replace(policy, loss_bits=loss_bits, loss_digits=None)
+    return policy
+
+
 def _limits(rule: Rule, policy: Policy) -> Limits:
     def number(name: str) -> float:
         given = getattr(rule, name)
@@ -182,7 +191,7 @@ def _not_negative(name: str, given: str | float) -> None:
         raise InputError(f"{name} = {given} is negative.", "Give 0 or more.")
 
 
-def _glob(pattern: str) -> re.Pattern[str]:
+def glob(pattern: str) -> re.Pattern[str]:
     """A pattern of `*`, `?` and `[...]`; raises InputError for an empty one, or one whose bracket is not closed."""
     if not pattern or pattern.count("[") > pattern.count("]"):
         raise InputError(f"{pattern!r} is no glob pattern.", "Use *, ? and [...], such as drift_*_max.")

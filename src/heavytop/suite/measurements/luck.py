@@ -54,7 +54,7 @@ class Remembered:
 
 
 def drift_bands(task: Task, run: Trajectory, metrics: Metrics) -> Metrics:
-    """``metrics`` of a drift row with their bands; as they are where the run failed or its integrator is a broken one."""
+    """``metrics`` of a drift row with their bands; as they are where the run failed or its integrator is broken."""
     assert task.case is not None
     if run.outcome is not Outcome.SUCCESS or task.integrator != "heyoka":
         return metrics
@@ -137,8 +137,11 @@ class _Watched:
 
 
 def _banded(task: Task, metrics: Metrics, reruns: list[Metrics]) -> Metrics:
-    """The metrics with the bands of the reruns.  In double the row's own run is one of them: where it was lucky, its
-    band says so.
-    """
-    found = bands(reruns, _FLOOR, metrics if parse(task.precision) == DOUBLE else {})
+    """The metrics with the bands of the reruns, the row's own run beside them in units of its eps."""
+    coarser = math.log10(2) * (parse(task.precision).bits - DOUBLE.bits)
+    own = {
+        name: metric if metric.log10 is None else msgspec.structs.replace(metric, log10=metric.log10 + coarser)
+        for name, metric in metrics.items()
+    }
+    found = bands(reruns, _FLOOR, own)
     return {name: msgspec.structs.replace(metric, band=found.get(name)) for name, metric in metrics.items()}
