@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
@@ -13,7 +14,7 @@ from heavytop.precision import exact
 from heavytop.records import Report, Row
 from heavytop.report.policy import BITS, Lookup, Policy
 from heavytop.report.store import Brief, BriefRow
-from heavytop.report.verdicts import SAME, Judged, Verdict, judge, judge_law, judge_seconds, law_text
+from heavytop.report.verdicts import Judged, Verdict, judge, judge_law, judge_seconds, law_text
 
 AnyReport = Report | Brief
 AnyRow = Row | BriefRow
@@ -50,11 +51,24 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
         }
 
 
-class Comparison(msgspec.Struct, frozen=True):
-    """All findings, and the differences of the plans and environments."""
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All findings, and the differences of the plans and environments.  changed: all findings but the same."""
 
     findings: list[Finding]
     environment: list[tuple[str, str, str]]
+    changed: list[Finding] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "changed", [f for f in self.findings if f.verdict is not Verdict.SAME])
+
+    @property
+    def tally(self) -> dict[Verdict, int]:
+        """How many findings of each verdict, in the order of the verdicts."""
+        verdicts = [finding.verdict for finding in self.changed]
+        same = len(self.findings) - len(self.changed)
+        counts = {verdict: verdicts.count(verdict) for verdict in Verdict} | {Verdict.SAME: same}
+        return {verdict: count for verdict, count in counts.items() if count}
 
     @property
     def verdict(self) -> str:
@@ -65,17 +79,6 @@ class Comparison(msgspec.Struct, frozen=True):
         if Verdict.MISSING in seen or Verdict.INCOMPARABLE in seen:
             return "incomparable"
         return "better" if Verdict.BETTER in seen else "same"
-
-    @property
-    def tally(self) -> dict[Verdict, int]:
-        """How many findings of each verdict, in the order of the verdicts."""
-        verdicts = [finding.verdict for finding in self.findings]
-        return {verdict: count for verdict in Verdict if (count := verdicts.count(verdict))}
-
-    @property
-    def changed(self) -> list[Finding]:
-        """All findings but the same."""
-        return [finding for finding in self.findings if finding.verdict is not Verdict.SAME]
 
     @property
     def exit_code(self) -> int:
@@ -148,43 +151,48 @@ class _Rows:
         self.lookup = Lookup(policy)
         self.timed = timed
 
-    def compare(self, key: tuple[str, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
+    def compare(self, key: tuple[str, ...], old: AnyRow, new: AnyRow) -> list[Finding]:
         reason = self._incomparable(old, new)
         if reason:
-            yield Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)
-            return
+            return [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
         rules = self.lookup.row(old.measure, old.case) if self.policy.rule else ()
-        eps = (1 - old.bits) * BITS
+        loss = self.lookup.metric((), "").loss
+        found = []
         for name, metric in old.metrics.items():
-            limits = self.lookup.metric(rules, name)
-            if limits.ignore:
-                continue
             match = new.metrics.get(name)
-            if match is None:
-                yield Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing")
-                continue
-            verdict, why = SAME
-            # most metrics of most reports: two numbers that differ by less than they may
             if (
-                limits.limit is not None
-                or metric.log10 is None
-                or match.log10 is None
-                or not metric.kind == match.kind == "error"
-                or abs(match.log10 - metric.log10) > limits.loss
+                # most metrics of most reports: two numbers that differ by less than they may under every rule
+                not rules
+                and match is not None
+                and metric.log10 is not None
+                and match.log10 is not None
+                and metric.kind == match.kind == "error"
+                and -loss <= metric.log10 - match.log10 <= loss
             ):
-                floors = least(old.metrics, name), least(new.metrics, name)
-                verdict, why = judge(metric, match, limits, eps, self.policy.suspicious_digits, floors)
-            yield Finding(key, name, verdict, metric.value, match.value, why)
-        for name, metric in new.metrics.items():
-            if name not in old.metrics and not self.lookup.metric(rules, name).ignore:
-                yield Finding(key, name, Verdict.NEW, None, metric.value)
+                found.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
+            elif not (limits := self.lookup.metric(rules, name)).ignore:
+                if match is None:
+                    found.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
+                    continue
+                least_of = least(old.metrics, name), least(new.metrics, name)
+                eps = (1 - old.bits) * BITS
+                verdict, why = judge(metric, match, limits, eps, self.policy.suspicious_digits, least_of)
+                found.append(Finding(key, name, verdict, metric.value, match.value, why))
+        if new.metrics.keys() != old.metrics.keys():
+            found += [
+                Finding(key, name, Verdict.NEW, None, metric.value)
+                for name, metric in new.metrics.items()
+                if name not in old.metrics and not self.lookup.metric(rules, name).ignore
+            ]
         if old.laws or new.laws:
-            yield from self._laws(key, rules, old, new)
+            found += self._laws(key, rules, old, new)
         if self.timed:
             for name in sorted(old.seconds.keys() & new.seconds.keys()):
-                verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
-                before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
-                yield Finding(key, f"seconds {name}", verdict, before, after, why)
+                if not self.lookup.metric(rules, f"seconds {name}").ignore:
+                    verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
+                    before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
+                    found.append(Finding(key, f"seconds {name}", verdict, before, after, why))
+        return found
 
     def _laws(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
         for name in dict.fromkeys((*old.laws, *new.laws)):
