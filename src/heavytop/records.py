@@ -15,7 +15,7 @@ Kind = Literal["error", "duration", "value"]
 """How two values of a metric compare: a smaller error is better, a longer duration is better, a value must agree."""
 
 
-class Metric(msgspec.Struct):
+class Metric(msgspec.Struct, gc=False):
     """One measured number.
 
     value: decimal text; or a word that is no number: "nan", "missing", "never", "unresolved" (smaller than ten radii

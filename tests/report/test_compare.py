@@ -157,7 +157,7 @@ def test_worse_outranks_incomparable_and_environments_are_shown() -> None:
 
 
 def test_two_empty_reports_are_refused() -> None:
-    with pytest.raises(InputError, match="Neither"):
+    with pytest.raises(InputError, match="nothing to compare"):
         compare(report(), report(), Policy())
 
 

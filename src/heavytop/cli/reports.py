@@ -1,4 +1,4 @@
-"""`score`, `compare` and `show`."""
+"""`score`, `compare`, `history` and `show`."""
 
 from __future__ import annotations
 
@@ -57,25 +57,86 @@ def _write_report(row: Any, sha256: str, out: Path) -> None:
 def compare(
     baseline: Annotated[Path, typer.Argument(help="Report or its folder.")],
     candidate: Annotated[Path, typer.Argument(help="Report or its folder.")],
-    floor: Annotated[str, typer.Option(help="Errors below FLOOR eps are all the same.")] = "4",
-    loss: Annotated[str, typer.Option(help="Bits that an error may grow by.")] = "2",
+    policy: Annotated[Path | None, typer.Option(help="TOML file of what counts as the same, docs/compare.md.")] = None,
+    floor: Annotated[str | None, typer.Option(help="Errors below FLOOR eps are all the same: 4.")] = None,
+    loss: Annotated[str | None, typer.Option(help="Bits that an error may grow by: 2.")] = None,
+    markdown: Annotated[Path | None, typer.Option(help="Write what changed as Markdown.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write what changed as JUnit XML.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page that draws both on the same axes.")] = None,
     json: Json = False,
 ) -> int:
     """Compare two reports: exit 1 if anything is worse, 3 if anything is missing or incomparable, else 0."""
-    from heavytop.precision import exact
-    from heavytop.report import store, text
-    from heavytop.report.compare import Policy
+    from heavytop.report import store
     from heavytop.report.compare import compare as compare_reports
 
-    policy = Policy(floor=exact(floor), loss=exact(loss))
-    result = compare_reports(store.read(baseline), store.read(candidate), policy)
-    if json:
-        rows = [finding.to_json() for finding in result.findings]
-        environment = [{"name": n, "baseline": a, "candidate": b} for n, a, b in result.environment]
-        print_json({"verdict": result.verdict, "rows": rows, "environment": environment})
+    rules = _policy(policy, floor, loss)
+    if html is not None:
+        old, new = store.read(baseline), store.read(candidate)
+        result = compare_reports(old, new, rules)
+        from heavytop.report.html import write_comparison
+
+        write_comparison(old, new, result, html)
     else:
-        show_on_terminal(text.comparison(result))
+        result = compare_reports(store.read_brief(baseline), store.read_brief(candidate), rules)
+    if markdown is not None:
+        from heavytop.report.markdown import comparison_markdown
+
+        _write(markdown, comparison_markdown(result, html))
+    if junit is not None:
+        from heavytop.report.junit import comparison_junit
+
+        _write(junit, comparison_junit(result))
+    if json:
+        print_json(result.to_json())
+    else:
+        from heavytop.report.comparison_text import comparison
+
+        show_on_terminal(comparison(result))
     return result.exit_code
+
+
+@command
+def history(
+    reports: Annotated[list[Path], typer.Argument(help="Reports or their folders, the oldest first.")],
+    metric: Annotated[str, typer.Option(help="Only metrics that match this pattern, changed or not.")] = "",
+    case: Annotated[str, typer.Option(help="Only cases that match this pattern.")] = "*",
+    policy: Annotated[Path | None, typer.Option(help="TOML file of what counts as a step.")] = None,
+    svg: Annotated[Path | None, typer.Option(help="Draw the metrics shown over the reports.")] = None,
+    json: Json = False,
+) -> int:
+    """Show metrics over two reports or more, with every step marked."""
+    from heavytop.report import history as over
+    from heavytop.report import store
+    from heavytop.report.policy import glob
+
+    if len(reports) < 2:
+        raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")
+    rules, cases, metrics = _policy(policy, None, None), glob(case), glob(metric or "*")
+    tracks = over.history([store.read_brief(path) for path in reports], rules)
+    tracks = [t for t in tracks if cases.fullmatch(t.key[1]) and metrics.fullmatch(t.metric)]
+    if not metric:
+        tracks = [track for track in tracks if track.steps]
+    names = [str(path) for path in reports]
+    if svg is not None:
+        _write(svg, over.history_svg(names, tracks))
+    if json:
+        print_json(over.history_json(names, tracks))
+    else:
+        show_on_terminal(over.history_text(names, tracks))
+    return 0
+
+
+def _policy(file: Path | None, floor: str | None, loss: str | None) -> Any:
+    """The policy of a file or the default one; the options count before either."""
+    from heavytop.report.policy import Policy, adjusted, load
+
+    return adjusted(Policy() if file is None else load(file), floor, loss)
+
+
+def _write(path: Path, text: str) -> None:
+    from heavytop.suite.checkpoint import replace
+
+    replace(path, text.encode())
 
 
 @command

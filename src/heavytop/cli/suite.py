@@ -21,6 +21,7 @@ def run(
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on instead.")] = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write DIR/rows.parquet too.")] = False,
+    seed: Annotated[int, typer.Option(help="Measure the same motions with other roundings: 0 to 1000.")] = 0,
 ) -> int:
     """Run a plan of measurements and write DIR/report.json."""
     from heavytop.report.parquet import require_pyarrow
@@ -30,13 +31,13 @@ def run(
         require_pyarrow()
 
     loaded, digest = load(plan)
-    tasks = expand(loaded)
+    tasks = expand(loaded, seed)
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
     directory = _fresh(out, loaded.name, resume)
-    identity = {"name": loaded.name, "sha256": digest}
+    identity = {"name": loaded.name, "sha256": digest, "seed": str(seed)}
     return _run(tasks, identity, directory, workers or os.cpu_count() or 1, scheduler, parquet)
 
 

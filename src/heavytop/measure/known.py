@@ -55,6 +55,14 @@ def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | Non
     return Known(solution, certificate, time, bits) if certificate.agreed_digits >= needed else None
 
 
+def closed_form(problem: Problem) -> ExactSolution | None:
+    """The closed form of a rounded problem, if it has one here."""
+    if problem.system is GYROSTAT:
+        # rounded, γ is no longer parallel to M: the rotor is that of the exact data
+        return Gyrostat(problem.top, problem.start, problem.parameters.rotor)
+    return next(matches(problem.top, problem.start), None)
+
+
 def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
     """The closed form of a rounded problem, or up to |t| = 100 its enclosure; why not, where there is neither.
 
@@ -62,12 +70,7 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
     source excludes it: then something is wrong with this program.
     """
     bits = problem.precision.bits + GUARD_BITS
-    found: ExactSolution | None
-    if problem.system is GYROSTAT:
-        # rounded, γ is no longer parallel to M: the rotor is that of the exact data
-        found = Gyrostat(problem.top, problem.start, problem.parameters.rotor)
-    else:
-        found = next(matches(problem.top, problem.start), None)
+    found = closed_form(problem)
     if found is None and abs(horizon) > _VALIDATED_HORIZON:
         return f"no closed form, and no enclosure beyond |t| = {_VALIDATED_HORIZON}"
     try:

@@ -2,54 +2,30 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from enum import Enum
-from fractions import Fraction
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
+import msgspec
+
 from heavytop.errors import InputError
-from heavytop.measure.scalar import UNRESOLVED
-from heavytop.precision import exact, log10
-from heavytop.records import Metric, Report, Row
+from heavytop.measure.luck import least
+from heavytop.precision import exact
+from heavytop.records import Report, Row
+from heavytop.report.policy import BITS, Lookup, Policy
+from heavytop.report.store import Brief, BriefRow
+from heavytop.report.verdicts import Judged, Verdict, judge, judge_law, judge_seconds, law_text
 
-_LOG10_2 = math.log10(2)
-
-
-class Verdict(Enum):
-    """What became of a metric, or of a whole row."""
-
-    SAME = "same"
-    BETTER = "better"
-    WORSE = "worse"
-    MISSING = "missing"
-    NEW = "new"
-    INCOMPARABLE = "incomparable"
+AnyReport = Report | Brief
+AnyRow = Row | BriefRow
+_MACHINE = ("system", "machine", "processor", "simd_width_double", "cpu_features")
 
 
-@dataclass(frozen=True, slots=True)
-class Policy:
-    """When two numbers count as the same.
+class Finding(msgspec.Struct, frozen=True, gc=False):
+    """One metric of one row: verdict, the two values as text, and why.
 
-    floor: errors below floor·eps of the row's format are rounding luck and all the same.
-    loss: an error may grow by that many bits.  duration: a duration may shrink by that fraction.
-    value: a value that must agree may be off by that fraction.
+    metric: "" for a whole row, ``growth NAME`` for the law of a series, ``seconds NAME`` for a timing.
     """
-
-    floor: Fraction = Fraction(4)
-    loss: Fraction = Fraction(2)
-    duration: Fraction = Fraction(1, 20)
-    value: Fraction = Fraction(1, 10**6)
-
-    def __post_init__(self) -> None:
-        for name in ("floor", "loss", "duration", "value"):
-            if getattr(self, name) < 0:
-                raise InputError(f"{name} = {getattr(self, name)} is negative.", "Give 0 or more.")
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One metric of one row: verdict, the two values as text, and why.  ``metric`` is "" for a whole row."""
 
     key: tuple[str, ...]
     metric: str
@@ -77,15 +53,27 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All findings, and the differences of the environments."""
+    """All findings, and the differences of the plans and environments.  changed: all findings but the same."""
 
     findings: list[Finding]
     environment: list[tuple[str, str, str]]
+    changed: list[Finding] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "changed", [f for f in self.findings if f.verdict is not Verdict.SAME])
+
+    @property
+    def tally(self) -> dict[Verdict, int]:
+        """How many findings of each verdict, in the order of the verdicts."""
+        verdicts = [finding.verdict for finding in self.changed]
+        same = len(self.findings) - len(self.changed)
+        counts = {verdict: verdicts.count(verdict) for verdict in Verdict} | {Verdict.SAME: same}
+        return {verdict: count for verdict, count in counts.items() if count}
 
     @property
     def verdict(self) -> str:
         """worse if anything is; else incomparable if anything is missing or incomparable; else better or same."""
-        seen = {finding.verdict for finding in self.findings}
+        seen = self.tally
         if Verdict.WORSE in seen:
             return "worse"
         if Verdict.MISSING in seen or Verdict.INCOMPARABLE in seen:
@@ -97,120 +85,156 @@ class Comparison:
         """0, 1 or 3, as for every command."""
         return {"worse": 1, "incomparable": 3}.get(self.verdict, 0)
 
-
-def compare(baseline: Report, candidate: Report, policy: Policy) -> Comparison:
-    """Every row of either report, in the baseline's order, new ones last."""
-    findings: list[Finding] = []
-    other = {row.key: row for row in candidate.rows}
-    for row in baseline.rows:
-        match = other.pop(row.key, None)
-        if match is None:
-            findings.append(Finding(row.key, "", Verdict.MISSING, row.outcome, None, "the row is missing"))
-        else:
-            findings += _rows(row, match, policy)
-    findings += [Finding(key, "", Verdict.NEW, None, row.outcome) for key, row in other.items()]
-    if not findings:
-        raise InputError("Neither report has a row.", "Compare reports of `heavytop run`.")
-    return Comparison(findings, _differences(baseline.environment, candidate.environment))
+    def to_json(self) -> dict[str, Any]:
+        """The document of `compare --json`."""
+        return {
+            "verdict": self.verdict,
+            "rows": [finding.to_json() for finding in self.findings],
+            "environment": [{"name": n, "baseline": a, "candidate": b} for n, a, b in self.environment],
+        }
 
 
-def _rows(old: Row, new: Row, policy: Policy) -> list[Finding]:
-    reason = _incomparable(old, new)
-    if reason:
-        return [Finding(old.key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
-    findings = []
-    for name, metric in old.metrics.items():
-        match = new.metrics.get(name)
-        if match is None:
-            findings.append(Finding(old.key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
-        else:
-            verdict, why = _metrics(metric, match, Fraction(2) ** (1 - old.bits), policy)
-            findings.append(Finding(old.key, name, verdict, metric.value, match.value, why))
-    findings += [
-        Finding(old.key, name, Verdict.NEW, None, metric.value)
-        for name, metric in new.metrics.items()
-        if name not in old.metrics
-    ]
-    return findings
+def compare(baseline: AnyReport, candidate: AnyReport, policy: Policy) -> Comparison:
+    """Every row of either report, in the baseline's order, new ones last.
 
-
-def _incomparable(old: Row, new: Row) -> str:
-    """Why two rows cannot be compared; empty where they can."""
-    for row, which in ((old, "baseline"), (new, "candidate")):
-        if row.outcome != "success":
-            return f"the {which} ended as {row.outcome} at t = {row.time_reached}"
-    if Fraction(old.horizon) != Fraction(new.horizon):
-        return f"horizon {old.horizon} against {new.horizon}"
-    if old.bits != new.bits:
-        return f"{old.bits} bits against {new.bits}"
-    names = sorted(set(old.flags) | set(new.flags))
-    changed = [name for name in names if old.flags.get(name) != new.flags.get(name)]
-    if changed:
-        return "flags differ: " + ", ".join(f"{n} {old.flags.get(n)} -> {new.flags.get(n)}" for n in changed)
-    # known is known, whichever closed form or enclosure it was: a better certificate makes no difference
-    kinds = [row.against.partition(":")[0].partition(",")[0] for row in (old, new)]
-    if kinds[0] != kinds[1]:
-        return f"held against {kinds[0]!r} and {kinds[1]!r}"
-    return ""
-
-
-def _metrics(old: Metric, new: Metric, eps: Fraction, policy: Policy) -> tuple[Verdict, str]:
-    if old.kind != new.kind:
-        return Verdict.INCOMPARABLE, f"kind {old.kind} against {new.kind}"
-    for metric in (old, new):
-        if metric.value in ("nan", "missing") or (
-            metric.value == UNRESOLVED and old.kind == "error" and not metric.bound
-        ):
-            return Verdict.INCOMPARABLE, f"{metric.value} is no number"
-    if old.kind == "error":
-        return _errors(old, new, policy.floor * eps, policy)
-    if old.value == new.value:
-        return Verdict.SAME, ""
-    if old.kind == "duration":
-        return _durations(old, new, policy)
-    if "never" in (old.value, new.value) or UNRESOLVED in (old.value, new.value):
-        return Verdict.WORSE, "a value that must agree does not"
-    a, b = exact(old.value), exact(new.value)
-    agree = abs(a - b) <= policy.value * max(abs(a), abs(b))
-    return (Verdict.SAME, "") if agree else (Verdict.WORSE, "a value that must agree does not")
-
-
-def _errors(old: Metric, new: Metric, floor: Fraction, policy: Policy) -> tuple[Verdict, str]:
-    """Smaller is better; below the floor all errors are the same.  What its reference does not resolve is at most its
-    bound: never better, and incomparable where the bound itself would be worse.
+    Raises InputError where neither report has a row, or the policy leaves nothing to compare.
     """
-    a, b = (max(abs(exact((m.bound or "") if m.value == UNRESOLVED else m.value)), floor) for m in (old, new))
-    if new.value == UNRESOLVED:
-        small = b <= a * Fraction(2) ** int(policy.loss)
-        return (Verdict.SAME, "") if small else (Verdict.INCOMPARABLE, f"unresolved below {new.bound}")
-    if old.value == UNRESOLVED and b <= a:
-        return Verdict.SAME, ""
-    if a == b:
-        return Verdict.SAME, ""
-    if not a or not b:
-        return (Verdict.WORSE, "no longer exactly 0") if b else (Verdict.BETTER, "now exactly 0")
-    grown = ((log10(b) or 0.0) - (log10(a) or 0.0)) / _LOG10_2
-    if grown > policy.loss:
-        return Verdict.WORSE, f"{grown:.1f} bits lost"
-    if -grown > policy.loss:
-        return Verdict.BETTER, f"{-grown:.1f} bits gained"
-    return Verdict.SAME, ""
+    findings: list[Finding] = []
+    rows = _Rows(policy, _timed(policy, baseline.environment, candidate.environment))
+    others = _Others(candidate.rows)
+    for row in baseline.rows:
+        key = row.key
+        match = others.take(key)
+        if match is None:
+            findings.append(Finding(key, "", Verdict.MISSING, row.outcome, None, "the row is missing"))
+        else:
+            findings += rows.compare(key, row, match)
+    findings += [Finding(row.key, "", Verdict.NEW, None, row.outcome) for row in others.left()]
+    if not findings:
+        raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
+    return Comparison(
+        findings,
+        _differences({"plan": baseline.plan}, {"plan": candidate.plan})
+        + _differences(baseline.environment, candidate.environment),
+    )
 
 
-def _durations(old: Metric, new: Metric, policy: Policy) -> tuple[Verdict, str]:
-    """Longer is better; never is longest."""
-    if old.value == "never":
-        return Verdict.WORSE, f"now at {new.value}"
-    if new.value == "never":
-        return Verdict.BETTER, "now never"
-    if exact(old.value) == 0:
-        return Verdict.BETTER, f"now at {new.value}"
-    ratio = exact(new.value) / exact(old.value)
-    if ratio < 1 - policy.duration:
-        return Verdict.WORSE, f"{float(1 - ratio):.0%} earlier"
-    if ratio > 1 + policy.duration:
-        return Verdict.BETTER, f"{float(ratio - 1):.0%} later"
-    return Verdict.SAME, ""
+class _Others:
+    """The rows of the candidate by their keys, taken as they come: two reports of one plan have the same order."""
+
+    def __init__(self, rows: Any) -> None:
+        self._rows = rows
+        self._coming = enumerate(rows)
+        self._passed: dict[tuple[str, ...], int] = {}
+
+    def take(self, key: tuple[str, ...]) -> AnyRow | None:
+        if key in self._passed:
+            row: AnyRow = self._rows[self._passed.pop(key)]
+            return row
+        for number, row in self._coming:
+            if row.key == key:
+                return row
+            self._passed[row.key] = number
+        return None
+
+    def left(self) -> Iterator[AnyRow]:
+        """Those that were not taken."""
+        for number in self._passed.values():
+            yield self._rows[number]
+        for _, row in self._coming:
+            yield row
+
+
+class _Rows:
+    def __init__(self, policy: Policy, timed: bool) -> None:
+        self.policy = policy
+        self.lookup = Lookup(policy)
+        self.timed = timed
+
+    def compare(self, key: tuple[str, ...], old: AnyRow, new: AnyRow) -> list[Finding]:
+        reason = self._incomparable(old, new)
+        if reason:
+            return [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
+        rules = self.lookup.row(old.measure, old.case) if self.policy.rule else ()
+        loss = self.lookup.metric((), "").loss
+        found = []
+        for name, metric in old.metrics.items():
+            match = new.metrics.get(name)
+            if (
+                # most metrics of most reports: two numbers that differ by less than they may under every rule
+                not rules
+                and match is not None
+                and metric.log10 is not None
+                and match.log10 is not None
+                and metric.kind == match.kind == "error"
+                and -loss <= metric.log10 - match.log10 <= loss
+            ):
+                found.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
+            elif not (limits := self.lookup.metric(rules, name)).ignore:
+                if match is None:
+                    found.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
+                    continue
+                least_of = least(old.metrics, name), least(new.metrics, name)
+                eps = (1 - old.bits) * BITS
+                verdict, why = judge(metric, match, limits, eps, self.policy.suspicious_digits, least_of)
+                found.append(Finding(key, name, verdict, metric.value, match.value, why))
+        if new.metrics.keys() != old.metrics.keys():
+            found += [
+                Finding(key, name, Verdict.NEW, None, metric.value)
+                for name, metric in new.metrics.items()
+                if name not in old.metrics and not self.lookup.metric(rules, name).ignore
+            ]
+        if old.laws or new.laws:
+            found += self._laws(key, rules, old, new)
+        if self.timed:
+            for name in sorted(old.seconds.keys() & new.seconds.keys()):
+                if not self.lookup.metric(rules, f"seconds {name}").ignore:
+                    verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
+                    before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
+                    found.append(Finding(key, f"seconds {name}", verdict, before, after, why))
+        return found
+
+    def _laws(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
+        for name in dict.fromkeys((*old.laws, *new.laws)):
+            metric = f"growth {name}"
+            if self.lookup.metric(rules, metric).ignore:
+                continue
+            a, b = old.laws.get(name), new.laws.get(name)
+            judged: Judged
+            if a is None or b is None:
+                judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
+            else:
+                judged = judge_law(a, b)
+            before, after = (None if law is None else law_text(law) for law in (a, b))
+            yield Finding(key, metric, judged[0], before, after, judged[1])
+
+    def _incomparable(self, old: AnyRow, new: AnyRow) -> str:
+        """Why two rows cannot be compared; empty where they can."""
+        for row, which in ((old, "baseline"), (new, "candidate")):
+            if row.outcome != "success":
+                return f"the {which} ended as {row.outcome} at t = {row.time_reached}"
+        if old.horizon != new.horizon and exact(old.horizon) != exact(new.horizon):
+            return f"horizon {old.horizon} against {new.horizon}"
+        if old.bits != new.bits:
+            return f"{old.bits} bits against {new.bits}"
+        if (old.starts == 1) != (new.starts == 1):
+            return f"{old.starts} starts against {new.starts}"
+        if old.flags != new.flags and self.policy.flags != "ignore":
+            names = [n for n in sorted({*old.flags, *new.flags}) if old.flags.get(n) != new.flags.get(n)]
+            return "flags differ: " + ", ".join(f"{n} {old.flags.get(n)} -> {new.flags.get(n)}" for n in names)
+        if old.against != new.against:
+            # known is known, whichever closed form or enclosure it was: a better certificate makes no difference
+            kinds = [row.against.partition(":")[0].partition(",")[0] for row in (old, new)]
+            if kinds[0] != kinds[1]:
+                return f"held against {kinds[0]!r} and {kinds[1]!r}"
+        return ""
+
+
+def _timed(policy: Policy, old: dict[str, Any], new: dict[str, Any]) -> bool:
+    when = policy.timings.compare
+    return when == "always" or (
+        when == "same-machine" and all(name in old and old[name] == new.get(name) for name in _MACHINE)
+    )
 
 
 def _differences(old: dict[str, Any], new: dict[str, Any]) -> list[tuple[str, str, str]]:
@@ -220,11 +244,11 @@ def _differences(old: dict[str, Any], new: dict[str, Any]) -> list[tuple[str, st
     return [(name, a, b) for name, a, b in pairs if a != b]
 
 
-def _flatten(block: dict[str, Any], prefix: str = "") -> list[tuple[str, str]]:
-    result: list[tuple[str, str]] = []
+def _flatten(block: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
     for name, value in block.items():
         if isinstance(value, dict):
-            result += _flatten(value, f"{prefix}{name}.")
+            yield from _flatten(value, f"{prefix}{name}.")
+        elif isinstance(value, list):
+            yield from ((f"{prefix}{name}.{part}", "present") for part in value)
         else:
-            result.append((f"{prefix}{name}", str(value)))
-    return result
+            yield f"{prefix}{name}", str(value)

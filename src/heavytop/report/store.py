@@ -3,28 +3,117 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
+from typing import Any, TypeVar
 
 import msgspec
+import numpy
 
 from heavytop.errors import InputError
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
-from heavytop.records import SCHEMA, Metric, Report, Row
+from heavytop.records import SCHEMA, Law, Metric, Report, Row
 from heavytop.suite.checkpoint import replace
 
 FILE = "report.json"
 DIGEST = "report.json.sha256"
 _REMEDY = "Make it again with `heavytop run`."
+_CHUNK = 100
+"""Rows of a brief report that are checked at once: few, so that they are still in the cache when compared."""
+_CLOSE = 1e-5
+"""How far a log10 of six decimals may be from that of its value."""
 
 
 def write(report: Report, directory: Path) -> Path:
-    """DIRECTORY/report.json, and beside it its SHA-256 in the format of ``sha256sum -c``."""
-    content = msgspec.json.format(msgspec.json.encode(report), indent=1) + b"\n"
+    """DIRECTORY/report.json, a row a line, and beside it its SHA-256 in the format of ``sha256sum -c``."""
+    head = {"schema": report.schema, "plan": report.plan, "environment": report.environment}
+    rows = b",\n".join(map(msgspec.json.encode, report.rows))
+    content = msgspec.json.encode(head)[:-1] + b',"rows":[\n' + rows + b"\n]}\n"
     replace(directory / DIGEST, f"{hashlib.sha256(content).hexdigest()}  {FILE}\n".encode())
     replace(directory / FILE, content)
     return directory / FILE
+
+
+class BriefRow(msgspec.Struct, gc=False):
+    """What a comparison needs of a :class:`heavytop.records.Row`: no series, no words about it."""
+
+    case: str
+    system: str
+    integrator: str
+    precision: str
+    bits: int
+    outcome: str
+    horizon: str
+    time_reached: str
+    steps: int
+    finite: bool
+    metrics: dict[str, Metric]
+    measure: str = ""
+    against: str = ""
+    flags: dict[str, str] = {}
+    starts: int = 1
+    laws: dict[str, Law] = {}
+    seconds: dict[str, float] = {}
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What makes a row the same row in another report."""
+        return self.measure, self.case, self.system, self.integrator, self.precision
+
+
+class Brief:
+    """A report as a comparison needs it: its rows are read and checked each time that they are gone through, so that
+    some hundred thousand of them fit into memory.
+    """
+
+    def __init__(self, file: Path, parts: _Parts) -> None:
+        self.file = file
+        self.plan = parts.plan
+        self.environment = parts.environment
+        self.rows = _Rows(file, parts.rows)
+
+
+class _Parts(msgspec.Struct):
+    schema: str
+    plan: dict[str, str]
+    environment: dict[str, Any]
+    rows: list[msgspec.Raw]
+
+
+class _Rows:
+    """The rows of a brief report; raises InputError at one that is wrong."""
+
+    def __init__(self, file: Path, rows: list[msgspec.Raw]) -> None:
+        self._file = file
+        self._rows = rows
+        self._decode = msgspec.json.Decoder(BriefRow).decode
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, number: int) -> BriefRow:
+        return self._decode(self._rows[number])
+
+    def __iter__(self) -> Iterator[BriefRow]:
+        seen: set[int] = set()
+        for start in range(0, len(self._rows), _CHUNK):
+            try:
+                rows = [self._decode(row) for row in self._rows[start : start + _CHUNK]]
+            except (msgspec.DecodeError, UnicodeDecodeError) as error:
+                raise InputError(f"{self._file} is not a whole report: {error}.", _REMEDY) from None
+            _check_rows(self._file, rows)
+            hashes = {hash(row.key) for row in rows}
+            if len(hashes) < len(rows) or hashes & seen:
+                _check_keys(self._file, (self._decode(row) for row in self._rows))
+            seen |= hashes
+            yield from rows
+
+
+_Kind = TypeVar("_Kind", Report, _Parts)
 
 
 def read(path: Path) -> Report:
@@ -33,26 +122,38 @@ def read(path: Path) -> Report:
     Raises InputError for a file that is missing, truncated, of another program or schema, edited since it was written
     (where its checksum lies beside it), or inconsistent in itself.
     """
+    file, report = _read(path, Report)
+    _check_keys(file, report.rows)
+    _check_rows(file, report.rows)
+    return report
+
+
+def read_brief(path: Path) -> Brief:
+    """The same for a comparison; what is wrong with a row is found as the rows are gone through."""
+    return Brief(*_read(path, _Parts))
+
+
+def _read(path: Path, kind: type[_Kind]) -> tuple[Path, _Kind]:
     file = path / FILE if path.is_dir() else path
     try:
         content = file.read_bytes()
     except OSError as error:
         raise InputError(f"There is no report at {file}: {error.strerror}.", _REMEDY) from None
-    _check_digest(file, content)
-    try:
-        schema = msgspec.json.decode(content, type=_Schema).schema
-        if schema != SCHEMA:
-            raise InputError(f"{file} has the schema {schema[:60]!r}, not {SCHEMA!r}.", _REMEDY)
-        report = msgspec.json.decode(content, type=Report)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{file} is not a whole report: {error}.", _REMEDY) from None
-    keys = set()
-    for row in report.rows:
-        _check_row(file, row)
-        if row.key in keys:
-            raise InputError(f"{file} holds the row {' '.join(filter(None, row.key))} twice.", _REMEDY)
-        keys.add(row.key)
-    return report
+    with ThreadPoolExecutor(1) as beside:
+        digest = beside.submit(_check_digest, file, content)
+        try:
+            report = msgspec.json.decode(content, type=kind)
+            problem = ""
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            problem = str(error)
+        digest.result()
+    if problem or report.schema != SCHEMA:
+        with suppress(msgspec.DecodeError, UnicodeDecodeError):
+            schema = msgspec.json.decode(content, type=_Schema).schema
+            if schema != SCHEMA:
+                raise InputError(f"{file} has the schema {schema[:60]!r}, not {SCHEMA!r}.", _REMEDY)
+        raise InputError(f"{file} is not a whole report: {problem}.", _REMEDY)
+    return file, report
 
 
 class _Schema(msgspec.Struct):
@@ -68,20 +169,62 @@ def _check_digest(file: Path, content: bytes) -> None:
         raise InputError(f"{file} was changed since it was written: its checksum differs.", _REMEDY)
 
 
-def _check_row(file: Path, row: Row) -> None:
-    where = f"{file}, row {row.case[:60]} ({row.precision[:20]})"
-    horizon, reached = (_number(where, value) for value in (row.horizon, row.time_reached))
-    if row.outcome == "success" and abs(reached) < abs(horizon):
+def _check_keys(file: Path, rows: Iterable[Row | BriefRow]) -> None:
+    seen = set()
+    for row in rows:
+        if row.key in seen:
+            raise InputError(f"{file} holds the row {' '.join(filter(None, row.key))} twice.", _REMEDY)
+        seen.add(row.key)
+
+
+def _check_rows(file: Path, rows: Sequence[Row] | Sequence[BriefRow]) -> None:
+    alike: set[tuple[Any, ...]] = set()
+    for row in rows:
+        # most rows are like one before in all that is checked
+        kind = row.measure, row.horizon, row.time_reached, row.outcome, row.bits, row.starts
+        if kind not in alike:
+            _check_row(file, row)
+            if row.measure not in _NEEDED:
+                alike.add(kind)
+    metrics = [metric for row in rows for metric in row.metrics.values()]
+    if doubtful := _doubtful(metrics):
+        for row in rows:
+            for name, metric in row.metrics.items():
+                if id(metric) in doubtful:
+                    _check_metric(f"{_where(file, row)}, {name[:60]}", metric, row.finite)
+
+
+def _doubtful(metrics: Sequence[Metric]) -> set[int]:
+    """The ids of the metrics that are not plainly a number with its logarithm and a band; told in a few strokes."""
+    plain = [m for m in metrics if m.log10 is not None and m.bound is None and (m.band is None or m.band >= 0)]
+    try:
+        values = numpy.array(list(map(float, [metric.value for metric in plain])))
+    except ValueError:
+        return set(map(id, metrics))
+    given = numpy.array([metric.log10 for metric in plain], dtype=float)
+    with numpy.errstate(all="ignore"):
+        good = abs(numpy.log10(abs(values)) - given) < _CLOSE / 2
+    if good.all() and len(plain) == len(metrics):
+        return set()
+    return set(map(id, metrics)) - {id(metric) for metric, fine in zip(plain, good, strict=True) if fine}
+
+
+def _where(file: Path, row: Row | BriefRow) -> str:
+    return f"{file}, row {row.case[:60]} ({row.precision[:20]})"
+
+
+def _check_row(file: Path, row: Row | BriefRow) -> None:
+    where = _where(file, row)
+    horizon, reached = (abs(_number(where, value)) for value in (row.horizon, row.time_reached))
+    if row.outcome == "success" and reached < horizon:
         raise InputError(f"{where}: a success that reached only {row.time_reached} of {row.horizon}.", _REMEDY)
     if not 0 <= row.bits <= _MOST_BITS:
         raise InputError(f"{where}: {row.bits} bits are no format.", _REMEDY)
+    if row.starts < 1:
+        raise InputError(f"{where}: {row.starts} starts.", _REMEDY)
     lacking = [name for name in _NEEDED.get(row.measure, ()) if name not in row.metrics]
     if lacking:
         raise InputError(f"{where}: a row of {row.measure} without {', '.join(lacking)}.", _REMEDY)
-    for name, metric in row.metrics.items():
-        _check_metric(f"{where}, {name[:60]}", metric)
-    if row.finite and any(metric.value == "nan" for metric in row.metrics.values()):
-        raise InputError(f"{where}: said to be finite, but holds a NaN.", _REMEDY)
 
 
 WORDS = {
@@ -104,18 +247,20 @@ _NEEDED = {
 """Metrics that a summary of such a row cannot do without."""
 
 
-def _check_metric(where: str, metric: Metric) -> None:
+def _check_metric(where: str, metric: Metric, finite: bool) -> None:
+    if metric.band is not None and not metric.band >= 0:
+        raise InputError(f"{where}: a band of {metric.band}.", _REMEDY)
     if metric.bound is not None:
         _number(where, metric.bound)
     if metric.value in WORDS[metric.kind]:
         if metric.log10 is not None:
             raise InputError(f"{where}: {metric.value} with a logarithm.", _REMEDY)
+        if finite and metric.value == "nan":
+            raise InputError(f"{where}: said to be finite, but holds a NaN.", _REMEDY)
         return
-    value = abs(_number(where, metric.value))
-    expected = log10(value)
-    given = metric.log10
+    given, expected = metric.log10, log10(_number(where, metric.value))
     if (given is None) != (expected is None) or (
-        given is not None and expected is not None and not abs(given - expected) < 1e-5
+        given is not None and expected is not None and not abs(given - expected) < _CLOSE
     ):
         raise InputError(f"{where}: value {metric.value} and log10 {given} disagree.", _REMEDY)
 

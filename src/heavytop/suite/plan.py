@@ -7,6 +7,7 @@ import re
 import tomllib
 from bisect import bisect_right
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import resources
 from itertools import accumulate
 from pathlib import Path
@@ -14,6 +15,7 @@ from pathlib import Path
 import msgspec
 
 from heavytop.errors import InputError
+from heavytop.measure.luck import MOST_SEEDS
 from heavytop.suite.cases import CASES, Case, case, require_possible
 from heavytop.suite.sweeps import Lazy, Sweep
 from heavytop.suite.tables import Table
@@ -72,17 +74,19 @@ def load(name: str) -> tuple[Plan, str]:
     return plan, hashlib.sha256(text.encode()).hexdigest()
 
 
-def expand(plan: Plan) -> Sequence[Task]:
-    """The plan's measurements in its order; those over a sweep are made when asked for.
+def expand(plan: Plan, seed: int = 0) -> Sequence[Task]:
+    """The plan's measurements in its order, with the roundings of a seed; those over a sweep are made when asked for.
 
-    Raises InputError for an unknown case or precision, an impossible value, and two measurements that would fill the
-    same row.
+    Raises InputError for an unknown case or precision, an impossible value or seed, and two measurements that would
+    fill the same row.
     """
+    if not 0 <= seed <= MOST_SEEDS:
+        raise InputError(f"There is no seed {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
     own = {top.name: _own_case(top) for top in plan.top}
     swept = _swept(plan)
     known = own | {name: cases[0] for name, cases in swept.items()}
     parts = [
-        (table.tasks(lambda name: case(name, known)), cases)
+        ([replace(task, seed=seed) for task in table.tasks(lambda name: case(name, known))], cases)
         for whole in plan.measure
         for table, cases in _parts(whole, swept)
     ]

@@ -17,6 +17,7 @@ class Task:
     times: exact, of the sign of the direction; for claim_evaluation they are values of k |t| with that sign.
     keep: the times that go into the series.  precision: "" where no format is involved.
     count: steps, for local_error.  integrator: heyoka, or a name of :mod:`heavytop.integrate.broken`.
+    seed: which roundings; 0 for those of the data as given.
     """
 
     kind: str
@@ -28,6 +29,7 @@ class Task:
     keep: tuple[Fraction, ...] = ()
     count: int = 0
     integrator: str = "heyoka"
+    seed: int = 0
 
     def of(self, case: Case) -> Task:
         """The same measurement of another case."""

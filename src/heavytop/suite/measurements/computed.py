@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -15,6 +16,8 @@ from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.solution_error import SolutionError
 from heavytop.precision import decimal_text, exact, number, parse
 from heavytop.records import Metric, Row, Series
+from heavytop.suite.cases import Case
+from heavytop.suite.measurements.luck import Remembered, drift_bands, homoclinic_bands
 from heavytop.suite.measurements.shared import case_of, integrator_of, time_metric, time_text
 from heavytop.suite.task import Task
 from heavytop.top.equations import Parameters
@@ -39,21 +42,35 @@ def homoclinic(task: Task) -> Row:
     known = certified(closed, Fraction(sign * _CERTIFIED_AT), precision.bits + GUARD_BITS)
     if known is None:
         raise OutOfReach(f"{closed.method} is not certified for {precision.name}.", "Use a format with fewer bits.")
-    drift = Drift(problem, holding(case.top, case.start, case.system), task.keep)
-    near = SolutionError(problem, closed, task.keep)
-    far = SolutionError(problem, closed, task.keep, threshold=BREAK_AWAY * case.alpha)
+    watch = _Homoclinic(case, problem, closed, task.keep)
+    run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=watch)
+    remembered = Remembered(closed.state)
+    metrics = homoclinic_bands(task, run, watch.metrics(), lambda given: _Homoclinic(case, given, remembered))
+    return computed_row(task, run, metrics, watch.series(), known.text)
 
-    def observe(time: Fraction, state: Any) -> None:
-        drift(time, state)
-        far(time, state)
-        if float(abs(time)) * case.rate <= WINDOW:
-            near(time, state)
 
-    run = propagate(case.top, case.start, task.times, precision, system=case.system, observer=observe)
-    name = "integration_error" if case.claim else "solution_error"
-    metrics = {"break_away_time": time_metric(far.break_away, "duration")}
-    metrics |= near.metrics(name) | drift.metrics()
-    return computed_row(task, run, metrics, far.series(time_text, name) | drift.series(time_text), known.text)
+class _Homoclinic:
+    """Drift, and the error while it is a number, and when it has become too large."""
+
+    def __init__(self, case: Case, problem: Problem, closed: Any, keep: Sequence[Fraction] = ()) -> None:
+        self.name = "integration_error" if case.claim else "solution_error"
+        self.rate = case.rate
+        self.drift = Drift(problem, holding(case.top, case.start, case.system), keep)
+        self.near = SolutionError(problem, closed, keep)
+        self.far = SolutionError(problem, closed, keep, threshold=BREAK_AWAY * case.alpha)
+
+    def __call__(self, time: Fraction, state: Any) -> None:
+        self.drift(time, state)
+        self.far(time, state)
+        if float(abs(time)) * self.rate <= WINDOW:
+            self.near(time, state)
+
+    def metrics(self) -> dict[str, Metric]:
+        metrics = {"break_away_time": time_metric(self.far.break_away, "duration")}
+        return metrics | self.near.metrics(self.name) | self.drift.metrics()
+
+    def series(self) -> dict[str, Series]:
+        return self.far.series(time_text, self.name) | self.drift.series(time_text)
 
 
 def _as_tuples(case: Any) -> Parameters:
@@ -71,9 +88,8 @@ def drift(task: Task) -> Row:
     known = known_motion(problem, exact(number(task.times[-1], precision)))
     if isinstance(known, str):
         run = integrate(case.top, case.start, task.times, precision, system=case.system, observer=drift)
-        return computed_row(
-            task, run, drift.metrics(), drift.series(time_text), f"its own first integrals; no reference: {known}"
-        )
+        against = f"its own first integrals; no reference: {known}"
+        return computed_row(task, run, drift_bands(task, run, drift.metrics()), drift.series(time_text), against)
     error = SolutionError(problem, known.solution, keep)
 
     def observe(time: Fraction, state: Any) -> None:
@@ -82,7 +98,8 @@ def drift(task: Task) -> Row:
 
     run = integrate(case.top, case.start, task.times, precision, system=case.system, observer=observe)
     series = drift.series(time_text) | error.series(time_text)
-    return computed_row(task, run, drift.metrics() | error.metrics(), series, known.text)
+    metrics = drift_bands(task, run, drift.metrics() | error.metrics())
+    return computed_row(task, run, metrics, series, known.text)
 
 
 def local_error(task: Task) -> Row:

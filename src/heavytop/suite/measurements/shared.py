@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from heavytop.claims.ershkov import Branch, PartialCase
 from heavytop.integrate import taylor
 from heavytop.integrate.broken import INTEGRATORS
+from heavytop.measure.luck import reroll
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import decimal_text
 from heavytop.records import Kind, Metric
@@ -28,9 +30,9 @@ def time_metric(time: Fraction | None, kind: Kind) -> Metric:
 
 
 def case_of(task: Task) -> Case:
-    """The case of a task that has one."""
+    """The case of a task that has one, with the roundings of its seed."""
     assert task.case is not None
-    return task.case
+    return replace(task.case, top=reroll(task.case.top, task.seed)) if task.seed else task.case
 
 
 def claim_of(task: Task) -> PartialCase:

@@ -1,0 +1,48 @@
+"""A comparison in words and a table, for people on a terminal."""
+
+from __future__ import annotations
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from heavytop.report.compare import Comparison, Finding
+from heavytop.report.text import short
+from heavytop.report.verdicts import Verdict
+
+_STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}
+
+
+def comparison(result: Comparison) -> RenderableType:
+    """Verdict first, then what changed, then the differences of the plans and environments."""
+    parts: list[RenderableType] = [Text(headline(result), style="bold")]
+    if result.changed:
+        table = Table(box=None, header_style="dim")
+        for column in ("verdict", "row", "metric", "baseline", "candidate", "why"):
+            table.add_column(column, overflow="fold")
+        for finding in result.changed:
+            cells = (row_name(finding), finding.metric, *values(finding), finding.reason)
+            style = _STYLE.get(finding.verdict, "")
+            table.add_row(Text(finding.verdict.value, style=style), *map(Text, cells))
+        parts.append(table)
+    if result.environment:
+        parts.append(Text("Environments differ:", style="bold"))
+        parts += [Text(f"  {name}: {old} -> {new}") for name, old, new in result.environment]
+    return Group(*parts)
+
+
+def headline(result: Comparison) -> str:
+    """The verdict and how many findings of each."""
+    tally = ", ".join(f"{count} {verdict.value}" for verdict, count in result.tally.items())
+    return f"Verdict: {result.verdict} ({tally})"
+
+
+def row_name(finding: Finding) -> str:
+    """The row of a finding in a few words."""
+    _, case, _, integrator, precision = finding.key
+    return " ".join(filter(None, (case, integrator, precision)))
+
+
+def values(finding: Finding) -> tuple[str, str]:
+    """The two values with few digits; a dash where there is none."""
+    return short(finding.baseline or "-"), short(finding.candidate or "-")
