@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from heavytop.cli.app import Json, command, print_json, show_on_terminal
+from heavytop.errors import InputError
 
 
 @command
@@ -36,9 +37,22 @@ def compare(
 
 
 @command
-def show(report: Annotated[Path, typer.Argument(help="Report or its folder.")]) -> int:
-    """Print the summary of a report."""
+def show(
+    report: Annotated[Path, typer.Argument(help="Report or its folder.")],
+    html: Annotated[Path | None, typer.Option(help="Write the report as a page to that file instead.")] = None,
+) -> int:
+    """Print the summary of a report, or write it as one self-contained page."""
     from heavytop.report import store, text
 
-    show_on_terminal(text.summary(store.read(report)))
+    found = store.read(report)
+    if html is None:
+        show_on_terminal(text.summary(found))
+        return 0
+    from heavytop.report.html import write_report
+
+    try:
+        write_report(found, html)
+    except InputError as error:
+        raise InputError(error.cause, "Give a file in a writable folder with --html.") from None
+    print(html)
     return 0

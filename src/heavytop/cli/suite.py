@@ -21,7 +21,7 @@ def run(
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on instead.")] = None,
 ) -> int:
-    """Run a plan of measurements and write DIR/report.json."""
+    """Run a plan of measurements; write DIR/report.json and DIR/report.html."""
     from heavytop.suite.plan import expand, load
 
     loaded, digest = load(plan)
@@ -44,7 +44,7 @@ def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, schedu
         )
 
     from heavytop.records import SCHEMA, Report
-    from heavytop.report import store, text
+    from heavytop.report import html, store, text
     from heavytop.report.environment import environment
     from heavytop.suite.checkpoint import Checkpoint
     from heavytop.suite.run import run as run_tasks
@@ -58,13 +58,14 @@ def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, schedu
             rows = run_tasks(tasks, checkpoint, advance, min(workers, len(tasks)), scheduler)
             report = Report(SCHEMA, plan, surroundings, rows)
             path = store.write(report, directory)
+            html.write_report(report, path.with_suffix(".html"))
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {error}.", "Choose a writable --out with space.") from None
     except KeyboardInterrupt:
         print(f"heavytop: interrupted; finished rows are kept: --out {directory} --resume goes on", file=sys.stderr)
         return 130
     show_on_terminal(text.summary(report))
-    print(f"\nReport: {path}")
+    print(f"\nReport: {path}\nPage:   {path.with_suffix('.html')}")
     return 0 if all(row.outcome == "success" for row in rows) else 3
 
 

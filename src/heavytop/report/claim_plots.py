@@ -9,7 +9,20 @@ from typing import Any
 
 from heavytop.precision import exact
 from heavytop.records import Report, Series
-from heavytop.report.plots import MOST_PLOTS, TIME, Key, Section, Sources, clip, draw, left_out, logarithm, points, scientific
+from heavytop.report.plots import (
+    DASHED,
+    MOST_PLOTS,
+    TIME,
+    Key,
+    Section,
+    Sources,
+    clip,
+    draw,
+    left_out,
+    logarithm,
+    points,
+    scientific,
+)
 from heavytop.report.svg import COLOURS, MARKERS, decades, finish, new_axes, spoken
 from heavytop.report.text import short
 
@@ -30,9 +43,12 @@ def claim_error(sources: Sources) -> Section | None:
             "Three errors that are easily taken for one another. Model: the formulas, exactly evaluated, against the "
             "true motion of the heavy top from the same data. Evaluation: the formulas in floating point against the "
             "same formulas exactly evaluated. Integration: an integrator on the motion that the formulas do solve, "
-            "against that motion. Crosses along the top mark times at which floating point gives no number."
+            "against that motion.",
+            "Crosses along the top mark times at which floating point gives no number; an error of exactly 0 has no "
+            "place on these axes.",
         ],
         columns=["case", "error", "quantity", "|t| = 1", "largest", "no number from |t|"],
+        across=2,
     )
     names = list(bases)[: MOST_PLOTS // 2]
     left_out(section, len(bases) - len(names), "case")
@@ -46,9 +62,9 @@ def claim_error(sources: Sources) -> Section | None:
                 for key, series, scale in _claim_parts(report, case, quantity, source):
                     heard += _claim_curve(axes, section, section.key(key), series, scale, case, symbol)
             title = f"{clip(case.removesuffix('/forward'), 40)}: error of {symbol}"
-            low, high = axes.get_ylim()
-            axes.set_ylim(max(low, _LOWEST), max(high, _LOWEST + 1))
             if heard:
+                box = axes.dataLim
+                axes.set_ylim(max(box.y0 - 1, _LOWEST), max(box.y1, _LOWEST) + 1)
                 section.pictures.append(finish(axes, title, spoken(heard), f"claim-{number}-{quantity}"))
     return section
 
@@ -73,17 +89,17 @@ def _claim_parts(report: Report, case: str, quantity: str, source: str) -> Itera
         if series is None or not series.times:
             continue
         if row.measure == "claim_model" and row.integrator == "claim:smooth":
-            yield Key(f"model{suffix}", 1, "s", "4 3" if old else "", old), series, 1.0
+            yield Key(f"model{suffix}", 1, "s", "", old), series, 1.0
         elif row.measure == "claim_evaluation" and row.bits == bits:
             form = row.integrator.partition(":")[2]
             ends = [logarithm(end) for end in (row.horizon, series.times[-1])]
             scale = 10 ** ((ends[0] or 0.0) - (ends[1] or 0.0))
             colour, marker = (3, "D") if form == "printed" else (2, "^")
             label = f"evaluation, {clip(form, 20)} form, {clip(row.precision, 20)}{suffix}"
-            yield Key(label, colour, marker, "4 3" if old else "", old), series, scale
+            yield Key(label, colour, marker, "", old), series, scale
         elif row.measure == "homoclinic" and row.bits == bits:
             label = f"integration, {clip(row.integrator, 20)}, {clip(row.precision, 20)}{suffix}"
-            yield Key(label, 0, "o", "4 3" if old else "", old), series, 1.0
+            yield Key(label, 0, "o", "", old), series, 1.0
 
 
 def _claim_curve(
@@ -94,7 +110,9 @@ def _claim_curve(
     lost = sorted(t + math.log10(scale) for t in dead if t is not None)
     if lost:
         colour = COLOURS[key.colour]
-        axes.plot(lost, [0.99] * len(lost), "x", transform=axes.get_xaxis_transform(), color=colour, ms=4, clip_on=False)
+        axes.plot(
+            lost, [0.99] * len(lost), "x", transform=axes.get_xaxis_transform(), color=colour, ms=4, clip_on=False
+        )
     if x:
         draw(axes, key, x, y)
     at_one = next((v for t, v in zip(x, y, strict=True) if abs(t) < 1e-6), None)
@@ -150,17 +168,18 @@ def break_away(sources: Sources) -> Section | None:
         key = section.key(Key(label, place, MARKERS[place], "", old, False))
         pairs = sorted(found[case, source].items())
         bits, times = [float(b) for b, _ in pairs], [float(t) for _, t in pairs]
-        draw(axes, key, bits, times, ms=5.5)
+        draw(axes, key, bits, times, 5.5)
         measured, expected = slopes.get((case, source), ("", ""))
         if expected and not old:
             slope, middle = float(exact(expected)), (sum(bits) / len(bits), sum(times) / len(times))
-            section.key(Key("law, ln 2 / rate per bit", 5, "", "6 3"))
             axes.plot(
-                bits, [middle[1] + slope * (b - middle[0]) for b in bits], color=COLOURS[place], lw=1.2, ls=(0, (6, 3))
+                bits, [middle[1] + slope * (b - middle[0]) for b in bits], color=COLOURS[place], lw=1.2, ls=DASHED
             )
         listed = ", ".join(f"{t:g} at {b:g}" for b, t in zip(bits, times, strict=True))
         heard.append(f"{label}: {listed} bits.")
         section.rows.append([label, listed, short(measured), short(expected)])
+    if slopes:
+        section.key(Key("law, ln 2 / rate per bit", 5, "", "6 3"))
     axes.set_xlim(left=0)
     axes.set_ylim(bottom=0)
     section.pictures.append(finish(axes, "Break-away time against bits", spoken(heard), "break-away"))

@@ -24,7 +24,10 @@ MOST_FINDINGS = 500
 
 
 def write_report(report: Report, path: Path) -> None:
-    """Write the page of ``report`` to ``path``; the same report gives the same bytes.  Raises OSError."""
+    """Write the page of ``report`` to ``path``; the same report gives the same bytes.
+
+    Raises InputError where it cannot be written.
+    """
     rows, left_out = detailed(report.rows)
     found = verdicts.audited(report)
     failures = [row for row in report.rows if row.outcome != "success"]
@@ -41,7 +44,7 @@ def write_report(report: Report, path: Path) -> None:
         failed=len(failures),
         not_finite=[row for row in report.rows if row.outcome == "success" and not row.finite],
         sections=sections([("", report)]),
-        rows=rows,
+        measures=_by_measure(rows),
         left_out=left_out,
         environment=flatten(report.environment),
         commands=commands(report),
@@ -75,7 +78,7 @@ def sections(sources: Sources, first: Sequence[str] | dict[str, None] = ()) -> l
     """The parts of the page that have pictures; those without a row are left out."""
     with quiet_style():
         made = [
-            plots.digits(sources),
+            plots.digits(sources, first),
             claim_plots.claim_error(sources),
             plots.growth(sources, first),
             claim_plots.break_away(sources),
@@ -87,6 +90,13 @@ def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
     """The rows shown one by one, the first and the worst of the others, and how many are left out."""
     rest = sorted(rows[MOST_ROWS:], key=_badness)[:MOST_WORST]
     return [*rows[:MOST_ROWS], *rest], max(0, len(rows) - MOST_ROWS - len(rest))
+
+
+def _by_measure(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row.measure or "other", []).append(row)
+    return found
 
 
 def _badness(row: Row) -> tuple[bool, bool, float]:

@@ -7,9 +7,8 @@ axes.  Plots are bounded in number; what is left out is said.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import Any
 
 from heavytop.errors import InputError
@@ -28,13 +27,16 @@ Sources = Sequence[tuple[str, Report]]
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """An entry of a legend; ``colour`` and ``marker`` count, ``dash`` is of SVG."""
+    """An entry of a legend: the number of its colour, a marker of matplotlib, a dash of SVG.
+
+    old: of the baseline, drawn hollow and broad, so that it shows beneath a candidate that did not change.
+    """
 
     label: str
     colour: int
     marker: str = ""
     dash: str = ""
-    hollow: bool = False
+    old: bool = False
     line: bool = True
 
 
@@ -50,16 +52,22 @@ class Section:
     columns: list[str] = field(default_factory=list)
     rows: list[list[str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    across: int = 3
 
     def key(self, key: Key) -> Key:
         """``key``, which from now on is in the legend."""
         return self.legend.setdefault(key.label, key)
 
 
+_ROOM = 40
+
+
 def clip(text: str, most: int = 60) -> str:
-    """A name as it can be shown: one line, no control characters, cut where it is long."""
+    """A name that can be shown: one line, no control characters, cut where it is long."""
     line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * most]).split())
-    return line if len(text) <= most else f"{line[: most - 1]}… ({len(text)} characters)"
+    if len(text) <= most:
+        return line
+    return f"{line[: most - 1]}…" + (f" ({len(text)} characters)" if most >= _ROOM else "")
 
 
 def logarithm(value: str | None) -> float | None:
@@ -90,16 +98,19 @@ def _format_key(name: str, place: int, source: str, line: bool = True) -> Key:
     marker, colour = MARKERS[place % len(MARKERS)], place % len(COLOURS)
     old = source == "baseline"
     label = f"{clip(name, 20)}, {source}" if source else clip(name, 20)
-    return Key(label, colour, marker, "4 3" if old and line else "", old, line)
+    return Key(label, colour, marker, "", old, line)
 
 
-def draw(axes: Any, key: Key, x: Any, y: Any, **more: Any) -> None:
-    dash = (0, tuple(float(part) for part in key.dash.split())) if key.dash else "-"
+def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6) -> None:
+    """One curve, or points, as its legend has it."""
     colour = COLOURS[key.colour]
-    face = "none" if key.hollow else colour
-    style = {"ls": dash if key.line else "none", "marker": key.marker, "color": colour, "mfc": face, "mec": colour}
-    # markers evenly along the curve, however dense its samples are
-    axes.plot(x, y, **(style | ({"markevery": 0.07} if key.line else {}) | more))
+    face = "none" if key.old else colour
+    if key.line:
+        axes.plot(x, y, "-", color=colour, lw=4.5 if key.old else 1.6, alpha=0.35 if key.old else None)
+    # markers evenly along a curve, however dense its samples are
+    every = 0.07 if key.line else None
+    size += 2 * key.old
+    axes.plot(x, y, key.marker, color=colour, mfc=face, mec=colour, ms=size, markevery=every)
 
 
 # ---- digits kept -----------------------------------------------------------------------------------------------
@@ -131,7 +142,7 @@ def digits_kept(row: Row) -> float | None:
 _WORDS = ("nan", "missing", "never", "unresolved")
 
 
-def digits(sources: Sources) -> Section | None:
+def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """Digits that each format holds at the end of its run, beside the digits it started with."""
     lanes: dict[tuple[str, ...], list[tuple[str, Row]]] = {}
     for source, report in sources:
@@ -150,7 +161,8 @@ def digits(sources: Sources) -> Section | None:
         columns=["case", "format", "T", "digits", "kept", "lost", "±"],
     )
     formats = _formats(sources)
-    names = list(lanes)[:MOST_LANES]
+    wanted = set(first)
+    names = sorted(lanes, key=lambda lane: lane[0] not in wanted)[:MOST_LANES]
     left_out(section, len(lanes) - len(names), "case")
     count = max(len(members) for members in lanes.values())
     lines = (count + 1) * len(names)
@@ -158,7 +170,7 @@ def digits(sources: Sources) -> Section | None:
     height = 0.8 / count
     heard = []
     for index, lane in enumerate(names):
-        for place, (source, row) in enumerate(lanes[lane]):
+        for place, (source, row) in enumerate(sorted(lanes[lane], key=lambda each: each[1].bits)):
             key = section.key(_format_key(row.precision, formats.get(row.precision, 0), source, line=False))
             y = index + (place - (len(lanes[lane]) - 1) / 2) * height
             full, kept = row.bits * math.log10(2), digits_kept(row)
@@ -171,13 +183,13 @@ def digits(sources: Sources) -> Section | None:
                 axes.plot([full], [y], "|", color=COLOURS[key.colour], ms=6)
                 if band:
                     axes.plot([kept - band, kept + band], [y, y], "-", color=COLOURS[key.colour], lw=4, alpha=0.3)
-                draw(axes, key, [kept], [y], ms=5)
+                draw(axes, key, [kept], [y], 5)
                 said = f"{kept:.1f}"
             heard.append(f"{_lane_name(lane)}, {key.label}: {said} of {full:.1f}.")
             lost = "" if kept is None else f"{full - kept:.1f}"
             spread = "" if band is None else f"{band:.2f}"
             section.rows.append([_lane_name(lane), key.label, short(row.horizon), f"{full:.1f}", said, lost, spread])
-    axes.set_yticks(range(len(names)), [_lane_name(lane, 22) for lane in names])
+    axes.set_yticks(range(len(names)), [_lane_name(lane, 17) for lane in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.set_xlim(left=0)
     axes.grid(False, axis="y")
@@ -222,7 +234,7 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         ],
         columns=["case", "format", "quantity", "last |t|", "last value", "law", "exponent", "digits gone at |t|"],
     )
-    wanted = list(first)
+    wanted = set(first)
     names = sorted(lanes, key=lambda lane: lane[0] not in wanted)[:MOST_PLOTS]
     left_out(section, len(lanes) - len(names), "case")
     formats = _formats(sources)
@@ -234,6 +246,8 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     plots = [plot for plot in drawn if plot]
     x = [plot[0].get_xlim() for plot in plots]
     y = [plot[0].get_ylim() for plot in plots]
+    if any(row.laws for lane in names for _, row in lanes[lane]):
+        section.key(Key("fitted law", 5, "", "6 3"))
     for number, (axes, title, heard) in enumerate(plots):
         axes.set_xlim(math.floor(min(low for low, _ in x) + 0.1), max(high for _, high in x))
         axes.set_ylim(min(low for low, _ in y), max(high for _, high in y))
@@ -276,7 +290,7 @@ def _growth_axes(
                 x, [v - band for v in y], [v + band for v in y], color=COLOURS[key.colour], alpha=0.18, lw=0
             )
         if law:
-            _law(axes, section, key, law, x, y)
+            _law(axes, key, law, x, y)
         what = name.removeprefix("drift_") if prefix == "drift_" else prefix.removeprefix("solution_error_")
         heard.append(f"{key.label}: {scientific(y[-1])} ε ({what.replace('_', ' ')}) at |t| = {scientific(x[-1])}.")
         last = row.series[name]
@@ -292,8 +306,9 @@ def _growth_axes(
         )
     if axes is None:
         return None
-    if lacking and prefix != "drift_":
-        section.notes.append(f"{_lane_name(lane)}: no reference for {', '.join(map(clip, lacking))}, so no {label}.")
+    if lacking and prefix == "solution_error_across":
+        these = ", ".join(dict.fromkeys(map(clip, lacking)))
+        section.notes.append(f"{_lane_name(lane)}: no known motion reaches as far as {these} ran, so no state error.")
     return axes, f"{_lane_name(lane)}: {label}", heard
 
 
@@ -309,7 +324,10 @@ def _band(metrics: dict[str, Metric], name: str) -> float | None:
     return next((band for band in found if band), None)
 
 
-def _law(axes: Any, section: Section, key: Key, law: Law, x: Sequence[float], y: Sequence[float]) -> None:
+DASHED = (0, (6.0, 3.0))
+
+
+def _law(axes: Any, key: Key, law: Law, x: Sequence[float], y: Sequence[float]) -> None:
     """The law through the mean of the samples it was fitted to, with the fan of its interval."""
     if law.exponent is None:
         return
@@ -321,8 +339,7 @@ def _law(axes: Any, section: Section, key: Key, law: Law, x: Sequence[float], y:
     grid = [low + (high - low) * step / 24 for step in range(25)]
     lines = [_through(law, slope, fitted, grid) for slope in (law.exponent, law.low, law.high) if slope is not None]
     colour = COLOURS[key.colour]
-    dashed = section.key(Key("fitted law", 5, "", "6 3"))
-    axes.plot(grid, lines[0], color=colour, lw=1.2, ls=(0, tuple(float(d) for d in dashed.dash.split())))
+    axes.plot(grid, lines[0], color=colour, lw=1.2, ls=DASHED)
     if len(lines) == 3:
         axes.fill_between(grid, *lines[1:], color=colour, alpha=0.18, lw=0)
 

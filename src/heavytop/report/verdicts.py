@@ -1,11 +1,11 @@
-"""What the rows of a report say about a claim, in sentences: refuted or not, of which system, how wrong and from when on."""
+"""What a report says about a claim: refuted or not, of which system, how wrong and from when on."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from heavytop.records import Report, Row
+from heavytop.records import Report, Row, Series
 from heavytop.report.text import short
 
 SYSTEMS = {"heavy_top": "the heavy top", "gyrostat": "the gyrostat"}
@@ -63,16 +63,11 @@ def wrongness(report: Report, times: Sequence[str] = ("0.1", "1", "2", "5")) -> 
     """How wrong a claim is, per case; forward in time, and the smooth branch, where there are several."""
     rows = [row for row in report.rows if row.measure == "claim_model" and not row.case.endswith("/backward")]
     smooth = {row.case for row in rows if row.integrator == "claim:smooth"}
-    return [
-        _wrongness(row, times) for row in rows if row.case not in smooth or row.integrator == "claim:smooth"
-    ]
+    return [_wrongness(row, times) for row in rows if row.case not in smooth or row.integrator == "claim:smooth"]
 
 
 def _wrongness(row: Row, times: Sequence[str]) -> Wrongness:
-    values = {}
-    for name in ("omega", "gamma"):
-        series = row.series.get(f"claim_model_error_{name}")
-        values[name] = dict(zip(series.times, series.values, strict=False)) if series else {}
+    omega, gamma = (_values(row.series.get(f"claim_model_error_{name}")) for name in ("omega", "gamma"))
     largest = row.metrics.get("claim_model_error_omega_max")
     return Wrongness(
         case=row.case.removesuffix("/forward"),
@@ -80,11 +75,13 @@ def _wrongness(row: Row, times: Sequence[str]) -> Wrongness:
         parts_at=short(row.metrics["claim_parts_by_1_percent_at"].value),
         largest=short(largest.value) if largest else "missing",
         horizon=short(row.horizon.removeprefix("-")),
-        at=[
-            (t, short(values["omega"][t]), short(values["gamma"].get(t, "missing"))) for t in times if t in values["omega"]
-        ],
+        at=[(t, short(omega[t]), short(gamma.get(t, "missing"))) for t in times if t in omega],
         against=row.against,
     )
+
+
+def _values(series: Series | None) -> dict[str, str]:
+    return dict(zip(series.times, series.values, strict=False)) if series else {}
 
 
 def headline(found: Sequence[Audited], systems: dict[str, str] = SYSTEMS) -> tuple[str, str]:
@@ -94,7 +91,8 @@ def headline(found: Sequence[Audited], systems: dict[str, str] = SYSTEMS) -> tup
     if not top:
         return "nothing", "No claim about the heavy top is audited in this plan"
     holds = [each.system for each in found if each.verdict == "holds" and each.system != "heavy_top"]
-    instead = f" It is one of {' and '.join(systems.get(s, s) for s in dict.fromkeys(holds))}." if holds else ""
+    solved = " and ".join(systems.get(name, name) for name in dict.fromkeys(holds))
+    instead = f" It solves {solved} instead." if holds else ""
     if verdicts == {"refuted"}:
         return "refuted", f"The claimed solution is not a motion of the heavy top.{instead}"
     if "refuted" in verdicts:
