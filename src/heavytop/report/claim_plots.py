@@ -156,7 +156,7 @@ def break_away(sources: Sources) -> Section | None:
         ],
         columns=["case", "break-away |t| per format", "measured slope (time per bit)", "ln 2 / rate"],
     )
-    axes = new_axes("bits of the format", "break-away |t| (time units of the data)", 3.0)
+    axes = new_axes("format (bits)", "break-away |t| (time units of the data)", 3.0)
     merged = _both_directions(found)
     left_out(section, len(merged) - len(COLOURS) * max(1, len(sources)), "case")
     heard, bases = [], list(dict.fromkeys(name for name, _, _ in merged))[: len(COLOURS)]

@@ -122,8 +122,8 @@ def _lane(row: Row) -> tuple[str, ...]:
 
 def _lane_name(lane: tuple[str, ...], most: int = 40) -> str:
     case, integrator, measure, _ = lane
-    extra = [part for part, usual in ((integrator, "heyoka"), (measure, "drift")) if part != usual]
-    return clip(case, most) + (f" ({', '.join(clip(part, 20) for part in extra)})" if extra else "")
+    extra = ", ".join(part for part, usual in ((integrator, "heyoka"), (measure, "drift")) if part != usual)
+    return clip(case, most) + (f" ({clip(extra, most)})" if extra else "")
 
 
 def digits_kept(row: Row) -> float | None:
@@ -166,7 +166,7 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     left_out(section, len(lanes) - len(names), "case")
     count = max(len(members) for members in lanes.values())
     lines = (count + 1) * len(names)
-    axes = new_axes("correct decimal digits of γ at the end", "", max(2.4, 0.8 + 0.12 * lines), 0.31)
+    axes = new_axes("γ at the end (correct decimal digits)", "case", max(2.4, 0.8 + 0.12 * lines), 0.4)
     height = 0.8 / count
     heard = []
     for index, lane in enumerate(names):
@@ -189,7 +189,7 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             lost = "" if kept is None else f"{full - kept:.1f}"
             spread = "" if band is None else f"{band:.2f}"
             section.rows.append([_lane_name(lane), key.label, short(row.horizon), f"{full:.1f}", said, lost, spread])
-    axes.set_yticks(range(len(names)), [_lane_name(lane, 17) for lane in names])
+    axes.set_yticks(range(len(names)), [_lane_name(lane, 15).replace(" (", "\n(", 1) for lane in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.set_xlim(left=0)
     axes.grid(False, axis="y")
@@ -337,14 +337,14 @@ def _law(axes: Any, key: Key, law: Law, x: Sequence[float], y: Sequence[float]) 
     if len(fitted) < 2:
         return
     grid = [low + (high - low) * step / 24 for step in range(25)]
-    lines = [_through(law, slope, fitted, grid) for slope in (law.exponent, law.low, law.high) if slope is not None]
+    lines = [through(law, slope, fitted, grid) for slope in (law.exponent, law.low, law.high) if slope is not None]
     colour = COLOURS[key.colour]
     axes.plot(grid, lines[0], color=colour, lw=1.2, ls=DASHED)
     if len(lines) == 3:
         axes.fill_between(grid, *lines[1:], color=colour, alpha=0.18, lw=0)
 
 
-def _through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid: Sequence[float]) -> list[float]:
+def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid: Sequence[float]) -> list[float]:
     shape: Callable[[float], float] = (lambda x: math.log10(math.e) * 10**x) if law.growth == "exponential" else float
     height = sum(b - slope * shape(a) for a, b in fitted) / len(fitted)
     return [height + slope * shape(x) for x in grid]

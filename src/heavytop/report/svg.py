@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#8c6d1f", "#555555")
 """Stand-ins that become the page's --c0, --c1, ..., which differ in light and dark."""
 MARKERS = ("o", "s", "^", "D", "v", "P")
+LABEL = "axis-label"
 _INK, _GRID = "#000000", "#cccccc"
 _SVG = "http://www.w3.org/2000/svg"
 _LINK = "{http://www.w3.org/1999/xlink}href"
@@ -67,8 +68,9 @@ def new_axes(x: str, y: str, height: float = 2.8, left: float = 0.17) -> Any:
     FigureCanvasSVG(figure)
     bottom = 0.5 / height
     axes = figure.add_axes((left, bottom, 0.97 - left, 1 - bottom - 0.12 / height))
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
+    axes.set_xlabel(x, gid=LABEL)
+    axes.set_ylabel(y, gid=LABEL)
+    axes.yaxis.set_label_coords((0.05 - left) / (0.97 - left), 0.5)
     return axes
 
 
@@ -125,7 +127,10 @@ def _restyle(element: Any, used: set[str], name: str) -> None:
     """Ids of its own and only where needed, short numbers, the page's colours and font."""
     for key, value in list(element.items()):
         if key == "id":
-            if value in used:
+            if value == LABEL:
+                del element.attrib[key]
+                element.set("class", LABEL)
+            elif value in used:
                 element.set(key, f"{name}-{value}")
             else:
                 del element.attrib[key]
