@@ -154,7 +154,7 @@ def break_away(sources: Sources) -> Section | None:
             "integrator stays on it: more digits buy time in proportion. Dashed: the law, ln 2 / rate time units per "
             "bit, through the mean of the points."
         ],
-        columns=["case", "break-away |t| per format", "measured slope (time per bit)", "ln 2 / rate"],
+        columns=["case", "break-away |t| per format", "slope (time per bit)", "ln 2 / rate"],
     )
     axes = new_axes("format (bits)", "break-away |t| (time units of the data)", 3.0)
     merged = _both_directions(found)

@@ -83,7 +83,10 @@ def sections(sources: Sources, first: Sequence[str] | dict[str, None] = ()) -> l
             plots.growth(sources, first),
             claim_plots.break_away(sources),
         ]
-    return [section for section in made if section]
+    found = [section for section in made if section]
+    for section in found:
+        section.drop_empty_columns()
+    return found
 
 
 def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:

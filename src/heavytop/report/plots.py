@@ -58,6 +58,12 @@ class Section:
         """``key``, which from now on is in the legend."""
         return self.legend.setdefault(key.label, key)
 
+    def drop_empty_columns(self) -> None:
+        """Take columns in which no row has anything out of the numbers."""
+        used = [index for index in range(len(self.columns)) if any(row[index] for row in self.rows)]
+        self.columns = [self.columns[index] for index in used]
+        self.rows = [[row[index] for index in used] for row in self.rows]
+
 
 _ROOM = 40
 
