@@ -104,10 +104,33 @@ def claim_rows(verdict: str = "refuted") -> list[Row]:
     ]
 
 
+def work(integrator: str, end: str, seconds: float, **changes: object) -> Row:
+    """A run whose error at the end is ``end``."""
+    metrics = {"error_final": Metric("missing", None) if end == "missing" else error(end)}
+    common = {"case": "euler/T=1000", "measure": "work_precision", "series": {}, "laws": {}}
+    return row(integrator=integrator, metrics=metrics, seconds={"run": seconds}, **common, **changes)
+
+
+WORK = [
+    work("heyoka tolerance=1e-9", "1e-9", 0.001),
+    work("heyoka tolerance=1e-12", "1e-12", 0.002),
+    work("peer:A tolerance=1e-9", "1e-8", 0.0001),
+    work("peer:A tolerance=1e-12", "1e-11", 0.006),
+    work("peer:B tolerance=1e-12", "missing", 0.1, outcome="err_nf_state", time_reached="3", finite=False),
+]
+
+
 def full_report(name: str = "test") -> Report:
     """Every section of the page has something to show; one run failed, one case has a hostile name."""
     early = row(case="lagrange", outcome="time_limit", time_reached="1", finite=False)
     quad = row(precision="quad", bits=113, metrics={"solution_error_gamma_final": error("1e-30")})
-    rows = [*claim_rows(), row(), quad, early, row(case=HOSTILE, metrics={**row().metrics, HOSTILE: error("1e-997")})]
+    rows = [
+        *claim_rows(),
+        row(),
+        quad,
+        early,
+        *WORK,
+        row(case=HOSTILE, metrics={**row().metrics, HOSTILE: error("1e-997")}),
+    ]
     environment = {"packages": {"heavytop": "0.1.0"}, "commit": "0" * 40, HOSTILE: HOSTILE}
     return Report(SCHEMA, {"name": name, "sha256": "0" * 64}, environment, rows)

@@ -13,7 +13,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.records import Law, Metric, Report, Series
-from heavytop.report import html, plots, store, verdicts
+from heavytop.report import html, plots, store, verdicts, work_plots
 from heavytop.report.compare import Policy, compare
 from report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row
 
@@ -94,7 +94,17 @@ def test_headings_are_in_order_and_tables_have_headers(pages: dict[str, Page], n
 
 def test_the_verdict_comes_first_then_the_sections_in_their_order(pages: dict[str, Page]) -> None:
     sections = [tags["id"] for tags in pages["report"].all("section")]
-    expected = ["verdict", "digits", "claim-error", "growth", "break-away", "rows", "environment", "reproduce"]
+    expected = [
+        "verdict",
+        "digits",
+        "claim-error",
+        "growth",
+        "break-away",
+        "work-precision",
+        "rows",
+        "environment",
+        "reproduce",
+    ]
     assert sections == expected
 
 
@@ -129,7 +139,7 @@ def test_how_wrong_and_from_when_on(pages: dict[str, Page]) -> None:
 
 
 def test_a_run_that_failed_is_a_verdict_and_no_number(pages: dict[str, Page]) -> None:
-    assert "8 of 9 measurements reached their horizon" in pages["report"].text
+    assert "12 of 14 measurements reached their horizon" in pages["report"].text
     assert "Runs that did not reach their horizon" in pages["report"].text
     section = plots.digits([("", full_report())])
     said = {line[0]: line[4:6] for line in section.rows}
@@ -210,6 +220,18 @@ def test_a_law_is_in_the_legend_and_in_the_numbers() -> None:
     lines = {tuple(line[:3]): line[5:7] for line in section.rows}
     assert lines["euler", "double", "error along"] == ["t^1.5", "1.50 [1.40, 1.60]"]
     assert lines["euler", "double", "drift of energy"] == ["", ""]
+
+
+def test_work_and_precision_says_what_is_faster_and_what_failed(pages: dict[str, Page]) -> None:
+    section = work_plots.work_precision([("", full_report())])
+    assert section.text[1:] == [
+        "euler/T=1000: an error of 1e-10 or less takes heyoka 0.002 s and the fastest other, peer:A, 0.006 s, "
+        "3 times as long."
+    ]
+    assert list(section.legend) == ["heyoka", "peer:A", "peer:B"]
+    assert "peer:B: failed." in section.pictures[0].description
+    assert work_plots.work_precision([("", Report("", {}, {}, [row()]))]) is None
+    assert section.text[1] in pages["report"].text
 
 
 def test_a_comparison_draws_both_and_lists_the_worst_first(pages: dict[str, Page]) -> None:

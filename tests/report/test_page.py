@@ -122,7 +122,9 @@ return [...document.querySelectorAll('main figure svg')].map(svg => ({
   box: [svg.getBoundingClientRect().left, svg.getBoundingClientRect().right],
 }));
 """
-UNITS = re.compile(r"case|.+ \((bits|rad|1/time unit|units of ε|correct decimal digits|time units of the data)\)")
+UNITS = re.compile(
+    r"case|.+ \((bits|rad|1/time unit|units of ε|units of Ω and γ|s|correct decimal digits|time units of the data)\)"
+)
 
 
 @pytest.mark.parametrize("page", PAGES)

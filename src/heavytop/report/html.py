@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.records import Report, Row
-from heavytop.report import claim_plots, plots, verdicts
+from heavytop.report import claim_plots, plots, verdicts, work_plots
 from heavytop.report.compare import Comparison, Finding, Verdict
 from heavytop.report.compare import _flatten as flatten
 from heavytop.report.plots import Section, Sources, clip, digits_kept
@@ -82,6 +82,7 @@ def sections(sources: Sources, first: Sequence[str] | dict[str, None] = ()) -> l
             claim_plots.claim_error(sources),
             plots.growth(sources, first),
             claim_plots.break_away(sources),
+            work_plots.work_precision(sources),
         ]
     found = [section for section in made if section]
     for section in found:

@@ -241,7 +241,8 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         columns=["case", "format", "quantity", "last |t|", "last value", "law", "exponent", "digits gone at |t|"],
     )
     wanted = set(first)
-    names = sorted(lanes, key=lambda lane: lane[0] not in wanted)[:MOST_PLOTS]
+    names = sorted(lanes, key=lambda lane: (lane[0] not in wanted, not any(row.laws for _, row in lanes[lane])))
+    names = names[:MOST_PLOTS]
     left_out(section, len(lanes) - len(names), "case")
     formats = _formats(sources)
     drawn = [
