@@ -369,4 +369,4 @@ def scientific(logarithm: float) -> str:
     """A number given by its logarithm, to two digits: 2.3e-13, 50, 1e5."""
     exponent = math.floor(logarithm + 1e-9)
     mantissa = 10 ** (logarithm - exponent)
-    return f"{10**logarithm:.3g}" if -3 < exponent < 5 else f"{mantissa:.1f}".removesuffix(".0") + f"e{exponent}"
+    return f"{10**logarithm:.3g}" if -4 < exponent < 5 else f"{mantissa:.1f}".removesuffix(".0") + f"e{exponent}"
