@@ -142,16 +142,28 @@ def _write(path: Path, text: str) -> None:
 @command
 def show(
     report: Annotated[Path, typer.Argument(help="Report or its folder.")],
-    parquet: Annotated[Path | None, typer.Option(help="Write its rows to this file too.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write the report as a page to that file instead.")] = None,
+    parquet: Annotated[Path | None, typer.Option(help="Write its rows to that file instead.")] = None,
 ) -> int:
-    """Print the summary of a report."""
+    """Print the summary of a report, or write it as one self-contained page, or its rows as a table."""
     from heavytop.report import parquet as tables
     from heavytop.report import store, text
 
     if parquet is not None:
         tables.check_name(parquet)
     found = store.read(report)
+    if html is None and parquet is None:
+        show_on_terminal(text.summary(found))
+        return 0
     if parquet is not None:
         tables.write(parquet, found.rows, found.plan)
-    show_on_terminal(text.summary(found))
+        print(parquet)
+    if html is not None:
+        from heavytop.report.html import write_report
+
+        try:
+            write_report(found, html)
+        except InputError as error:
+            raise InputError(error.cause, "Give a file in a writable folder with --html.") from None
+        print(html)
     return 0

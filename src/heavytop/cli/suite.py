@@ -23,7 +23,7 @@ def run(
     parquet: Annotated[bool, typer.Option("--parquet", help="Write DIR/rows.parquet too.")] = False,
     seed: Annotated[int, typer.Option(help="Measure the same motions with other roundings: 0 to 1000.")] = 0,
 ) -> int:
-    """Run a plan of measurements and write DIR/report.json."""
+    """Run a plan of measurements; write DIR/report.json and DIR/report.html."""
     from heavytop.report.parquet import require_pyarrow
     from heavytop.suite.plan import expand, load
 
@@ -51,7 +51,7 @@ def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, schedu
         )
 
     from heavytop.records import SCHEMA, Report
-    from heavytop.report import store, text
+    from heavytop.report import html, store, text
     from heavytop.report.environment import environment
     from heavytop.report.parquet import FILE as PARQUET
     from heavytop.report.parquet import write as write_parquet
@@ -69,13 +69,14 @@ def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, schedu
             if parquet:
                 write_parquet(directory / PARQUET, report.rows, plan)
             path = store.write(report, directory)
+            html.write_report(report, path.with_suffix(".html"))
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {error}.", "Choose a writable --out with space.") from None
     except KeyboardInterrupt:
         print(f"heavytop: interrupted; finished rows are kept: --out {directory} --resume goes on", file=sys.stderr)
         return 130
     show_on_terminal(text.summary(report))
-    print(f"\nReport: {path}")
+    print(f"\nReport: {path}\nPage:   {path.with_suffix('.html')}")
     # that a peer gives up is what the work-precision rows are there to show
     return 0 if all(row.outcome == "success" for row in rows if row.measure != "work_precision") else 3
 

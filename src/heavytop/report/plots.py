@@ -1,0 +1,372 @@
+"""The sections of a page that have pictures: what of a report is drawn, in which units, and the same in numbers.
+
+Each takes sources, ("", report) or ("baseline", ...) and ("candidate", ...): what lies in several is drawn on the same
+axes.  Plots are bounded in number; what is left out is said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.precision import exact, log10
+from heavytop.records import Law, Metric, Report, Row, Series
+from heavytop.report.svg import COLOURS, MARKERS, Picture, decades, finish, new_axes, spoken
+from heavytop.report.text import short
+
+MOST_PLOTS = 12
+MOST_LANES = 40
+TIME = "|t| (time units of the data)"
+_ELSEWHERE = ("homoclinic", "work_precision", "claim_evaluation", "claim_model", "audit")
+
+Sources = Sequence[tuple[str, Report]]
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """An entry of a legend: the number of its colour, a marker of matplotlib, a dash of SVG.
+
+    old: of the baseline, drawn hollow and broad, so that it shows beneath a candidate that did not change.
+    """
+
+    label: str
+    colour: int
+    marker: str = ""
+    dash: str = ""
+    old: bool = False
+    line: bool = True
+
+
+@dataclass(slots=True)
+class Section:
+    """A part of the page: words, pictures with one legend, the same in numbers, and what is not drawn."""
+
+    id: str
+    title: str
+    text: list[str]
+    pictures: list[Picture] = field(default_factory=list)
+    legend: dict[str, Key] = field(default_factory=dict)
+    columns: list[str] = field(default_factory=list)
+    rows: list[list[str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    across: int = 3
+
+    def key(self, key: Key) -> Key:
+        """``key``, which from now on is in the legend."""
+        return self.legend.setdefault(key.label, key)
+
+    def drop_empty_columns(self) -> None:
+        """Take columns in which no row has anything out of the numbers."""
+        used = [index for index in range(len(self.columns)) if any(row[index] for row in self.rows)]
+        self.columns = [self.columns[index] for index in used]
+        self.rows = [[row[index] for index in used] for row in self.rows]
+
+
+_ROOM = 40
+
+
+def clip(text: str, most: int = 60) -> str:
+    """A name that can be shown: one line, no control characters, cut where it is long."""
+    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * most]).split())
+    if len(text) <= most:
+        return line
+    return f"{line[: most - 1]}…" + (f" ({len(text)} characters)" if most >= _ROOM else "")
+
+
+def logarithm(value: str | None) -> float | None:
+    """log10 |value| of a report's text; None for 0 and for what is no number."""
+    try:
+        return log10(exact(value)) if value is not None else None
+    except InputError:
+        return None
+
+
+def points(series: Series, shift: float = 0.0, scale: float = 1.0) -> tuple[list[float], list[float]]:
+    """Logarithms of |t|·scale and of the values minus ``shift``, where both have one."""
+    found = [(logarithm(t), logarithm(v)) for t, v in zip(series.times, series.values, strict=False)]
+    pairs = [(x + math.log10(scale), y - shift) for x, y in found if x is not None and y is not None]
+    return [x for x, _ in pairs], [y for _, y in pairs]
+
+
+# ---- the formats -----------------------------------------------------------------------------------------------
+
+
+def _formats(sources: Sources) -> dict[str, int]:
+    """Formats by their bits, each with its place: its colour and its marker."""
+    bits = {row.precision: row.bits for _, report in sources for row in report.rows if row.series and row.bits}
+    return {name: place for place, name in enumerate(sorted(bits, key=lambda name: (bits[name], name)))}
+
+
+def _format_key(name: str, place: int, source: str, line: bool = True) -> Key:
+    marker, colour = MARKERS[place % len(MARKERS)], place % len(COLOURS)
+    old = source == "baseline"
+    label = f"{clip(name, 20)}, {source}" if source else clip(name, 20)
+    return Key(label, colour, marker, "", old, line)
+
+
+def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6) -> None:
+    """One curve, or points, as its legend has it."""
+    colour = COLOURS[key.colour]
+    face = "none" if key.old else colour
+    if key.line:
+        axes.plot(x, y, "-", color=colour, lw=4.5 if key.old else 1.6, alpha=0.35 if key.old else None)
+    # markers evenly along a curve, however dense its samples are
+    every = 0.07 if key.line else None
+    size += 2 * key.old
+    axes.plot(x, y, key.marker, color=colour, mfc=face, mec=colour, ms=size, markevery=every)
+
+
+# ---- digits kept -----------------------------------------------------------------------------------------------
+
+
+def _lane(row: Row) -> tuple[str, ...]:
+    return row.case, row.integrator, row.measure, row.system
+
+
+def _lane_name(lane: tuple[str, ...], most: int = 40) -> str:
+    case, integrator, measure, _ = lane
+    extra = ", ".join(part for part, usual in ((integrator, "heyoka"), (measure, "drift")) if part != usual)
+    return clip(case, most) + (f" ({clip(extra, most)})" if extra else "")
+
+
+def digits_kept(row: Row) -> float | None:
+    """-log10 of the error of γ at the horizon; |γ| = 1, so the error is relative.  None where there is no number."""
+    metric = row.metrics.get("solution_error_gamma_final")
+    if metric is None or row.outcome != "success":
+        return None
+    if metric.value == "unresolved":
+        bound = logarithm(metric.bound)
+        return None if bound is None else -bound
+    if metric.log10 is not None:
+        return -metric.log10
+    return row.bits * math.log10(2) if logarithm(metric.value) is None and metric.value not in _WORDS else None
+
+
+_WORDS = ("nan", "missing", "never", "unresolved")
+
+
+def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
+    """Digits that each format holds at the end of its run, beside the digits it started with."""
+    lanes: dict[tuple[str, ...], list[tuple[str, Row]]] = {}
+    for source, report in sources:
+        for row in report.rows:
+            if row.measure not in _ELSEWHERE and "solution_error_gamma_final" in row.metrics:
+                lanes.setdefault(_lane(row), []).append((source, row))
+    if not lanes:
+        return None
+    section = Section(
+        "digits",
+        "Digits kept per format",
+        [
+            "Correct decimal digits of γ at the end of each run, −log10 of its error against the known motion; since "
+            "|γ| = 1 the error is relative. A thin line leads from the digits that the format has to those it kept."
+        ],
+        columns=["case", "format", "T", "digits", "kept", "lost", "±"],
+    )
+    formats = _formats(sources)
+    wanted = set(first)
+    names = sorted(lanes, key=lambda lane: lane[0] not in wanted)[:MOST_LANES]
+    left_out(section, len(lanes) - len(names), "case")
+    count = max(len(members) for members in lanes.values())
+    lines = (count + 1) * len(names)
+    axes = new_axes("γ at the end (correct decimal digits)", "case", max(2.4, 0.8 + 0.12 * lines), 0.4)
+    height = 0.8 / count
+    heard = []
+    for index, lane in enumerate(names):
+        for place, (source, row) in enumerate(sorted(lanes[lane], key=lambda each: each[1].bits)):
+            key = section.key(_format_key(row.precision, formats.get(row.precision, 0), source, line=False))
+            y = index + (place - (len(lanes[lane]) - 1) / 2) * height
+            full, kept = row.bits * math.log10(2), digits_kept(row)
+            band = row.metrics["solution_error_gamma_final"].band
+            if kept is None:
+                axes.plot([0], [y], "x", color=COLOURS[key.colour], mew=1.6, ms=6)
+                said = row.outcome if row.outcome != "success" else row.metrics["solution_error_gamma_final"].value
+            else:
+                axes.plot([kept, full], [y, y], "-", color=COLOURS[key.colour], lw=0.9)
+                axes.plot([full], [y], "|", color=COLOURS[key.colour], ms=6)
+                if band:
+                    axes.plot([kept - band, kept + band], [y, y], "-", color=COLOURS[key.colour], lw=4, alpha=0.3)
+                draw(axes, key, [kept], [y], 5)
+                said = f"{kept:.1f}"
+            heard.append(f"{_lane_name(lane)}, {key.label}: {said} of {full:.1f}.")
+            lost = "" if kept is None else f"{full - kept:.1f}"
+            spread = "" if band is None else f"{band:.2f}"
+            section.rows.append([_lane_name(lane), key.label, short(row.horizon), f"{full:.1f}", said, lost, spread])
+    axes.set_yticks(range(len(names)), [_lane_name(lane, 15).replace(" (", "\n(", 1) for lane in names])
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.set_xlim(left=0)
+    axes.grid(False, axis="y")
+    section.pictures.append(finish(axes, "Digits kept per format", spoken(heard, 24), "digits"))
+    section.notes.append("A cross at 0 is a run that failed or has no number.")
+    return section
+
+
+def left_out(section: Section, count: int, what: str) -> None:
+    """Say how many are not drawn."""
+    if count > 0:
+        section.notes.append(f"{count} more {what}{'s' if count > 1 else ''} not drawn; report.json has them all.")
+
+
+# ---- drift and state error over time ---------------------------------------------------------------------------
+
+_COLUMNS: tuple[tuple[str, str, str], ...] = (
+    ("drift_", "drift of a first integral", "|I(t) − I(0)| (units of ε)"),
+    ("solution_error_along", "state error along the flow", "error along (units of ε)"),
+    ("solution_error_across", "state error across the flow", "error across (units of ε)"),
+)
+
+
+def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
+    """Drift and state error over time, on logarithmic axes that all plots share.  ``first``: cases to draw first."""
+    lanes: dict[tuple[str, ...], list[tuple[str, Row]]] = {}
+    for source, report in sources:
+        for row in report.rows:
+            if row.bits and row.measure not in _ELSEWHERE and any(name.startswith(_PREFIXES) for name in row.series):
+                lanes.setdefault(_lane(row), []).append((source, row))
+    if not lanes:
+        return None
+    section = Section(
+        "growth",
+        "Drift and state error over time",
+        [
+            "Each error in units of ε = 2^(1 − bits) of its own format, so that all formats share one scale: 10⁶ means "
+            "that six digits are lost. Of the first integrals the one that drifts farthest is drawn. A first integral "
+            "that holds is no proof that the motion is right: the distance from the true motion stands beside it.",
+            "Dashed: the fitted law of growth over the span that was fitted, with the 95 % interval of its exponent; a "
+            "shade around a curve is the interval in which rounding luck alone moves it.",
+        ],
+        columns=["case", "format", "quantity", "last |t|", "last value", "law", "exponent", "digits gone at |t|"],
+    )
+    wanted = set(first)
+    names = sorted(lanes, key=lambda lane: (lane[0] not in wanted, not any(row.laws for _, row in lanes[lane])))
+    names = names[:MOST_PLOTS]
+    left_out(section, len(lanes) - len(names), "case")
+    formats = _formats(sources)
+    drawn = [
+        _growth_axes(section, lanes[lane], lane, prefix, label, unit, formats)
+        for lane in names
+        for prefix, label, unit in _COLUMNS
+    ]
+    plots = [plot for plot in drawn if plot]
+    x = [plot[0].get_xlim() for plot in plots]
+    y = [plot[0].get_ylim() for plot in plots]
+    if any(row.laws for lane in names for _, row in lanes[lane]):
+        section.key(Key("fitted law", 5, "", "6 3"))
+    for number, (axes, title, heard) in enumerate(plots):
+        axes.set_xlim(math.floor(min(low for low, _ in x) + 0.1), max(high for _, high in x))
+        axes.set_ylim(min(low for low, _ in y), max(high for _, high in y))
+        section.pictures.append(finish(axes, title, spoken(heard), f"growth-{number}"))
+    return section
+
+
+_PREFIXES = tuple(prefix for prefix, _, _ in _COLUMNS)
+
+
+def _growth_axes(
+    section: Section,
+    members: Sequence[tuple[str, Row]],
+    lane: tuple[str, ...],
+    prefix: str,
+    label: str,
+    unit: str,
+    formats: dict[str, int],
+) -> tuple[Any, str, list[str]] | None:
+    axes, heard, lacking = None, [], []
+    for source, row in members:
+        name = _largest(row, prefix)
+        if name is None:
+            lacking.append(row.precision)
+            continue
+        epsilon = (1 - row.bits) * math.log10(2)
+        x, y = points(row.series[name], epsilon)
+        if not x:
+            heard.append(f"{row.precision}: nothing that the reference resolves, or exactly 0.")
+            continue
+        if axes is None:
+            axes = new_axes(TIME, unit)
+            decades(axes.xaxis)
+            decades(axes.yaxis)
+        key = section.key(_format_key(row.precision, formats.get(row.precision, 0), source))
+        draw(axes, key, x, y)
+        law, band = row.laws.get(name), _band(row.metrics, name)
+        if band:
+            axes.fill_between(
+                x, [v - band for v in y], [v + band for v in y], color=COLOURS[key.colour], alpha=0.18, lw=0
+            )
+        if law:
+            _law(axes, key, law, x, y)
+        what = name.removeprefix("drift_") if prefix == "drift_" else prefix.removeprefix("solution_error_")
+        heard.append(f"{key.label}: {scientific(y[-1])} ε ({what.replace('_', ' ')}) at |t| = {scientific(x[-1])}.")
+        last = row.series[name]
+        section.rows.append(
+            [
+                _lane_name(lane),
+                key.label,
+                f"{'drift of ' if prefix == 'drift_' else 'error '}{what.replace('_', ' ')}",
+                short(last.times[-1]),
+                short(last.values[-1]),
+                *_law_words(law),
+            ]
+        )
+    if axes is None:
+        return None
+    if lacking and prefix == "solution_error_across":
+        these = ", ".join(dict.fromkeys(map(clip, lacking)))
+        section.notes.append(f"{_lane_name(lane)}: no known motion reaches as far as {these} ran, so no state error.")
+    return axes, f"{_lane_name(lane)}: {label}", heard
+
+
+def _largest(row: Row, prefix: str) -> str | None:
+    """Of the series with that prefix the one whose last number is the largest."""
+    names = [name for name, series in row.series.items() if name.startswith(prefix) and series.values]
+    ends = {name: logarithm(row.series[name].values[-1]) for name in names}
+    return max(names, key=lambda name: -math.inf if ends[name] is None else ends[name] or 0.0, default=None)
+
+
+def _band(metrics: dict[str, Metric], name: str) -> float | None:
+    found = (metrics[key].band for key in (f"{name}_max", f"{name}_rms", f"{name}_final", name) if key in metrics)
+    return next((band for band in found if band), None)
+
+
+DASHED = (0, (6.0, 3.0))
+
+
+def _law(axes: Any, key: Key, law: Law, x: Sequence[float], y: Sequence[float]) -> None:
+    """The law through the mean of the samples it was fitted to, with the fan of its interval."""
+    if law.exponent is None:
+        return
+    ends = [logarithm(end) for end in (law.first, law.last)]
+    low, high = (given if given is not None else other for given, other in zip(ends, (x[0], x[-1]), strict=True))
+    fitted = [(a, b) for a, b in zip(x, y, strict=True) if low - 1e-9 <= a <= high + 1e-9]
+    if len(fitted) < 2:
+        return
+    grid = [low + (high - low) * step / 24 for step in range(25)]
+    lines = [through(law, slope, fitted, grid) for slope in (law.exponent, law.low, law.high) if slope is not None]
+    colour = COLOURS[key.colour]
+    axes.plot(grid, lines[0], color=colour, lw=1.2, ls=DASHED)
+    if len(lines) == 3:
+        axes.fill_between(grid, *lines[1:], color=colour, alpha=0.18, lw=0)
+
+
+def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid: Sequence[float]) -> list[float]:
+    shape: Callable[[float], float] = (lambda x: math.log10(math.e) * 10**x) if law.growth == "exponential" else float
+    height = sum(b - slope * shape(a) for a, b in fitted) / len(fitted)
+    return [height + slope * shape(x) for x in grid]
+
+
+def _law_words(law: Law | None) -> list[str]:
+    if law is None:
+        return ["", "", ""]
+    interval = "" if law.low is None or law.high is None else f" [{law.low:.2f}, {law.high:.2f}]"
+    exponent = "" if law.exponent is None else f"{law.exponent:.2f}{interval}"
+    return [law.growth, exponent, short(law.lost_at) if law.lost_at else ""]
+
+
+def scientific(logarithm: float) -> str:
+    """A number given by its logarithm, to two digits: 2.3e-13, 50, 1e5."""
+    exponent = math.floor(logarithm + 1e-9)
+    mantissa = 10 ** (logarithm - exponent)
+    return f"{10**logarithm:.3g}" if -4 < exponent < 5 else f"{mantissa:.1f}".removesuffix(".0") + f"e{exponent}"

@@ -1,0 +1,283 @@
+"""The page of a report and of a comparison, read as text; test_page.py looks at it in a browser."""
+
+import math
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.records import Law, Metric, Report, Series
+from heavytop.report import html, plots, store, work_plots
+from heavytop.report.compare import Policy, compare
+from report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row
+
+RESULTS = Path(__file__).parents[2] / "results" / "default"
+
+
+class Page(HTMLParser):
+    """Tags with their attributes, in order, and the text outside of <style>."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self._in: list[str] = []
+        self.feed(path.read_text("utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        self._in.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag in self._in:
+            del self._in[len(self._in) - 1 - self._in[::-1].index(tag) :]
+
+    def handle_data(self, data):
+        if "style" not in self._in:
+            self.text += data
+
+    def all(self, name: str) -> list[dict[str, str | None]]:
+        return [attributes for tag, attributes in self.tags if tag == name]
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
+    folder = tmp_path_factory.mktemp("pages")
+    baseline, candidate = full_report(), full_report(HOSTILE)
+    candidate.rows[5].metrics["solution_error_gamma_final"] = error("1e-7")
+    html.write_report(candidate, folder / "report.html")
+    html.write_report(store.read(RESULTS), folder / "results.html")
+    result = compare(baseline, candidate, Policy())
+    html.write_comparison(baseline, candidate, result, folder / "comparison.html")
+    return {path.stem: Page(path) for path in folder.glob("*.html")}
+
+
+NAMES = pytest.mark.parametrize("name", ["report", "results", "comparison"])
+
+
+@NAMES
+def test_the_page_stands_alone(pages: dict[str, Page], name: str) -> None:
+    page = pages[name]
+    assert not page.all("script")
+    links = [value for _, tags in page.tags for key, value in tags.items() if key in ("href", "src", "xlink:href")]
+    assert links
+    assert all(value and value.startswith(("#", "data:,")) for value in links)
+    assert not [key for _, tags in page.tags for key in tags if key.startswith("on")]
+
+
+@NAMES
+def test_ids_are_unique_and_whatever_is_referred_to_exists(pages: dict[str, Page], name: str) -> None:
+    page = pages[name]
+    ids = [tags["id"] for _, tags in page.tags if "id" in tags]
+    assert len(ids) == len(set(ids))
+    wanted = {value[1:] for _, tags in page.tags for k, value in tags.items() if k == "href" and value[0] == "#"}
+    for _, tags in page.tags:
+        wanted |= set((tags.get("aria-labelledby") or "").split())
+        wanted |= set(re.findall(r"url\(#([^)]+)\)", " ".join(value or "" for value in tags.values())))
+    assert wanted <= set(ids)
+
+
+@NAMES
+def test_headings_are_in_order_and_tables_have_headers(pages: dict[str, Page], name: str) -> None:
+    levels = [int(tag[1]) for tag, _ in pages[name].tags if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1
+    assert all(b <= a + 1 for a, b in pairwise(levels))
+    assert all(tags.get("scope") in ("col", "row") for tags in pages[name].all("th"))
+    assert {"main", "header", "nav", "footer"} <= {tag for tag, _ in pages[name].tags}
+
+
+def test_the_verdict_comes_first_then_the_sections_in_their_order(pages: dict[str, Page]) -> None:
+    sections = [tags["id"] for tags in pages["report"].all("section")]
+    expected = [
+        "verdict",
+        "digits",
+        "claim-error",
+        "growth",
+        "break-away",
+        "work-precision",
+        "rows",
+        "environment",
+        "reproduce",
+    ]
+    assert sections == expected
+
+
+@pytest.mark.parametrize(
+    ("verdict", "words"),
+    [
+        ("refuted", "is not a motion of the heavy top. It solves the gyrostat instead."),
+        ("holds", "Every equation of the claim is proven for the heavy top."),
+        ("undecided", "No equation of the claim is refuted, but not all are proven."),
+    ],
+)
+def test_the_headline_says_what_the_audit_found(tmp_path: Path, verdict: str, words: str) -> None:
+    report = full_report()
+    report.rows[:5] = claim_rows(verdict)
+    found = claim_verdict.audited(report)
+    assert found[0].verdict == verdict
+    assert found[0].refuted == (["(1.2)"] if verdict == "refuted" else [])
+    assert words in claim_verdict.headline(found)[1]
+    html.write_report(report, tmp_path / "page.html")
+    assert words in Page(tmp_path / "page.html").text
+
+
+def test_no_claim_no_verdict_on_one() -> None:
+    assert claim_verdict.headline([])[0] == "nothing"
+
+
+def test_how_wrong_and_from_when_on(pages: dict[str, Page]) -> None:
+    found = claim_verdict.wrongness(full_report())
+    assert [(each.case, each.parts_at, each.largest) for each in found] == [("c-2", "0.24", "0.25")]
+    assert found[0].at == [("0.1", "0.0025", "0.05"), ("1", "0.17", "0.34")]
+    assert "|t| = 0.24" in pages["report"].text
+
+
+def test_a_run_that_failed_is_a_verdict_and_no_number(pages: dict[str, Page]) -> None:
+    assert "12 of 14 measurements reached their horizon" in pages["report"].text
+    assert "Runs that did not reach their horizon" in pages["report"].text
+    section = plots.digits([("", full_report())])
+    said = {line[0]: line[4:6] for line in section.rows}
+    assert said["lagrange"] == ["time_limit", ""]
+    assert said["euler"] == ["30.0", "4.0"]
+
+
+def test_digits_kept_of_numbers_bounds_and_words() -> None:
+    def kept(metric: Metric, **changes: object) -> float | None:
+        return plots.digits_kept(row(metrics={"solution_error_gamma_final": metric}, **changes))
+
+    assert kept(error("1e-10")) == 10
+    assert kept(Metric("unresolved", None, "error", "1e-18")) == 18
+    assert kept(Metric("0", None)) == pytest.approx(53 * math.log10(2))
+    assert kept(Metric("nan", None)) is None
+    assert kept(Metric("unresolved", None)) is None
+    assert kept(error("1e-10"), outcome="time_limit") is None
+    assert plots.digits_kept(row(metrics={})) is None
+
+
+def test_hostile_names_are_text_cut_where_they_are_long(pages: dict[str, Page]) -> None:
+    for name in ("report", "comparison"):
+        assert "<script>window.hacked" in pages[name].text
+        assert "x" * 200 not in pages[name].text
+        assert "characters)" in pages[name].text
+        assert "\x00" not in pages[name].text
+
+
+def test_the_same_report_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        html.write_report(full_report(), tmp_path / name)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_of_many_rows_the_first_and_the_worst_are_shown() -> None:
+    rows = [row(case=f"case {number}") for number in range(3000)]
+    rows[2000] = row(case="late failure", outcome="time_limit")
+    rows[2500] = row(case="fewest digits", metrics={"solution_error_gamma_final": error("1e-3")})
+    shown, left_out = html.detailed(rows)
+    assert len(shown) + left_out == 3000
+    assert [each.case for each in shown[html.MOST_ROWS :]][:2] == ["late failure", "fewest digits"]
+    assert html.detailed(rows[:10]) == (rows[:10], 0)
+
+
+def test_what_is_not_drawn_is_said() -> None:
+    report = Report("", {}, {}, [row(case=f"case {number}") for number in range(50)])
+    section = html.sections([("", report)])
+    assert [each.id for each in section] == ["digits", "growth"]
+    assert "10 more cases not drawn" in section[0].notes[0]
+    assert len(section[1].pictures) == 3 * plots.MOST_PLOTS
+    assert f"{50 - plots.MOST_PLOTS} more cases not drawn" in section[1].notes[0]
+
+
+def test_errors_smaller_than_any_float_have_their_place() -> None:
+    x, y = plots.points(Series(["1", "10", "100"], ["1e-997", "nan", "1e-990"]), -1000.0)
+    assert x == [0, 2]
+    assert y == [3, 10]
+
+
+@pytest.mark.parametrize("exponent", [0.0, 0.5, 1.5])
+def test_a_law_lies_on_the_samples_that_follow_it(exponent: float) -> None:
+    x, y = plots.points(power(exponent, 1e-16))
+    line = plots.through(Law("t", 8, exponent), exponent, list(zip(x, y, strict=True)), x)
+    assert line == pytest.approx(y, abs=1e-5)
+
+
+def test_an_exponential_law_is_one_in_time_and_not_in_its_logarithm() -> None:
+    rate = 0.25
+    x = [math.log10(float(time)) for time in TIMES]
+    y = [-16 + rate * float(time) * math.log10(math.e) for time in TIMES]
+    line = plots.through(Law("exponential", 8, rate), rate, list(zip(x, y, strict=True)), x)
+    assert line == pytest.approx(y)
+
+
+def test_a_law_is_in_the_legend_and_in_the_numbers() -> None:
+    section = plots.growth([("", full_report())])
+    assert "fitted law" in section.legend
+    lines = {tuple(line[:3]): line[5:7] for line in section.rows}
+    assert lines["euler", "double", "error along"] == ["t^1.5", "1.50 [1.40, 1.60]"]
+    assert lines["euler", "double", "drift of energy"] == ["", ""]
+
+
+def test_work_and_precision_says_what_is_faster_and_what_failed(pages: dict[str, Page]) -> None:
+    section = work_plots.work_precision([("", full_report())])
+    assert section.text[1:] == [
+        "euler/T=1000: an error of 1e-10 or less takes heyoka 0.002 s and the fastest other, peer:A, 0.006 s, "
+        "3 times as long."
+    ]
+    assert list(section.legend) == ["heyoka", "peer:A", "peer:B"]
+    assert "peer:B: failed." in section.pictures[0].description
+    assert work_plots.work_precision([("", Report("", {}, {}, [row()]))]) is None
+    assert section.text[1] in pages["report"].text
+
+
+def test_a_comparison_draws_both_and_lists_the_worst_first(pages: dict[str, Page]) -> None:
+    text = pages["comparison"].text
+    assert "double, baseline" in text
+    assert "double, candidate" in text
+    assert "Not everything could be compared" not in text
+    assert "Something is worse than in the baseline." in text
+    table = text[text.index("worst first") :]
+    assert table.index("bits lost") < table.index("the baseline ended as time_limit")
+
+
+def test_a_comparison_of_a_report_with_itself_says_so(tmp_path: Path) -> None:
+    report = full_report()
+    report.rows = [each for each in report.rows if each.outcome == "success"]
+    html.write_comparison(report, report, compare(report, report, Policy()), tmp_path / "page.html")
+    assert "Every metric of every row is the same." in Page(tmp_path / "page.html").text
+
+
+def test_how_to_reproduce_names_the_plan_only_where_it_is_built_in() -> None:
+    report = full_report("smoke")
+    assert "--plan smoke " in html.commands(report)[3]
+    assert "--plan FILE.toml " in html.commands(full_report(HOSTILE))[3]
+    assert html.commands(report)[0] == f"git checkout {'0' * 40}"
+    unknown = msgspec.structs.replace(report, environment={"packages": {"heavytop": "0.1.0"}, "commit": None})
+    assert html.commands(unknown)[0] == "# heavytop 0.1.0"
+
+
+def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be written"):
+        html.write_report(full_report(), tmp_path / "none" / "page.html")
+    assert not list(tmp_path.iterdir())
+
+
+def test_show_writes_a_page(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "heavytop", "show", str(RESULTS), "--html"]
+    done = subprocess.run([*command, "page.html"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == "page.html\n"
+    assert Page(tmp_path / "page.html").all("svg")
+    refused = subprocess.run([*command, "no/page.html"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    assert "--html" in refused.stderr
+
+
+def test_every_number_of_the_results_is_in_the_page(pages: dict[str, Page]) -> None:
+    report = store.read(RESULTS)
+    for each in (report.rows[4], report.rows[-10]):
+        for metric in each.metrics.values():
+            assert metric.value in pages["results"].text

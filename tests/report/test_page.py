@@ -1,0 +1,230 @@
+"""The page in Chromium, wide and narrow, light and dark; skipped where Chromium or its driver is not installed."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from heavytop.report import html, store
+from heavytop.report.compare import Policy, compare
+from report_helpers import HOSTILE, error, full_report
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromedriver on the PATH")
+
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--force-color-profile=srgb",
+]
+TEXT, LARGE_TEXT, DRAWING = 4.5, 3.0, 3.0
+"""Contrast that WCAG 2.2 AA asks for."""
+PAGES = ("report", "results", "comparison")
+VIEWS = [(width, scheme) for width in (1280, 390) for scheme in ("light", "dark")]
+
+
+class Browser:
+    """A window with what it logged and what it asked the network for."""
+
+    def __init__(self, profile: Path) -> None:
+        from selenium import webdriver
+        from selenium.webdriver.chrome.service import Service
+
+        options = webdriver.ChromeOptions()
+        options.binary_location = CHROMIUM or ""
+        for flag in (*FLAGS, f"--user-data-dir={profile}"):
+            options.add_argument(flag)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+
+    def open(self, page: Path, width: int, scheme: str, media: str = "screen") -> None:
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media, "features": features})
+        for log in ("browser", "performance"):
+            self.driver.get_log(log)
+        self.driver.get(page.as_uri())
+
+    def ask(self, script: str) -> Any:
+        return self.driver.execute_script(script)
+
+    def requests(self) -> list[str]:
+        """Addresses that the page asked for, itself left out."""
+        events = [json.loads(entry["message"])["message"] for entry in self.driver.get_log("performance")]
+        sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
+        ours = [each for each in sent if each["documentURL"].startswith("file:")]
+        assert ours
+        return [each["request"]["url"] for each in ours if each["request"]["url"] != each["documentURL"]]
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    found = Browser(tmp_path_factory.mktemp("profile"))
+    yield found
+    found.driver.quit()
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("pages")
+    baseline, candidate = full_report(), full_report(HOSTILE)
+    candidate.rows[5].metrics["solution_error_gamma_final"] = error("1e-7")
+    html.write_report(candidate, folder / "report.html")
+    html.write_report(store.read(Path(__file__).parents[2] / "results" / "default"), folder / "results.html")
+    html.write_comparison(baseline, candidate, compare(baseline, candidate, Policy()), folder / "comparison.html")
+    return {name: folder / f"{name}.html" for name in PAGES}
+
+
+UNFOLD = "document.querySelectorAll('details').forEach(each => each.open = true);"
+OVERFLOW = """
+const root = document.documentElement;
+const wide = [...document.querySelectorAll('body *')].filter(each =>
+  !each.closest('.scroll') && !each.closest('svg') && !each.closest('.skip') &&
+  each.getBoundingClientRect().right > root.clientWidth + 0.5);
+return [root.scrollWidth, root.clientWidth, wide.map(each => each.outerHTML.slice(0, 80))];
+"""
+
+
+@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize(("width", "scheme"), VIEWS)
+def test_nothing_overflows_errs_or_is_loaded(
+    browser: Browser, pages: dict[str, Path], page: str, width: int, scheme: str
+) -> None:
+    browser.open(pages[page], width, scheme)
+    for script in (OVERFLOW, UNFOLD + OVERFLOW):
+        needed, there, wide = browser.ask(script)
+        assert needed <= there, wide
+        assert not wide
+    assert browser.driver.get_log("browser") == []
+    assert browser.requests() == []
+
+
+PLOTS = """
+return [...document.querySelectorAll('main figure svg')].map(svg => ({
+  role: svg.getAttribute('role'),
+  named: svg.getAttribute('aria-labelledby').split(' ').map(id => document.getElementById(id).textContent),
+  labels: [...svg.querySelectorAll('.axis-label text')].map(each => each.textContent),
+  texts: [...svg.querySelectorAll('text')].map(each => each.getBoundingClientRect()).map(r => [r.left, r.right]),
+  box: [svg.getBoundingClientRect().left, svg.getBoundingClientRect().right],
+}));
+"""
+UNITS = re.compile(
+    r"case|.+ \((bits|rad|1/time unit|units of ε|units of Ω and γ|s|correct decimal digits|time units of the data)\)"
+)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_plot_has_a_name_and_axes_with_units(browser: Browser, pages: dict[str, Path], page: str) -> None:
+    browser.open(pages[page], 390, "light")
+    found = browser.ask(PLOTS)
+    assert len(found) > 5
+    for plot in found:
+        assert plot["role"] == "img"
+        assert len(plot["named"]) == 2
+        assert all(plot["named"])
+        assert len(plot["labels"]) == 2
+        assert all(UNITS.fullmatch(label) for label in plot["labels"]), plot["labels"]
+        left, right = plot["box"]
+        assert all(left <= a and b <= right for a, b in plot["texts"]), plot["named"]
+
+
+COLOURS = """
+const background = each => {
+  for (; each; each = each.parentElement) {
+    const colour = getComputedStyle(each).backgroundColor;
+    if (colour !== 'rgba(0, 0, 0, 0)') return colour;
+  }
+  return 'none';
+};
+const seen = new Map();
+const note = (front, back, kind, text) => seen.set([front, back, kind].join('|'), [front, back, kind, text]);
+for (const each of document.querySelectorAll('body *')) {
+  const own = [...each.childNodes].some(node => node.nodeType === 3 && node.data.trim());
+  if (!own || !each.checkVisibility() || each.closest('title, desc')) continue;
+  const style = getComputedStyle(each), size = parseFloat(style.fontSize);
+  const large = size >= 24 || (size >= 18.66 && style.fontWeight >= 700);
+  note(each.closest('svg') ? style.fill : style.color, background(each), large ? 'large' : 'text', each.textContent);
+}
+for (const each of document.querySelectorAll('figure svg path[style*="var(--c"], .legend svg *')) {
+  const style = getComputedStyle(each);
+  if (style.stroke !== 'none') note(style.stroke, background(each), 'drawing', each.outerHTML.slice(0, 80));
+}
+return [...seen.values()];
+"""
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance, WCAG 2.2."""
+    parts = [float(part) / 255 for part in re.findall(r"[\d.]+", colour)[:3]]
+    assert len(parts) == 3, colour
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: str, other: str) -> float:
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_contrast_is_that_of_the_standard() -> None:
+    assert contrast("rgb(0, 0, 0)", "rgb(255, 255, 255)") == pytest.approx(21)
+    assert contrast("rgb(119, 119, 119)", "rgb(255, 255, 255)") == pytest.approx(4.48, abs=0.01)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("page", PAGES)
+def test_contrast_is_enough_in_light_and_dark(browser: Browser, pages: dict[str, Path], page: str, scheme: str) -> None:
+    browser.open(pages[page], 1280, scheme)
+    found = browser.ask(UNFOLD + COLOURS)
+    assert {kind for _, _, kind, _ in found} == {"text", "large", "drawing"}
+    least = {"text": TEXT, "large": LARGE_TEXT, "drawing": DRAWING}
+    poor = [(kind, text, f, b) for f, b, kind, text in found if contrast(f, b) < least[kind]]
+    assert not poor
+    dark = luminance(browser.ask("return getComputedStyle(document.body).backgroundColor")) < 0.2
+    assert dark == (scheme == "dark")
+
+
+@pytest.mark.parametrize("page", ["report", "comparison"])
+def test_a_hostile_name_is_text(browser: Browser, pages: dict[str, Path], page: str) -> None:
+    browser.open(pages[page], 1280, "light")
+    assert browser.ask("return [document.scripts.length, window.hacked === undefined]") == [0, True]
+    browser.ask(UNFOLD)
+    assert browser.ask("return document.body.innerText.includes('<script>window.hacked')")
+    named = "return [...document.querySelectorAll('svg title')].some(each => each.textContent.includes('<script>'))"
+    assert browser.ask(named)
+
+
+def test_on_paper_the_numbers_are_unfolded(browser: Browser, pages: dict[str, Path]) -> None:
+    unseen = """return [...document.querySelectorAll('details.numbers table')].filter(
+      each => !each.checkVisibility({contentVisibilityAuto: true})).length"""
+    browser.open(pages["results"], 800, "light", "screen")
+    assert browser.ask(unseen) > 0
+    browser.open(pages["results"], 800, "light", "print")
+    assert browser.ask(unseen) == 0
+
+
+def test_the_keyboard_reaches_the_content_first(browser: Browser, pages: dict[str, Path]) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    browser.open(pages["report"], 1280, "light")
+    browser.driver.find_element("tag name", "body").send_keys(Keys.TAB)
+    box = "const r = document.activeElement.getBoundingClientRect(); return [document.activeElement.className, r.left]"
+    name, left = browser.ask(box)
+    assert name == "skip"
+    assert left >= 0
+    browser.driver.switch_to.active_element.send_keys(Keys.ENTER)
+    assert browser.ask("return document.activeElement.id") == "content"
