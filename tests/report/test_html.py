@@ -13,7 +13,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.records import Law, Metric, Report, Series
-from heavytop.report import html, plots, store, work_plots
+from heavytop.report import claim_verdict, html, plots, store, work_plots
 from heavytop.report.compare import Policy, compare
 from report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row
 

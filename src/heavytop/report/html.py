@@ -8,11 +8,12 @@ from typing import Any
 
 from heavytop.records import Report, Row
 from heavytop.report import claim_plots, claim_verdict, plots, work_plots
-from heavytop.report.compare import Comparison, Finding, Verdict
+from heavytop.report.compare import Comparison, Finding
 from heavytop.report.compare import _flatten as flatten
 from heavytop.report.plots import Section, Sources, clip, digits_kept
 from heavytop.report.svg import quiet_style
 from heavytop.report.text import short
+from heavytop.report.verdicts import Verdict
 from heavytop.suite.checkpoint import replace
 from heavytop.suite.plan import BUILT_IN
 
