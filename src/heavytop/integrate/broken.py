@@ -21,8 +21,6 @@ from heavytop.precision import DOUBLE, Precision
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
-_HEALTHY: dict[str, Any] = {"high_accuracy": True}
-
 
 class _OneByOne(Stepper):
     """Steps taken singly, each followed by what is wrong."""
@@ -90,7 +88,7 @@ def _not_a_number(states: Sequence[Any]) -> list[Any]:
 
 @dataclass(frozen=True, slots=True)
 class Integrator:
-    """heyoka in double with compensated summation, and what is wrong with it.
+    """heyoka in double, and what is wrong with it.
 
     options: those of `taylor.compiled` that differ.  top: what is integrated in the place of the one asked for.
     stepping: how steps are taken.  states: what is handed over in the place of the states.  stops: the part of the
@@ -126,10 +124,10 @@ class Integrator:
         return self._disguised(replace(run, states=(), outcome=outcome), top, start)
 
     def first_steps(
-        self, top: HeavyTop, start: State, count: int, precision: Precision = DOUBLE, *, system: System = HEAVY_TOP
+        self, top: HeavyTop, start: State, until: Fraction, precision: Precision = DOUBLE, *, system: System = HEAVY_TOP
     ) -> tuple[Trajectory, list[TaylorStep]]:
         """As :func:`heavytop.integrate.taylor.first_steps`; hands over what :meth:`propagate` does."""
-        run, steps = taylor.first_steps(self.top(top), start, count, precision, **self._how(system))
+        run, steps = taylor.first_steps(self.top(top), start, until, precision, **self._how(system))
         ends = self.states([step.end for step in steps])
         steps = [replace(step, end=end) for step, end in zip(steps, ends, strict=True)]
         return self._disguised(run, top, start), steps
@@ -137,21 +135,23 @@ class Integrator:
     def _how(self, system: System) -> dict[str, Any]:
         if system is not HEAVY_TOP:
             raise InputError(f"The planted faults are not for {system.name}.", "Use heavy_top.")
-        return _HEALTHY | self.options | {"stepping": self.stepping}
+        return self.options | {"stepping": self.stepping}
 
     def _disguised(self, run: Trajectory, top: HeavyTop, start: State) -> Trajectory:
         healthy = Problem.of(top, start, DOUBLE)
-        return replace(run, problem=healthy, flags=compiled(HEAVY_TOP, DOUBLE, **_HEALTHY).flags)
+        return replace(run, problem=healthy, flags=compiled(HEAVY_TOP, DOUBLE).flags)
 
 
-HEALTHY = "healthy"
-INTEGRATORS = {
-    HEALTHY: Integrator("nothing"),
+FAULTS = {
     "sign": Integrator("P γ × r enters (1.1) with the other sign", top=_pulled_upwards),
     "coefficient": Integrator("I1 is larger by 1e-10 of itself", top=_off_by_1e_10),
     "tolerance": Integrator("tolerance 1e-9", options={"tolerance": Fraction(1, 10**9)}),
     "order": Integrator("one order less, at heyoka's own step", stepping=_OneOrderLess),
-    "summation": Integrator("no compensated summation in a step", options={"high_accuracy": False}, detectable=False),
+    "summation": Integrator(
+        "compensated summation in a step the other way round: on, where the healthy run has it off",
+        options={"high_accuracy": True},
+        detectable=False,
+    ),
     "clock": Integrator("time summed in one double", stepping=_ClockInOneWord),
     "axes": Integrator("axes 1 and 2 swapped in what is handed over", states=_swapped),
     "frozen": Integrator("the state stands still from the middle on", states=_frozen),
@@ -159,4 +159,4 @@ INTEGRATORS = {
     "stop": Integrator("stops early and says so", stops=Fraction(3, 4)),
     "silent stop": Integrator("stops early and says nothing", stops=Fraction(3, 4), silent=True),
 }
-"""The healthy integrator and each fault, by name."""
+"""Each fault by name."""

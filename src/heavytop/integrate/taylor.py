@@ -315,14 +315,14 @@ def follow(
 def first_steps(
     top: HeavyTop,
     start: State,
-    count: int,
+    until: Fraction,
     precision: Precision,
     *,
     system: System = HEAVY_TOP,
     stepping: type[Stepper] = Stepper,
     **options: Any,
 ) -> tuple[Trajectory, list[TaylorStep]]:
-    """The first ``count`` steps of the motion, at their ends and as polynomials; fewer if it fails before.
+    """The steps that begin before the time ``until`` > 0, at their ends and as polynomials; none at an equilibrium.
 
     stepping, options: as in :func:`propagate`.  Raises what that raises.
     """
@@ -334,10 +334,11 @@ def first_steps(
     steps: list[TaylorStep] = []
     outcome = Outcome.SUCCESS
     began = perf_counter()
-    while len(steps) < count and outcome is Outcome.SUCCESS:
+    end = number(until, precision)
+    while stepper.time < end and outcome is Outcome.SUCCESS and stepper._at_rest is None:
         before = tool.engine.state.copy()
         outcome = stepper.single()
-        if outcome is Outcome.SUCCESS:
+        if outcome is Outcome.SUCCESS and stepper._at_rest is None:
             after = tool.engine.state.copy()
             steps.append(TaylorStep(before, tool.engine.last_h, stepper.polynomial(), after))
             times.append(exact(tool.engine.time))

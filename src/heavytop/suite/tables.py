@@ -16,7 +16,6 @@ from heavytop.suite.cases import Case
 from heavytop.suite.task import Task
 
 _MAX_SAMPLES = 1_000_000
-_MAX_STEPS = 10_000
 Find = Callable[[str], Case]
 """The case of a name; raises InputError for an unknown one."""
 
@@ -158,18 +157,17 @@ class Drift(Strict, tag="drift"):
 
 
 class LocalError(Strict, tag="local_error"):
-    """Error of single steps, and the order of the method as it shows beyond the step.  steps: that many, the first."""
+    """Error of the single steps that begin before the horizon, and the order of the method as it shows beyond them."""
 
     cases: list[str]
     precisions: list[str]
-    steps: int = 64
+    horizon: str
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
-        if not 1 <= self.steps <= _MAX_STEPS:
-            raise InputError(f"{self.steps} steps cannot be examined.", f"Give a number from 1 to {_MAX_STEPS}.")
+        times = tuple(_positive([self.horizon], "horizon"))
         return [
-            Task("local_error", each.name, each, parse(name).name, "", count=self.steps)
+            Task("local_error", each.name, each, parse(name).name, "", times)
             for each in map(find, self.cases)
             for name in self.precisions
         ]

@@ -16,7 +16,7 @@ class Task:
     name: as the row names its case.  case: None for an audit, whose ``form`` is the system.
     times: exact, of the sign of the direction; for claim_evaluation they are values of k |t| with that sign.
     keep: the times that go into the series.  precision: "" where no format is involved.
-    count: steps, for local_error.  integrator: heyoka, or a name of :mod:`heavytop.integrate.broken`.
+    integrator: heyoka, or a fault of :mod:`heavytop.integrate.broken`.
     seed: which roundings; 0 for those of the data as given.
     """
 
@@ -27,7 +27,6 @@ class Task:
     form: str
     times: tuple[Fraction, ...] = ()
     keep: tuple[Fraction, ...] = ()
-    count: int = 0
     integrator: str = "heyoka"
     seed: int = 0
 
@@ -48,8 +47,8 @@ class Task:
             return 5.0
         bits = parse(self.precision).bits
         per_step = 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5
-        if not self.times:
-            return 1.0 + 0.05 * self.count
+        if self.kind == "local_error":
+            return 1.0 + 0.2 * float(self.times[-1])
         return (
             (3.0 if self.kind == "drift" else 1.0) + float(abs(self.times[-1])) * 4 * per_step + len(self.times) * 1e-4
         )

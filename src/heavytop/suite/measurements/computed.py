@@ -105,7 +105,7 @@ def drift(task: Task) -> Row:
 def local_error(task: Task) -> Row:
     case, precision = case_of(task), parse(task.precision)
     asked = integrator_of(task).first_steps
-    run, steps = asked(case.top, case.start, task.count, precision, system=case.system)
+    run, steps = asked(case.top, case.start, task.times[-1], precision, system=case.system)
     error = LocalError(run.problem)
     for time, step in zip(run.times, steps, strict=True):
         error(time, step)

@@ -9,7 +9,7 @@ from typing import Any
 
 from heavytop.claims.ershkov import Branch, PartialCase
 from heavytop.integrate import taylor
-from heavytop.integrate.broken import INTEGRATORS
+from heavytop.integrate.broken import FAULTS
 from heavytop.measure.luck import reroll
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import decimal_text
@@ -51,4 +51,4 @@ def integrator_of(task: Task) -> Any:
     """What has the `propagate` and `first_steps` of :mod:`heavytop.integrate.taylor`: that, or a broken one."""
     if task.integrator == "heyoka":
         return taylor
-    return INTEGRATORS[task.integrator]
+    return FAULTS[task.integrator]

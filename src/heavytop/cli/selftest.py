@@ -1,0 +1,34 @@
+"""`selftest`."""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated
+
+import typer
+
+from heavytop.cli.app import Json, command, print_json, show_on_terminal
+from heavytop.cli.suite import _progress as progress
+from heavytop.errors import InputError
+
+
+@command
+def selftest(
+    workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
+    json: Json = False,
+) -> int:
+    """Try the suite's detectors on broken integrators: exit 1 if a fault they should see slips through."""
+    from heavytop.report import selftest as detectors
+
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
+    tasks = detectors.tasks()
+    with progress(tasks) as advance:
+        trials = detectors.trials(tasks, workers or os.cpu_count() or 1, advance)
+    if json:
+        print_json({"trials": [trial.to_json() for trial in trials]})
+    else:
+        from heavytop.report.selftest_text import selftest_text
+
+        show_on_terminal(selftest_text(trials))
+    return 0 if all(trial.as_expected for trial in trials) else 1
