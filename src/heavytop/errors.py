@@ -21,7 +21,7 @@ class NotInClass(InputError):
 
 
 class Contradiction(HeavyTopError):
-    """Two proven sources exclude each other: one of them is wrong, and nothing may be scored against either."""
+    """Two sources that must agree exclude each other: one of them is wrong, and nothing may rest on either."""
 
     exit_code = 1
 

@@ -239,6 +239,12 @@ def log10(value: Fraction) -> float | None:
     return round(shift * math.log10(2) + math.log10(abs(value) / Fraction(2) ** shift), 6)
 
 
+def native(text: str, precision: Precision) -> Any:
+    """The number of ``precision`` that :func:`native_text` named; a zero keeps its sign in "-0"."""
+    value = number(exact(text), precision)
+    return -value if value == 0 and text.startswith("-") else value
+
+
 def native_text(value: Any, precision: Precision) -> str:
     """A number of ``precision`` as decimal text that names it uniquely; ``nan``, ``inf`` or ``-inf`` where it is."""
     import numpy

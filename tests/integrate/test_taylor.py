@@ -1,5 +1,6 @@
 """heyoka behind one call: right in every format, the same bits however it is cut, and honest about failure."""
 
+import json
 from fractions import Fraction
 
 import numpy
@@ -7,7 +8,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.integrate.taylor import Stepper, compiled, propagate
-from heavytop.integrate.trajectory import Outcome, Problem
+from heavytop.integrate.trajectory import Outcome, Place, Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
@@ -185,3 +186,35 @@ def test_the_body_of_a_sleeping_top_turns_though_omega_and_gamma_rest() -> None:
     values = [exact(v) for v in run.states[0]]
     assert values[:6] == list(start.flat)
     assert float(values[6]) == pytest.approx(float(numpy.cos(3.0)))
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(100)], ids=lambda p: p.name)
+@pytest.mark.parametrize("case", ["forward", "backward", "attitude", "resting"])
+def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: str) -> None:
+    """Samples lie closer than steps and farther apart; -0 and rest are kept."""
+    top, start, sign, options = TOP, START, 1, {}
+    if case == "backward":
+        sign = -1
+    elif case == "attitude":
+        options = {"xi": perpendicular(START.gamma)}
+    elif case == "resting":
+        top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))
+    times = [sign * Fraction(t) for t in ("1/64", "1/32", "1", "3", "193/64", "4")]
+
+    def run(place: Place | None = None):
+        states, places = [], []
+        found = propagate(
+            top, start, times, precision, place=place, mark=lambda at: places.append(at.content(precision)),
+            observer=lambda time, state: states.append((time, [str(v) for v in state])), **options,
+        )  # fmt: skip
+        for each in places:
+            each["seconds"] = 0.0
+        return (found.outcome, found.steps, found.time_reached), states, places
+
+    summary, states, places = run()
+    assert len(places) == len(times)
+    for index, content in enumerate(places):
+        again, rest, later = run(Place.of(json.loads(json.dumps(content)), precision))
+        assert again == summary
+        assert rest == states[index + 1 :]
+        assert later == places[index + 1 :]

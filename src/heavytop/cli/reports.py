@@ -134,7 +134,7 @@ def _policy(file: Path | None, floor: str | None, loss: str | None) -> Any:
 
 
 def _write(path: Path, text: str) -> None:
-    from heavytop.suite.checkpoint import replace
+    from heavytop.suite.files import replace
 
     replace(path, text.encode())
 

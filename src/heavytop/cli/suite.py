@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +15,10 @@ import typer
 
 from heavytop.cli.app import command, show_on_terminal
 from heavytop.errors import InputError
+
+_PAGE = "report.html"
+_MOST_ON_A_PAGE = 5000
+"""Beyond so many rows a run makes no page: it would hold them all."""
 
 
 @command
@@ -22,6 +30,7 @@ def run(
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on instead.")] = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write DIR/rows.parquet too.")] = False,
     seed: Annotated[int, typer.Option(help="Measure the same motions with other roundings: 0 to 1000.")] = 0,
+    save_every: Annotated[float, typer.Option(help="Seconds after which a long row saves its place.", min=0)] = 10.0,
 ) -> int:
     """Run a plan of measurements; write DIR/report.json and DIR/report.html."""
     from heavytop.report.parquet import require_pyarrow
@@ -36,12 +45,26 @@ def run(
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
-    directory = _fresh(out, loaded.name, resume)
     identity = {"name": loaded.name, "sha256": digest, "seed": str(seed)}
-    return _run(tasks, identity, directory, workers or os.cpu_count() or 1, scheduler, parquet)
+    directory = out or _new_folder(loaded.name)
+    if resume and _is_finished(directory):
+        return _show_finished(directory, identity)
+    _require_fit(directory, resume)
+    where = {"workers": workers or os.cpu_count() or 1, "scheduler": scheduler}
+    return _run(tasks, identity, directory, resume, save_every, where, parquet)
 
 
-def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, scheduler: str | None, parquet: bool) -> int:
+def _run(
+    tasks: Any,
+    plan: dict[str, str],
+    directory: Path,
+    resume: bool,
+    save_every: float,
+    where: dict[str, Any],
+    parquet: bool = False,
+) -> int:
+    from msgspec.structs import replace
+
     from heavytop.precision import available, parse
 
     missing = {name for name in {task.precision for task in tasks} - {""} if available()[parse(name).family]}
@@ -50,55 +73,108 @@ def _run(tasks: Any, plan: dict[str, str], directory: Path, workers: int, schedu
             f"The plan needs {', '.join(sorted(missing))}, which this platform lacks.", "`heavytop list` says why."
         )
 
-    from heavytop.records import SCHEMA, Report
+    from heavytop.records import SCHEMA, Report, Row
     from heavytop.report import html, store, text
     from heavytop.report.environment import environment
     from heavytop.report.parquet import FILE as PARQUET
     from heavytop.report.parquet import write as write_parquet
-    from heavytop.suite.checkpoint import Checkpoint
+    from heavytop.suite.checkpoint import Checkpoint, identity_of
     from heavytop.suite.run import run as run_tasks
 
     surroundings = environment()
-    identity = {**plan, **surroundings["packages"]}
-    identity |= {key: str(surroundings[key]) for key in ("commit", "processor", "simd_width_double")}
+    report = Report(SCHEMA, plan, surroundings, [])
+    identity = identity_of(report)
     try:
-        directory.mkdir(parents=True, exist_ok=True)
-        with Checkpoint(directory, identity) as checkpoint, _progress(tasks) as advance:
-            rows = run_tasks(tasks, checkpoint, advance, min(workers, len(tasks)), scheduler)
-            report = Report(SCHEMA, plan, surroundings, rows)
+        with (
+            _terminated_like_interrupted(),
+            Checkpoint(directory, identity, lambda: _require_fit(directory, resume), save_every) as checkpoint,
+            _progress(tasks) as advance,
+        ):
+            laws = run_tasks(tasks, checkpoint, advance, **where)
+
+            def rows() -> Iterator[Row]:
+                return chain(checkpoint.rows(range(len(tasks))), laws)
+
             if parquet:
-                write_parquet(directory / PARQUET, report.rows, plan)
-            path = store.write(report, directory)
-            html.write_report(report, path.with_suffix(".html"))
+                write_parquet(directory / PARQUET, rows(), plan)
+            path, page = store.write(report, directory, rows()), directory / _PAGE
+            if len(tasks) <= _MOST_ON_A_PAGE:
+                html.write_report(replace(report, rows=list(rows())), page)
+            summary = text.overview(report, rows())
+            good = text.all_good(rows())
     except OSError as error:
-        raise InputError(f"{directory} cannot be written: {error}.", "Choose a writable --out with space.") from None
-    except KeyboardInterrupt:
+        raise InputError(
+            f"{directory} cannot be written: {error}.",
+            "Make space, or choose a writable --out; finished rows are kept for --resume.",
+        ) from None
+    except KeyboardInterrupt as stop:
         print(f"heavytop: interrupted; finished rows are kept: --out {directory} --resume goes on", file=sys.stderr)
-        return 130
-    show_on_terminal(text.summary(report))
-    print(f"\nReport: {path}\nPage:   {path.with_suffix('.html')}")
-    # that a peer gives up is what the work-precision rows are there to show
-    return 0 if all(row.outcome == "success" for row in rows if row.measure != "work_precision") else 3
+        return 143 if isinstance(stop, _Terminated) else 130
+    show_on_terminal(summary)
+    print(f"\nReport: {path}")
+    print(f"Page:   {page if page.exists() else f'none for so many rows; `heavytop show {directory} --html FILE`'}")
+    return 0 if good else 3
 
 
-def _fresh(out: Path | None, plan: str, resume: bool) -> Path:
-    """The folder to write to; raises InputError where it holds anything that this run did not put there."""
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM, which ends a run like Ctrl-C."""
+
+
+@contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    def terminate(*_: object) -> None:
+        raise _Terminated
+
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _new_folder(plan: str) -> Path:
     from datetime import UTC, datetime
 
+    return Path("heavytop-results") / f"{plan}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+
+
+def _is_finished(directory: Path) -> bool:
+    from heavytop.report.store import FILE as REPORT
     from heavytop.suite.checkpoint import FILE
 
-    if out is None:
-        stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
-        return Path("heavytop-results") / f"{plan}-{stamp}"
-    if not out.exists():
-        return out
-    if not out.is_dir():
-        raise InputError(f"{out} is a file.", "Give a new folder with --out.")
-    content = {path.name for path in out.iterdir()} - {".lock"}
-    if not content or (resume and FILE in content):
-        return out
-    remedy = "Give a new folder with --out." + (" Or go on with --resume." if FILE in content else "")
-    raise InputError(f"{out} already holds {', '.join(sorted(content)[:5])}.", remedy)
+    return (directory / REPORT).exists() and not (directory / FILE).exists()
+
+
+def _show_finished(directory: Path, plan: dict[str, str]) -> int:
+    from heavytop.report import store, text
+    from heavytop.suite.checkpoint import require_same
+
+    report = store.read(directory)
+    require_same(report.plan, plan, directory)
+    show_on_terminal(text.overview(report, report.rows))
+    print(f"\nReport: {directory / store.FILE} (was finished already)")
+    return 0 if text.all_good(report.rows) else 3
+
+
+def _require_fit(directory: Path, resume: bool) -> None:
+    """Raises InputError where the folder holds anything that a run did not put there, or all of it without --resume."""
+    from heavytop.report.parquet import FILE as PARQUET
+    from heavytop.report.store import DIGEST
+    from heavytop.report.store import FILE as REPORT
+    from heavytop.suite.checkpoint import FILE, OURS
+
+    if not directory.exists():
+        return
+    if not directory.is_dir():
+        raise InputError(f"{directory} is a file.", "Give a new folder with --out.")
+    content = {path.name for path in directory.iterdir()}
+    begun = FILE in content
+    content -= {name for name in content if OURS.fullmatch(name) and (resume or name != FILE)}
+    if resume and begun:
+        content -= {REPORT, DIGEST, _PAGE, PARQUET}  # written, but not yet cleared up after
+    if content:
+        remedy = "Give a new folder with --out." + (" Or go on with --resume." if begun else "")
+        raise InputError(f"{directory} already holds {', '.join(sorted(content)[:5])}.", remedy)
 
 
 class _progress:  # noqa: N801 - a context manager used like a function

@@ -30,6 +30,7 @@ FUNCTIONS = SimpleNamespace(
 _MAX_BITS = 1 << 22
 _HALF = arb(0.5)
 _GUARD, _STEP = 16, 64
+_RADIUS_BITS = 30
 
 
 class working_precision:  # noqa: N801 - reads as a verb
@@ -70,6 +71,30 @@ def radius_text(value: Fraction) -> str:
     context = Context(prec=3, rounding=ROUND_CEILING, Emax=MAX_EMAX, Emin=MIN_EMIN)
     quotient = context.divide(Decimal(value.numerator), Decimal(value.denominator))
     return str(quotient) if quotient else "0"
+
+
+def ball_text(value: arb) -> str:
+    """A ball as text that :func:`ball_from` makes the very same ball of: ``m e r s`` for m 2^e ± r 2^s, or ``nan``."""
+    if not value.is_finite():
+        return "nan"
+    return " ".join(str(int(part)) for part in (*value.mid().man_exp(), *value.rad().man_exp()))
+
+
+def ball_from(text: str) -> arb:
+    """The ball of :func:`ball_text`.  Raises ValueError for other text."""
+    if text == "nan":
+        return arb("nan")
+    m, e, r, s = (int(part) for part in text.split())
+    if not r:
+        return arb((m, e))
+    with working_precision(m.bit_length() + 64):
+        value = arb((m, e), (r, s))
+        if r.bit_length() == _RADIUS_BITS:
+            # FLINT rounds such a radius up on its way in, and takes an addition of next to nothing for one unit
+            value = arb((m, e), (r - 1, s)) + arb(0, (1, s - 100))
+    if ball_text(value) != text:
+        raise ValueError(f"no ball is {text[:60]!r}")
+    return value
 
 
 def value_text(value: arb, digits: int) -> tuple[str, str]:

@@ -17,7 +17,9 @@ from typing import Any
 import heyoka
 import numpy
 
-from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
+from heavytop.errors import InputError
+from heavytop.integrate.selfcheck import check
+from heavytop.integrate.trajectory import Outcome, Place, Problem, TaylorStep, Trajectory
 from heavytop.precision import Precision, exact, number, require
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, VARIABLES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -90,6 +92,8 @@ def compiled(
     lanes: that many motions at once in SIMD lanes, in double only; None for a scalar integrator, whose bits differ.
     tolerance: None for the format's eps.  compact_mode: None for off in double and extended (faster to run) and on in
     quad and real (else they take minutes to compile).
+
+    Raises Contradiction where its first step, which is known, is wrong.
     """
     require(precision)
     compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
@@ -111,7 +115,9 @@ def compiled(
             fp_type=type(one),
             **options,
         )
-        _compiled[key] = Compiled(engine, perf_counter() - before, _flags(engine))
+        seconds = perf_counter() - before
+        check(engine, system, precision)
+        _compiled[key] = Compiled(engine, seconds, _flags(engine))
     return _compiled[key]
 
 
@@ -154,6 +160,7 @@ class Stepper:
     _seconds_per_step: float = field(default=CHUNK_SECONDS)
     _one_by_one: bool = False
     _at_rest: Any = None
+    _before: Any = None
 
     def reach(self, target: Any) -> Outcome:
         """Step until the polynomial of the last step covers ``target``."""
@@ -187,6 +194,7 @@ class Stepper:
     def single(self) -> Outcome:
         """One step, whose polynomial is then at hand."""
         before, state, began = self.engine.time, self.engine.state.copy(), perf_counter()
+        self._before = state, self.engine.dtime, self.steps
         outcome, _ = (self.engine.step if self.forwards else self.engine.step_backward)(write_tc=True)
         self._seconds_per_step = perf_counter() - began
         self._covers = True
@@ -228,6 +236,17 @@ class Stepper:
         """Taylor coefficients of the last step, a copy, shape (6 or 9, order + 1)."""
         return self.engine.tc.copy()
 
+    def begin(self, place: Place) -> None:
+        """Go on from there."""
+        self.engine.state[:] = numpy.array(place.state)
+        self.engine.dtime = place.time
+        self.steps, self.time = place.steps, self.engine.time
+
+    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
+        """Where the last step began."""
+        state, time, steps = self._before
+        return Place(samples, tuple(state), time, steps, seconds, flags)
+
     def sample(self, target: Any) -> Any:
         """The state at ``target``, inside the last step; a copy, shape (6,) or (9,)."""
         self._one_by_one = False
@@ -247,6 +266,8 @@ def propagate(
     step_limit: int | None = None,
     observer: Observer | None = None,
     stepping: type[Stepper] = Stepper,
+    place: Place | None = None,
+    mark: Callable[[Place], None] | None = None,
     **options: Any,
 ) -> Trajectory:
     """The motion from ``start`` at t = 0, at ``times``, computed by heyoka in ``precision``.
@@ -256,15 +277,18 @@ def propagate(
     step_limit: stop after that many steps; the times reached until then are returned.
     observer: called with (exact time, native state) at each sample in place of keeping the states.
     stepping: how steps are taken; another than heyoka's own is for trying the detectors.
+    place: where an earlier run of the same problem stopped; goes on behind its samples, to the same bits.
+    mark: called after each sample with the place from which this run could go on.
     options: tolerance, high_accuracy, compact_mode as in :func:`compiled`.
 
-    Raises InputError for times out of order, a format that the platform lacks, data outside its exponent range, and a
-    start that the system does not admit.  A failed run is an outcome, not an exception.
+    Raises InputError for times out of order, a format that the platform lacks, data outside its exponent range, a
+    start that the system does not admit, and a place reached with other flags.  A failed run is an outcome, not an
+    exception.
     """
     problem = Problem.of(top, start, precision, system, xi)
     targets = [number(time, precision) for time in check_times(times)]
     tool = compiled(system, precision, attitude=xi is not None, **options)
-    return follow(tool, tool.engine, problem, targets, step_limit, observer, stepping=stepping)
+    return follow(tool, tool.engine, problem, targets, step_limit, observer, stepping=stepping, place=place, mark=mark)
 
 
 def follow(
@@ -275,7 +299,10 @@ def follow(
     step_limit: int | None,
     observer: Observer | None,
     between: Callable[[], None] | None = None,
+    *,
     stepping: type[Stepper] = Stepper,
+    place: Place | None = None,
+    mark: Callable[[Place], None] | None = None,
 ) -> Trajectory:
     """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
     load(engine, problem)
@@ -283,9 +310,14 @@ def follow(
     stepper = stepping(engine, forwards, step_limit, far(forwards, problem.precision), between)
     kept_times: list[Fraction] = []
     kept_states: list[Any] = []
-    outcome = Outcome.SUCCESS
-    began = perf_counter()
-    for target in targets:
+    outcome, done, began = Outcome.SUCCESS, 0, perf_counter()
+    if place is not None:
+        _require_same(place.flags, tool.flags)
+        stepper.begin(place)
+        done, began = place.samples, began - place.seconds
+        kept_times = [exact(target) for target in targets[:done]]
+        stepper.reach(targets[done - 1])
+    for target in targets[done:]:
         if target == 0:
             state = engine.state.copy()
         else:
@@ -293,11 +325,14 @@ def follow(
             if outcome is not Outcome.SUCCESS:
                 break
             state = stepper.sample(target)
+        done += 1
         kept_times.append(exact(target))
         if observer is None:
             kept_states.append(state)
         else:
             observer(kept_times[-1], state)
+        if mark is not None and target != 0:
+            mark(stepper.place(done, perf_counter() - began, tool.flags))
     return Trajectory(
         problem,
         "heyoka",
@@ -360,6 +395,17 @@ def load(engine: Any, problem: Problem) -> None:
     """Set an engine to the beginning of a problem."""
     engine.pars[:], engine.state[:] = arrays(problem)
     engine.time = number(Fraction(0), problem.precision)
+
+
+def _require_same(there: dict[str, str], here: dict[str, str]) -> None:
+    different = [name for name in sorted(there.keys() | here.keys()) if there.get(name) != here.get(name)]
+    if different:
+        raise InputError(
+            "The run that is to go on was integrated with "
+            + ", ".join(f"{name} = {there.get(name)} (now {here.get(name)})" for name in different)
+            + ".",
+            "Go on with the program and machine that began it, or start anew in another folder.",
+        )
 
 
 def arrays(problem: Problem) -> tuple[Any, Any]:

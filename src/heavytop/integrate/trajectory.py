@@ -7,7 +7,7 @@ from enum import Enum
 from fractions import Fraction
 from typing import Any
 
-from heavytop.precision import Precision, exact, native_text, number, rounded
+from heavytop.precision import Precision, exact, native, native_text, number, rounded
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -79,6 +79,45 @@ class Problem:
     def native(self, values: Any) -> list[Any]:
         """Exact numbers as numbers of the format."""
         return [number(exact(value), self.precision) for value in values]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a run is: all that it needs to go on with the same bits, in native numbers.
+
+    samples: how many of the times are done.  state: before the step that covers the last of them; time: both words of
+    its time; steps: taken until then.  seconds: run so far.  flags: everything else that can change bits.
+    """
+
+    samples: int
+    state: tuple[Any, ...]
+    time: tuple[Any, Any]
+    steps: int
+    seconds: float
+    flags: dict[str, str]
+
+    def content(self, precision: Precision) -> dict[str, Any]:
+        """As plain text and integers, exact."""
+
+        def texts(values: tuple[Any, ...]) -> list[str]:
+            # a zero keeps its sign
+            return ["-0" if v == 0 and str(v).startswith("-") else native_text(v, precision) for v in values]
+
+        return {
+            "samples": self.samples,
+            "state": texts(self.state),
+            "time": texts(self.time),
+            "steps": self.steps,
+            "seconds": self.seconds,
+            "flags": self.flags,
+        }
+
+    @classmethod
+    def of(cls, content: dict[str, Any], precision: Precision) -> Place:
+        """The place with that :meth:`content`."""
+        state = tuple(native(text, precision) for text in content["state"])
+        high, low = (native(text, precision) for text in content["time"])
+        return cls(content["samples"], state, (high, low), content["steps"], content["seconds"], content["flags"])
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.balls import ball, ball_from, ball_text, working_precision
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scalar import GUARD_BITS, metric, text, to_ball
 from heavytop.records import Metric, Series
@@ -52,6 +52,22 @@ class Running:
         """The kept values."""
         return Series([time_text(t) for t in self.kept], [text(v) for v in self.kept.values()])
 
+    def content(self) -> dict[str, Any]:
+        """As plain text and integers, exact."""
+        return {
+            "maximum": ball_text(self.maximum),
+            "squares": ball_text(self.squares),
+            "final": ball_text(self.final),
+            "count": self.count,
+            "kept": {str(time): ball_text(value) for time, value in self.kept.items()},
+        }
+
+    def restore(self, content: dict[str, Any]) -> None:
+        """Become what had that :meth:`content`."""
+        self.maximum, self.squares, self.final = (ball_from(content[k]) for k in ("maximum", "squares", "final"))
+        self.count = content["count"]
+        self.kept = {Fraction(time): ball_from(value) for time, value in content["kept"].items()}
+
 
 class Drift:
     """|I(t) − I(0)| of each integral, absolute, from the rounded start; evaluated with 64 guard bits.
@@ -93,6 +109,15 @@ class Drift:
     def series(self, time_text: Callable[[Fraction], str]) -> dict[str, Series]:
         """``drift_NAME`` over the kept times."""
         return {f"drift_{name}": run.series(time_text) for name, run in self.running.items()}
+
+    def content(self) -> dict[str, Any]:
+        """What was taken in so far, as plain text and integers, exact."""
+        return {name: run.content() for name, run in self.running.items()}
+
+    def restore(self, content: dict[str, Any]) -> None:
+        """Go on from that :meth:`content`."""
+        for name, run in self.running.items():
+            run.restore(content[name])
 
 
 def _xi_squared(_: Parameters, y: Any) -> Any:

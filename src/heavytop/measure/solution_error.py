@@ -72,6 +72,17 @@ class SolutionError:
         """The same over the kept times."""
         return {f"{prefix}_{name}": run.series(time_text) for name, run in self.running.items()}
 
+    def content(self) -> dict[str, Any]:
+        """What was taken in so far, as plain text and integers, exact."""
+        running = {name: run.content() for name, run in self.running.items()}
+        return {"break_away": None if self.break_away is None else str(self.break_away), **running}
+
+    def restore(self, content: dict[str, Any]) -> None:
+        """Go on from that :meth:`content`."""
+        self.break_away = None if content["break_away"] is None else Fraction(content["break_away"])
+        for name, run in self.running.items():
+            run.restore(content[name])
+
 
 def split(delta: Sequence[arb], flow: Sequence[arb]) -> tuple[arb, arb]:
     """|δ| along the unit vector of the flow, and the Euclidean rest across it; the whole across at an equilibrium."""

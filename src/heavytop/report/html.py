@@ -14,7 +14,7 @@ from heavytop.report.plots import Section, Sources, clip, digits_kept
 from heavytop.report.svg import quiet_style
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
-from heavytop.suite.checkpoint import replace
+from heavytop.suite.files import replace
 from heavytop.suite.plan import BUILT_IN
 
 MOST_ROWS = 500

@@ -17,7 +17,7 @@ from heavytop.errors import InputError
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
 from heavytop.records import SCHEMA, Law, Metric, Report, Row
-from heavytop.suite.checkpoint import replace
+from heavytop.suite.files import replace
 
 FILE = "report.json"
 DIGEST = "report.json.sha256"
@@ -28,14 +28,23 @@ _CLOSE = 1e-5
 """How far a log10 of six decimals may be from that of its value."""
 
 
-def write(report: Report, directory: Path) -> Path:
-    """DIRECTORY/report.json, a row a line, and beside it its SHA-256 in the format of ``sha256sum -c``."""
-    head = {"schema": report.schema, "plan": report.plan, "environment": report.environment}
-    rows = b",\n".join(map(msgspec.json.encode, report.rows))
-    content = msgspec.json.encode(head)[:-1] + b',"rows":[\n' + rows + b"\n]}\n"
-    replace(directory / DIGEST, f"{hashlib.sha256(content).hexdigest()}  {FILE}\n".encode())
-    replace(directory / FILE, content)
+def write(report: Report, directory: Path, rows: Iterable[Row] | None = None) -> Path:
+    """DIRECTORY/report.json, a row a line, and beside it its SHA-256 in the format of ``sha256sum -c``.
+
+    rows: in place of those of the report, where they are too many to hold; written one by one.
+    """
+    digest = replace(directory / FILE, _pieces(report, report.rows if rows is None else rows))
+    replace(directory / DIGEST, [f"{digest}  {FILE}\n".encode()])
     return directory / FILE
+
+
+def _pieces(report: Report, rows: Iterable[Row]) -> Iterator[bytes]:
+    head = {"schema": report.schema, "plan": report.plan, "environment": report.environment}
+    between = msgspec.json.encode(head)[:-1] + b',"rows":[\n'
+    for row in rows:
+        yield between + msgspec.json.encode(row)
+        between = b",\n"
+    yield (b"" if between == b",\n" else between) + b"\n]}\n"
 
 
 class BriefRow(msgspec.Struct, gc=False):

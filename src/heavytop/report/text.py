@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from decimal import Decimal
 from fractions import Fraction
+from itertools import chain, islice
+from math import inf
 
+from msgspec import structs
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -31,12 +35,48 @@ def short(value: str, digits: int = 3) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
+MOST_ROWS = 200
+"""More rows than these are summed up after a run, not listed."""
+
+
+def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
+    """The summary of ``report`` with these rows; where they are too many to read, the worst for each measure.
+
+    The rows may be a stream of any length: none is held but the first.
+    """
+    stream = iter(rows)
+    first = list(islice(stream, MOST_ROWS + 1))
+    if len(first) <= MOST_ROWS:
+        return summary(structs.replace(report, rows=first))
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    worst: dict[tuple[str, str], dict[str, tuple[float, str, str]]] = {}
+    for row in chain(first, stream):
+        group = row.measure, row.precision
+        counts.setdefault(group, Counter())[row.outcome] += 1
+        found = worst.setdefault(group, {})
+        for name, metric in row.metrics.items():
+            size = inf if metric.value == "nan" else metric.log10
+            if metric.kind == "error" and size is not None and size > found.get(name, (-inf,))[0]:
+                found[name] = size, metric.value, row.case
+    parts: list[RenderableType] = [_head(report, sum(count.total() for count in counts.values()))]
+    for group, found in worst.items():
+        outcomes = ", ".join(f"{number} {outcome}" for outcome, number in sorted(counts[group].items()))
+        parts += [Text(), _title(f"{' in '.join(filter(None, group))}: {outcomes}; the largest errors")]
+        parts.append(_table(["metric", "largest", "in"], [[n, short(v), c] for n, (_, v, c) in found.items()]))
+    return Group(*parts, Text(), Text("`heavytop show` lists every row."))
+
+
+def all_good(rows: Iterable[Row]) -> bool:
+    """Whether every run reached its horizon; that a peer gives up is what the work-precision rows are there to show."""
+    return all(row.outcome == "success" for row in rows if row.measure != "work_precision")
+
+
 def summary(report: Report) -> RenderableType:
     """What is known, what the claim gets wrong and from when on, digits kept and drift per format."""
     by_measure: dict[str, list[Row]] = {}
     for row in report.rows:
         by_measure.setdefault(row.measure, []).append(row)
-    parts: list[RenderableType] = [_head(report)]
+    parts: list[RenderableType] = [_head(report, len(report.rows))]
     for name, section in (
         ("audit", _audit),
         ("claim_model", _claim_model),
@@ -58,10 +98,10 @@ def summary(report: Report) -> RenderableType:
     return Group(*parts)
 
 
-def _head(report: Report) -> Text:
+def _head(report: Report, rows: int) -> Text:
     packages = report.environment.get("packages", {})
     versions = ", ".join(f"{n} {packages[n]}" for n in ("heavytop", "heyoka", "numpy", "python-flint") if n in packages)
-    return Text(f"Plan {report.plan.get('name', '?')}: {len(report.rows)} measurements ({versions})")
+    return Text(f"Plan {report.plan.get('name', '?')}: {rows} measurements ({versions})")
 
 
 def _title(text: str) -> Text:

@@ -1,117 +1,218 @@
-"""Finished rows on disk while a run goes on, so that `run --resume` does not measure them again.
+"""What a run has on disk while it goes on, so that `run --resume` measures nothing twice.
 
-DIR/rows.jsonl: a first line that names plan and program, then one line a row, each written whole with its checksum.
-A line that a kill cut short is measured again.
+DIR/rows.jsonl: a first line that names plan and program, then one line a row, each with its checksum.  A line that a
+kill cut short is measured again.  DIR/row-N.partial: the place of a long row in progress.  All is text; nothing is
+ever unpickled.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from time import monotonic
 from types import TracebackType
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import msgspec
 
 from heavytop.errors import InputError
-from heavytop.records import Row
+from heavytop.records import Report, Row
+from heavytop.suite.files import line, replace, verified
 
 FILE = "rows.jsonl"
+OURS = re.compile(r"rows\.jsonl|row-\d+\.partial|\.lock|\..*\.partial")
+"""Names of what a run leaves behind when it is killed."""
+EVERY = 10.0
+"""Seconds between two places of a row in progress."""
+_SYNC_EVERY = 1.0
+"""Seconds of finished rows that a power cut may cost.  A kill costs none."""
+
+
+class Saved:
+    """The place of one row in progress, in a file of its own; nowhere where ``path`` is None.
+
+    A measurement asks :meth:`load` once, and where :meth:`due` says so hands plain text and integers to :meth:`save`.
+    """
+
+    def __init__(self, path: Path | None = None, identity: str = "", every: float = EVERY) -> None:
+        self.path = path
+        self.identity = identity
+        self.every = every
+        self._last = monotonic()
+
+    def load(self) -> dict[str, Any] | None:
+        """What was saved last by the same plan and program; None where nothing was."""
+        if self.path is None or not self.path.exists():
+            return None
+        content = verified(self.path.read_bytes().removesuffix(b"\n"))
+        if content is None:
+            return None
+        identity, saved = msgspec.json.decode(content, type=tuple[str, dict[str, Any]])
+        return saved if identity == self.identity else None
+
+    def due(self) -> bool:
+        """Whether the last save is long enough ago.  No result depends on it."""
+        return self.path is not None and monotonic() - self._last >= self.every
+
+    def save(self, content: dict[str, Any]) -> None:
+        """Keep this in the place of what was saved before."""
+        assert self.path is not None
+        replace(self.path, [line(msgspec.json.encode((self.identity, content)))])
+        self._last = monotonic()
 
 
 class Checkpoint:
-    """The rows of one run directory; a lock file lets only one run write there."""
+    """The rows of one run directory, kept on disk; a lock lets only one run write there.
 
-    def __init__(self, directory: Path, identity: dict[str, str]) -> None:
+    identity: what must be the same for a run to go on.  check: called with the lock held, before anything is read; it
+    raises InputError where the directory is not fit.
+    """
+
+    def __init__(
+        self, directory: Path, identity: dict[str, str], check: Callable[[], None], every: float = EVERY
+    ) -> None:
+        self.directory = directory
         self.path = directory / FILE
-        self.lock = directory / ".lock"
-        self.identity = msgspec.json.encode(identity)
-        self.done: dict[int, Row] = {}
-        self._file: BinaryIO | None = None
+        self.identity = identity
+        self.check = check
+        self.every = every
+        self.offsets: dict[int, int] = {}
+        self._digest = hashlib.sha256(msgspec.json.encode(identity)).hexdigest()
+        self._file: BinaryIO
+        self._synced = 0.0
 
     def __enter__(self) -> Checkpoint:
-        import fcntl
-
-        self._lock_file = self.lock.open("w")
+        self._lock = _locked(self.directory)
         try:
-            fcntl.flock(self._lock_file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            self._lock_file.close()
-            raise InputError(
-                f"Another run writes to {self.path.parent}.", "Wait for it, or give another --out."
-            ) from None
-        if self.path.exists():
+            self.check()
+            for leftover in self.directory.glob(".*.partial"):
+                leftover.unlink()
+            if not self.path.exists():
+                replace(self.path, [line(msgspec.json.encode(self.identity))])
+            # unbuffered: a row is with the system when add returns, and a failed write leaves nothing to fail again
+            self._file = self.path.open("r+b", buffering=0)
             self._read()
-        else:
-            self.path.write_bytes(_line(self.identity))
-        self._file = self.path.open("ab")
+        except BaseException:
+            self._leave()
+            raise
         return self
 
     def _read(self) -> None:
-        lines = self.path.read_bytes().split(b"\n")
-        first = _checked(lines[0])
-        if first != self.identity:
-            raise InputError(
-                f"{self.path} belongs to another run: {(first or b'unreadable')[:200].decode(errors='replace')}, "
-                f"this one is {self.identity.decode()}.",
-                "Resume with the same plan and program version, or give another --out.",
-            )
-        kept = [lines[0]]
-        for line in lines[1:]:
-            content = _checked(line)
-            if content is None:
-                continue
-            index, row = msgspec.json.decode(content, type=tuple[int, Row])
-            self.done[index] = row
-            kept.append(line)
-        # drop what a kill cut short, so that the next line starts on its own
-        replace(self.path, b"\n".join(kept) + b"\n")
+        end = 0
+        with self.path.open("rb") as file:
+            first = verified(file.readline().removesuffix(b"\n"))
+            self._require_same(first)
+            end = file.tell()
+            for whole in file:
+                content = verified(whole[:-1]) if whole.endswith(b"\n") else None
+                if content is not None:
+                    index, _ = msgspec.json.decode(content, type=tuple[int, msgspec.Raw])
+                    self.offsets[index] = end
+                elif not whole.endswith(b"\n"):
+                    break
+                end += len(whole)
+        # what a kill cut short goes, so that the next line starts on its own
+        self._file.truncate(end)
+        self._file.seek(end)
+
+    def _require_same(self, first: bytes | None) -> None:
+        if first is None:
+            raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.")
+        require_same(msgspec.json.decode(first, type=dict[str, str]), self.identity, self.path)
+
+    def saved(self, index: int) -> Saved:
+        """Where the row of that index keeps its place."""
+        return Saved(self._place(index), self._digest, self.every)
+
+    def _place(self, index: int) -> Path:
+        return self.directory / f"row-{index}.partial"
 
     def add(self, index: int, row: Row) -> None:
-        """Keep a finished row; it is on disk when this returns."""
-        assert self._file is not None
-        self.done[index] = row
-        self._file.write(_line(msgspec.json.encode((index, row))))
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        """Keep a finished row.  Raises OSError where the disk takes it only in part; then it is measured again."""
+        offset = self._file.tell()
+        content = line(msgspec.json.encode((index, row)))
+        view = memoryview(content)
+        while view:
+            view = view[self._file.write(view) :]
+        if monotonic() - self._synced > _SYNC_EVERY:
+            os.fsync(self._file.fileno())
+            self._synced = monotonic()
+        self.offsets[index] = offset
+        self._place(index).unlink(missing_ok=True)
+
+    def rows(self, indices: range | list[int]) -> Iterator[Row]:
+        """The finished rows of those indices, one after the other from the disk."""
+        with self.path.open("rb") as file:
+            for index in indices:
+                file.seek(self.offsets[index])
+                content = verified(file.readline().removesuffix(b"\n"))
+                if content is None:
+                    raise InputError(f"{self.path} was changed while it was in use.", "Go on with --resume.")
+                yield msgspec.json.decode(content, type=tuple[int, Row])[1]
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._file is not None:
+        if kind is None or not (self.offsets or any(self.directory.glob("row-*.partial"))):
+            self.path.unlink(missing_ok=True)
+            for partial in self.directory.glob("row-*.partial"):
+                partial.unlink(missing_ok=True)
+        self._leave()
+
+    def _leave(self) -> None:
+        if hasattr(self, "_file"):
             self._file.close()
-        if kind is None:
-            self.path.unlink(missing_ok=True)
-        if not self.done:
-            self.path.unlink(missing_ok=True)
-        self.lock.unlink(missing_ok=True)
-        self._lock_file.close()
+        # the name goes while the lock is held; whoever waits for this file finds that it is no longer the one
+        (self.directory / ".lock").unlink(missing_ok=True)
+        self._lock.close()
         with suppress(OSError):  # only an empty folder goes: nothing was finished, so nothing stays
-            self.path.parent.rmdir()
+            self.directory.rmdir()
 
 
-def _line(content: bytes) -> bytes:
-    return hashlib.sha256(content).hexdigest().encode() + b" " + content + b"\n"
+def identity_of(report: Report) -> dict[str, str]:
+    """Plan, program and machine of a report: with these the same its rows are the same."""
+    surroundings = report.environment
+    plan = {f"plan {key}": value for key, value in report.plan.items()}
+    return plan | {
+        **surroundings["packages"],
+        **{key: str(surroundings[key]) for key in ("commit", "processor", "simd_width_double")},
+    }
 
 
-def _checked(line: bytes) -> bytes | None:
-    digest, _, content = line.partition(b" ")
-    return content if hashlib.sha256(content).hexdigest().encode() == digest else None
-
-
-def replace(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all."""
-    temporary = path.with_name(f".{path.name}.partial")
-    try:
-        with temporary.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
+def require_same(there: dict[str, str], here: dict[str, str], where: Path) -> None:
+    """Raises InputError that names each key in which two identities differ, with both values."""
+    different = [key for key in (*there, *(here.keys() - there.keys())) if there.get(key) != here.get(key)]
+    if different:
         raise InputError(
-            f"{path} cannot be written: {error.strerror}.", "Choose a writable --out with space."
-        ) from None
+            f"{where} belongs to another run: "
+            + ", ".join(f"{key} is {there.get(key)} there and {here.get(key)} now" for key in different)
+            + ".",
+            "Resume with the same plan, program and machine, or give another --out.",
+        )
+
+
+def _locked(directory: Path) -> BinaryIO:
+    """The lock file of a directory, held; raises InputError where another process holds it."""
+    import fcntl
+
+    path = directory / ".lock"
+    while True:
+        directory.mkdir(parents=True, exist_ok=True)
+        try:
+            file = path.open("wb")
+        except FileNotFoundError:
+            continue  # the run before removed its folder just now
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            file.close()
+            raise InputError(f"Another run writes to {directory}.", "Wait for it, or give another --out.") from None
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                return file
+        # locked, but the run before had removed the name: the next run would lock another file
+        file.close()

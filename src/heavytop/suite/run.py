@@ -1,4 +1,4 @@
-"""Runs a plan and gathers its rows in the plan's order."""
+"""Runs a plan: every row to disk as it is finished, the laws drawn from them at the end."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ def run(
     workers: int = 1,
     scheduler: str | None = None,
 ) -> list[Row]:
-    """The rows of all tasks, in order, then the laws drawn from them.
+    """Every row of the tasks into the checkpoint; returns only the laws drawn from them.
 
     Rows that the checkpoint holds are not measured again.  ``progress`` hears of each task as it is done.
     """
-    for index in checkpoint.done:
+    for index in checkpoint.offsets:
         progress(tasks[index])
-    for index, row in rows(tasks, workers, scheduler, checkpoint.done):
+    for index, row in rows(tasks, min(workers, len(tasks)), scheduler, checkpoint.offsets, checkpoint.saved):
         checkpoint.add(index, row)
         progress(tasks[index])
-    measured = [checkpoint.done[index] for index in range(len(tasks))]
-    if any(row.measure == "homoclinic" for row in measured):
-        from heavytop.suite.measurements.laws import break_away_law
+    homoclinic = [index for index, task in enumerate(tasks) if task.kind == "homoclinic"]
+    if not homoclinic:
+        return []
+    from heavytop.suite.measurements.laws import break_away_law
 
-        rates = {task.name: task.case.rate for task in tasks if task.case and task.kind == "homoclinic"}
-        measured += break_away_law(measured, rates)
-    return measured
+    rates = {tasks[index].name: case.rate for index in homoclinic if (case := tasks[index].case)}
+    return break_away_law(list(checkpoint.rows(homoclinic)), rates)

@@ -21,6 +21,7 @@ from typing import Any
 
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.records import Row
+from heavytop.suite.checkpoint import Saved
 from heavytop.suite.task import Task
 
 _AHEAD = 4
@@ -42,22 +43,30 @@ def versions() -> Versions:
 
 
 def rows(
-    tasks: Sequence[Task], workers: int, scheduler: str | None, done: Container[int] = ()
+    tasks: Sequence[Task],
+    workers: int,
+    scheduler: str | None,
+    done: Container[int] = (),
+    saved: Callable[[int], Saved] | None = None,
 ) -> Iterator[tuple[int, Row]]:
     """(index of the task, its row) as they finish, long ones started first; without those in ``done``.
+
+    saved: for the index of a task, where its row keeps its place; None where it keeps none, as on a cluster, which may
+    have no disk in common with this machine.
 
     A task whose worker died is run again, three times in all.
     Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
     InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
     """
     queue = _longest_first(tasks, done)
+    saved = saved or (lambda index: Saved())
     if scheduler is not None:
         yield from _on_cluster(tasks, queue, scheduler)
     elif workers > 1:
-        yield from _in_processes(tasks, queue, workers)
+        yield from _in_processes(tasks, queue, workers, saved)
     else:
         for index in queue:
-            yield index, _measure(tasks[index])
+            yield index, _measure(tasks[index], saved(index))
 
 
 def _longest_first(tasks: Sequence[Task], done: Container[int]) -> deque[int]:
@@ -65,12 +74,14 @@ def _longest_first(tasks: Sequence[Task], done: Container[int]) -> deque[int]:
     return deque(sorted(costs, key=lambda index: -costs[index]))
 
 
-def _in_processes(tasks: Sequence[Task], queue: deque[int], workers: int) -> Iterator[tuple[int, Row]]:
+def _in_processes(
+    tasks: Sequence[Task], queue: deque[int], workers: int, saved: Callable[[int], Saved]
+) -> Iterator[tuple[int, Row]]:
     deaths: Counter[int] = Counter()
     under_way: UnderWay = {}
 
     def submit(index: int) -> Future[Row]:
-        return pool.submit(_measure, tasks[index])
+        return pool.submit(_measure, tasks[index], saved(index))
 
     def at_once() -> int:
         # any task that was under way when a worker died may be to blame: fewer and fewer at once tell which
@@ -151,10 +162,10 @@ def _windowed(
             del under_way[future]
 
 
-def _measure(task: Task) -> Row:
+def _measure(task: Task, saved: Saved) -> Row:
     from heavytop.suite.measurements import measure
 
-    return measure(task)
+    return measure(task, saved)
 
 
 def _measure_as(expected: Versions, task: Task) -> Row:
@@ -163,7 +174,7 @@ def _measure_as(expected: Versions, task: Task) -> Row:
     other = [f"{name} {here[name]} instead of {expected[name]}" for name in expected if here[name] != expected[name]]
     if other:
         raise InputError(f"A worker has {', '.join(other)}.", _SAME)
-    return _measure(task)
+    return _measure(task, Saved())
 
 
 def _leave_interrupts_to_the_parent() -> None:

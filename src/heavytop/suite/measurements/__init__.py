@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from heavytop.records import Row
+from heavytop.suite.checkpoint import Saved
 from heavytop.suite.measurements import claimed, computed, work_precision
 from heavytop.suite.task import Task
 
@@ -13,12 +14,20 @@ _MEASURES: dict[str, Callable[[Task], Row]] = {
     "claim_model": claimed.claim_model,
     "claim_evaluation": claimed.claim_evaluation,
     "homoclinic": computed.homoclinic,
-    "drift": computed.drift,
     "local_error": computed.local_error,
     "work_precision": work_precision.work_precision,
 }
+_LONG: dict[str, Callable[[Task, Saved], Row]] = {
+    "drift": computed.drift,
+}
+"""Measurements that keep their place on the way."""
 
 
-def measure(task: Task) -> Row:
-    """The row of ``task``; a run that fails is a row with its outcome."""
+def measure(task: Task, saved: Saved | None = None) -> Row:
+    """The row of ``task``; a run that fails is a row with its outcome.
+
+    saved: the place of an earlier, interrupted measurement of this row, and where this one keeps its own.
+    """
+    if task.kind in _LONG:
+        return _LONG[task.kind](task, saved or Saved())
     return _MEASURES[task.kind](task)

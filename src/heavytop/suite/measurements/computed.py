@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 from heavytop.errors import OutOfReach
 from heavytop.integrate.taylor import propagate
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
 from heavytop.measure.drift import Drift
 from heavytop.measure.known import certified, known_motion
 from heavytop.measure.local_error import LocalError
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.solution_error import SolutionError
-from heavytop.precision import decimal_text, exact, number, parse
+from heavytop.precision import Precision, decimal_text, exact, number, parse
 from heavytop.records import Metric, Row, Series
 from heavytop.suite.cases import Case
+from heavytop.suite.checkpoint import Saved
 from heavytop.suite.measurements.luck import Remembered, drift_bands, homoclinic_bands
 from heavytop.suite.measurements.shared import case_of, integrator_of, time_metric, time_text
 from heavytop.suite.task import Task
@@ -78,25 +79,19 @@ def _as_tuples(case: Any) -> Parameters:
     return Parameters(tuple(given.inertia), tuple(given.moment), Fraction(given.rotor))
 
 
-def drift(task: Task) -> Row:
+def drift(task: Task, saved: Saved) -> Row:
     case, precision = case_of(task), parse(task.precision)
-    integrate = integrator_of(task).propagate
     problem = Problem.of(case.top, case.start, precision, case.system)
     # samples are taken at the rounded times, so the series must be asked for by these
     keep = [exact(number(time, precision)) for time in task.keep]
     drift = Drift(problem, holding(case.top, case.start, case.system), keep)
     known = known_motion(problem, exact(number(task.times[-1], precision)))
     if isinstance(known, str):
-        run = integrate(case.top, case.start, task.times, precision, system=case.system, observer=drift)
+        run = streamed(task, precision, {"drift": drift}, saved)
         against = f"its own first integrals; no reference: {known}"
         return computed_row(task, run, drift_bands(task, run, drift.metrics()), drift.series(time_text), against)
     error = SolutionError(problem, known.solution, keep)
-
-    def observe(time: Fraction, state: Any) -> None:
-        drift(time, state)
-        error(time, state)
-
-    run = integrate(case.top, case.start, task.times, precision, system=case.system, observer=observe)
+    run = streamed(task, precision, {"drift": drift, "error": error}, saved)
     series = drift.series(time_text) | error.series(time_text)
     metrics = drift_bands(task, run, drift.metrics() | error.metrics())
     return computed_row(task, run, metrics, series, known.text)
@@ -110,6 +105,35 @@ def local_error(task: Task) -> Row:
     for time, step in zip(run.times, steps, strict=True):
         error(time, step)
     return computed_row(task, run, error.metrics(), {}, "known: validated enclosure of each step from where it starts")
+
+
+def streamed(
+    task: Task, precision: Precision, measures: Mapping[str, Drift | SolutionError], saved: Saved
+) -> Trajectory:
+    """The run of a task through all measures, from the place that was saved; it saves its own on the way."""
+    case, before = case_of(task), saved.load()
+    if before is not None:
+        for name, each in measures.items():
+            each.restore(before["measures"][name])
+
+    def observe(time: Fraction, state: Any) -> None:
+        for each in measures.values():
+            each(time, state)
+
+    def mark(place: Place) -> None:
+        if saved.due():
+            content = {name: each.content() for name, each in measures.items()}
+            saved.save({"run": place.content(precision), "measures": content})
+
+    going_on: dict[str, Any] = {}
+    if task.integrator == "heyoka":
+        place = None if before is None else Place.of(before["run"], precision)
+        going_on = {"place": place, "mark": mark}
+    integrate = integrator_of(task).propagate
+    run: Trajectory = integrate(
+        case.top, case.start, task.times, precision, system=case.system, observer=observe, **going_on
+    )
+    return run
 
 
 def computed_row(

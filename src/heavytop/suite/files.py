@@ -1,0 +1,48 @@
+"""Files written whole or not at all, and lines that carry their checksum."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from heavytop.errors import InputError
+
+
+def line(content: bytes) -> bytes:
+    """``content``, which holds no line break, behind its SHA-256."""
+    return hashlib.sha256(content).hexdigest().encode() + b" " + content + b"\n"
+
+
+def verified(whole: bytes) -> bytes | None:
+    """The content of a line without its line break; None where it was damaged."""
+    digest, _, content = whole.partition(b" ")
+    return content if hashlib.sha256(content).hexdigest().encode() == digest else None
+
+
+def replace(path: Path, content: bytes | Iterable[bytes]) -> str:
+    """Write a file whole or not at all, or piece by piece; returns its SHA-256.
+
+    Raises InputError where it cannot be written; then nothing is left behind.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    digest = hashlib.sha256()
+    try:
+        with temporary.open("wb") as file:
+            for piece in [content] if isinstance(content, bytes) else content:
+                file.write(piece)
+                digest.update(piece)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be written: {error.strerror}.",
+            "Make space, or give another --out; what a run finished is kept for --resume.",
+        ) from None
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+    return digest.hexdigest()

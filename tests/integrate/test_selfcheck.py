@@ -1,0 +1,100 @@
+"""The known first step of a compiled integrator: known from elsewhere too, and met only by healthy code."""
+
+from fractions import Fraction
+
+import numpy
+import pytest
+
+from heavytop.errors import Contradiction
+from heavytop.exact.validated import Validated
+from heavytop.integrate import taylor
+from heavytop.integrate.selfcheck import _GAMMA, _OMEGA, _PARAMETERS, check, derivatives
+from heavytop.integrate.taylor import compiled
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State
+
+
+def test_the_known_derivatives_are_those_of_the_enclosed_motion() -> None:
+    """The enclosure has a recurrence of its own, in balls."""
+    top, start = HeavyTop(_PARAMETERS.inertia, 1, _PARAMETERS.moment), State(_OMEGA, _GAMMA)
+    series = Validated(top, start, HEAVY_TOP).series(Fraction(0), 12, 200)
+    factorial = 1
+    for n, known in enumerate(derivatives(HEAVY_TOP, False, 12)):
+        factorial *= n or 1
+        for component, value in zip(series, known, strict=True):
+            assert (component[n] * factorial).contains(value)
+
+
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+def test_every_kind_of_integrator_passes_and_is_at_time_0_again(system) -> None:
+    for precision in (DOUBLE, EXTENDED, QUAD, real(24), real(150)):
+        engine = compiled(system, precision, attitude=True).engine
+        assert engine.time == 0
+        assert not numpy.any(engine.state != 0)
+    for options in (
+        {"high_accuracy": True},
+        {"compact_mode": True},
+        {"tolerance": Fraction(1, 1000)},
+        {"tolerance": Fraction(1, 10**12), "lanes": 4},
+    ):
+        compiled(system, DOUBLE, **options)
+
+
+class Faulty:
+    """A healthy integrator of which one thing is off by one part in 10^12."""
+
+    def __init__(self, engine, what: str) -> None:
+        self.__dict__.update(engine=engine, what=what)
+
+    def __getattr__(self, name: str):
+        value = getattr(self.engine, name)
+        if name == "tc" and self.what.startswith("coefficient"):
+            value = value.copy()
+            value[4, int(self.what.split()[1])] *= 1 + 1e-12
+        elif name == self.what == "last_h":
+            return value * (1 + 1e-11)
+        return value
+
+    def __setattr__(self, name: str, value) -> None:
+        setattr(self.engine, name, value)
+
+    def update_d_output(self, time):
+        return self.engine.update_d_output(time) * (1 + 1e-12 * (self.what == "dense"))
+
+    def step(self, **options):
+        if self.what == "nan":
+            self.engine.pars[0] = float("nan")
+        return self.engine.step(**options)
+
+
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [
+        ("coefficient 1", "Taylor coefficient 1"),
+        ("coefficient 20", "Taylor coefficient 20"),
+        ("last_h", "length of the step"),
+        ("dense", "dense output"),
+        ("nan", "Taylor coefficient"),
+    ],
+)
+def test_a_part_in_a_million_million_is_found(what: str, message: str) -> None:
+    engine = compiled(HEAVY_TOP, DOUBLE).engine
+    check(Faulty(engine, "nothing"), HEAVY_TOP, DOUBLE)
+    with pytest.raises(Contradiction, match=message):
+        check(Faulty(engine, what), HEAVY_TOP, DOUBLE)
+    check(engine, HEAVY_TOP, DOUBLE)
+
+
+def test_a_wrong_field_is_refused_before_its_first_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    healthy = taylor.expressions
+
+    def biased(*args):
+        (first, rate), *rest = healthy(*args)
+        return [(first, rate * (1 + 1e-13)), *rest]
+
+    monkeypatch.setattr(taylor, "expressions", biased)
+    monkeypatch.setattr(taylor, "_compiled", {})
+    with pytest.raises(Contradiction, match="Taylor coefficient 1"):
+        compiled(HEAVY_TOP, DOUBLE)
+    assert not taylor._compiled

@@ -1,0 +1,81 @@
+"""Kill a run again and again, go on, and compare: ``python tests/suite/kills.py PLAN KILLS [WORKERS]``."""
+
+from __future__ import annotations
+
+import json
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+TINY = """name = "kills"
+[[measure]]
+kind = "drift"
+cases = ["euler"]
+runs = [{ precision = "double", horizon = "50", samples = 200 }, { precision = "quad", horizon = "2", samples = 40 }]
+[[measure]]
+kind = "homoclinic"
+cases = ["delone"]
+precisions = ["double", "quad"]
+directions = ["forward"]
+samples = 1
+"""
+
+
+def start(plan: str, out: Path, workers: int, *options: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "heavytop", "run", "--plan", plan, "--out", str(out), "--workers", str(workers)]
+    return subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+
+
+def finish(process: subprocess.Popen[bytes]) -> None:
+    _, errors = process.communicate(timeout=600)
+    assert process.returncode == 0, errors.decode()
+
+
+def comparable(folder: Path) -> bytes:
+    """The report but for timings and the environment, in its own order."""
+    assert {path.name for path in folder.iterdir()} == {"report.json", "report.json.sha256", "report.html"}
+    report = json.loads((folder / "report.json").read_bytes())
+    del report["environment"]
+    for row in report["rows"]:
+        row["seconds"] = {}
+    return json.dumps(report).encode()
+
+
+def kill_and_resume(plan: str, kills: int, workers: int = 1, seed: int = 1) -> list[tuple[int, bool]]:
+    """(kills that a run lived through, whether its report is that of a run left alone), for each run."""
+    rng = random.Random(seed)
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        left_alone = Path(folder) / "whole"
+        before = time.monotonic()
+        finish(start(plan, left_alone, workers))
+        span = time.monotonic() - before
+        whole = comparable(left_alone)
+        while (missing := kills - sum(number for number, _ in found)) > 0:
+            out = Path(folder) / f"run{len(found)}"
+            killed = 0
+            while killed < missing:
+                process = start(plan, out, workers, "--resume", "--save-every", "0.02")
+                try:
+                    _, errors = process.communicate(timeout=rng.uniform(0, 1.1 * span))
+                    assert process.returncode == 0, errors.decode()
+                    break
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.communicate()
+                    killed += 1
+            else:
+                finish(start(plan, out, workers, "--resume"))
+            if killed:
+                found.append((killed, comparable(out) == whole))
+                print(*found[-1], flush=True)
+    return found
+
+
+if __name__ == "__main__":
+    runs = kill_and_resume(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 1)
+    killed = sum(number for number, _ in runs)
+    print(f"{killed} kills in {len(runs)} runs: {sum(same for _, same in runs)} of {len(runs)} reports identical")

@@ -1,0 +1,262 @@
+"""What a run keeps on disk: taken up again to the same bytes, refused where it does not belong, never half written."""
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.records import SCHEMA, Metric, Report, Row
+from heavytop.report import store
+from heavytop.suite.checkpoint import Checkpoint, Saved, _locked
+from heavytop.suite.measurements import measure
+from heavytop.suite.plan import expand, load
+
+IDENTITY = {"plan name": "tiny", "heavytop": "0.1.0"}
+PLAN = """name = "tiny"
+[[measure]]
+kind = "drift"
+cases = ["euler", "lagrange"]
+runs = [{ precision = "double", horizon = "60", samples = 60 }, { precision = "quad", horizon = "2", samples = 12 }]
+[[measure]]
+kind = "drift"
+cases = ["kovalevskaya", "gyrostat"]
+runs = [{ precision = "extended", horizon = "4", samples = 12 }]
+"""
+
+
+def row(name: str) -> Row:
+    return Row(name, "heavy_top", "none", "double", 53, "success", "1", "1", 0, True, {"e": Metric("1e-3", -3.0)})
+
+
+def checkpoint(folder: Path, identity: dict[str, str] | None = None) -> Checkpoint:
+    return Checkpoint(folder, identity or IDENTITY, lambda: None)
+
+
+def killed(folder: Path, rows: int) -> Path:
+    """The file of a run that was killed behind that many rows."""
+    with suppress(KeyboardInterrupt), checkpoint(folder) as kept:
+        for index in range(rows):
+            kept.add(index, row(f"case {index}"))
+        raise KeyboardInterrupt
+    return folder / "rows.jsonl"
+
+
+class Notes(Saved):
+    """Saved places in memory, as text."""
+
+    def __init__(self, before: bytes | None, every: int) -> None:
+        super().__init__()
+        self.before, self.every_sample, self.count, self.notes = before, every, 0, []
+
+    def load(self):
+        return None if self.before is None else msgspec.json.decode(self.before)
+
+    def due(self) -> bool:
+        self.count += 1
+        return self.count % self.every_sample == 0
+
+    def save(self, content) -> None:
+        del content["run"]["seconds"]
+        self.notes.append(msgspec.json.encode(content))
+
+
+@pytest.fixture(scope="module")
+def tasks(tmp_path_factory: pytest.TempPathFactory):
+    file = tmp_path_factory.mktemp("plan") / "tiny.toml"
+    file.write_text(PLAN)
+    return expand(load(str(file))[0])
+
+
+@pytest.mark.parametrize("index", range(6))
+def test_a_row_taken_up_anywhere_ends_with_the_same_bytes(tasks, index: int) -> None:
+    def measured(notes: Notes) -> bytes:
+        found = measure(tasks[index], notes)
+        found.seconds = {}
+        return msgspec.json.encode(found)
+
+    every = len(tasks[index].times) // 2
+    whole = Notes(None, every)
+    result = measured(whole)
+    assert len(whole.notes) == 2
+    for place, note in enumerate(whole.notes):
+        content = msgspec.json.decode(note)
+        content["run"]["seconds"] = 1.0
+        again = Notes(msgspec.json.encode(content), every)
+        assert measured(again) == result
+        # and what it saves on its own way is the same to the last digit of every ball
+        assert again.notes == whole.notes[place + 1 :]
+
+
+def test_a_place_reached_with_other_flags_is_refused_by_name(tasks) -> None:
+    whole = Notes(None, 30)
+    measure(tasks[0], whole)
+    content = msgspec.json.decode(whole.notes[0])
+    content["run"] |= {"seconds": 1.0, "flags": content["run"]["flags"] | {"high_accuracy": "true"}}
+    with pytest.raises(InputError, match=r"high_accuracy = true \(now false\)"):
+        measure(tasks[0], Notes(msgspec.json.encode(content), 30))
+
+
+def test_what_was_saved_comes_back_and_what_was_damaged_does_not(tmp_path: Path) -> None:
+    saved = Saved(tmp_path / "row-0.partial", "this plan", 0)
+    assert saved.load() is None
+    saved.save({"x": ["1e-30"], "n": 2**70})
+    assert saved.load() == {"x": ["1e-30"], "n": 2**70}
+    assert Saved(saved.path, "another plan").load() is None
+    whole = saved.path.read_bytes()
+    for damaged in (whole[:-20], whole.replace(b"1e-30", b"1e-31"), b""):
+        saved.path.write_bytes(damaged)
+        assert saved.load() is None
+    assert [path.name for path in tmp_path.iterdir()] == ["row-0.partial"]
+    assert not Saved().due()
+
+
+def test_rows_come_back_but_for_those_that_were_cut_short_or_damaged(tmp_path: Path) -> None:
+    file = killed(tmp_path / "out", 3)
+    lines = file.read_bytes().splitlines(keepends=True)
+    lines[2] = lines[2].replace(b"case 1", b"case 7")
+    file.write_bytes(b"".join(lines) + lines[1][:40])
+    with checkpoint(tmp_path / "out") as kept:
+        assert sorted(kept.offsets) == [0, 2]
+        kept.add(1, row("case 1"))
+        assert [each.case for each in kept.rows(range(3))] == ["case 0", "case 1", "case 2"]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("changed", [{"heavytop": "0.2.0"}, {"plan name": "other"}, {"simd": "8"}])
+def test_a_checkpoint_of_another_run_is_refused_with_what_differs(tmp_path: Path, changed: dict[str, str]) -> None:
+    file = killed(tmp_path / "out", 2)
+    before = file.read_bytes()
+    (key, value), = changed.items()  # fmt: skip
+    with (
+        pytest.raises(InputError, match=f"{key} is {IDENTITY.get(key)} there and {value} now"),
+        checkpoint(tmp_path / "out", IDENTITY | changed),
+    ):
+        pass
+    assert file.read_bytes() == before
+    assert not (tmp_path / "out" / ".lock").exists()
+
+
+def test_a_second_run_into_one_folder_is_refused(tmp_path: Path) -> None:
+    with checkpoint(tmp_path / "out") as kept:
+        kept.add(0, row("first"))
+        with pytest.raises(InputError, match="Another run writes"), checkpoint(tmp_path / "out"):
+            pass
+        kept.add(1, row("second"))
+
+
+def test_a_lock_whose_name_is_gone_locks_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run opens the lock file just before another, at its end, removes the name."""
+    import fcntl
+
+    names = []
+
+    def slow(file: object, how: int) -> None:
+        names.append(file)
+        if len(names) == 1:
+            (tmp_path / ".lock").unlink()
+            other = _locked(tmp_path)
+            names.append(other)
+            other.close()
+        real(file, how)
+
+    real = fcntl.flock
+    monkeypatch.setattr(fcntl, "flock", slow)
+    with _locked(tmp_path) as file:
+        assert os.path.samestat(os.fstat(file.fileno()), (tmp_path / ".lock").stat())
+        with pytest.raises(InputError, match="Another run writes"):
+            _locked(tmp_path)
+
+
+def test_a_streamed_report_is_the_one_written_at_once_a_row_a_line(tmp_path: Path) -> None:
+    rows = [row(f'a "quoted"\n{{line}} {index}') for index in range(3)]
+    for some in ([], rows[:1], rows):
+        report = Report(SCHEMA, {"name": "x"}, {"formats": {}, "list": []}, some)
+        path = store.write(msgspec.structs.replace(report, rows=[]), tmp_path, iter(some))
+        assert json.loads(path.read_bytes()) == msgspec.to_builtins(report)
+        assert path.read_bytes().count(b"\n") == 1 + max(1, len(some)) + 1
+        assert path.read_bytes() == store.write(report, tmp_path).read_bytes()
+        assert store.read(tmp_path) == report
+
+
+def test_a_kill_at_every_call_that_changes_the_disk_changes_nothing(tmp_path: Path) -> None:
+    plan = tmp_path / "tiny.toml"
+    plan.write_text(PLAN.split("[[measure]]\nkind")[0] + '[[measure]]\nkind = "audit"\n'
+                    'claims = ["ershkov-partial"]\nsystems = ["heavy_top", "gyrostat"]\n')  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, str(Path(__file__).with_name("killed_everywhere.py")), str(plan), str(tmp_path / "out")],
+        capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 15
+
+
+def command(plan: Path, *options: str) -> list[str]:
+    return [sys.executable, "-m", "heavytop", "run", "--plan", str(plan), "--workers", "1", *options]
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("quick")
+    (folder / "quick.toml").write_text(
+        'name = "quick"\n[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = ['
+        '{ precision = "double", horizon = "20", samples = 40 }, { precision = "quad", horizon = "2", samples = 40 }]\n'
+    )
+    subprocess.run(command(folder / "quick.toml", "--out", str(folder / "whole")), check=True, capture_output=True)
+    return folder
+
+
+def resumed(quick: Path, out: Path) -> subprocess.CompletedProcess[str]:
+    resume = command(quick / "quick.toml", "--out", str(out), "--resume")
+    return subprocess.run(resume, capture_output=True, text=True, check=False)
+
+
+def rows_of(folder: Path) -> list[dict]:
+    return [each | {"seconds": None} for each in json.loads((folder / "report.json").read_bytes())["rows"]]
+
+
+@pytest.mark.parametrize("limit", [300, 5000])
+def test_a_full_disk_is_said_with_exit_2_and_the_run_goes_on_once_there_is_space(quick: Path, limit: int) -> None:
+    def small_files() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    out = quick / f"full{limit}"
+    full = subprocess.run(
+        command(quick / "quick.toml", "--out", str(out), "--save-every", "0"),
+        capture_output=True, text=True, preexec_fn=small_files, check=False,
+    )  # fmt: skip
+    assert full.returncode == 2
+    assert "cannot be written" in full.stderr
+    assert "Traceback" not in full.stderr
+    assert not (out / "report.json").exists()
+    assert resumed(quick, out).returncode == 0
+    assert rows_of(out) == rows_of(quick / "whole")
+
+
+def test_sigterm_ends_a_run_with_exit_143_and_it_goes_on(quick: Path) -> None:
+    out = quick / "terminated"
+    process = subprocess.Popen(
+        command(quick / "quick.toml", "--out", str(out), "--save-every", "0"),
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while process.poll() is None and not list(out.glob("row-*.partial")):
+        time.sleep(0.001)
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 143
+    assert "--resume goes on" in errors
+    assert "Traceback" not in errors
+    assert (out / "rows.jsonl").exists()
+    assert resumed(quick, out).returncode == 0
+    assert rows_of(out) == rows_of(quick / "whole")
+    again = resumed(quick, out)
+    assert again.returncode == 0
+    assert "was finished already" in again.stdout

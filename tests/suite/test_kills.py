@@ -1,0 +1,13 @@
+"""A run that is killed goes on to the report of a run left alone."""
+
+from pathlib import Path
+
+from kills import TINY, kill_and_resume
+
+
+def test_ten_kills_change_nothing(tmp_path: Path) -> None:
+    plan = tmp_path / "kills.toml"
+    plan.write_text(TINY)
+    runs = kill_and_resume(str(plan), 10)
+    assert sum(killed for killed, _ in runs) == 10
+    assert all(same for _, same in runs)
