@@ -45,7 +45,7 @@ def test_the_lead_is_over_the_best_peer_that_gets_there() -> None:
     assert (lead.case, lead.peer) == ("top/T=9", "cyrk:DOP853")
     assert lead.ours == pytest.approx(2)
     assert lead.ratio == pytest.approx(4.5)
-    expected = "is 4.5 times faster than the best peer that gets there, cyrk:DOP853 (2 s against 9 s)"
+    expected = "is 4.5 times faster than the best peer that gets there, cyrk:DOP853 (2 s against 9 s; a motion in lanes takes 1 ms)"
     assert expected in lead.text
 
 
@@ -61,6 +61,18 @@ def test_the_lead_is_over_the_best_peer_that_gets_there() -> None:
 def test_a_lead_that_is_none_is_not_claimed(rows: list, words: str) -> None:
     (lead,) = leads(rows)
     assert words in lead.text
+
+
+def test_formats_beyond_extended_are_compared_where_double_ends() -> None:
+    wide = [row("mpmath:odefun tolerance=eps", -33, 100.0, precision="real:113")]
+    wide += [row("heyoka tolerance=eps", -33, s, precision=name) for name, s in (("quad", 4.0), ("real:113", 2.0))]
+    both = leads(ALL + wide)
+    assert [(lead.log10, lead.name, lead.peer) for lead in both] == [
+        (-10, "heyoka double", "cyrk:DOP853"),
+        (-30, "heyoka real:113", "mpmath:odefun real:113"),
+    ]
+    assert both[1].ratio == pytest.approx(50)
+    assert leads(OURS + wide) == both[1:]
 
 
 def test_cases_formats_and_failures_are_kept_apart() -> None:
