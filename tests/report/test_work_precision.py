@@ -45,8 +45,8 @@ def test_the_lead_is_over_the_best_peer_that_gets_there() -> None:
     assert (lead.case, lead.peer) == ("top/T=9", "cyrk:DOP853")
     assert lead.ours == pytest.approx(2)
     assert lead.ratio == pytest.approx(4.5)
-    expected = "is 4.5 times faster than the best peer that gets there, cyrk:DOP853 (2 s against 9 s; a motion in lanes takes 1 ms)"
-    assert expected in lead.text
+    assert "is 4.5 times faster than the best peer that gets there, cyrk:DOP853" in lead.text
+    assert lead.text.endswith("(2 s against 9 s; a motion in lanes takes 1 ms)")
 
 
 @pytest.mark.parametrize(
