@@ -2,10 +2,11 @@
 
 import pytest
 
+from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Metric, Report, Row, Series
 from heavytop.report.text import summary
 from heavytop.report.work_precision import Line, Point, leads, panels
-from heavytop.report.work_precision_figure import growth_figure, svg, work_precision_figure
+from heavytop.report.work_precision_figure import draw_work_precision, growth_figure, svg, work_precision_figure
 
 
 def row(integrator: str, log10: float | None, seconds: float, *, case="top/T=9", precision="double", outcome="success"):
@@ -121,6 +122,16 @@ def test_the_picture_shows_every_line_and_each_failure_as_a_cross_on_the_edge() 
     assert "4.5 × as fast as cyrk:DOP853" in axes.get_title()
     assert svg(figure) == svg(work_precision_figure(report))
     assert svg(growth_figure(report)).count("<svg") == 1
+
+
+def test_the_pictures_are_files(tmp_path) -> None:
+    growth = [row(f"{name} tolerance=1e-5", -5, 1.0) for name in ("heyoka", "cyrk:DOP853")] + SPLITTING
+    files = draw_work_precision(Report(SCHEMA, {"name": "peers"}, {}, growth), tmp_path / "new")
+    assert [file.name for file in files] == ["work-precision.svg", "work-precision.png", "growth.svg", "growth.png"]
+    assert all(file.stat().st_size > 5000 for file in files)
+    with pytest.raises(InputError, match="no row of work against precision"):
+        draw_work_precision(Report(SCHEMA, {"name": "x"}, {}, []), tmp_path / "none")
+    assert not (tmp_path / "none").exists()
 
 
 def test_without_such_rows_there_is_no_picture() -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+from heavytop.errors import InputError
 from heavytop.records import Report, Row
 from heavytop.report.work_precision import Line, leads, panels
 
@@ -25,6 +27,24 @@ _DASHES = ("-", "--", ":", "-.")
 _CROSS: dict[str, Any] = {"linestyle": "", "marker": "x", "markersize": 9, "markeredgewidth": 2}
 _GROWTH = ("heyoka", "cyrk:DOP853", "splitting:4")
 _GROWTH_LOG10 = -5.0
+
+
+def draw_work_precision(report: Report, directory: Path) -> list[Path]:
+    """The files written into ``directory``: work-precision and growth, as SVG and as PNG.
+
+    Raises InputError for a report without a row of work against precision.
+    """
+    figures = {"work-precision": work_precision_figure(report), "growth": growth_figure(report)}
+    if figures["work-precision"] is None:
+        raise InputError("The report has no row of work against precision.", "`heavytop run --plan peers` makes them.")
+    directory.mkdir(parents=True, exist_ok=True)
+    files = []
+    for name, figure in figures.items():
+        if figure is not None:
+            files += [directory / f"{name}.svg", directory / f"{name}.png"]
+            files[-2].write_text(svg(figure), "utf-8")
+            figure.savefig(files[-1], dpi=110, metadata={"Software": "heavytop"})
+    return files
 
 
 def looks(lines: Sequence[Line]) -> dict[str, dict[str, Any]]:
