@@ -2,10 +2,11 @@
 
 import pytest
 
+from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Metric, Report, Row, Series
 from heavytop.report.text import summary
 from heavytop.report.work_precision import Line, Point, leads, panels
-from heavytop.report.work_precision_figure import growth_figure, svg, work_precision_figure
+from heavytop.report.work_precision_figure import draw_work_precision, growth_figure, svg, work_precision_figure
 
 
 def row(integrator: str, log10: float | None, seconds: float, *, case="top/T=9", precision="double", outcome="success"):
@@ -45,8 +46,8 @@ def test_the_lead_is_over_the_best_peer_that_gets_there() -> None:
     assert (lead.case, lead.peer) == ("top/T=9", "cyrk:DOP853")
     assert lead.ours == pytest.approx(2)
     assert lead.ratio == pytest.approx(4.5)
-    expected = "is 4.5 times faster than the best peer that gets there, cyrk:DOP853 (2 s against 9 s)"
-    assert expected in lead.text
+    assert "is 4.5 times faster than the best peer that gets there, cyrk:DOP853" in lead.text
+    assert lead.text.endswith("(2 s against 9 s; a motion in lanes takes 1 ms)")
 
 
 @pytest.mark.parametrize(
@@ -61,6 +62,18 @@ def test_the_lead_is_over_the_best_peer_that_gets_there() -> None:
 def test_a_lead_that_is_none_is_not_claimed(rows: list, words: str) -> None:
     (lead,) = leads(rows)
     assert words in lead.text
+
+
+def test_formats_beyond_extended_are_compared_where_double_ends() -> None:
+    wide = [row("mpmath:odefun tolerance=eps", -33, 100.0, precision="real:113")]
+    wide += [row("heyoka tolerance=eps", -33, s, precision=name) for name, s in (("quad", 4.0), ("real:113", 2.0))]
+    both = leads(ALL + wide)
+    assert [(lead.log10, lead.name, lead.peer) for lead in both] == [
+        (-10, "heyoka double", "cyrk:DOP853"),
+        (-30, "heyoka real:113", "mpmath:odefun real:113"),
+    ]
+    assert both[1].ratio == pytest.approx(50)
+    assert leads(OURS + wide) == both[1:]
 
 
 def test_cases_formats_and_failures_are_kept_apart() -> None:
@@ -109,6 +122,16 @@ def test_the_picture_shows_every_line_and_each_failure_as_a_cross_on_the_edge() 
     assert "4.5 × as fast as cyrk:DOP853" in axes.get_title()
     assert svg(figure) == svg(work_precision_figure(report))
     assert svg(growth_figure(report)).count("<svg") == 1
+
+
+def test_the_pictures_are_files(tmp_path) -> None:
+    growth = [row(f"{name} tolerance=1e-5", -5, 1.0) for name in ("heyoka", "cyrk:DOP853")] + SPLITTING
+    files = draw_work_precision(Report(SCHEMA, {"name": "peers"}, {}, growth), tmp_path / "new")
+    assert [file.name for file in files] == ["work-precision.svg", "work-precision.png", "growth.svg", "growth.png"]
+    assert all(file.stat().st_size > 5000 for file in files)
+    with pytest.raises(InputError, match="no row of work against precision"):
+        draw_work_precision(Report(SCHEMA, {"name": "x"}, {}, []), tmp_path / "none")
+    assert not (tmp_path / "none").exists()
 
 
 def test_without_such_rows_there_is_no_picture() -> None:

@@ -35,15 +35,26 @@ def audit(
 
 
 @command
-def figures(out: Annotated[Path, typer.Option(help="Folder for the pictures.")]) -> int:
+def figures(
+    out: Annotated[Path, typer.Option(help="Folder for the pictures.")],
+    report: Annotated[Path | None, typer.Option(help="Draw work against precision of this report instead.")] = None,
+) -> int:
     """Draw Figs 2-8 of the paper, and the same with the true motion beside the claim, as SVG and PNG."""
-    from heavytop.report.figures import draw_figures
-
     require_new(out)
     try:
-        files = draw_figures(out)
+        for file in _drawn(out, report):
+            print(file)
     except OSError as error:
         raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None
-    for file in files:
-        print(file)
     return 0
+
+
+def _drawn(out: Path, report: Path | None) -> list[Path]:
+    if report is None:
+        from heavytop.report.figures import draw_figures
+
+        return draw_figures(out)
+    from heavytop.report import store
+    from heavytop.report.work_precision_figure import draw_work_precision
+
+    return draw_work_precision(store.read(report), out)

@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from heavytop.records import Row
 
 OURS = "heyoka"
-TARGET = -10.0
-"""log10 of the error at which integrators are compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,16 +61,18 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Lead:
-    """How heyoka in double compares with the best peer that reaches the error, on one case.
+    """How heyoka compares with the best peer that reaches an error, on one case.
 
-    ours, theirs: seconds, None where none reaches it.  peer: the best one.
+    log10: of the error.  ours, theirs, lanes: seconds, None where none reaches it.  name, peer: who took them.
     """
 
     case: str
     log10: float
+    name: str
     ours: float | None
     peer: str
     theirs: float | None
+    lanes: float | None = None
 
     @property
     def ratio(self) -> float | None:
@@ -82,14 +82,15 @@ class Lead:
     @property
     def text(self) -> str:
         """The lead in a sentence."""
-        goal = f"{self.case}: heyoka double at error 1e{self.log10:g}"
+        goal = f"{self.case}: {self.name} at error 1e{self.log10:g}"
         if self.ours is None:
             return f"{goal}: not reached"
         if self.ratio is None or self.theirs is None:
             return f"{goal} takes {_time(self.ours)}; no peer gets there"
         speed = f"{self.ratio:.1f} times faster" if self.ratio >= 1 else f"{1 / self.ratio:.1f} times slower"
         pair = f"{_time(self.ours)} against {_time(self.theirs)}"
-        return f"{goal} is {speed} than the best peer that gets there, {self.peer} ({pair})"
+        more = "" if self.lanes is None else f"; a motion in lanes takes {_time(self.lanes)}"
+        return f"{goal} is {speed} than the best peer that gets there, {self.peer} ({pair}{more})"
 
 
 def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Line]]:
@@ -109,18 +110,29 @@ def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Lin
     return {case: list(lines.values()) for case, lines in found.items()}
 
 
-def leads(rows: Sequence[Row], log10: float = TARGET) -> list[Lead]:
-    """heyoka in double against the best peer, for each case that has both."""
-    result = []
-    for case, lines in panels(rows).items():
-        ours = next((line for line in lines if (line.integrator, line.precision) == (OURS, "double")), None)
-        peers = [line for line in lines if line.integrator.partition(":")[0] != OURS]
-        if ours is None or not peers:
-            continue
-        times = [(seconds, line.label) for line in peers if (seconds := line.seconds_at(log10)) is not None]
-        theirs, name = min(times, default=(None, ""))
-        result.append(Lead(case, log10, ours.seconds_at(log10), name, theirs))
-    return result
+def leads(rows: Sequence[Row]) -> list[Lead]:
+    """heyoka against the best peer, for each case that has both: in double at 1e-10, and beyond extended at 1e-30."""
+    return [
+        lead
+        for case, lines in panels(rows).items()
+        for log10, formats in ((-10.0, ("double",)), (-30.0, ("quad", "real")))
+        if (lead := _lead(case, log10, [line for line in lines if line.precision.partition(":")[0] in formats]))
+    ]
+
+
+def _lead(case: str, log10: float, lines: Sequence[Line]) -> Lead | None:
+    ours = [line for line in lines if line.integrator == OURS]
+    lanes = [line for line in lines if line.integrator == f"{OURS}:lanes"]
+    peers = [line for line in lines if line.integrator.partition(":")[0] != OURS]
+    if not ours or not peers:
+        return None
+    (mine, name), (theirs, peer), (side_by_side, _) = (_quickest(group, log10) for group in (ours, peers, lanes))
+    return Lead(case, log10, name or ours[0].label, mine, peer, theirs, side_by_side)
+
+
+def _quickest(lines: Sequence[Line], log10: float) -> tuple[float | None, str]:
+    times = [(seconds, line.label) for line in lines if (seconds := line.seconds_at(log10)) is not None]
+    return min(times, default=(None, ""))
 
 
 def _time(seconds: float) -> str:

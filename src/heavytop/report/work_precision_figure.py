@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+from heavytop.errors import InputError
 from heavytop.records import Report, Row
 from heavytop.report.work_precision import Line, leads, panels
 
@@ -27,31 +29,55 @@ _GROWTH = ("heyoka", "cyrk:DOP853", "splitting:4")
 _GROWTH_LOG10 = -5.0
 
 
-def work_precision_axes(axes: Any, lines: Sequence[Line]) -> None:
-    """Draw seconds against error on ``axes``; a run that gave up is a cross on the right edge, at the time it took."""
-    members: dict[str, int] = {}
+def draw_work_precision(report: Report, directory: Path) -> list[Path]:
+    """The files written into ``directory``: work-precision and growth, as SVG and as PNG.
+
+    Raises InputError for a report without a row of work against precision.
+    """
+    figures = {"work-precision": work_precision_figure(report), "growth": growth_figure(report)}
+    if figures["work-precision"] is None:
+        raise InputError("The report has no row of work against precision.", "`heavytop run --plan peers` makes them.")
+    directory.mkdir(parents=True, exist_ok=True)
+    files = []
+    for name, figure in figures.items():
+        if figure is not None:
+            files += [directory / f"{name}.svg", directory / f"{name}.png"]
+            files[-2].write_text(svg(figure), "utf-8")
+            figure.savefig(files[-1], dpi=110, metadata={"Software": "heavytop"})
+    return files
+
+
+def looks(lines: Sequence[Line]) -> dict[str, dict[str, Any]]:
+    """Colour, marker and dashes for each label, the same in every panel."""
+    members: dict[str, list[str]] = {}
     for line in lines:
-        family = line.integrator.partition(":")[0]
-        member = members.setdefault(family, 0)
-        members[family] += 1
+        labels = members.setdefault(line.integrator.partition(":")[0], [])
+        if line.label not in labels:
+            labels.append(line.label)
+    return {
+        label: {
+            "color": _COLOURS.get(family, _OTHER),
+            "marker": _MARKERS[index % len(_MARKERS)],
+            "linestyle": _DASHES[index % len(_DASHES)],
+            "linewidth": 2.2 if label == "heyoka double" else 1.2,
+        }
+        for family, labels in members.items()
+        for index, label in enumerate(labels)
+    }
+
+
+def work_precision_axes(axes: Any, lines: Sequence[Line], styles: dict[str, dict[str, Any]] | None = None) -> None:
+    """Draw seconds against error on ``axes``; a run that gave up is a cross on the right edge, at the time it took."""
+    styles = looks(lines) if styles is None else styles
+    for line in lines:
+        style = styles[line.label]
         points = sorted(line.points, key=lambda point: point.log10)
-        style: dict[str, Any] = {"color": _COLOURS.get(family, _OTHER)}
-        axes.plot(
-            [10**point.log10 for point in points],
-            [point.seconds for point in points],
-            marker=_MARKERS[member % len(_MARKERS)],
-            linestyle=_DASHES[member % len(_DASHES)],
-            linewidth=2.2 if line.integrator == "heyoka" else 1.2,
-            markersize=4,
-            label=line.label,
-            **style,
-        )
+        errors = [10**point.log10 for point in points]
+        axes.plot(errors, [point.seconds for point in points], markersize=4, label=line.label, **style)
         if line.failures:
             edge = axes.get_yaxis_transform()
-            count = [1.0] * len(line.failures)
-            axes.plot(
-                count, line.failures, "x", transform=edge, clip_on=False, markersize=9, markeredgewidth=2, **style
-            )
+            cross = _CROSS | {"color": style["color"], "clip_on": False}
+            axes.plot([1.0] * len(line.failures), line.failures, transform=edge, **cross)
     axes.set(xscale="log", yscale="log", xlabel="largest error of a component on the way", ylabel="seconds")
     axes.grid(True, color="#dddddd")
     axes.spines[["top", "right"]].set_visible(False)
@@ -63,17 +89,18 @@ def work_precision_figure(report: Report, metric: str = "error_max") -> Any:
     if not cases:
         return None
     lead = {each.case: each for each in leads(report.rows)}
+    styles = looks([line for lines in cases.values() for line in lines])
     rows = -(-len(cases) // 2)
     figure = _figure(11, 4.4 * rows + 1.2)
     grid = figure.subplots(rows, 2, squeeze=False).ravel()
     labels: dict[str, Any] = {}
     for axes, (case, lines) in zip(grid, cases.items(), strict=False):
-        work_precision_axes(axes, lines)
+        work_precision_axes(axes, lines, styles)
         found = lead.get(case)
-        note = (
-            "" if found is None or found.ratio is None else f"\nat 1e-10: {found.ratio:.1f} × as fast as {found.peer}"
-        )
-        axes.set_title(case.replace("/T=", ", up to t = ") + note, fontsize=10)
+        title = case.replace("/T=", ", up to t = ")
+        if found is not None and found.ratio is not None:
+            title += f"\nat 1e{found.log10:g} {found.name} is {found.ratio:.1f} × as fast as {found.peer}"
+        axes.set_title(title, fontsize=10)
         handles, names = axes.get_legend_handles_labels()
         labels |= dict(zip(names, handles, strict=True))
     for axes in grid[len(cases) :]:

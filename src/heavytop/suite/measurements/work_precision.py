@@ -6,7 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cache, lru_cache
 from statistics import median
-from time import perf_counter
+from time import perf_counter, sleep
 from typing import Any
 
 import msgspec
@@ -29,6 +29,8 @@ from heavytop.top.integrals import holding
 
 _ENOUGH_SECONDS = 0.3
 _RUNS = range(5, 101)
+_REST = 0.002
+"""Seconds of sleep before a run: it then starts on a fresh slice of the processor's time."""
 _TOO_LONG = 3.0
 """A run of so many seconds is timed once."""
 MISSING = Metric("missing", None)
@@ -77,6 +79,7 @@ def _timed(integrate: Any) -> tuple[dict[str, float], Trajectory]:
     if spent[0] < _TOO_LONG and run.outcome is Outcome.SUCCESS:
         spent = []
         while len(spent) < _RUNS[-1] and (len(spent) < _RUNS[0] or perf_counter() - began < _ENOUGH_SECONDS):
+            sleep(_REST)
             run = integrate()
             spent.append(run.seconds["run"])
     figures = {"compile": compile_seconds, "run": median(spent), "least": min(spent), "repeats": float(len(spent))}
