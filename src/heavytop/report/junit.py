@@ -33,7 +33,7 @@ def comparison_junit(result: Comparison) -> str:
         where = f"{finding.key[0]}.{row_name(finding)}"
         name = finding.metric or "whole row"
         case = ElementTree.SubElement(suite, "testcase", classname=_plain(where), name=_plain(name), time="0")
-        message = f"{finding.verdict.value}: {finding.baseline} -> {finding.candidate}; {finding.reason}"
+        message = f"{finding.verdict.value}: {finding.baseline or '-'} -> {finding.candidate or '-'}; {finding.reason}"
         if finding.verdict in _FAILURE | _ERROR:
             kind = "failure" if finding.verdict in _FAILURE else "error"
             ElementTree.SubElement(case, kind, message=_plain(message), type=finding.verdict.value)

@@ -188,7 +188,8 @@ def _limits(rule: Rule, policy: Policy) -> Limits:
 
 def _not_negative(name: str, given: str | float) -> None:
     if exact(given) < 0:
-        raise InputError(f"{name} = {given} is negative.", "Give 0 or more.")
+        shown = f"{given:g}" if isinstance(given, float) else given
+        raise InputError(f"{name} = {shown} is negative.", "Give 0 or more.")
 
 
 def glob(pattern: str) -> re.Pattern[str]:

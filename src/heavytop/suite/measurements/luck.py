@@ -78,7 +78,7 @@ def homoclinic_bands(task: Task, run: Trajectory, metrics: Metrics, watch: Calla
         return metrics
     case = task.case
     end = (1.1 * DOUBLE.bits * math.log(2) + 4) / case.rate
-    times = [time for time in task.times[1::2] if float(abs(time)) <= end]
+    times = [time for time in task.times[3::4] if float(abs(time)) <= end]
     reruns = _reruns(Problem.of(case.top, case.start, DOUBLE, case.system), task.seed, times, watch)
     banded = _banded(task, metrics, reruns)
     own = banded["break_away_time"]

@@ -1,0 +1,137 @@
+"""What was done to a report on disk is never "the same"; read for a comparison it is the report it is."""
+
+import json
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from heavytop.errors import InputError
+from heavytop.records import Law, Metric
+from heavytop.report import store
+from heavytop.report.compare import compare
+from heavytop.report.policy import Policy
+from small_reports import error, report, row
+
+GOOD = report(
+    row(laws={"drift_energy": Law("t^0.5", 64, 0.5, 0.4, 0.6)}),
+    row(case="lagrange"),
+    row(case="delone", metrics={"solution_error_omega_max": Metric("unresolved", None, "error", "1E-20")}),
+    row(case="gyrostat", metrics={"drift_area_max": Metric("1E-997", -997.0), "drift_area_rms": error("0")}),
+)
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Every place in the rows of a document where something stands that a comparison looks at."""
+    if isinstance(value, dict):
+        return [
+            p for k, v in value.items() for p in ((*path, k), *places(v, (*path, k))) if k not in ("seconds", "series")
+        ]
+    if isinstance(value, list):
+        return [p for i, v in enumerate(value) for p in ((*path, i), *places(v, (*path, i)))]
+    return []
+
+
+DOCUMENT = json.loads(msgspec.json.encode(GOOD))
+COMPARED = ("horizon", "outcome", "bits", "metrics", "flags", "case", "measure", "integrator", "precision", "system")
+# a place, and what it is made into; a lone band or bound only widens or narrows what counts as the same
+PLACES = [
+    ("rows", *p)
+    for p in places(DOCUMENT["rows"])
+    if (len(p) == 1 or p[1] in COMPARED) and p[-1] not in ("band", "bound", "kind")
+]
+
+
+def changed(path: tuple[Any, ...], how: str) -> Any:
+    document = deepcopy(DOCUMENT)
+    inner = document
+    for part in path[:-1]:
+        inner = inner[part]
+    if how == "remove":
+        del inner[path[-1]]
+    else:
+        inner[path[-1]] = {"null": None, "nan": "nan", "missing": "missing", "text": "x", "number": 12345}[how]
+    return document
+
+
+def on_disk(folder: Path, document: Any) -> Path:
+    folder.mkdir(exist_ok=True)
+    (folder / "report.json").write_text(json.dumps(document))
+    return folder
+
+
+@given(st.sampled_from(PLACES), st.sampled_from(["remove", "null", "nan", "missing", "text", "number"]))
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_mutated_report_is_refused_or_not_the_same(tmp_path: Path, path: tuple[Any, ...], how: str) -> None:
+    document = changed(path, how)
+    if document == DOCUMENT:
+        return
+    good, bad = on_disk(tmp_path / "good", DOCUMENT), on_disk(tmp_path / "bad", document)
+    for old, new in ((good, bad), (bad, good)):
+        try:
+            result = compare(store.read_brief(old), store.read_brief(new), Policy())
+        except InputError:
+            continue
+        assert result.changed, (path, how)
+        if new is bad:
+            assert result.verdict != "same" or all(f.verdict.value == "new" for f in result.changed)
+
+
+@given(st.integers(0, len(json.dumps(DOCUMENT)) - 1))
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_truncated_report_is_refused_at_every_length(tmp_path: Path, length: int) -> None:
+    (tmp_path / "report.json").write_text(json.dumps(DOCUMENT)[:length])
+    with pytest.raises(InputError, match="not a whole report"):
+        store.read_brief(tmp_path)
+
+
+@pytest.mark.parametrize("indent", [None, 1])
+def test_brief_and_whole_reports_compare_alike_however_they_are_laid_out(tmp_path: Path, indent: int | None) -> None:
+    other = deepcopy(DOCUMENT)
+    other["rows"][1]["metrics"]["drift_energy_max"] = {"value": "1E-9", "log10": -9.0}
+    other["rows"].reverse()
+    for name, document in (("a", DOCUMENT), ("b", other)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "report.json").write_text(json.dumps(document, indent=indent))
+    old, new = tmp_path / "a", tmp_path / "b"
+    whole = compare(store.read(old), store.read(new), Policy())
+    brief = compare(store.read_brief(old), store.read_brief(new), Policy())
+    assert whole == brief
+    assert [(f.key[1], f.verdict.value) for f in brief.changed] == [("lagrange", "worse")]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (b'"1E-12"', b'"1E-13"', "disagree"),
+        (b'"case":"lagrange"', b'"case":"euler"', "twice"),
+        (b'"bits":53', b'"bits":-1', "no format"),
+        (b'"starts":1', b'"starts":0', "0 starts"),
+        (b'"band":null', b'"band":-0.5', "a band of -0.5"),
+        (b'"1E-20"', b'"tiny"', "not a finite number"),
+        (b'"steps":10', b'"steps":"ten"', "not a whole report"),
+    ],
+)
+def test_a_wrong_row_is_found_while_comparing(tmp_path: Path, old: bytes, new: bytes, message: str) -> None:
+    path = store.write(GOOD, tmp_path)
+    content = path.read_bytes()
+    assert old in content
+    (tmp_path / "report.json.sha256").unlink()
+    path.write_bytes(content.replace(old, new))
+    with pytest.raises(InputError, match=message):
+        compare(store.read_brief(tmp_path), store.read_brief(tmp_path), Policy())
+
+
+def test_a_row_missing_at_the_start_and_one_new_are_told_apart(tmp_path: Path) -> None:
+    rows = [row(case=name) for name in "abcdef"]
+    (tmp_path / "a").mkdir()
+    store.write(report(*rows[:-1]), tmp_path / "a")
+    (tmp_path / "b").mkdir()
+    store.write(report(*reversed(rows[1:])), tmp_path / "b")
+    result = compare(store.read_brief(tmp_path / "a"), store.read_brief(tmp_path / "b"), Policy())
+    assert [(f.key[1], f.verdict.value) for f in result.changed] == [("a", "missing"), ("f", "new")]
+    assert result.exit_code == 3

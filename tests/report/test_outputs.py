@@ -1,0 +1,154 @@
+"""What people and machines get to read of a report, a comparison and a history.
+
+Golden text lies in tests/report/golden; `python tests/report/test_outputs.py` writes it anew (with tests on the path),
+to be looked at in the diff.
+"""
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from rich.console import Console
+
+from heavytop.errors import InputError
+from heavytop.measure.scalar import of_fraction
+from heavytop.precision import exact
+from heavytop.records import Law, Report, Series
+from heavytop.report.compare import Comparison, compare
+from heavytop.report.comparison_text import comparison
+from heavytop.report.history import history, history_json, history_svg, history_text
+from heavytop.report.junit import comparison_junit
+from heavytop.report.markdown import comparison_markdown
+from heavytop.report.policy import Policy
+from heavytop.report.text import summary
+from small_reports import error, report, row
+
+GOLDEN = Path(__file__).parent / "golden"
+HOSTILE = 'a | b <script>alert("1")</script>\n`x`\x01' + "y" * 10_000
+
+
+def baseline() -> Report:
+    return report(
+        row(laws={"drift_energy": Law("t^0.5", 64, 0.5, 0.45, 0.55)}),
+        row(case="lagrange", metrics={"drift_energy_max": error("3e-13"), "solution_error_across_max": error("1e-9")}),
+        row(case="gone"),
+        row(case="stopped"),
+        row(
+            case="delone/forward",
+            measure="homoclinic",
+            metrics={
+                "break_away_time": of_fraction(exact("35.5"), "duration"),
+                "solution_error_omega_max": error("2.5e-13"),
+            },
+        ),
+        row(case="delone/backward", measure="homoclinic", precision="real:237", bits=237),
+    )
+
+
+def candidate() -> Report:
+    rows = [each for each in baseline().rows if each.case != "gone"]
+    rows[0].laws = {"drift_energy": Law("t", 64, 1.0, 0.9, 1.1)}
+    rows[0].metrics["drift_energy_max"] = error("1e-10")
+    rows[1].metrics["solution_error_across_max"] = error("1e-14")
+    rows[2].outcome, rows[2].time_reached = "step_limit", "7.5"
+    made = report(*rows, row(case="added"))
+    made.environment = {"packages": {"heyoka": "8"}, "llvm": "23.0"}
+    made.plan = {"name": "test", "seed": "1"}
+    return made
+
+
+def compared() -> Comparison:
+    return compare(baseline(), candidate(), Policy())
+
+
+def on_paper(renderable: object) -> str:
+    console = Console(width=160, record=True, file=open("/dev/null", "w"), highlight=False)  # noqa: SIM115
+    console.print(renderable)
+    console.file.close()
+    return "\n".join(line.rstrip() for line in console.export_text().splitlines()) + "\n"
+
+
+def shown() -> Report:
+    made = baseline()
+    made.rows[0].series = {"drift_energy": Series(["1", "10"], ["1e-14", "1e-13"])}
+    return made
+
+
+def three() -> tuple[list[str], list[Report]]:
+    return ["v1", "v2", "v3"], [baseline(), baseline(), candidate()]
+
+
+MADE = {
+    "show.txt": lambda: on_paper(summary(shown())),
+    "compare.txt": lambda: on_paper(comparison(compared())),
+    "compare.md": lambda: comparison_markdown(compared(), Path("out/both sides.html")),
+    "compare.xml": lambda: comparison_junit(compared()),
+    "history.txt": lambda: on_paper(
+        history_text(three()[0], [t for t in history(three()[1], Policy()) if t.steps]),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_the_text_is_the_golden_one(name: str) -> None:
+    assert MADE[name]() == (GOLDEN / name).read_text("utf-8")
+
+
+def hostile() -> Comparison:
+    bad = row(case=HOSTILE, metrics={HOSTILE: error("1e-5")})
+    return compare(report(row(case=HOSTILE, metrics={HOSTILE: error("1e-12")})), report(bad), Policy())
+
+
+def test_hostile_names_do_not_get_out_of_a_markdown_cell() -> None:
+    text = comparison_markdown(hostile())
+    (line,) = [line for line in text.splitlines() if line.startswith("| worse")]
+    assert len(line) < 1000
+    assert line.replace(r"\|", "").count("|") == 7
+    assert "<script>" not in text.replace(r"\<", "")
+
+
+def test_a_long_comparison_stays_a_short_comment() -> None:
+    old = report(*(row(case=f"top-{i}") for i in range(300)))
+    new = report(*(row(case=f"top-{i}", metrics={**row().metrics, "drift_energy_max": error("1")}) for i in range(300)))
+    text = comparison_markdown(compare(old, new, Policy()))
+    assert "and 250 more." in text
+    assert len(text) < 65_536
+
+
+def test_junit_is_xml_whatever_the_names_and_counts_what_it_holds() -> None:
+    for result in (compared(), hostile()):
+        suite = ElementTree.fromstring(comparison_junit(result).encode())
+        cases = suite.findall("testcase")
+        assert len(cases) == int(suite.get("tests", "")) == len(result.findings)
+        assert len(suite.findall("testcase/failure")) == int(suite.get("failures", "")) > 0
+        assert len(suite.findall("testcase/error")) == int(suite.get("errors", ""))
+
+
+def test_a_history_marks_each_step_at_the_report_it_came_with() -> None:
+    names, reports = three()
+    tracks = {(t.key[1], t.metric): t for t in history(reports, Policy())}
+    track = tracks["euler", "drift_energy_max"]
+    assert track.values == ["1E-12", "1E-12", "1E-10"]
+    assert {number: verdict.value for number, (verdict, _) in track.steps.items()} == {2: "worse"}
+    assert tracks["euler", "break_away_time"].steps == {}
+    assert tracks["gone", ""].steps[2][0].value == "missing"
+    assert tracks["added", ""].steps[2][0].value == "new"
+    document = json.loads(json.dumps(history_json(names, list(tracks.values()))))
+    assert document["reports"] == names
+    assert document["tracks"][0]["values"] == track.values
+
+
+def test_a_history_is_drawn_with_its_steps() -> None:
+    names, reports = three()
+    tracks = [t for t in history(reports, Policy()) if t.metric.endswith("_max")]
+    picture = history_svg(names, tracks)
+    assert ElementTree.fromstring(picture.encode()).tag.endswith("svg")
+    for wrong in ([], tracks * 10):
+        with pytest.raises(InputError, match="cannot be drawn"):
+            history_svg(names, wrong)
+
+
+if __name__ == "__main__":
+    for file, make in MADE.items():
+        (GOLDEN / file).write_text(make(), "utf-8")

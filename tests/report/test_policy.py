@@ -1,0 +1,218 @@
+"""Policies: rules by pattern, first match counts, and what is wrong with one is said."""
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.precision import exact
+from heavytop.records import Law, Row
+from heavytop.report.compare import compare
+from heavytop.report.policy import Policy, adjusted, load
+from heavytop.report.verdicts import Verdict
+from small_reports import error, report, row
+
+
+def policy(tmp_path: Path, text: str) -> Policy:
+    file = tmp_path / "policy.toml"
+    file.write_text(text)
+    return load(file)
+
+
+def verdicts(old: Row, new: Row, given: Policy) -> dict[str, Verdict]:
+    return {f.metric: f.verdict for f in compare(report(old), report(new), given).findings}
+
+
+def drift(value: str, band: float | None = None, **changes) -> Row:
+    metric = msgspec.structs.replace(error(value), band=band)
+    return row(metrics={"drift_energy_max": metric}, **changes)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("colour = 3", "unknown field `colour`"),
+        ("[[rule]]\nmetrik = 'x'", "unknown field `metrik`"),
+        ("floor = -1", "floor = -1 is negative"),
+        ("noise = 'much'", "is not a finite number"),
+        ("loss_bits = 1\nloss_digits = 1", "both loss_bits and loss_digits"),
+        ("flags = 'sometimes'", "Invalid enum value 'sometimes'"),
+        ("[timings]\ncompare = 'no'", "Invalid enum value 'no'"),
+        ("[timings]\nratio = 0.5", "not 1 or more"),
+        ("[[rule]]\nmetric = ''", "no glob pattern"),
+        ("[[rule]]\nmetric = 'drift_[ab'", "no glob pattern"),
+        ("[[rule]]\nlimit = '-1e-9'", "limit = -1e-9 is negative"),
+        ("suspicious_digits = nan", "not a finite number"),
+        ("floor = ", "not valid"),
+    ],
+)
+def test_a_wrong_policy_is_refused_with_the_reason(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=r"policy\.toml is not valid") as caught:
+        policy(tmp_path, text)
+    assert message in str(caught.value)
+
+
+def test_a_policy_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        load(tmp_path / "none.toml")
+
+
+def test_the_first_rule_that_matches_counts(tmp_path: Path) -> None:
+    given = policy(
+        tmp_path,
+        """
+        loss_digits = 3
+        [[rule]]
+        case = "lag*"
+        metric = "drift_*_max"
+        loss_digits = 0.1
+        [[rule]]
+        metric = "*"
+        loss_digits = 1
+        """,
+    )
+    assert verdicts(drift("1e-12"), drift("5e-12"), given)["drift_energy_max"] is Verdict.SAME
+    strict = {"case": "lagrange"}
+    found = verdicts(drift("1e-12", **strict), drift("5e-12", **strict), given)
+    assert found["drift_energy_max"] is Verdict.WORSE
+    assert verdicts(drift("1e-12"), drift("2e-11"), given)["drift_energy_max"] is Verdict.WORSE
+
+
+def test_a_limit_holds_whatever_the_baseline_was(tmp_path: Path) -> None:
+    given = policy(tmp_path, "[[rule]]\nmetric = 'drift_*'\nlimit = '1e-10'\n[[rule]]\nmetric = 'break*'\nlimit = 50")
+    bad = drift("2e-10")
+    assert verdicts(bad, bad, given)["drift_energy_max"] is Verdict.WORSE
+    assert verdicts(drift("1e-12"), drift("2e-12"), given)["drift_energy_max"] is Verdict.SAME
+    assert verdicts(row(), row(), given)["break_away_time"] is Verdict.SAME
+    tight = policy(tmp_path, "[[rule]]\nmetric = 'break*'\nlimit = 70")
+    assert verdicts(row(), row(), tight)["break_away_time"] is Verdict.WORSE
+
+
+def test_what_is_ignored_is_left_out_even_where_it_is_missing_or_worse(tmp_path: Path) -> None:
+    given = policy(tmp_path, "[[rule]]\nmetric = 'drift_*'\nignore = true")
+    assert set(verdicts(row(), drift("1"), given)) == {"break_away_time"}
+    with pytest.raises(InputError, match="nothing to compare"):
+        compare(report(drift("1")), report(drift("2")), given)
+
+
+def test_changed_flags_are_compared_only_where_the_policy_says_so(tmp_path: Path) -> None:
+    other = drift("1e-12", flags={"tolerance": "1e-9"})
+    assert verdicts(drift("1e-12"), other, Policy()) == {"": Verdict.INCOMPARABLE}
+    given = policy(tmp_path, "flags = 'ignore'")
+    assert verdicts(drift("1e-12"), other, given) == {"drift_energy_max": Verdict.SAME}
+
+
+@pytest.mark.parametrize(
+    ("when", "machine", "verdict"),
+    [
+        ("never", "A", None),
+        ("same-machine", "A", Verdict.WORSE),
+        ("same-machine", "B", None),
+        ("always", "B", Verdict.WORSE),
+    ],
+)
+def test_timings_compare_by_their_own_rule(tmp_path: Path, when: str, machine: str, verdict: Verdict | None) -> None:
+    given = policy(tmp_path, f"[timings]\ncompare = '{when}'\nratio = 2")
+    old, new = (report(drift("1e-12", seconds={"run": seconds, "compile": 0.01})) for seconds in (1.0, 2.5))
+    names = ("system", "machine", "processor", "simd_width_double", "cpu_features")
+    old.environment |= dict.fromkeys(names, "A")
+    new.environment |= dict.fromkeys(names, machine)
+    found = {f.metric: f.verdict for f in compare(old, new, given).findings}
+    assert found.get("seconds run") is verdict
+    assert found.get("seconds compile") in (None, Verdict.SAME)
+    if verdict:
+        back = {f.metric: f.verdict for f in compare(new, old, given).findings}
+        assert back["seconds run"] is Verdict.BETTER
+
+
+def test_timings_are_off_by_default() -> None:
+    assert Policy().timings.compare == "never"
+
+
+def test_a_difference_within_both_bands_in_quadrature_is_noise() -> None:
+    def found(value: str, old: float, new: float, **given) -> Verdict:
+        return verdicts(drift("1e-12", old), drift(value, new), Policy(**given))["drift_energy_max"]
+
+    # 2 hypot(0.3, 0.4) = 1 decade
+    assert found("9.9e-12", 0.3, 0.4) is Verdict.SAME
+    assert found("1.01e-11", 0.3, 0.4) is Verdict.WORSE
+    assert found("1.01e-13", 0.3, 0.4) is Verdict.SAME
+    assert found("0.99e-13", 0.3, 0.4) is Verdict.BETTER
+    assert found("9.9e-12", 0.3, 0.4, noise=1) is Verdict.WORSE
+    assert found("9.9e-12", 0.3, 0.4, noise=0) is Verdict.WORSE
+    # the allowed loss holds where the band is narrower
+    assert found("3.9e-12", 0.01, 0.01) is Verdict.SAME
+    assert found("4.1e-12", 0.01, 0.01) is Verdict.WORSE
+
+
+def test_a_large_gain_is_better_and_suspicious() -> None:
+    (finding,) = compare(report(drift("1e-9")), report(drift("1e-12")), Policy(suspicious_digits=2.9)).findings
+    assert finding.verdict is Verdict.BETTER
+    assert "suspicious" in finding.reason
+    (finding,) = compare(report(drift("1e-11")), report(drift("1e-12")), Policy()).findings
+    assert finding.verdict is Verdict.BETTER
+    assert "suspicious" not in finding.reason
+
+
+def test_a_last_value_below_its_own_root_mean_square_is_luck() -> None:
+    def ends(final: str, rms: str = "1e-12") -> Row:
+        return row(metrics={"drift_energy_rms": error(rms), "drift_energy_final": error(final)})
+
+    assert verdicts(ends("1e-15"), ends("2e-12"), Policy())["drift_energy_final"] is Verdict.SAME
+    assert verdicts(ends("1e-15"), ends("5e-12"), Policy())["drift_energy_final"] is Verdict.WORSE
+
+
+LAWS = ["bounded", "t^0.5", "t", "t^1.5", "t^2", "exponential"]
+
+
+@pytest.mark.parametrize("old", LAWS)
+@pytest.mark.parametrize("new", [*LAWS, "unresolved"])
+def test_a_change_of_growth_class_is_never_noise(old: str, new: str) -> None:
+    def grows(how: str) -> Row:
+        return drift("1e-12", 9.0, laws={"drift_energy": Law(how, 64)})  # type: ignore[arg-type]
+
+    found = verdicts(grows(old), grows(new), Policy())["growth drift_energy"]
+    if new == "unresolved":
+        assert found is Verdict.INCOMPARABLE
+        assert verdicts(grows(new), grows(old), Policy())["growth drift_energy"] is Verdict.INCOMPARABLE
+    else:
+        order = LAWS.index(new) - LAWS.index(old)
+        assert found is (Verdict.SAME if not order else Verdict.WORSE if order > 0 else Verdict.BETTER)
+
+
+def test_exponents_differ_where_their_intervals_do_not_meet_and_a_lost_law_is_missing() -> None:
+    def grows(low: float, high: float) -> Row:
+        return drift("1e-12", laws={"drift_energy": Law("t", 64, (low + high) / 2, low, high)})
+
+    def found(old: Row, new: Row) -> Verdict:
+        return verdicts(old, new, Policy())["growth drift_energy"]
+
+    assert found(grows(0.9, 1.0), grows(0.95, 1.1)) is Verdict.SAME
+    assert found(grows(0.9, 1.0), grows(1.01, 1.1)) is Verdict.WORSE
+    assert found(grows(0.9, 1.0), grows(0.8, 0.89)) is Verdict.BETTER
+    assert found(grows(0.9, 1.0), drift("1e-12")) is Verdict.MISSING
+    assert found(drift("1e-12"), grows(0.9, 1.0)) is Verdict.NEW
+
+
+def test_an_ensemble_is_not_compared_with_one_run() -> None:
+    assert verdicts(drift("1e-12"), drift("1e-12", starts=64), Policy()) == {"": Verdict.INCOMPARABLE}
+
+
+def test_options_count_before_the_policy() -> None:
+    given = adjusted(Policy(loss_digits=3), floor="0", loss_bits="1")
+    assert (given.floor, given.loss_bits, given.loss_digits) == ("0", "1", None)
+    assert verdicts(drift("1e-17"), drift("3e-17"), given)["drift_energy_max"] is Verdict.WORSE
+    with pytest.raises(InputError, match="negative"):
+        adjusted(Policy(), loss_bits="-2")
+
+
+def test_a_value_with_a_band_agrees_within_it() -> None:
+    def slope(value: str) -> Row:
+        from heavytop.measure.scalar import of_fraction
+
+        metric = msgspec.structs.replace(of_fraction(exact(value), "value"), band=0.01)
+        return row(metrics={"break_away_slope": metric})
+
+    assert verdicts(slope("1"), slope("1.06"), Policy())["break_away_slope"] is Verdict.SAME
+    assert verdicts(slope("1"), slope("1.08"), Policy())["break_away_slope"] is Verdict.WORSE

@@ -1,0 +1,99 @@
+"""Rows carry the noise of their metrics, and a rerun with other roundings is the same within it."""
+
+from dataclasses import replace
+
+import msgspec
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.measure.scalar import of_fraction
+from heavytop.precision import exact
+from heavytop.records import SCHEMA, Report, Row
+from heavytop.report.compare import compare
+from heavytop.report.policy import Policy
+from heavytop.report.verdicts import Verdict
+from heavytop.suite.measurements import measure
+from heavytop.suite.plan import Plan, expand
+
+PLAN = msgspec.convert(
+    {
+        "name": "tiny",
+        "measure": [
+            {
+                "kind": "homoclinic",
+                "cases": ["delone"],
+                "precisions": ["double", "extended"],
+                "directions": ["forward"],
+            },
+            {
+                "kind": "drift",
+                "cases": ["lagrange", "gyrostat"],
+                "runs": [{"precision": "double", "horizon": "50", "samples": 50}],
+            },
+            {
+                "kind": "drift",
+                "cases": ["generic"],
+                "runs": [{"precision": "extended", "horizon": "150", "samples": 50}],
+            },
+        ],
+    },
+    Plan,
+)
+
+
+@pytest.fixture(scope="module")
+def reports() -> list[Report]:
+    return [Report(SCHEMA, {"name": "tiny"}, {}, [measure(t) for t in expand(PLAN, seed)]) for seed in range(4)]
+
+
+def test_every_error_and_break_away_has_a_band(reports: list[Report]) -> None:
+    for row in reports[0].rows:
+        for name, metric in row.metrics.items():
+            assert metric.band is not None, (row.case, name)
+            assert 0 <= metric.band < 3
+        wide = [metric.band for name, metric in row.metrics.items() if name.endswith("_max")]
+        assert max(band for band in wide if band is not None) > 0.05
+
+
+def test_other_seeds_are_other_numbers_and_the_same_verdict(reports: list[Report]) -> None:
+    for other in reports[1:]:
+        result = compare(reports[0], other, Policy())
+        assert result.verdict == "same"
+        assert all(a.metrics != b.metrics for a, b in zip(reports[0].rows, other.rows, strict=True))
+
+
+def test_the_same_seed_is_the_same_row(reports: list[Report]) -> None:
+    again = measure(expand(PLAN, 2)[-1])
+    assert again.metrics == reports[2].rows[-1].metrics
+
+
+def planted(row: Row, factor: str) -> Row:
+    metrics = {
+        name: msgspec.structs.replace(of_fraction(exact(m.value) * exact(factor)), band=m.band)
+        if m.kind == "error" and m.log10 is not None
+        else m
+        for name, m in row.metrics.items()
+    }
+    return msgspec.structs.replace(row, metrics=metrics)
+
+
+def test_errors_a_thousand_times_larger_are_worse_in_every_row(reports: list[Report]) -> None:
+    for other in reports[1:]:
+        bad = msgspec.structs.replace(other, rows=[planted(row, "1000") for row in other.rows])
+        result = compare(reports[0], bad, Policy())
+        worse = {finding.key for finding in result.findings if finding.verdict is Verdict.WORSE}
+        assert worse == {row.key for row in other.rows}
+
+
+def test_a_run_that_failed_has_no_bands() -> None:
+    task = expand(PLAN, 0)[-1]
+    wild = replace(task.case.start, omega=tuple(exact(x) for x in ("1e140", "1e140", "1")))
+    row = measure(replace(task, precision="double", case=replace(task.case, start=wild)))
+    assert row.outcome != "success"
+    assert {metric.band for metric in row.metrics.values()} == {None}
+
+
+@pytest.mark.parametrize("seed", [-1, 1001])
+def test_a_seed_out_of_range_is_refused(seed: int) -> None:
+    with pytest.raises(InputError, match=f"no seed {seed}"):
+        expand(PLAN, seed)

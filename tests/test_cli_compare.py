@@ -1,0 +1,96 @@
+"""`compare` and `history` on the command line: policies, output files, and what is refused."""
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import typer
+
+from heavytop.cli import run_command_line
+from heavytop.report import store
+from small_reports import error, report, row
+
+
+@pytest.fixture
+def reports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    worse = row(metrics={**row().metrics, "drift_energy_max": error("5e-12")})
+    for name, made in (("old", row()), ("worse", worse), ("same", row())):
+        Path(name).mkdir()
+        store.write(report(made), Path(name))
+    return tmp_path
+
+
+def heavytop(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
+    monkeypatch.setattr("sys.argv", ["heavytop", *arguments])
+    try:
+        return run_command_line()
+    except (SystemExit, typer.Exit) as done:
+        return int(getattr(done, "code", None) or getattr(done, "exit_code", 0))
+
+
+def test_a_policy_decides_and_options_count_before_it(reports, monkeypatch, capsys) -> None:
+    assert heavytop(monkeypatch, "compare", "old", "worse") == 1
+    (reports / "policy.toml").write_text("loss_digits = 1")
+    assert heavytop(monkeypatch, "compare", "old", "worse", "--policy", "policy.toml") == 0
+    assert heavytop(monkeypatch, "compare", "old", "worse", "--policy", "policy.toml", "--loss", "1") == 1
+    capsys.readouterr()
+
+
+def test_files_are_written_beside_the_text_and_say_the_same(reports, monkeypatch, capsys) -> None:
+    names = ["--markdown", "out.md", "--junit", "out.xml", "--json"]
+    assert heavytop(monkeypatch, "compare", "old", "worse", *names) == 1
+    document = json.loads(capsys.readouterr().out)
+    assert set(document) == {"verdict", "rows", "environment"}
+    assert "worse | euler heyoka double | drift\\_energy\\_max" in Path("out.md").read_text()
+    assert ElementTree.parse("out.xml").getroot().get("failures") == "1"
+    assert {path.name for path in reports.iterdir()} == {"old", "worse", "same", "out.md", "out.xml"}
+
+
+@pytest.mark.parametrize("option", ["--markdown", "--junit"])
+def test_a_path_that_cannot_be_written_is_refused(reports, monkeypatch, capsys, option: str) -> None:
+    assert heavytop(monkeypatch, "compare", "old", "worse", option, "nowhere/out") == 2
+    message = capsys.readouterr().err
+    assert "nowhere/out cannot be written" in message
+
+
+def test_nothing_is_written_where_a_report_is_wrong(reports, monkeypatch, capsys) -> None:
+    content = (reports / "worse" / "report.json").read_text()
+    (reports / "cut.json").write_text(content[:-40])
+    before = sorted(reports.iterdir())
+    assert heavytop(monkeypatch, "compare", "old", "cut.json", "--markdown", "out.md", "--junit", "out.xml") == 2
+    assert "not a whole report" in capsys.readouterr().err
+    assert sorted(reports.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["compare", "old", "same", "--loss", "-1"], "loss_bits = -1 is negative"),
+        (["compare", "old", "same", "--floor", "x"], "not a finite number"),
+        (["compare", "old", "same", "--policy", "none.toml"], "cannot be read"),
+        (["history", "old"], "two reports or more"),
+        (["history", "old", "same", "--metric", "[x"], "no glob pattern"),
+        (["history", "old", "same", "--svg", "x.svg"], "cannot be drawn"),
+    ],
+)
+def test_bad_input_is_refused_in_words(reports, monkeypatch, capsys, arguments: list[str], message: str) -> None:
+    assert heavytop(monkeypatch, *arguments) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err
+    assert captured.out == ""
+
+
+def test_a_history_shows_what_changed_or_what_is_asked_for(reports, monkeypatch, capsys) -> None:
+    assert heavytop(monkeypatch, "history", "old", "same", "worse") == 0
+    text = capsys.readouterr().out
+    assert "drift_energy_max" in text
+    assert "▲" in text
+    assert "break_away_time" not in text
+    assert heavytop(monkeypatch, "history", "old", "worse", "--metric", "break*", "--json", "--svg", "h.svg") == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [track["metric"] for track in document["tracks"]] == ["break_away_time"]
+    assert Path("h.svg").read_text().lstrip().startswith("<?xml")
+    assert heavytop(monkeypatch, "history", "old", "same") == 0
+    assert "none changed" in capsys.readouterr().out
