@@ -219,6 +219,8 @@ def test_an_exponential_law_is_one_in_time_and_not_in_its_logarithm() -> None:
 def test_a_law_is_in_the_legend_and_in_the_numbers() -> None:
     section = plots.growth([("", full_report())])
     assert "fitted law" in section.legend
+    assert section.pictures[1].note.startswith("double: t^1.5, exponent 1.50 [1.40, 1.60].")
+    assert section.pictures[0].note == ""
     lines = {tuple(line[:3]): line[5:7] for line in section.rows}
     assert lines["euler", "double", "error along"] == ["t^1.5", "1.50 [1.40, 1.60]"]
     assert lines["euler", "double", "drift of energy"] == ["", ""]

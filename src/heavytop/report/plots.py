@@ -166,10 +166,10 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     y = [plot[0].get_ylim() for plot in plots]
     if any(row.laws for lane in names for _, row in lanes[lane]):
         section.key(Key("fitted law", 5, "", "6 3"))
-    for number, (axes, title, heard) in enumerate(plots):
-        axes.set_xlim(math.floor(min(low for low, _ in x) + 0.1), max(high for _, high in x))
+    for number, (axes, title, heard, laws) in enumerate(plots):
+        axes.set_xlim(min(low for low, _ in x), max(high for _, high in x))
         axes.set_ylim(min(low for low, _ in y), max(high for _, high in y))
-        section.pictures.append(finish(axes, title, spoken(heard), f"growth-{number}"))
+        section.pictures.append(finish(axes, title, spoken([*heard, *laws]), f"growth-{number}", " ".join(laws)))
     return section
 
 
@@ -184,8 +184,8 @@ def _growth_axes(
     label: str,
     unit: str,
     formats: dict[str, int],
-) -> tuple[Any, str, list[str]] | None:
-    axes, heard, lacking = None, [], []
+) -> tuple[Any, str, list[str], list[str]] | None:
+    axes, heard, laws, lacking = None, [], [], []
     for source, row in members:
         name = _largest(row, prefix)
         if name is None:
@@ -209,6 +209,7 @@ def _growth_axes(
             )
         if law:
             _law(axes, key, law, x, y)
+            laws.append(_law_said(key.label, law))
         what = name.removeprefix("drift_") if prefix == "drift_" else prefix.removeprefix("solution_error_")
         heard.append(f"{key.label}: {scientific(y[-1])} ε ({what.replace('_', ' ')}) at |t| = {scientific(x[-1])}.")
         last = row.series[name]
@@ -227,7 +228,7 @@ def _growth_axes(
     if lacking and prefix == "solution_error_across":
         these = ", ".join(dict.fromkeys(map(clip, lacking)))
         section.notes.append(f"{_lane_name(lane)}: no known motion reaches as far as {these} ran, so no state error.")
-    return axes, f"{_lane_name(lane)}: {label}", heard
+    return axes, f"{_lane_name(lane)}: {label}", heard, laws
 
 
 def _largest(row: Row, prefix: str) -> str | None:
@@ -263,6 +264,13 @@ def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid:
     shape: Callable[[float], float] = (lambda x: math.log10(math.e) * 10**x) if law.growth == "exponential" else float
     height = sum(b - slope * shape(a) for a, b in fitted) / len(fitted)
     return [height + slope * shape(x) for x in grid]
+
+
+def _law_said(label: str, law: Law) -> str:
+    growth, exponent, _ = _law_words(law)
+    if not exponent:
+        return f"{label}: law {growth}."
+    return f"{label}: {growth}, {'rate' if growth == 'exponential' else 'exponent'} {exponent}."
 
 
 def _law_words(law: Law | None) -> list[str]:
