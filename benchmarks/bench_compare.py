@@ -30,7 +30,9 @@ FLAGS = {
     "code_cache": "none",
     "coefficients": "par",
 }
-AGAINST = "known: closed form: Euler-Poinsot, Jacobi functions, radius below 6.02E-36; certified at t = 100000 to 43 digits"
+AGAINST = (
+    "known: closed form: Euler-Poinsot, Jacobi functions, radius below 6.02E-36; certified at t = 100000 to 43 digits"
+)
 
 
 def metric(random: Random) -> Metric:

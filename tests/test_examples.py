@@ -20,6 +20,7 @@ SHELL = re.compile(r"\|\||&&|;|>|&$|\s#\s")
 def commands(path: Path) -> list[str]:
     """Lines that start with the program, without what belongs to the shell."""
     lines = (line.strip() for line in path.read_text("utf-8").splitlines())
+    lines = (line.removeprefix(".venv/bin/") for line in lines)
     return [SHELL.split(line)[0].strip() for line in lines if line.startswith("heavytop ")]
 
 

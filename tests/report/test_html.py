@@ -14,7 +14,9 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.records import Law, Metric, Report, Series
 from heavytop.report import claim_verdict, html, plots, store, work_plots
-from heavytop.report.compare import Policy, compare
+from heavytop.report.compare import compare
+from heavytop.report.policy import Policy
+from heavytop.report.section import MOST_PLOTS, points
 from report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row
 
 RESULTS = Path(__file__).parents[2] / "results" / "default"
@@ -189,19 +191,19 @@ def test_what_is_not_drawn_is_said() -> None:
     section = html.sections([("", report)])
     assert [each.id for each in section] == ["digits", "growth"]
     assert "10 more cases not drawn" in section[0].notes[0]
-    assert len(section[1].pictures) == 3 * plots.MOST_PLOTS
-    assert f"{50 - plots.MOST_PLOTS} more cases not drawn" in section[1].notes[0]
+    assert len(section[1].pictures) == 3 * MOST_PLOTS
+    assert f"{50 - MOST_PLOTS} more cases not drawn" in section[1].notes[0]
 
 
 def test_errors_smaller_than_any_float_have_their_place() -> None:
-    x, y = plots.points(Series(["1", "10", "100"], ["1e-997", "nan", "1e-990"]), -1000.0)
+    x, y = points(Series(["1", "10", "100"], ["1e-997", "nan", "1e-990"]), -1000.0)
     assert x == [0, 2]
     assert y == [3, 10]
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.5, 1.5])
 def test_a_law_lies_on_the_samples_that_follow_it(exponent: float) -> None:
-    x, y = plots.points(power(exponent, 1e-16))
+    x, y = points(power(exponent, 1e-16))
     line = plots.through(Law("t", 8, exponent), exponent, list(zip(x, y, strict=True)), x)
     assert line == pytest.approx(y, abs=1e-5)
 
@@ -217,6 +219,8 @@ def test_an_exponential_law_is_one_in_time_and_not_in_its_logarithm() -> None:
 def test_a_law_is_in_the_legend_and_in_the_numbers() -> None:
     section = plots.growth([("", full_report())])
     assert "fitted law" in section.legend
+    assert section.pictures[1].note.startswith("double: t^1.5, exponent 1.50 [1.40, 1.60].")
+    assert section.pictures[0].note == ""
     lines = {tuple(line[:3]): line[5:7] for line in section.rows}
     assert lines["euler", "double", "error along"] == ["t^1.5", "1.50 [1.40, 1.60]"]
     assert lines["euler", "double", "drift of energy"] == ["", ""]
@@ -224,14 +228,14 @@ def test_a_law_is_in_the_legend_and_in_the_numbers() -> None:
 
 def test_work_and_precision_says_what_is_faster_and_what_failed(pages: dict[str, Page]) -> None:
     section = work_plots.work_precision([("", full_report())])
-    assert section.text[1:] == [
-        "euler/T=1000: an error of 1e-10 or less takes heyoka 0.002 s and the fastest other, peer:A, 0.006 s, "
-        "3 times as long."
-    ]
-    assert list(section.legend) == ["heyoka", "peer:A", "peer:B"]
-    assert "peer:B: failed." in section.pictures[0].description
-    assert work_plots.work_precision([("", Report("", {}, {}, [row()]))]) is None
+    assert "3.0 times faster than the best peer that gets there, peer:A" in section.text[1]
     assert section.text[1] in pages["report"].text
+    assert list(section.legend) == ["heyoka double", "peer:A", "peer:B"]
+    assert len(section.pictures) == 2
+    for picture in section.pictures:
+        assert "peer:B: gave up (1)." in picture.description
+    assert work_plots.work_precision([("", Report("", {}, {}, [row()]))]) is None
+    assert "1 run of work against precision gave up" in pages["report"].text
 
 
 def test_a_comparison_draws_both_and_lists_the_worst_first(pages: dict[str, Page]) -> None:

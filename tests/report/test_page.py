@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from heavytop.report import html, store
-from heavytop.report.compare import Policy, compare
+from heavytop.report.compare import compare
+from heavytop.report.policy import Policy
 from report_helpers import HOSTILE, error, full_report
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

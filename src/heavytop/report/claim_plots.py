@@ -9,7 +9,7 @@ from typing import Any
 
 from heavytop.precision import exact
 from heavytop.records import Report, Series
-from heavytop.report.plots import (
+from heavytop.report.section import (
     DASHED,
     MOST_PLOTS,
     TIME,

@@ -89,7 +89,7 @@ def headline(found: Sequence[Audited], systems: dict[str, str] = SYSTEMS) -> tup
     top = [each for each in found if each.system == "heavy_top"]
     verdicts = {each.verdict for each in top}
     if not top:
-        return "nothing", "No claim about the heavy top is audited in this plan"
+        return "nothing", "No claim about the heavy top is audited in this plan."
     holds = [each.system for each in found if each.verdict == "holds" and each.system != "heavy_top"]
     solved = " and ".join(systems.get(name, name) for name in dict.fromkeys(holds))
     instead = f" It solves {solved} instead." if holds else ""

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from heavytop.records import Report, Row
 from heavytop.report import claim_plots, claim_verdict, plots, work_plots
-from heavytop.report.compare import Comparison, Finding
-from heavytop.report.compare import _flatten as flatten
-from heavytop.report.plots import Section, Sources, clip, digits_kept
+from heavytop.report.compare import Comparison
+from heavytop.report.plots import digits_kept
+from heavytop.report.section import Section, Sources, clip
 from heavytop.report.svg import quiet_style
 from heavytop.report.text import short
-from heavytop.report.verdicts import Verdict
 from heavytop.suite.files import replace
 from heavytop.suite.plan import BUILT_IN
 
@@ -22,6 +22,7 @@ MOST_WORST = 50
 MOST_FAILURES = 50
 MOST_METRICS = 100
 MOST_FINDINGS = 500
+_ORDER = ("worse", "missing", "incomparable", "better", "new")
 
 
 def write_report(report: Report, path: Path) -> None:
@@ -31,7 +32,7 @@ def write_report(report: Report, path: Path) -> None:
     """
     rows, left_out = detailed(report.rows)
     found = claim_verdict.audited(report)
-    failures = [row for row in report.rows if row.outcome != "success"]
+    failures = [row for row in report.rows if row.outcome != "success" and row.measure != "work_precision"]
     word, sentence = claim_verdict.headline(found)
     page = _render(
         "report.html.j2",
@@ -43,11 +44,12 @@ def write_report(report: Report, path: Path) -> None:
         wrongness=claim_verdict.wrongness(report),
         failures=failures[:MOST_FAILURES],
         failed=len(failures),
+        gave_up=work_plots.gave_up(report),
         not_finite=[row for row in report.rows if row.outcome == "success" and not row.finite],
         sections=sections([("", report)]),
         measures=_by_measure(rows),
         left_out=left_out,
-        environment=flatten(report.environment),
+        environment=report.environment,
         commands=commands(report),
         dirty=str(report.environment.get("commit")).endswith("-dirty"),
     )
@@ -56,21 +58,20 @@ def write_report(report: Report, path: Path) -> None:
 
 def write_comparison(baseline: Report, candidate: Report, comparison: Comparison, path: Path) -> None:
     """Write the page of a comparison to ``path``: verdict, changed rows, both reports on the same axes."""
-    changed = [each for each in comparison.findings if each.verdict is not Verdict.SAME]
-    order = [Verdict.WORSE, Verdict.MISSING, Verdict.INCOMPARABLE, Verdict.BETTER, Verdict.NEW]
-    changed.sort(key=lambda finding: order.index(finding.verdict))
+    changed = [each for each in comparison.findings if each.verdict.value != "same"]
+    changed.sort(key=lambda finding: _ORDER.index(finding.verdict.value))
     sources = [("baseline", baseline), ("candidate", candidate)]
     page = _render(
         "comparison.html.j2",
         report=candidate,
         baseline=baseline,
         comparison=comparison,
-        tally=_tally(comparison.findings),
+        tally=Counter(finding.verdict.value for finding in comparison.findings),
         changed=changed[:MOST_FINDINGS],
         left_out=max(0, len(changed) - MOST_FINDINGS),
         sections=sections(sources, dict.fromkeys(finding.key[1] for finding in changed)),
         differences=[[clip(part, 200) for part in each] for each in comparison.environment],
-        environment=flatten(candidate.environment),
+        environment=candidate.environment,
     )
     replace(path, page.encode())
 
@@ -122,13 +123,6 @@ def commands(report: Report) -> list[str]:
         ".venv/bin/heavytop compare report.json again",
     ]
     return lines
-
-
-def _tally(findings: Sequence[Finding]) -> list[tuple[str, int]]:
-    counts = dict.fromkeys(Verdict, 0)
-    for finding in findings:
-        counts[finding.verdict] += 1
-    return [(verdict.value, count) for verdict, count in counts.items() if count]
 
 
 def _render(template: str, **context: Any) -> str:

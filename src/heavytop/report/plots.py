@@ -1,97 +1,31 @@
-"""The sections of a page that have pictures: what of a report is drawn, in which units, and the same in numbers.
-
-Each takes sources, ("", report) or ("baseline", ...) and ("candidate", ...): what lies in several is drawn on the same
-axes.  Plots are bounded in number; what is left out is said.
-"""
+"""The sections of a page about computed motions: digits kept, and drift and state error over time."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
-from heavytop.errors import InputError
-from heavytop.precision import exact, log10
-from heavytop.records import Law, Metric, Report, Row, Series
-from heavytop.report.svg import COLOURS, MARKERS, Picture, decades, finish, new_axes, spoken
+from heavytop.records import Law, Metric, Row
+from heavytop.report.section import (
+    DASHED,
+    MOST_PLOTS,
+    TIME,
+    Key,
+    Section,
+    Sources,
+    clip,
+    draw,
+    left_out,
+    logarithm,
+    points,
+    scientific,
+)
+from heavytop.report.svg import COLOURS, MARKERS, decades, finish, new_axes, spoken
 from heavytop.report.text import short
 
-MOST_PLOTS = 12
 MOST_LANES = 40
-TIME = "|t| (time units of the data)"
 _ELSEWHERE = ("homoclinic", "work_precision", "claim_evaluation", "claim_model", "audit")
-
-Sources = Sequence[tuple[str, Report]]
-
-
-@dataclass(frozen=True, slots=True)
-class Key:
-    """An entry of a legend: the number of its colour, a marker of matplotlib, a dash of SVG.
-
-    old: of the baseline, drawn hollow and broad, so that it shows beneath a candidate that did not change.
-    """
-
-    label: str
-    colour: int
-    marker: str = ""
-    dash: str = ""
-    old: bool = False
-    line: bool = True
-
-
-@dataclass(slots=True)
-class Section:
-    """A part of the page: words, pictures with one legend, the same in numbers, and what is not drawn."""
-
-    id: str
-    title: str
-    text: list[str]
-    pictures: list[Picture] = field(default_factory=list)
-    legend: dict[str, Key] = field(default_factory=dict)
-    columns: list[str] = field(default_factory=list)
-    rows: list[list[str]] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    across: int = 3
-
-    def key(self, key: Key) -> Key:
-        """``key``, which from now on is in the legend."""
-        return self.legend.setdefault(key.label, key)
-
-    def drop_empty_columns(self) -> None:
-        """Take columns in which no row has anything out of the numbers."""
-        used = [index for index in range(len(self.columns)) if any(row[index] for row in self.rows)]
-        self.columns = [self.columns[index] for index in used]
-        self.rows = [[row[index] for index in used] for row in self.rows]
-
-
-_ROOM = 40
-
-
-def clip(text: str, most: int = 60) -> str:
-    """A name that can be shown: one line, no control characters, cut where it is long."""
-    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * most]).split())
-    if len(text) <= most:
-        return line
-    return f"{line[: most - 1]}…" + (f" ({len(text)} characters)" if most >= _ROOM else "")
-
-
-def logarithm(value: str | None) -> float | None:
-    """log10 |value| of a report's text; None for 0 and for what is no number."""
-    try:
-        return log10(exact(value)) if value is not None else None
-    except InputError:
-        return None
-
-
-def points(series: Series, shift: float = 0.0, scale: float = 1.0) -> tuple[list[float], list[float]]:
-    """Logarithms of |t|·scale and of the values minus ``shift``, where both have one."""
-    found = [(logarithm(t), logarithm(v)) for t, v in zip(series.times, series.values, strict=False)]
-    pairs = [(x + math.log10(scale), y - shift) for x, y in found if x is not None and y is not None]
-    return [x for x, _ in pairs], [y for _, y in pairs]
-
-
-# ---- the formats -----------------------------------------------------------------------------------------------
 
 
 def _formats(sources: Sources) -> dict[str, int]:
@@ -105,21 +39,6 @@ def _format_key(name: str, place: int, source: str, line: bool = True) -> Key:
     old = source == "baseline"
     label = f"{clip(name, 20)}, {source}" if source else clip(name, 20)
     return Key(label, colour, marker, "", old, line)
-
-
-def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6) -> None:
-    """One curve, or points, as its legend has it."""
-    colour = COLOURS[key.colour]
-    face = "none" if key.old else colour
-    if key.line:
-        axes.plot(x, y, "-", color=colour, lw=4.5 if key.old else 1.6, alpha=0.35 if key.old else None)
-    # markers evenly along a curve, however dense its samples are
-    every = 0.07 if key.line else None
-    size += 2 * key.old
-    axes.plot(x, y, key.marker, color=colour, mfc=face, mec=colour, ms=size, markevery=every)
-
-
-# ---- digits kept -----------------------------------------------------------------------------------------------
 
 
 def _lane(row: Row) -> tuple[str, ...]:
@@ -204,14 +123,6 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     return section
 
 
-def left_out(section: Section, count: int, what: str) -> None:
-    """Say how many are not drawn."""
-    if count > 0:
-        section.notes.append(f"{count} more {what}{'s' if count > 1 else ''} not drawn; report.json has them all.")
-
-
-# ---- drift and state error over time ---------------------------------------------------------------------------
-
 _COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("drift_", "drift of a first integral", "|I(t) − I(0)| (units of ε)"),
     ("solution_error_along", "state error along the flow", "error along (units of ε)"),
@@ -255,10 +166,10 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     y = [plot[0].get_ylim() for plot in plots]
     if any(row.laws for lane in names for _, row in lanes[lane]):
         section.key(Key("fitted law", 5, "", "6 3"))
-    for number, (axes, title, heard) in enumerate(plots):
-        axes.set_xlim(math.floor(min(low for low, _ in x) + 0.1), max(high for _, high in x))
+    for number, (axes, title, heard, laws) in enumerate(plots):
+        axes.set_xlim(min(low for low, _ in x), max(high for _, high in x))
         axes.set_ylim(min(low for low, _ in y), max(high for _, high in y))
-        section.pictures.append(finish(axes, title, spoken(heard), f"growth-{number}"))
+        section.pictures.append(finish(axes, title, spoken([*heard, *laws]), f"growth-{number}", " ".join(laws)))
     return section
 
 
@@ -273,8 +184,8 @@ def _growth_axes(
     label: str,
     unit: str,
     formats: dict[str, int],
-) -> tuple[Any, str, list[str]] | None:
-    axes, heard, lacking = None, [], []
+) -> tuple[Any, str, list[str], list[str]] | None:
+    axes, heard, laws, lacking = None, [], [], []
     for source, row in members:
         name = _largest(row, prefix)
         if name is None:
@@ -298,6 +209,7 @@ def _growth_axes(
             )
         if law:
             _law(axes, key, law, x, y)
+            laws.append(_law_said(key.label, law))
         what = name.removeprefix("drift_") if prefix == "drift_" else prefix.removeprefix("solution_error_")
         heard.append(f"{key.label}: {scientific(y[-1])} ε ({what.replace('_', ' ')}) at |t| = {scientific(x[-1])}.")
         last = row.series[name]
@@ -316,7 +228,7 @@ def _growth_axes(
     if lacking and prefix == "solution_error_across":
         these = ", ".join(dict.fromkeys(map(clip, lacking)))
         section.notes.append(f"{_lane_name(lane)}: no known motion reaches as far as {these} ran, so no state error.")
-    return axes, f"{_lane_name(lane)}: {label}", heard
+    return axes, f"{_lane_name(lane)}: {label}", heard, laws
 
 
 def _largest(row: Row, prefix: str) -> str | None:
@@ -329,9 +241,6 @@ def _largest(row: Row, prefix: str) -> str | None:
 def _band(metrics: dict[str, Metric], name: str) -> float | None:
     found = (metrics[key].band for key in (f"{name}_max", f"{name}_rms", f"{name}_final", name) if key in metrics)
     return next((band for band in found if band), None)
-
-
-DASHED = (0, (6.0, 3.0))
 
 
 def _law(axes: Any, key: Key, law: Law, x: Sequence[float], y: Sequence[float]) -> None:
@@ -357,16 +266,16 @@ def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid:
     return [height + slope * shape(x) for x in grid]
 
 
+def _law_said(label: str, law: Law) -> str:
+    growth, exponent, _ = _law_words(law)
+    if not exponent:
+        return f"{label}: law {growth}."
+    return f"{label}: {growth}, {'rate' if growth == 'exponential' else 'exponent'} {exponent}."
+
+
 def _law_words(law: Law | None) -> list[str]:
     if law is None:
         return ["", "", ""]
     interval = "" if law.low is None or law.high is None else f" [{law.low:.2f}, {law.high:.2f}]"
     exponent = "" if law.exponent is None else f"{law.exponent:.2f}{interval}"
     return [law.growth, exponent, short(law.lost_at) if law.lost_at else ""]
-
-
-def scientific(logarithm: float) -> str:
-    """A number given by its logarithm, to two digits: 2.3e-13, 50, 1e5."""
-    exponent = math.floor(logarithm + 1e-9)
-    mantissa = 10 ** (logarithm - exponent)
-    return f"{10**logarithm:.3g}" if -4 < exponent < 5 else f"{mantissa:.1f}".removesuffix(".0") + f"e{exponent}"

@@ -25,11 +25,15 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """One plot: ``svg`` is markup; title and description are in it too, for those who do not see it."""
+    """One plot: ``svg`` is markup; title and description are in it too, for those who do not see it.
+
+    note: what the plot shows, in words under it.
+    """
 
     title: str
     description: str
     svg: str
+    note: str = ""
 
 
 @contextmanager
@@ -87,12 +91,12 @@ def power_of_ten(exponent: int) -> str:
     return str(10**exponent) if 0 <= exponent <= 2 else "10" + str(exponent).translate(_SUPERSCRIPT)
 
 
-def finish(axes: Any, title: str, description: str, name: str) -> Picture:
+def finish(axes: Any, title: str, description: str, name: str, note: str = "") -> Picture:
     """The axes as markup.  ``name``: an identifier that no other picture of the page has."""
     file = BytesIO()
     axes.figure.savefig(file, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     root = ElementTree.fromstring(file.getvalue())
-    return Picture(title, description, _inline(root, title, description, name))
+    return Picture(title, description, _inline(root, title, description, name), note)
 
 
 def _inline(root: Any, title: str, description: str, name: str) -> str:

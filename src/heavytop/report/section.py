@@ -1,0 +1,114 @@
+"""A part of the page, and what its pictures share: legends, names that can be shown, logarithms of what is measured.
+
+Sources are ("", report), or ("baseline", ...) and ("candidate", ...): what lies in several is drawn on the same axes.
+Plots are bounded in number; what is left out is said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.precision import exact, log10
+from heavytop.records import Report, Series
+from heavytop.report.svg import COLOURS, Picture
+
+MOST_PLOTS = 12
+TIME = "|t| (time units of the data)"
+DASHED = (0, (6.0, 3.0))
+
+Sources = Sequence[tuple[str, Report]]
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """An entry of a legend: the number of its colour, a marker of matplotlib, a dash of SVG.
+
+    old: of the baseline, drawn hollow and broad, so that it shows beneath a candidate that did not change.
+    """
+
+    label: str
+    colour: int
+    marker: str = ""
+    dash: str = ""
+    old: bool = False
+    line: bool = True
+
+
+@dataclass(slots=True)
+class Section:
+    """A part of the page: words, pictures with one legend, the same in numbers, and what is not drawn."""
+
+    id: str
+    title: str
+    text: list[str]
+    pictures: list[Picture] = field(default_factory=list)
+    legend: dict[str, Key] = field(default_factory=dict)
+    columns: list[str] = field(default_factory=list)
+    rows: list[list[str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    across: int = 3
+
+    def key(self, key: Key) -> Key:
+        """``key``, which from now on is in the legend."""
+        return self.legend.setdefault(key.label, key)
+
+    def drop_empty_columns(self) -> None:
+        """Take columns in which no row has anything out of the numbers."""
+        used = [index for index in range(len(self.columns)) if any(row[index] for row in self.rows)]
+        self.columns = [self.columns[index] for index in used]
+        self.rows = [[row[index] for index in used] for row in self.rows]
+
+
+_ROOM = 40
+
+
+def clip(text: str, most: int = 60) -> str:
+    """A name that can be shown: one line, no control characters, cut where it is long."""
+    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * most]).split())
+    if len(text) <= most:
+        return line
+    return f"{line[: most - 1]}…" + (f" ({len(text)} characters)" if most >= _ROOM else "")
+
+
+def logarithm(value: str | None) -> float | None:
+    """log10 |value| of a report's text; None for 0 and for what is no number."""
+    try:
+        return log10(exact(value)) if value is not None else None
+    except InputError:
+        return None
+
+
+def points(series: Series, shift: float = 0.0, scale: float = 1.0) -> tuple[list[float], list[float]]:
+    """Logarithms of |t|·scale and of the values minus ``shift``, where both have one."""
+    found = [(logarithm(t), logarithm(v)) for t, v in zip(series.times, series.values, strict=False)]
+    pairs = [(x + math.log10(scale), y - shift) for x, y in found if x is not None and y is not None]
+    return [x for x, _ in pairs], [y for _, y in pairs]
+
+
+def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6) -> None:
+    """One curve, or points, as its legend has it."""
+    colour = COLOURS[key.colour]
+    face = "none" if key.old else colour
+    if key.line:
+        axes.plot(x, y, "-", color=colour, lw=4.5 if key.old else 1.6, alpha=0.35 if key.old else None)
+    # markers evenly along a curve, however dense its samples are
+    every = 0.07 if key.line else None
+    size += 2 * key.old
+    axes.plot(x, y, key.marker, color=colour, mfc=face, mec=colour, ms=size, markevery=every)
+
+
+def left_out(section: Section, count: int, what: str) -> None:
+    """Say how many are not drawn."""
+    if count > 0:
+        section.notes.append(f"{count} more {what}{'s' if count > 1 else ''} not drawn; report.json has them all.")
+
+
+def scientific(logarithm: float) -> str:
+    """A number given by its logarithm, to two digits: 2.3e-13, 50, 1e5."""
+    exponent = math.floor(logarithm + 1e-9)
+    mantissa = 10 ** (logarithm - exponent)
+    return f"{10**logarithm:.3g}" if -4 < exponent < 5 else f"{mantissa:.1f}".removesuffix(".0") + f"e{exponent}"
