@@ -3,14 +3,17 @@
 Exit codes: 0 good, 1 a finding, 2 usage or bad input, 3 incomplete, undecided or incomparable, 130 interrupted.
 """
 
+# ruff: noqa: I001
 from __future__ import annotations
 
 import os
 import sys
 
-from heavytop.cli import claims, motions, reports, suite  # noqa: F401 - in the order of `heavytop --help`
 from heavytop.cli.app import app
 from heavytop.errors import HeavyTopError
+
+# the commands, in the order of `heavytop --help`
+from heavytop.cli import run, reports, motions, score, claims, selftest, listing  # noqa: F401
 
 
 def run_command_line() -> int:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from heavytop.cli.app import Json, command, print_json, show_on_terminal
-from heavytop.cli.suite import _progress as progress
+from heavytop.cli.progress import Progress
 from heavytop.errors import InputError
 
 
@@ -23,7 +23,7 @@ def selftest(
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     tasks = detectors.tasks()
-    with progress(tasks) as advance:
+    with Progress(tasks) as advance:
         trials = detectors.trials(tasks, workers or os.cpu_count() or 1, advance)
     if json:
         print_json({"trials": [trial.to_json() for trial in trials]})

@@ -1,4 +1,4 @@
-"""`run` and `list`."""
+"""`run`."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import command, show_on_terminal
+from heavytop.cli.progress import Progress
 from heavytop.errors import InputError
 
 _PAGE = "report.html"
@@ -88,7 +89,7 @@ def _run(
         with (
             _terminated_like_interrupted(),
             Checkpoint(directory, identity, lambda: _require_fit(directory, resume), save_every) as checkpoint,
-            _progress(tasks) as advance,
+            Progress(tasks) as advance,
         ):
             laws = run_tasks(tasks, checkpoint, advance, **where)
 
@@ -175,50 +176,3 @@ def _require_fit(directory: Path, resume: bool) -> None:
     if content:
         remedy = "Give a new folder with --out." + (" Or go on with --resume." if begun else "")
         raise InputError(f"{directory} already holds {', '.join(sorted(content)[:5])}.", remedy)
-
-
-class _progress:  # noqa: N801 - a context manager used like a function
-    """A bar with ETA on a terminal, nothing elsewhere; called with each finished task."""
-
-    def __init__(self, tasks: Any) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-        columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-        console = Console(stderr=True)
-        self.bar = Progress(*columns, console=console, disable=not console.is_terminal, transient=True)
-        self.id = self.bar.add_task("starting", total=sum(task.cost for task in tasks))
-
-    def __enter__(self) -> _progress:
-        self.bar.start()
-        return self
-
-    def __call__(self, task: Any) -> None:
-        self.bar.update(self.id, advance=task.cost, description=task.label[:48])
-
-    def __exit__(self, *_: object) -> None:
-        self.bar.stop()
-
-
-@command
-def list_() -> int:
-    """List the cases, plans, systems, number formats and integrators that are there."""
-    from heavytop.integrate import peers
-    from heavytop.precision import available
-    from heavytop.suite.cases import CASES
-    from heavytop.suite.plan import BUILT_IN
-
-    print("Cases")
-    for case in CASES.values():
-        print(f"  {case.name:20} {case.system.name:10} {case.about}")
-    print(f"Plans\n  {', '.join(BUILT_IN)}, or a TOML file")
-    print("Systems\n  heavy_top, gyrostat")
-    print("Number formats")
-    for name, reason in available().items():
-        label = "real:BITS" if name == "real" else name
-        note = {"real": "24 to 20000 bits", "double": "53 bits", "extended": "64 bits", "quad": "113 bits"}[name]
-        print(f"  {label:10} {note if reason is None else f'not available: {reason}'}")
-    print("Integrators")
-    for name, reason in peers.available().items():
-        print(f"  {name:15} {'installed' if reason is None else reason}")
-    return 0
