@@ -216,3 +216,14 @@ def test_a_value_with_a_band_agrees_within_it() -> None:
 
     assert verdicts(slope("1"), slope("1.06"), Policy())["break_away_slope"] is Verdict.SAME
     assert verdicts(slope("1"), slope("1.08"), Policy())["break_away_slope"] is Verdict.WORSE
+
+
+def test_a_row_is_ignored_as_a_whole_by_a_rule_for_all_its_metrics(tmp_path: Path) -> None:
+    given = policy(tmp_path, "[[rule]]\ncase = 'gone*'\nignore = true\n[[rule]]\nmetric = 'drift*'\nignore = true")
+    failed = row(case="gone-2", outcome="step_limit", time_reached="1")
+    old, new = report(row(), row(case="gone-1"), row(case="gone-2")), report(row(), failed, row(case="gone-3"))
+    assert {(f.key[1], f.metric, f.verdict) for f in compare(old, new, given).findings} == {
+        ("euler", "break_away_time", Verdict.SAME)
+    }
+    # a rule for some metrics leaves no row out
+    assert compare(report(row(), row(case="other")), report(row()), given).exit_code == 3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,7 +35,8 @@ def compare(
         result = compare_reports(old, new, rules)
         from heavytop.report.html import write_comparison
 
-        write_comparison(old, new, result, html)
+        with _writing():
+            write_comparison(old, new, result, html)
     else:
         result = compare_reports(store.read_brief(baseline), store.read_brief(candidate), rules)
     if markdown is not None:
@@ -94,7 +97,16 @@ def _policy(file: Path | None, floor: str | None, loss: str | None) -> Any:
 def _write(path: Path, text: str) -> None:
     from heavytop.suite.files import replace
 
-    replace(path, text.encode())
+    with _writing():
+        replace(path, text.encode())
+
+
+@contextmanager
+def _writing() -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise InputError(error.cause, "Give a file in a writable folder.") from None
 
 
 @command
@@ -119,9 +131,7 @@ def show(
     if html is not None:
         from heavytop.report.html import write_report
 
-        try:
+        with _writing():
             write_report(found, html)
-        except InputError as error:
-            raise InputError(error.cause, "Give a file in a writable folder with --html.") from None
         print(html)
     return 0

@@ -105,11 +105,11 @@ def compare(baseline: AnyReport, candidate: AnyReport, policy: Policy) -> Compar
     for row in baseline.rows:
         key = row.key
         match = others.take(key)
-        if match is None:
-            findings.append(Finding(key, "", Verdict.MISSING, row.outcome, None, "the row is missing"))
-        else:
+        if match is not None:
             findings += rows.compare(key, row, match)
-    findings += [Finding(row.key, "", Verdict.NEW, None, row.outcome) for row in others.left()]
+        elif not rows.ignores(row):
+            findings.append(Finding(key, "", Verdict.MISSING, row.outcome, None, "the row is missing"))
+    findings += [Finding(row.key, "", Verdict.NEW, None, row.outcome) for row in others.left() if not rows.ignores(row)]
     if not findings:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     return Comparison(
@@ -151,10 +151,16 @@ class _Rows:
         self.lookup = Lookup(policy)
         self.timed = timed
 
+    def ignores(self, row: AnyRow) -> bool:
+        """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
+        return bool(self.policy.rule) and self.lookup.metric(self.lookup.row(row.measure, row.case), "").ignore
+
     def compare(self, key: tuple[str, ...], old: AnyRow, new: AnyRow) -> list[Finding]:
         reason = self._incomparable(old, new)
         if reason:
-            return [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
+            return (
+                [] if self.ignores(old) else [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
+            )
         rules = self.lookup.row(old.measure, old.case) if self.policy.rule else ()
         loss = self.lookup.metric((), "").loss
         found = []
