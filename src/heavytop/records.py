@@ -5,12 +5,14 @@ Numbers that measure something are decimal text with their log10 beside them, so
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
 SCHEMA = "heavytop-report/1"
 
+Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
+Starts = Annotated[int, msgspec.Meta(ge=1)]
 Kind = Literal["error", "duration", "value"]
 """How two values of a metric compare: a smaller error is better, a longer duration is better, a value must agree."""
 
@@ -28,7 +30,7 @@ class Metric(msgspec.Struct, gc=False):
     log10: float | None
     kind: Kind = "error"
     bound: str | None = None
-    band: float | None = None
+    band: Annotated[float, msgspec.Meta(ge=0)] | None = None
 
 
 class Series(msgspec.Struct):
@@ -75,7 +77,7 @@ class Row(msgspec.Struct):
     system: str
     integrator: str
     precision: str
-    bits: int
+    bits: Bits
     outcome: str
     horizon: str
     time_reached: str
@@ -89,7 +91,7 @@ class Row(msgspec.Struct):
     flags: dict[str, str] = {}
     input_rounding: str | None = None
     series: dict[str, Series] = {}
-    starts: int = 1
+    starts: Starts = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, float] = {}
     evaluations: int | None = None

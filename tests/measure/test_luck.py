@@ -79,5 +79,8 @@ def test_a_last_value_counts_as_its_rms_at_least() -> None:
 
 def test_luck_that_is_added_to_a_duration() -> None:
     times = [100 + (-1) ** i for i in range(16)]
-    assert duration_band(times, 100) == pytest.approx(math.log10(1 + 2 / 100 / math.sqrt(2)), abs=1e-4)
-    assert duration_band(times, 400) < duration_band(times, 100)
+    plain = duration_band(times, 100, 50)
+    assert plain == pytest.approx(math.log10(1 + 2 / 100 / math.sqrt(2)), abs=1e-4)
+    assert duration_band(times, 400, 50) < plain
+    # a run that held out longer than all others was lucky
+    assert duration_band(times, 100, 120) > 5 * plain

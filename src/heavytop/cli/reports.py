@@ -38,7 +38,8 @@ def compare(
         with _writing():
             write_comparison(old, new, result, html)
     else:
-        result = compare_reports(store.read_brief(baseline), store.read_brief(candidate), rules)
+        all_of_them = json or junit is not None
+        result = compare_reports(store.read_brief(baseline), store.read_brief(candidate), rules, list_same=all_of_them)
     if markdown is not None:
         from heavytop.report.markdown import comparison_markdown
 

@@ -62,9 +62,13 @@ def bands(runs: Sequence[Mapping[str, Metric]], floor: float, own: Mapping[str, 
     return found
 
 
-def duration_band(times: Sequence[float], own: float) -> float:
-    """The band in decades of a duration ``own`` > 0 that luck moves as it moves ``times``, by addition."""
-    return round(math.log10(1 + _spread(times) / own), 4)
+def duration_band(times: Sequence[float], own: float, expected: float) -> float:
+    """The band in decades of a duration ``own`` > 0 that luck moves as it moves ``times``, by addition.
+
+    expected: what the duration would be among those; it counts where it is no shorter than they are.
+    """
+    family = [*times, expected] if expected >= min(times) else times
+    return round(math.log10(1 + _spread(family) / own), 4)
 
 
 def _size(run: Mapping[str, Metric], name: str) -> float:

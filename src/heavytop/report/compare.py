@@ -53,10 +53,14 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All findings, and the differences of the plans and environments.  changed: all findings but the same."""
+    """All findings, and the differences of the plans and environments.
+
+    same: how many metrics are the same, where these are not among the findings.  changed: all findings but the same.
+    """
 
     findings: list[Finding]
     environment: list[tuple[str, str, str]]
+    same: int = 0
     changed: list[Finding] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -66,7 +70,7 @@ class Comparison:
     def tally(self) -> dict[Verdict, int]:
         """How many findings of each verdict, in the order of the verdicts."""
         verdicts = [finding.verdict for finding in self.changed]
-        same = len(self.findings) - len(self.changed)
+        same = self.same + len(self.findings) - len(self.changed)
         counts = {verdict: verdicts.count(verdict) for verdict in Verdict} | {Verdict.SAME: same}
         return {verdict: count for verdict, count in counts.items() if count}
 
@@ -94,13 +98,14 @@ class Comparison:
         }
 
 
-def compare(baseline: AnyReport, candidate: AnyReport, policy: Policy) -> Comparison:
+def compare(baseline: AnyReport, candidate: AnyReport, policy: Policy, *, list_same: bool = True) -> Comparison:
     """Every row of either report, in the baseline's order, new ones last.
 
+    list_same: False to count what plainly stayed the same in place of listing it.
     Raises InputError where neither report has a row, or the policy leaves nothing to compare.
     """
     findings: list[Finding] = []
-    rows = _Rows(policy, _timed(policy, baseline.environment, candidate.environment))
+    rows = _Rows(policy, _timed(policy, baseline.environment, candidate.environment), list_same)
     others = _Others(candidate.rows)
     for row in baseline.rows:
         key = row.key
@@ -110,12 +115,13 @@ def compare(baseline: AnyReport, candidate: AnyReport, policy: Policy) -> Compar
         elif not rows.ignores(row):
             findings.append(Finding(key, "", Verdict.MISSING, row.outcome, None, "the row is missing"))
     findings += [Finding(row.key, "", Verdict.NEW, None, row.outcome) for row in others.left() if not rows.ignores(row)]
-    if not findings:
+    if not findings and not rows.same:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     return Comparison(
         findings,
         _differences({"plan": baseline.plan}, {"plan": candidate.plan})
         + _differences(baseline.environment, candidate.environment),
+        rows.same,
     )
 
 
@@ -146,8 +152,10 @@ class _Others:
 
 
 class _Rows:
-    def __init__(self, policy: Policy, timed: bool) -> None:
+    def __init__(self, policy: Policy, timed: bool, list_same: bool) -> None:
         self.policy = policy
+        self.list_same = list_same
+        self.same = 0
         self.lookup = Lookup(policy)
         self.timed = timed
 
@@ -175,7 +183,10 @@ class _Rows:
                 and metric.kind == match.kind == "error"
                 and -loss <= metric.log10 - match.log10 <= loss
             ):
-                found.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
+                if self.list_same:
+                    found.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
+                else:
+                    self.same += 1
             elif not (limits := self.lookup.metric(rules, name)).ignore:
                 if match is None:
                     found.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))

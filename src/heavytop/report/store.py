@@ -16,7 +16,7 @@ import numpy
 from heavytop.errors import InputError
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
-from heavytop.records import SCHEMA, Law, Metric, Report, Row
+from heavytop.records import SCHEMA, Bits, Law, Metric, Report, Row, Starts
 from heavytop.suite.files import replace
 
 FILE = "report.json"
@@ -54,7 +54,7 @@ class BriefRow(msgspec.Struct, gc=False):
     system: str
     integrator: str
     precision: str
-    bits: int
+    bits: Bits
     outcome: str
     horizon: str
     time_reached: str
@@ -64,7 +64,7 @@ class BriefRow(msgspec.Struct, gc=False):
     measure: str = ""
     against: str = ""
     flags: dict[str, str] = {}
-    starts: int = 1
+    starts: Starts = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, float] = {}
 
@@ -187,14 +187,12 @@ def _check_keys(file: Path, rows: Iterable[Row | BriefRow]) -> None:
 
 
 def _check_rows(file: Path, rows: Sequence[Row] | Sequence[BriefRow]) -> None:
-    alike: set[tuple[Any, ...]] = set()
+    known: set[str] = set()
     for row in rows:
-        # most rows are like one before in all that is checked
-        kind = row.measure, row.horizon, row.time_reached, row.outcome, row.bits, row.starts
-        if kind not in alike:
+        # most rows reached the horizon of the row before
+        if row.horizon not in known or row.time_reached != row.horizon or row.measure in _NEEDED:
             _check_row(file, row)
-            if row.measure not in _NEEDED:
-                alike.add(kind)
+            known.add(row.horizon)
     metrics = [metric for row in rows for metric in row.metrics.values()]
     if doubtful := _doubtful(metrics):
         for row in rows:
@@ -204,18 +202,15 @@ def _check_rows(file: Path, rows: Sequence[Row] | Sequence[BriefRow]) -> None:
 
 
 def _doubtful(metrics: Sequence[Metric]) -> set[int]:
-    """The ids of the metrics that are not plainly a number with its logarithm and a band; told in a few strokes."""
-    plain = [m for m in metrics if m.log10 is not None and m.bound is None and (m.band is None or m.band >= 0)]
+    """The ids of the metrics that are not plainly a number with its logarithm; told in a few strokes."""
     try:
-        values = numpy.array(list(map(float, [metric.value for metric in plain])))
+        values = numpy.array(list(map(float, [metric.value for metric in metrics])))
     except ValueError:
         return set(map(id, metrics))
-    given = numpy.array([metric.log10 for metric in plain], dtype=float)
+    given = numpy.array([metric.log10 for metric in metrics], dtype=float)
     with numpy.errstate(all="ignore"):
-        good = abs(numpy.log10(abs(values)) - given) < _CLOSE / 2
-    if good.all() and len(plain) == len(metrics):
-        return set()
-    return set(map(id, metrics)) - {id(metric) for metric, fine in zip(plain, good, strict=True) if fine}
+        plain = abs(numpy.log10(abs(values)) - given) < _CLOSE / 2
+    return set() if plain.all() else {id(metrics[index]) for index in numpy.flatnonzero(~plain).tolist()}
 
 
 def _where(file: Path, row: Row | BriefRow) -> str:
@@ -227,10 +222,6 @@ def _check_row(file: Path, row: Row | BriefRow) -> None:
     horizon, reached = (abs(_number(where, value)) for value in (row.horizon, row.time_reached))
     if row.outcome == "success" and reached < horizon:
         raise InputError(f"{where}: a success that reached only {row.time_reached} of {row.horizon}.", _REMEDY)
-    if not 0 <= row.bits <= _MOST_BITS:
-        raise InputError(f"{where}: {row.bits} bits are no format.", _REMEDY)
-    if row.starts < 1:
-        raise InputError(f"{where}: {row.starts} starts.", _REMEDY)
     lacking = [name for name in _NEEDED.get(row.measure, ()) if name not in row.metrics]
     if lacking:
         raise InputError(f"{where}: a row of {row.measure} without {', '.join(lacking)}.", _REMEDY)
@@ -242,7 +233,6 @@ WORDS = {
     "value": ("nan", "missing", "never", UNRESOLVED),
 }
 """What may stand in the place of a number, for each kind of metric."""
-_MOST_BITS = 100_000
 _QUANTITIES = ("omega", "theta", "psi")
 _NEEDED = {
     "homoclinic": ("break_away_time",),
@@ -257,8 +247,6 @@ _NEEDED = {
 
 
 def _check_metric(where: str, metric: Metric, finite: bool) -> None:
-    if metric.band is not None and not metric.band >= 0:
-        raise InputError(f"{where}: a band of {metric.band}.", _REMEDY)
     if metric.bound is not None:
         _number(where, metric.bound)
     if metric.value in WORDS[metric.kind]:

@@ -84,7 +84,8 @@ def homoclinic_bands(task: Task, run: Trajectory, metrics: Metrics, watch: Calla
     own = banded["break_away_time"]
     ends = [float(exact(rerun["break_away_time"].value)) for rerun in reruns if rerun["break_away_time"].log10]
     if own.log10 is not None and len(ends) == len(reruns):
-        own.band = duration_band(ends, float(exact(own.value)))
+        time, gained = float(exact(own.value)), (run.problem.precision.bits - DOUBLE.bits) * math.log(2) / case.rate
+        own.band = duration_band(ends, time, time - gained)
     return banded
 
 
