@@ -27,8 +27,9 @@ def test_the_known_derivatives_are_those_of_the_enclosed_motion() -> None:
 
 
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
-def test_every_kind_of_integrator_passes_and_is_at_time_0_again(system) -> None:
-    for precision in (DOUBLE, EXTENDED, QUAD, real(24), real(150)):
+def test_every_kind_of_integrator_passes_and_is_at_time_0_again(system, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(taylor, "_compiled", {})
+    for precision in (EXTENDED, QUAD, real(24), real(150)):
         engine = compiled(system, precision, attitude=True).engine
         assert engine.time == 0
         assert not numpy.any(engine.state != 0)

@@ -11,8 +11,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import heavytop.report.environment
+import heavytop.report.html
 import heavytop.suite.run
-from heavytop.cli import suite
+from heavytop.cli import run as command
+from heavytop.suite.files import replace
 from heavytop.suite.measurements import measure
 from heavytop.suite.plan import expand, load
 
@@ -24,14 +26,16 @@ SURROUNDINGS = heavytop.report.environment.environment()
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "os.rmdir", "fcntl.flock")
 
 
-def rows(tasks, workers, scheduler, saved) -> Iterator:
+def rows(tasks, workers, scheduler, done, saved) -> Iterator:
     for index, task in enumerate(tasks):
-        saved(index).save({"task": task.label})
-        yield index, ROWS[task.label]
+        if index not in done:
+            saved(index).save({"task": task.label})
+            yield index, ROWS[task.label]
 
 
 heavytop.suite.run.rows = rows
 heavytop.report.environment.environment = lambda: SURROUNDINGS
+heavytop.report.html.write_report = lambda report, path: replace(path, repr(report.rows).encode())  # quick
 
 
 def run(out: Path, killed_at: int) -> int:
@@ -53,7 +57,7 @@ def run(out: Path, killed_at: int) -> int:
     sys.addaudithook(count)
     code = 99
     try:
-        code = suite._run(TASKS, {"name": "x"}, out, True, 10.0, {"workers": 1, "scheduler": None})
+        code = command._run(TASKS, {"name": "x"}, out, True, 10.0, {"workers": 1, "scheduler": None})
     finally:
         os._exit(code)
 

@@ -1,6 +1,7 @@
 """The command line.  Only this room prints; each command is a few lines that join the other rooms.
 
-Exit codes: 0 good, 1 a finding, 2 usage or bad input, 3 incomplete, undecided or incomparable, 130 interrupted.
+Exit codes: 0 good, 1 a finding, 2 usage or bad input, 3 incomplete, undecided or incomparable, 130 interrupted,
+143 terminated.
 """
 
 # ruff: noqa: I001

@@ -50,19 +50,28 @@ def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
         return summary(structs.replace(report, rows=first))
     counts: dict[tuple[str, str], Counter[str]] = {}
     worst: dict[tuple[str, str], dict[str, tuple[float, str, str]]] = {}
+    words: dict[tuple[str, str, str], Counter[str]] = {}
     for row in chain(first, stream):
         group = row.measure, row.precision
         counts.setdefault(group, Counter())[row.outcome] += 1
         found = worst.setdefault(group, {})
         for name, metric in row.metrics.items():
-            size = inf if metric.value == "nan" else metric.log10
-            if metric.kind == "error" and size is not None and size > found.get(name, (-inf,))[0]:
+            if metric.kind != "error":
+                continue
+            if metric.log10 is None and metric.value != "0":
+                words.setdefault((*group, name), Counter())[metric.value] += 1
+            size = inf if metric.value == "nan" else -inf if metric.log10 is None else metric.log10
+            if name not in found or size > found[name][0]:
                 found[name] = size, metric.value, row.case
     parts: list[RenderableType] = [_head(report, sum(count.total() for count in counts.values()))]
     for group, found in worst.items():
         outcomes = ", ".join(f"{number} {outcome}" for outcome, number in sorted(counts[group].items()))
         parts += [Text(), _title(f"{' in '.join(filter(None, group))}: {outcomes}; the largest errors")]
-        parts.append(_table(["metric", "largest", "in"], [[n, short(v), c] for n, (_, v, c) in found.items()]))
+        lines = [
+            [name, short(value), case, ", ".join(f"{n} {word}" for word, n in words.get((*group, name), {}).items())]
+            for name, (_, value, case) in found.items()
+        ]
+        parts.append(_table(["metric", "largest", "in", "no number"], lines))
     return Group(*parts, Text(), Text("`heavytop show` lists every row."))
 
 

@@ -1,0 +1,41 @@
+"""What a run of very many rows prints."""
+
+from io import StringIO
+
+from rich.console import Console
+
+from heavytop.records import SCHEMA, Metric, Report, Row
+from heavytop.report.text import MOST_ROWS, overview
+
+
+def row(index: int, value: str, log10: float | None, outcome: str = "success") -> Row:
+    metrics = {"drift_energy_max": Metric(value, log10), "count": Metric("7", 0.845, "value")}
+    return Row(f"top[{index}]", "heavy_top", "heyoka", "double", 53, outcome, "1", "1", 3, True, metrics, "drift")
+
+
+def shown(rows) -> str:
+    console = Console(width=120, record=True, file=StringIO())
+    console.print(overview(Report(SCHEMA, {"name": "many"}, {}, []), rows))
+    return console.export_text()
+
+
+def test_many_rows_are_summed_up_with_the_worst_of_each_metric() -> None:
+    rows = [row(i, "1e-14", -14.0) for i in range(MOST_ROWS + 100)]
+    rows[250] = row(250, "3e-9", -8.5)
+    rows[7] = row(7, "unresolved", None)
+    rows[8] = row(8, "1", 0.0, "step_limit")
+    text = shown(iter(rows))
+    assert f"{MOST_ROWS + 100} measurements" in text
+    assert f"drift in double: 1 step_limit, {MOST_ROWS + 99} success" in text
+    assert "top[8]" in text
+    assert "1 unresolved" in text
+    assert "count" not in text
+    assert len(text.splitlines()) < 12
+    rows[9] = row(9, "nan", None)
+    worst = shown(iter(rows))
+    assert "top[9]" in worst
+    assert "1 nan" in worst
+
+
+def test_few_rows_are_listed() -> None:
+    assert "top[3]" in shown(row(i, "1e-14", -14.0) for i in range(5))
