@@ -240,6 +240,35 @@ def test_a_broken_peer_is_an_error_in_words(name: str, cause: str) -> None:
     assert cause in str(peers.available()[name])
 
 
+def test_a_peer_that_is_not_installed_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "CyRK", None)
+    monkeypatch.delitem(sys.modules, "heavytop.integrate.peers.cyrk", raising=False)
+    with pytest.raises(InputError, match="cyrk:DOP853 is not available") as caught:
+        peers.peer("cyrk:DOP853")
+    assert "heavytop[peers]" in caught.value.remedy
+
+
+def test_without_numba_the_field_is_evaluated_in_python() -> None:
+    code = """
+import sys
+sys.modules["numba"] = None
+from fractions import Fraction
+from heavytop.integrate import peers
+from heavytop.suite.cases import CASES
+case = CASES["generic"]
+for name, knob, size in (("scipy:DOP853", "tolerance", 10**10), ("splitting:4", "step", 512)):
+    run = peers.run(name, case.top, case.start, [Fraction(2)], setting=(knob, Fraction(1, size)))
+    print(run.flags["field"], *run.states[-1])
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    case = CASES["generic"]
+    ours = propagate(case.top, case.start, [Fraction(2)], DOUBLE)
+    lines = [line.split() for line in result.stdout.splitlines()]
+    assert [line[0] for line in lines] == ["python", "python"]
+    for line in lines:
+        np.testing.assert_allclose([float(text) for text in line[1:]], ours.states[-1], rtol=0, atol=1e-8)
+
+
 def test_nothing_is_imported_before_it_is_used() -> None:
     code = (
         "import sys, heavytop.integrate.peers as p; p.known();"

@@ -28,7 +28,7 @@ from heavytop.top.heavy_top import State
 from heavytop.top.integrals import holding
 
 _ENOUGH_SECONDS = 0.3
-_RUNS = range(5, 101)
+_RUNS = range(3, 101)
 _REST = 0.002
 """Seconds of sleep before a run: it then starts on a fresh slice of the processor's time."""
 _TOO_LONG = 3.0
