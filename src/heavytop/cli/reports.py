@@ -119,9 +119,6 @@ def show(
     if html is not None:
         from heavytop.report.html import write_report
 
-        try:
-            write_report(found, html)
-        except InputError as error:
-            raise InputError(error.cause, "Give a file in a writable folder with --html.") from None
+        write_report(found, html)
         print(html)
     return 0
