@@ -149,17 +149,19 @@ def test_a_run_that_failed_is_a_verdict_and_no_number(pages: dict[str, Page]) ->
     assert said["euler"] == ["30.0", "4.0"]
 
 
-def test_digits_kept_of_numbers_bounds_and_words() -> None:
+def test_digits_at_the_end_of_numbers_bounds_and_words() -> None:
     def kept(metric: Metric, **changes: object) -> float | None:
-        return plots.digits_kept(row(metrics={"solution_error_gamma_final": metric}, **changes))
+        return plots.digits_at_end(row(metrics={"solution_error_gamma_final": metric}, **changes))
 
     assert kept(error("1e-10")) == 10
-    assert kept(Metric("unresolved", None, "error", "1e-18")) == 18
+    assert kept(Metric("unresolved", None, "error", "1e-12")) == 12
+    assert kept(Metric("unresolved", None, "error", "1e-18")) == pytest.approx(53 * math.log10(2))
+    assert kept(error("1e-18")) == pytest.approx(53 * math.log10(2))
     assert kept(Metric("0", None)) == pytest.approx(53 * math.log10(2))
     assert kept(Metric("nan", None)) is None
     assert kept(Metric("unresolved", None)) is None
     assert kept(error("1e-10"), outcome="time_limit") is None
-    assert plots.digits_kept(row(metrics={})) is None
+    assert plots.digits_at_end(row(metrics={})) is None
 
 
 def test_hostile_names_are_text_cut_where_they_are_long(pages: dict[str, Page]) -> None:
@@ -277,7 +279,7 @@ def test_show_writes_a_page(tmp_path: Path) -> None:
     assert Page(tmp_path / "page.html").all("svg")
     refused = subprocess.run([*command, "no/page.html"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert refused.returncode == 2
-    assert "--html" in refused.stderr
+    assert "Give the page a file in a writable folder" in refused.stderr
 
 
 def test_every_number_of_the_results_is_in_the_page(pages: dict[str, Page]) -> None:

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from heavytop.errors import InputError
 from heavytop.records import Report, Row
 from heavytop.report import claim_plots, claim_verdict, plots, work_plots
 from heavytop.report.compare import Comparison
-from heavytop.report.plots import digits_kept
+from heavytop.report.plots import digits_at_end
 from heavytop.report.section import Section, Sources, clip
 from heavytop.report.svg import quiet_style
 from heavytop.report.text import short
@@ -53,11 +54,14 @@ def write_report(report: Report, path: Path) -> None:
         commands=commands(report),
         dirty=str(report.environment.get("commit")).endswith("-dirty"),
     )
-    replace(path, page.encode())
+    _write(path, page)
 
 
 def write_comparison(baseline: Report, candidate: Report, comparison: Comparison, path: Path) -> None:
-    """Write the page of a comparison to ``path``: verdict, changed rows, both reports on the same axes."""
+    """Write the page of a comparison to ``path``: verdict, changed rows, both reports on the same axes.
+
+    Raises InputError where it cannot be written.
+    """
     changed = [each for each in comparison.findings if each.verdict.value != "same"]
     changed.sort(key=lambda finding: _ORDER.index(finding.verdict.value))
     sources = [("baseline", baseline), ("candidate", candidate)]
@@ -73,7 +77,14 @@ def write_comparison(baseline: Report, candidate: Report, comparison: Comparison
         differences=[[clip(part, 200) for part in each] for each in comparison.environment],
         environment=candidate.environment,
     )
-    replace(path, page.encode())
+    _write(path, page)
+
+
+def _write(path: Path, page: str) -> None:
+    try:
+        replace(path, page.encode())
+    except InputError as error:
+        raise InputError(error.cause, "Give the page a file in a writable folder with space.") from None
 
 
 def sections(sources: Sources, first: Sequence[str] | dict[str, None] = ()) -> list[Section]:
@@ -106,7 +117,7 @@ def _by_measure(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def _badness(row: Row) -> tuple[bool, bool, float]:
-    kept = digits_kept(row)
+    kept = digits_at_end(row)
     return row.outcome == "success", row.finite, float("inf") if kept is None else kept
 
 

@@ -51,17 +51,21 @@ def _lane_name(lane: tuple[str, ...], most: int = 40) -> str:
     return clip(case, most) + (f" ({clip(extra, most)})" if extra else "")
 
 
-def digits_kept(row: Row) -> float | None:
-    """-log10 of the error of γ at the horizon; |γ| = 1, so the error is relative.  None where there is no number."""
+def digits_at_end(row: Row) -> float | None:
+    """-log10 of the error of γ at the horizon, at most the digits of the format; |γ| = 1, so the error is relative.
+
+    None where there is no number.
+    """
     metric = row.metrics.get("solution_error_gamma_final")
     if metric is None or row.outcome != "success":
         return None
+    most = row.bits * math.log10(2)
     if metric.value == "unresolved":
         bound = logarithm(metric.bound)
-        return None if bound is None else -bound
-    if metric.log10 is not None:
-        return -metric.log10
-    return row.bits * math.log10(2) if logarithm(metric.value) is None and metric.value not in _WORDS else None
+        return None if bound is None else min(most, -bound)
+    if metric.value in _WORDS:
+        return None
+    return most if metric.log10 is None else min(most, -metric.log10)
 
 
 _WORDS = ("nan", "missing", "never", "unresolved")
@@ -98,7 +102,7 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         for place, (source, row) in enumerate(sorted(lanes[lane], key=lambda each: each[1].bits)):
             key = section.key(_format_key(row.precision, formats.get(row.precision, 0), source, line=False))
             y = index + (place - (len(lanes[lane]) - 1) / 2) * height
-            full, kept = row.bits * math.log10(2), digits_kept(row)
+            full, kept = row.bits * math.log10(2), digits_at_end(row)
             band = row.metrics["solution_error_gamma_final"].band
             if kept is None:
                 axes.plot([0], [y], "x", color=COLOURS[key.colour], mew=1.6, ms=6)
