@@ -237,17 +237,17 @@ def _exponential(times: Array, rms: Array, logs: Array, starts: int) -> _Fit | N
 
 
 def _lost(ensemble: Ensemble, growth: Growth, slope: float, times: Array, rms: Array) -> str | None:
-    """When the law reaches a tenth of the size: the first sample that has, else by the law from the last samples."""
+    """When the RMS is a tenth of the size: the first sample where it is, else by the class from the last samples on."""
     import numpy
 
     beyond = numpy.flatnonzero(ensemble.rms() >= LOST * ensemble.size)
     if len(beyond):
         return f"{ensemble.times[beyond[0]]:.3g}"
-    if growth == "bounded" or slope <= 0:
+    if growth == "bounded":
         return None
-    # from the last quarter of the samples: there the law is nearest
-    times, rms = times[-(-3 * len(times) // 4) :], rms[-(-3 * len(rms) // 4) :]
-    missing = numpy.log(LOST * ensemble.size) - numpy.log(rms).mean()
+    # the last quarter of the samples: there the law is nearest
+    late = slice(-(len(times) // 4), None)
+    missing = numpy.log(LOST * ensemble.size) - numpy.log(rms[late]).mean()
     if growth == "exponential":
-        return f"{times.mean() + missing / slope:.3g}"
-    return f"{numpy.exp(numpy.log(times).mean() + missing / slope):.3g}"
+        return f"{times[late].mean() + missing / slope:.3g}"
+    return f"{numpy.exp(numpy.log(times[late]).mean() + missing / CLASSES[growth]):.3g}"
