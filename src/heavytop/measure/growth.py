@@ -28,8 +28,6 @@ LOST = 0.1
 """An error of this part of the size of a quantity leaves no digit of it."""
 RESOLVED = 10
 """Times the error of the reference, below which an error is unresolved."""
-SETTLED = 10
-"""Steps in which the first roundings are forgotten."""
 _RESAMPLES = 1000
 _SEED = 20261121
 
@@ -121,14 +119,20 @@ def _interval(estimates: Array, starts: int) -> tuple[float, float]:
 
 
 def law(ensemble: Ensemble) -> Law:
-    """The law of growth, by least squares of log RMS on log |t| (or on |t|), with its interval over starts.
+    """The law of growth, with its interval over starts.
 
-    The span begins when ten steps are behind, or three decades before its end where that is earlier; it ends before
-    the error of any start reaches a tenth of the size of the quantity.  Samples with no resolved RMS are not used.
-    A power needs three decades of |t|; its class is the nearest, and must be in the interval (to ±0.12) with its
-    neighbours out of it.  An exponential needs three decades of error, a power fit steeper than t², and must fit
-    better than the power in 95 % of the resamples.  Otherwise the law is unresolved.
-    An error that is exactly 0 throughout is bounded, without an exponent.
+    Only samples with a resolved RMS before the error of any start is a tenth of the size of the quantity are used.
+
+    A power is a least-squares line through log RMS over log |t|, over the last three decades of these: earlier the law
+    that wins in the end may hide behind another.  Each start counts by its share of the RMS relative to its own mean
+    share, so that the few starts with the largest errors do not make the exponent alone.  Its class is the nearest,
+    and must be in the interval (to ±0.12) with its neighbours out of it.
+
+    An exponential is a line through log RMS over |t|, each sample counting as much as the time it
+    stands for.  It needs three decades of error, a power fit steeper than t², and a better fit than that of the power
+    in 95 % of the resamples.
+
+    Anything else is unresolved.  An error that is exactly 0 throughout is bounded, without an exponent.
 
     detects: the smallest ε, a systematic relative fault a step, that would have been told: its n-th sum f lifts the
     RMS r at the last fitted time to √(r² + f²), and the lower end of that ensemble's 95 % interval, about
@@ -143,27 +147,26 @@ def law(ensemble: Ensemble) -> Law:
         return unresolved
     errors = ensemble.errors[ensemble.healthy]
     if not errors.any():
-        ends = [f"{ensemble.times[i]:.6g}" for i in (0, -1)]
-        return Law("bounded", starts, first=ends[0], last=ends[1])
-    span = _span(ensemble, errors)
-    if len(span) < FEWEST_SAMPLES:
+        return Law("bounded", starts, first=f"{ensemble.times[0]:.6g}", last=f"{ensemble.times[-1]:.6g}")
+    used = _usable(ensemble, errors)
+    if len(used) < FEWEST_SAMPLES:
         return unresolved
-    times, rms = ensemble.times[span], ensemble.rms()[span]
-    squares = (errors[:, span] / rms) ** 2
-    logs = numpy.log(rms) + numpy.log(resampled(starts) @ squares) / 2
-    found = _exponential(times, rms, logs, starts) or _power(times, rms, logs, starts)
+    times, rms = ensemble.times[used], ensemble.rms()[used]
+    shares = (errors[:, used] / rms) ** 2
+    found = _exponential(times, rms, shares) or _power(times, rms, shares)
     if found is None:
         return unresolved
-    growth, slope, (low, high) = found
+    growth, first, slope, (low, high) = found
+    logs = numpy.log(rms[-1]) + numpy.log(resampled(starts) @ shares[:, -1]) / 2
     return Law(
         growth,
         starts,
         round(slope, 6),
         round(low, 6),
         round(high, 6),
-        first=f"{times[0]:.6g}",
+        first=f"{first:.6g}",
         last=f"{times[-1]:.6g}",
-        detects=None if growth == "exponential" else _detects(ensemble, times[-1], _interval(logs[:, -1], starts)),
+        detects=None if growth == "exponential" else _detects(ensemble, times[-1], _interval(logs, starts)),
         lost_at=_lost(ensemble, growth, slope, times, rms),
     )
 
@@ -177,20 +180,14 @@ def _detects(ensemble: Ensemble, last: float, logs: tuple[float, float]) -> str:
     return f"{(high**2 - low**2) ** 0.5 * order / n**order / ensemble.size:.3g}"
 
 
-def _span(ensemble: Ensemble, errors: Array) -> Array:
-    """Indices of the samples to fit."""
+def _usable(ensemble: Ensemble, errors: Array) -> Array:
+    """Indices of the samples from the first step on, with a resolved RMS, before saturation."""
     import numpy
 
     saturated = numpy.flatnonzero(errors.max(axis=0) >= LOST * ensemble.size)
     end = int(saturated[0]) if len(saturated) else len(ensemble.times)
-    if not end:
-        return numpy.array([], dtype=int)
-    last = ensemble.times[end - 1]
-    begin = max(ensemble.step, min(SETTLED * ensemble.step, last / 10**FEWEST_DECADES))
-    index = numpy.arange(end)
-    usable = (ensemble.times[:end] >= begin * (1 - 1e-9)) & (ensemble.rms()[:end] > 0)
-    found: Array = index[usable]
-    return found
+    known = (ensemble.rms() > 0) & (ensemble.times >= ensemble.step)
+    return numpy.flatnonzero(known[:end])
 
 
 def _fit(x: Array, y: Array, weights: Array | None = None) -> tuple[Any, Any]:
@@ -204,36 +201,54 @@ def _fit(x: Array, y: Array, weights: Array | None = None) -> tuple[Any, Any]:
     return slopes, (rest - slopes[..., numpy.newaxis] * centred) ** 2 @ w
 
 
-_Fit = tuple[Growth, float, tuple[float, float]]
+_Found = tuple[Growth, float, float, tuple[float, float]]
+"""The class, the first fitted time, the exponent or rate, its interval."""
 
 
-def _power(times: Array, rms: Array, logs: Array, starts: int) -> _Fit | None:
+def _power(times: Array, rms: Array, shares: Array) -> _Found | None:
     import numpy
 
-    if times[-1] < times[0] * 10**FEWEST_DECADES * 0.999:
+    # times are rounded to a few digits
+    late = times >= times[-1] / 10**FEWEST_DECADES * 0.999
+    x, y, shares = numpy.log(times[late]), numpy.log(rms[late]), shares[:, late]
+    if times[late][-1] < times[late][0] * 10**FEWEST_DECADES * 0.9 or len(x) < FEWEST_SAMPLES:
         return None
-    x = numpy.log(times)
-    slope = float(_fit(x, numpy.log(rms))[0])
-    low, high = _interval(_fit(x, logs)[0], starts)
+    starts = len(shares)
+    slope = float(_fit(x, y + _levelled(shares, numpy.full((1, starts), 1 / starts)))[0][0])
+    low, high = _interval(_fit(x, y + _levelled(shares, resampled(starts)))[0], starts)
     growth = min(CLASSES, key=lambda name: abs(CLASSES[name] - slope))
     others = (value for name, value in CLASSES.items() if name != growth)
     if not low - NEAR <= CLASSES[growth] <= high + NEAR or any(low <= value <= high for value in others):
         return None
-    return growth, slope, (low, high)
+    return growth, times[late][0], slope, (low, high)
 
 
-def _exponential(times: Array, rms: Array, logs: Array, starts: int) -> _Fit | None:
-    """Samples count as much as the time they stand for: spaced in log |t|, the first of them would hide the rate."""
+def _levelled(shares: Array, weights: Array) -> Array:
+    """Half the log of the mean share with each start scaled to its own mean, shape (resamples, samples).
+
+    weights: of the starts, shape (resamples, starts); the RMS that the own means refer to is the resample's.
+    """
+    import numpy
+
+    means = weights @ shares
+    own = (1 / means) @ shares.T
+    scaled = numpy.divide(weights, own, out=numpy.zeros_like(own), where=own > 0)
+    found: Array = numpy.log(scaled @ shares) / 2
+    return found
+
+
+def _exponential(times: Array, rms: Array, shares: Array) -> _Found | None:
     import numpy
 
     if rms[-1] < rms[0] * 10**FEWEST_DECADES:
         return None
-    weights = numpy.gradient(times)
+    weights, starts = numpy.gradient(times), len(shares)
+    logs = numpy.log(rms) + numpy.log(resampled(starts) @ shares) / 2
     powers, off_power = _fit(numpy.log(times), logs, weights)
     rates, off_exponential = _fit(times, logs, weights)
     if _interval(powers, starts)[0] <= CLASSES["t^2"] or (off_exponential < off_power).mean() < 0.95:
         return None
-    return "exponential", float(_fit(times, numpy.log(rms), weights)[0]), _interval(rates, starts)
+    return "exponential", times[0], float(_fit(times, numpy.log(rms), weights)[0]), _interval(rates, starts)
 
 
 def _lost(ensemble: Ensemble, growth: Growth, slope: float, times: Array, rms: Array) -> str | None:

@@ -85,6 +85,7 @@ def summary(report: Report) -> RenderableType:
         ("break_away_law", _laws),
         ("drift", _drift),
         ("work_precision", _work_precision),
+        ("growth", _growth),
     ):
         if name in by_measure:
             parts += [Text(), *section(by_measure[name])]
@@ -283,3 +284,68 @@ def _work_precision(rows: Sequence[Row]) -> list[RenderableType]:
         parts += [_table(columns, cells), Text()]
     parts += [Text(f"  {lead.text}", style="bold") for lead in leads(rows)]
     return parts
+
+
+def _growth(rows: Sequence[Row]) -> list[RenderableType]:
+    lines = [
+        [
+            " ".join((row.case, *row.integrator.split()[1:])),
+            row.precision,
+            name.removeprefix("drift_").replace("solution_error_", "error "),
+            f"{law.starts} of {row.starts}" if law.starts < row.starts else str(law.starts),
+            law.growth,
+            "-" if law.exponent is None else f"{law.exponent:.3f} [{law.low:.3f}, {law.high:.3f}]",
+            short(law.detects or "-", 2),
+            short(law.lost_at or "-", 2),
+        ]
+        for row in rows
+        for name, law in row.laws.items()
+    ]
+    columns = [
+        "case",
+        "format",
+        "quantity",
+        "starts",
+        "grows like",
+        "exponent or rate [95 %]",
+        "detects",
+        "lost at |t|",
+    ]
+    return [
+        _title(
+            "Growth laws: root mean square over random starts, drift of the first integrals and distance from truth"
+        ),
+        Text("  Detects: the smallest relative fault a step that these starts would have told from the healthy law."),
+        _table(columns, lines),
+    ]
+
+
+_STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}
+
+
+def comparison(result: Comparison) -> RenderableType:
+    """Verdict first, then what changed, then the differences of the environments."""
+    counts: dict[Verdict, int] = {}
+    for finding in result.findings:
+        counts[finding.verdict] = counts.get(finding.verdict, 0) + 1
+    tally = ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in Verdict if verdict in counts)
+    parts: list[Any] = [Text(f"Verdict: {result.verdict} ({tally})", style="bold")]
+    changed = [finding for finding in result.findings if finding.verdict is not Verdict.SAME]
+    if changed:
+        table = Table(box=None, header_style="dim")
+        for column in ("verdict", "row", "metric", "baseline", "candidate", "why"):
+            table.add_column(column, overflow="fold")
+        for finding in changed:
+            table.add_row(
+                Text(finding.verdict.value, style=_STYLE.get(finding.verdict, "")),
+                Text(" ".join(part for part in (finding.key[1], finding.key[3], finding.key[4]) if part)),
+                Text(finding.metric),
+                Text(short(finding.baseline or "-")),
+                Text(short(finding.candidate or "-")),
+                Text(finding.reason),
+            )
+        parts.append(table)
+    if result.environment:
+        parts.append(Text("Environments differ:", style="bold"))
+        parts += [Text(f"  {name}: {old} -> {new}") for name, old, new in result.environment]
+    return Group(*parts)

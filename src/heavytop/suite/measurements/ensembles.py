@@ -56,10 +56,13 @@ class _Reference:
 
 @dataclass(frozen=True, slots=True)
 class _Quantity:
-    """An error over the ensemble: an :class:`Ensemble`, but for the step.  values: shape (starts, samples)."""
+    """An error over the ensemble: an :class:`Ensemble`, but for the step.
+
+    values: shape (starts, samples).  sizes: of the quantity itself, shape (starts,).
+    """
 
     values: Array
-    size: float
+    sizes: Array
     accumulates: int
     resolution: Array | float = 0.0
 
@@ -97,20 +100,24 @@ def growth(task: Task) -> Row:
     motions = propagate_ensemble(given, times, observer=observe, **_options(run))
     seconds = {"reference": ready - began, "run": perf_counter() - ready, "compile": motions[0].seconds["compile"]}
     quantities = {
-        f"drift_{name}": _Quantity(_values(times, (d.running[name] for d in drifts)), _size(drifts, name), 1)
+        f"drift_{name}": _Quantity(
+            _values(times, (d.running[name] for d in drifts)), numpy.array([float(d.initial[name]) for d in drifts]), 1
+        )
         for name in drifts[0].running
     }
     if any(errors):
-        turning = _rms(numpy.array([[float(w) for w in start.omega] for start in starts]).ravel()) * 3**0.5
-        for name, size, accumulates in (
-            ("along", (turning**2 + 1) ** 0.5, 2),
-            ("across", (turning**2 + 1) ** 0.5, 1),
-            ("omega", turning, 2),
-            ("gamma", 1.0, 2),
+        omega = numpy.linalg.norm([[float(w) for w in start.omega] for start in starts], axis=1)
+        one = numpy.ones(len(starts))
+        whole = numpy.hypot(omega, one)
+        for name, sizes, accumulates in (
+            ("along", whole, 2),
+            ("across", whole, 1),
+            ("omega", omega, 2),
+            ("gamma", one, 2),
         ):
             values = _values(times, (e.running[name] if e else Running() for e in errors))
             resolution = reference.radius + reference.part * values
-            quantities[f"solution_error_{name}"] = _Quantity(values, size, accumulates, resolution)
+            quantities[f"solution_error_{name}"] = _Quantity(values, sizes, accumulates, resolution)
     rounding = max(input_rounding(case.top, start, problem) for start, problem in zip(starts, true, strict=True))
     row = _row(task, motions, reference.text, seconds, rounding)
     steps = sum(motion.steps for motion in motions) / len(motions)
@@ -197,7 +204,7 @@ def _own_error(
     )
     part = _distance(reference, truth) / _distance(propagate_ensemble(given, early, **options), truth)
     return part, (
-        f"against {widest.name} on {len(true)} starts up to |t| = {shown(early[-1])}, "
+        f"against {widest.name} on {len(true)} starts up to |t| = {float(early[-1]):.3g}, "
         f"its error is {part:.1e} of the error measured"
     )
 
@@ -223,11 +230,6 @@ def _rms(values: Array) -> float:
     return float(largest * ((values / largest) ** 2).mean() ** 0.5)
 
 
-def _size(drifts: Sequence[Drift], name: str) -> float:
-    """The root mean square of an integral over the starts; 1 where it is 0 at all of them."""
-    return _rms(numpy.array([float(drift.initial[name]) for drift in drifts])) or 1.0
-
-
 def _values(times: Sequence[Fraction], runnings: Iterable[Running]) -> Array:
     """Errors at the samples, shape (starts, samples); NaN where a motion did not come that far."""
     return numpy.array([[float(r.kept[t]) if t in r.kept else numpy.nan for t in times] for r in runnings])
@@ -239,11 +241,11 @@ def _add(row: Row, name: str, quantity: _Quantity, times: Sequence[Fraction], st
         numpy.array([float(abs(time)) for time in times]),
         quantity.values,
         step,
-        quantity.size,
-        quantity.resolution,
-        quantity.accumulates,
+        resolution=quantity.resolution,
+        accumulates=quantity.accumulates,
     )
     kept = quantity.values[ensemble.healthy]
+    ensemble = replace(ensemble, size=_rms(quantity.sizes[ensemble.healthy]) or 1.0)
     rms = ensemble.rms()
     row.series[name] = Series([time_text(time) for time in times], [_text(value, len(kept) > 0) for value in rms])
     for part, values in (("max", kept.max(axis=1)), ("final", kept[:, -1])):
