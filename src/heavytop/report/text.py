@@ -318,34 +318,3 @@ def _growth(rows: Sequence[Row]) -> list[RenderableType]:
         Text("  Detects: the smallest relative fault a step that these starts would have told from the healthy law."),
         _table(columns, lines),
     ]
-
-
-_STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}
-
-
-def comparison(result: Comparison) -> RenderableType:
-    """Verdict first, then what changed, then the differences of the environments."""
-    counts: dict[Verdict, int] = {}
-    for finding in result.findings:
-        counts[finding.verdict] = counts.get(finding.verdict, 0) + 1
-    tally = ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in Verdict if verdict in counts)
-    parts: list[Any] = [Text(f"Verdict: {result.verdict} ({tally})", style="bold")]
-    changed = [finding for finding in result.findings if finding.verdict is not Verdict.SAME]
-    if changed:
-        table = Table(box=None, header_style="dim")
-        for column in ("verdict", "row", "metric", "baseline", "candidate", "why"):
-            table.add_column(column, overflow="fold")
-        for finding in changed:
-            table.add_row(
-                Text(finding.verdict.value, style=_STYLE.get(finding.verdict, "")),
-                Text(" ".join(part for part in (finding.key[1], finding.key[3], finding.key[4]) if part)),
-                Text(finding.metric),
-                Text(short(finding.baseline or "-")),
-                Text(short(finding.candidate or "-")),
-                Text(finding.reason),
-            )
-        parts.append(table)
-    if result.environment:
-        parts.append(Text("Environments differ:", style="bold"))
-        parts += [Text(f"  {name}: {old} -> {new}") for name, old, new in result.environment]
-    return Group(*parts)
