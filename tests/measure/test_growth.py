@@ -118,13 +118,16 @@ def test_a_power_between_the_classes_is_unresolved(power: float) -> None:
     assert law(Ensemble(TIMES, errors, STEP)).growth == "unresolved"
 
 
-def test_two_laws_that_cross_are_not_taken_for_one() -> None:
+@pytest.mark.parametrize("second", ["linear", "integrated", "quadratic"])
+def test_two_laws_that_cross_are_not_taken_for_one(second: str) -> None:
     rng = numpy.random.default_rng(6)
-    walk = synthetic("walk", rng)
-    crossing = numpy.abs(walk + EPS * TIMES * 2)
-    assert law(Ensemble(TIMES, crossing, STEP)).growth != "t^0.5"
-    # a fault that is far below the walk at the end of the span leaves its law alone
-    assert law(Ensemble(TIMES, walk + EPS * TIMES * 1e-5, STEP)).growth == "t^0.5"
+    walk, later = synthetic("walk", rng), synthetic(second, rng)
+    middle = numpy.searchsorted(TIMES, 10**3.5)
+    crossing = walk + later * (_rms(walk[:, middle]) / _rms(later[:, middle]))
+    assert law(Ensemble(TIMES, crossing, STEP)).growth == "unresolved"
+    # a second law that is far below the first throughout leaves it alone
+    hidden = walk + later * (_rms(walk[:, -1]) / _rms(later[:, -1]) / 30)
+    assert law(Ensemble(TIMES, hidden, STEP)).growth == "t^0.5"
 
 
 @pytest.mark.parametrize(

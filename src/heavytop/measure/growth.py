@@ -24,6 +24,8 @@ FEWEST_DECADES = 3.0
 FEWEST_SAMPLES = 8
 NEAR = 0.12
 """A class exponent this far outside the interval still names the law: samples see a power only up to a transient."""
+BENT = 0.25
+"""Half the way from a class to the next: an exponent that surely changes by this within the span is no law."""
 LOST = 0.1
 """An error of this part of the size of a quantity leaves no digit of it."""
 RESOLVED = 10
@@ -126,7 +128,8 @@ def law(ensemble: Ensemble) -> Law:
     A power is a least-squares line through log RMS over log |t|, over the last three decades of these: earlier the law
     that wins in the end may hide behind another.  Each start counts by its share of the RMS relative to its own mean
     share, so that the few starts with the largest errors do not make the exponent alone.  Its class is the nearest,
-    and must be in the interval (to ±0.12) with its neighbours out of it.
+    and must be in the interval (to ±0.12) with its neighbours out of it; and the exponents of its two halves
+    must not surely differ by more than a quarter, as they do where one law takes over from another.
 
     An exponential is a line through log RMS over |t|, each sample counting as much as the time it
     stands for.  It needs three decades of error, a power fit steeper than t², and a better fit than that of the power
@@ -213,9 +216,13 @@ def _power(times: Array, rms: Array, shares: Array) -> _Found | None:
     x, y, shares = numpy.log(times[late]), numpy.log(rms[late]), shares[:, late]
     if times[late][-1] < times[late][0] * 10**FEWEST_DECADES * 0.9 or len(x) < FEWEST_SAMPLES:
         return None
-    starts = len(shares)
+    starts, half = len(shares), len(x) // 2
     slope = float(_fit(x, y + _levelled(shares, numpy.full((1, starts), 1 / starts)))[0][0])
-    low, high = _interval(_fit(x, y + _levelled(shares, resampled(starts)))[0], starts)
+    logs = y + _levelled(shares, resampled(starts))
+    low, high = _interval(_fit(x, logs)[0], starts)
+    bends = _interval(_fit(x[half:], logs[:, half:])[0] - _fit(x[:half], logs[:, :half])[0], starts)
+    if bends[0] > BENT or bends[1] < -BENT:
+        return None
     growth = min(CLASSES, key=lambda name: abs(CLASSES[name] - slope))
     others = (value for name, value in CLASSES.items() if name != growth)
     if not low - NEAR <= CLASSES[growth] <= high + NEAR or any(low <= value <= high for value in others):
