@@ -31,6 +31,7 @@ LOST = 0.1
 RESOLVED = 10
 """Times the error of the reference, below which an error is unresolved."""
 _RESAMPLES = 1000
+_ROUNDS = 3
 _SEED = 20261121
 
 
@@ -233,14 +234,16 @@ def _power(times: Array, rms: Array, shares: Array) -> _Found | None:
 def _levelled(shares: Array, weights: Array) -> Array:
     """Half the log of the mean share with each start scaled to its own mean, shape (resamples, samples).
 
-    weights: of the starts, shape (resamples, starts); the RMS that the own means refer to is the resample's.
+    weights: of the starts, shape (resamples, starts); the shares that the own means refer to are the resample's.
     """
     import numpy
 
-    means = weights @ shares
-    own = (1 / means) @ shares.T
-    scaled = numpy.divide(weights, own, out=numpy.zeros_like(own), where=own > 0)
-    found: Array = numpy.log(scaled @ shares) / 2
+    mean = weights @ shares
+    # a start's own mean is taken relative to all: again with the scaled ones, until large ones do not lead
+    for _ in range(_ROUNDS):
+        own = (1 / mean) @ shares.T
+        mean = numpy.divide(weights, own, out=numpy.zeros_like(own), where=own > 0) @ shares
+    found: Array = numpy.log(mean) / 2
     return found
 
 
