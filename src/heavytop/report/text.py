@@ -94,6 +94,7 @@ def summary(report: Report) -> RenderableType:
         ("break_away_law", _laws),
         ("drift", _drift),
         ("work_precision", _work_precision),
+        ("growth", _growth),
     ):
         if name in by_measure:
             parts += [Text(), *section(by_measure[name])]
@@ -292,3 +293,37 @@ def _work_precision(rows: Sequence[Row]) -> list[RenderableType]:
         parts += [_table(columns, cells), Text()]
     parts += [Text(f"  {lead.text}", style="bold") for lead in leads(rows)]
     return parts
+
+
+def _growth(rows: Sequence[Row]) -> list[RenderableType]:
+    lines = [
+        [
+            " ".join((row.case, *row.integrator.split()[1:])),
+            row.precision,
+            name.removeprefix("drift_").replace("solution_error_", "error "),
+            f"{law.starts} of {row.starts}" if law.starts < row.starts else str(law.starts),
+            law.growth,
+            "-" if law.exponent is None else f"{law.exponent:.3f} [{law.low:.3f}, {law.high:.3f}]",
+            short(law.detects or "-", 2),
+            short(law.lost_at or "-", 2),
+        ]
+        for row in rows
+        for name, law in row.laws.items()
+    ]
+    columns = [
+        "case",
+        "format",
+        "quantity",
+        "starts",
+        "grows like",
+        "exponent or rate [95 %]",
+        "detects",
+        "lost at |t|",
+    ]
+    return [
+        _title(
+            "Growth laws: root mean square over random starts, drift of the first integrals and distance from truth"
+        ),
+        Text("  Detects: the smallest relative fault a step that these starts would have told from the healthy law."),
+        _table(columns, lines),
+    ]

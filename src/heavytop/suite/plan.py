@@ -25,7 +25,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
-BUILT_IN = ("smoke", "default", "long", "peers", "selftest")
+BUILT_IN = ("smoke", "default", "growth", "long", "peers", "selftest")
 
 
 class Top(msgspec.Struct, forbid_unknown_fields=True):

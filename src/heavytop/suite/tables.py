@@ -13,6 +13,7 @@ from heavytop.errors import InputError
 from heavytop.integrate import peers
 from heavytop.precision import exact, parse, physical
 from heavytop.suite.cases import Case
+from heavytop.suite.starts import GrowthRun, growth_task
 from heavytop.suite.task import Task
 
 _MAX_SAMPLES = 1_000_000
@@ -222,6 +223,17 @@ class WorkPrecision(Strict, tag="work_precision"):
         ]
 
 
+class Growth(Strict, tag="growth"):
+    """How drift and solution error grow over an ensemble of random starts of each case."""
+
+    cases: list[str]
+    runs: list[GrowthRun]
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        return [growth_task(each, run) for each in map(find, self.cases) for run in self.runs]
+
+
 def log_spaced(count: int, per_decade: int = 8) -> list[int]:
     """About ``per_decade`` whole numbers a decade from 1 to ``count``, both included."""
     wanted = {count}
@@ -255,4 +267,4 @@ def _signed(times: list[Fraction], direction: str) -> tuple[Fraction, ...]:
     return tuple(-time for time in times) if direction == "backward" else tuple(times)
 
 
-Table = Audit | ClaimModel | ClaimEvaluation | Homoclinic | Drift | LocalError | WorkPrecision
+Table = Audit | ClaimModel | ClaimEvaluation | Homoclinic | Drift | LocalError | WorkPrecision | Growth

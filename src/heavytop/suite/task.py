@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from heavytop.precision import parse
 from heavytop.suite.cases import Case
+
+if TYPE_CHECKING:
+    from heavytop.suite.starts import GrowthRun
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +22,7 @@ class Task:
     keep: the times that go into the series.  precision: "" where no format is involved.
     integrator: heyoka, or a fault of :mod:`heavytop.integrate.broken`.
     seed: which roundings; 0 for those of the data as given.
+    ensemble: of a growth measurement.
     """
 
     kind: str
@@ -29,6 +34,7 @@ class Task:
     keep: tuple[Fraction, ...] = ()
     integrator: str = "heyoka"
     seed: int = 0
+    ensemble: GrowthRun | None = None
 
     def of(self, case: Case) -> Task:
         """The same measurement of another case."""
@@ -49,6 +55,7 @@ class Task:
         per_step = 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5
         if self.kind == "local_error":
             return 1.0 + 0.2 * float(self.times[-1])
-        return (
-            (3.0 if self.kind == "drift" else 1.0) + float(abs(self.times[-1])) * 4 * per_step + len(self.times) * 1e-4
-        )
+        seconds = float(abs(self.times[-1])) * 4 * per_step + len(self.times) * 1e-4
+        if self.ensemble is not None:
+            return 5.0 + self.ensemble.starts * seconds / 2
+        return (3.0 if self.kind == "drift" else 1.0) + seconds

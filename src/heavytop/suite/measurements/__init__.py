@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.measurements import claimed, computed, work_precision
+from heavytop.suite.measurements import claimed, computed, ensembles, work_precision
 from heavytop.suite.task import Task
 
 _MEASURES: dict[str, Callable[[Task], Row]] = {
@@ -16,6 +16,7 @@ _MEASURES: dict[str, Callable[[Task], Row]] = {
     "homoclinic": computed.homoclinic,
     "local_error": computed.local_error,
     "work_precision": work_precision.work_precision,
+    "growth": ensembles.growth,
 }
 _LONG: dict[str, Callable[[Task, Saved], Row]] = {
     "drift": computed.drift,

@@ -19,7 +19,7 @@ from heavytop.records import Metric, Row, Series
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.measurements.luck import Remembered, drift_bands, homoclinic_bands
-from heavytop.suite.measurements.shared import case_of, integrator_of, time_metric, time_text
+from heavytop.suite.measurements.shared import case_of, input_rounding, integrator_of, time_metric, time_text
 from heavytop.suite.task import Task
 from heavytop.top.equations import Parameters
 from heavytop.top.integrals import holding
@@ -139,7 +139,7 @@ def streamed(
 def computed_row(
     task: Task, run: Trajectory, metrics: dict[str, Metric], series: dict[str, Series], against: str
 ) -> Row:
-    precision = run.problem.precision
+    case, precision = case_of(task), run.problem.precision
     outcome = run.outcome
     if outcome is Outcome.SUCCESS and task.times and len(run.times) < len(task.times):
         outcome = Outcome.INCOMPLETE
@@ -162,19 +162,7 @@ def computed_row(
         against=against,
         order=run.order,
         flags=run.flags,
-        input_rounding=decimal_text(input_rounding(task, run.problem), 3),
+        input_rounding=decimal_text(input_rounding(case.top, case.start, run.problem), 3),
         series=series,
         seconds=run.seconds,
     )
-
-
-def input_rounding(task: Task, problem: Problem) -> Fraction:
-    """The largest relative rounding of the data that the run was given: not charged to it, but said."""
-    case = case_of(task)
-    given = case.system.parameters(case.top, case.start)
-    pairs = zip(
-        (*given.inertia, *given.moment, Fraction(given.rotor), *case.start.flat),
-        (*problem.parameters.inertia, *problem.parameters.moment, problem.parameters.rotor, *problem.start.flat),
-        strict=True,
-    )
-    return max(abs(b - a) / abs(a) if a else Fraction(0) for a, b in pairs)

@@ -10,12 +10,14 @@ from typing import Any
 from heavytop.claims.ershkov import Branch, PartialCase
 from heavytop.integrate import taylor
 from heavytop.integrate.broken import FAULTS
+from heavytop.integrate.trajectory import Problem
 from heavytop.measure.luck import reroll
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import decimal_text
 from heavytop.records import Kind, Metric
 from heavytop.suite.cases import Case
 from heavytop.suite.task import Task
+from heavytop.top.heavy_top import HeavyTop, State
 
 
 def time_text(time: Fraction) -> str:
@@ -52,3 +54,14 @@ def integrator_of(task: Task) -> Any:
     if task.integrator == "heyoka":
         return taylor
     return FAULTS[task.integrator]
+
+
+def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:
+    """The largest relative rounding of the data that the run was given: not charged to it, but said."""
+    given = problem.system.parameters(top, start)
+    pairs = zip(
+        (*given.inertia, *given.moment, Fraction(given.rotor), *start.flat),
+        (*problem.parameters.inertia, *problem.parameters.moment, problem.parameters.rotor, *problem.start.flat),
+        strict=True,
+    )
+    return max(abs(b - a) / abs(a) if a else Fraction(0) for a, b in pairs)

@@ -1,0 +1,278 @@
+"""How an error grows with |t|: a law fitted to its root mean square over an ensemble of starts.
+
+The healthy laws are Brouwer's: rounding errors that are independent from step to step make every integral walk at
+random, like √t, and the phase like t^1.5 (D. Brouwer, Astron. J. 46, 1937, 149).  A systematic error a step gives t
+and t², a wrong coefficient of the field bounded integrals and a phase like t, a chaotic motion an exponential.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any, get_args
+
+from heavytop.records import Growth, Law
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[Any]
+
+CLASSES: dict[Growth, float] = dict(zip(get_args(Growth)[:5], (0.0, 0.5, 1.0, 1.5, 2.0), strict=True))
+FEWEST_STARTS = 8
+FEWEST_DECADES = 3.0
+FEWEST_SAMPLES = 8
+NEAR = 0.12
+"""A class exponent this far outside the interval still names the law: samples see a power only up to a transient."""
+BENT = 0.25
+"""Half the way from a class to the next: an exponent that surely changes by this within the span is no law."""
+LOST = 0.1
+"""An error of this part of the size of a quantity leaves no digit of it."""
+RESOLVED = 10
+"""Times the error of the reference, below which an error is unresolved."""
+_RESAMPLES = 1000
+_ROUNDS = 3
+_SEED = 20261121
+
+
+@dataclass(frozen=True, slots=True)
+class Ensemble:
+    """One quantity along many motions of one kind.
+
+    times: |t| > 0, growing, shape (samples,).
+    errors: |error|, above 1e-300 or 0, shape (starts, samples); a start with a NaN has failed and is left out.
+    step: the mean |t| of a step.
+    size: the largest that the error can be, roughly.
+    resolution: the error of the reference, broadcast to the shape of ``errors``.
+    accumulates: 1 where a systematic fault of ε a step becomes size · ε · n after n steps (an integral), 2 where it
+    becomes size · ε · n²/2 (the phase, whose rate is what drifts).
+    """
+
+    times: Array
+    errors: Array
+    step: float
+    size: float = 1.0
+    resolution: Array | float = 0.0
+    accumulates: int = 1
+
+    @property
+    def healthy(self) -> Array:
+        """Which starts are finite at every time, shape (starts,)."""
+        import numpy
+
+        return numpy.asarray(numpy.isfinite(self.errors).all(axis=1))
+
+    def rms(self) -> Array:
+        """Root mean square over the healthy starts, shape (samples,); NaN where it is not resolved or no start is."""
+        import numpy
+
+        kept = self.errors[self.healthy]
+        if not len(kept):
+            return numpy.full(len(self.times), numpy.nan)
+        limits = numpy.broadcast_to(self.resolution, self.errors.shape)[self.healthy]
+        rms, blur = (_root_mean_square(values) for values in (kept, limits))
+        return numpy.where(rms >= RESOLVED * blur, rms, numpy.nan)
+
+
+def _root_mean_square(values: Array) -> Array:
+    """Over axis 0, without underflow of the squares."""
+    import numpy
+
+    largest: Array = numpy.abs(values).max(axis=0)
+    scaled = numpy.divide(values, largest, out=numpy.zeros_like(values, dtype=float), where=largest > 0)
+    root: Array = largest * numpy.sqrt((scaled**2).mean(axis=0))
+    return root
+
+
+@cache
+def resampled(starts: int) -> Array:
+    """Weights of the bootstrap, shape (resamples, starts); each row sums to 1.  The same for the same ``starts``."""
+    import numpy
+
+    draws = numpy.random.default_rng(_SEED).multinomial(starts, numpy.full(starts, 1 / starts), _RESAMPLES)
+    weights: Array = draws / starts
+    return weights
+
+
+def band(values: Array) -> float | None:
+    """Half-width in decades of the 95 % bootstrap interval of the RMS of ``values``, shape (starts,).
+
+    None with fewer than eight values, where one is not finite, and where most are 0.
+    """
+    import numpy
+
+    if len(values) < FEWEST_STARTS or not numpy.isfinite(values).all() or numpy.count_nonzero(values) < len(values) / 2:
+        return None
+    squares = (values / values.max()) ** 2
+    low, high = _interval(numpy.log10(resampled(len(values)) @ squares) / 2, len(values))
+    return float(high - low) / 2
+
+
+def _interval(estimates: Array, starts: int) -> tuple[float, float]:
+    """The 95 % percentile interval, expanded for few starts (T. Hesterberg, Am. Stat. 69, 2015, 371).
+
+    By √(n/(n − 1)), for resamples scatter about the sample and not the truth, and by the ratio of the 97.5 % points of
+    Student's t and the normal distribution, 1 + (z² + 1)/(4 (n − 1)) with z = 1.96.
+    """
+    import numpy
+
+    low, middle, high = numpy.percentile(estimates, [2.5, 50, 97.5])
+    wider = (starts / (starts - 1)) ** 0.5 * (1 + 1.21 / (starts - 1))
+    return float(middle + (low - middle) * wider), float(middle + (high - middle) * wider)
+
+
+def law(ensemble: Ensemble) -> Law:
+    """The law of growth, with its interval over starts.
+
+    Only samples with a resolved RMS before the error of any start is a tenth of the size of the quantity are used.
+
+    A power is a least-squares line through log RMS over log |t|, over the last three decades of these: earlier the law
+    that wins in the end may hide behind another.  Each start counts by its share of the RMS relative to its own mean
+    share, so that the few starts with the largest errors do not make the exponent alone.  Its class is the nearest,
+    and must be in the interval (to ±0.12) with its neighbours out of it; and the exponents of its two halves
+    must not surely differ by more than a quarter, as they do where one law takes over from another.
+
+    An exponential is a line through log RMS over |t|, each sample counting as much as the time it
+    stands for.  It needs three decades of error, a power fit steeper than t², and a better fit than that of the power
+    in 95 % of the resamples.
+
+    Anything else is unresolved.  An error that is exactly 0 throughout is bounded, without an exponent.
+
+    detects: the smallest ε, a systematic relative fault a step, that would have been told: its n-th sum f lifts the
+    RMS r at the last fitted time to √(r² + f²), and the lower end of that ensemble's 95 % interval, about
+    √(r_low² + f²), must be above the upper end r_high of the healthy one: f = √(r_high² − r_low²), with
+    f = size ε n for an integral and size ε n²/2 for the phase.
+    """
+    import numpy
+
+    starts = int(ensemble.healthy.sum())
+    unresolved = Law("unresolved", starts)
+    if starts < FEWEST_STARTS:
+        return unresolved
+    errors = ensemble.errors[ensemble.healthy]
+    if not errors.any():
+        return Law("bounded", starts, first=f"{ensemble.times[0]:.6g}", last=f"{ensemble.times[-1]:.6g}")
+    used = _usable(ensemble, errors)
+    if len(used) < FEWEST_SAMPLES:
+        return unresolved
+    times, rms = ensemble.times[used], ensemble.rms()[used]
+    shares = (errors[:, used] / rms) ** 2
+    found = _exponential(times, rms, shares) or _power(times, rms, shares)
+    if found is None:
+        return unresolved
+    growth, first, slope, (low, high) = found
+    logs = numpy.log(rms[-1]) + numpy.log(resampled(starts) @ shares[:, -1]) / 2
+    return Law(
+        growth,
+        starts,
+        round(slope, 6),
+        round(low, 6),
+        round(high, 6),
+        first=f"{first:.6g}",
+        last=f"{times[-1]:.6g}",
+        detects=None if growth == "exponential" else _detects(ensemble, times[-1], _interval(logs, starts)),
+        lost_at=_lost(ensemble, growth, slope, times, rms),
+    )
+
+
+def _detects(ensemble: Ensemble, last: float, logs: tuple[float, float]) -> str:
+    """As :func:`law` says, from the interval of log RMS at the ``last`` time."""
+    import numpy
+
+    low, high = numpy.exp(logs)
+    n, order = last / ensemble.step, ensemble.accumulates
+    return f"{(high**2 - low**2) ** 0.5 * order / n**order / ensemble.size:.3g}"
+
+
+def _usable(ensemble: Ensemble, errors: Array) -> Array:
+    """Indices of the samples from the first step on, with a resolved RMS, before saturation."""
+    import numpy
+
+    saturated = numpy.flatnonzero(errors.max(axis=0) >= LOST * ensemble.size)
+    end = int(saturated[0]) if len(saturated) else len(ensemble.times)
+    known = (ensemble.rms() > 0) & (ensemble.times >= ensemble.step)
+    return numpy.flatnonzero(known[:end])
+
+
+def _fit(x: Array, y: Array, weights: Array | None = None) -> tuple[Any, Any]:
+    """Slopes and sums of squared residuals of least-squares lines through (x, y), y of shape (..., samples)."""
+    import numpy
+
+    w = numpy.ones_like(x) if weights is None else weights
+    centred = x - numpy.average(x, weights=w)
+    rest = y - numpy.average(y, axis=-1, weights=w)[..., numpy.newaxis]
+    slopes = rest @ (w * centred) / (w @ centred**2)
+    return slopes, (rest - slopes[..., numpy.newaxis] * centred) ** 2 @ w
+
+
+_Found = tuple[Growth, float, float, tuple[float, float]]
+"""The class, the first fitted time, the exponent or rate, its interval."""
+
+
+def _power(times: Array, rms: Array, shares: Array) -> _Found | None:
+    import numpy
+
+    # times are rounded to a few digits
+    late = times >= times[-1] / 10**FEWEST_DECADES * 0.999
+    x, y, shares = numpy.log(times[late]), numpy.log(rms[late]), shares[:, late]
+    if times[late][-1] < times[late][0] * 10**FEWEST_DECADES * 0.9 or len(x) < FEWEST_SAMPLES:
+        return None
+    starts, half = len(shares), len(x) // 2
+    slope = float(_fit(x, y + _levelled(shares, numpy.full((1, starts), 1 / starts)))[0][0])
+    logs = y + _levelled(shares, resampled(starts))
+    low, high = _interval(_fit(x, logs)[0], starts)
+    bends = _interval(_fit(x[half:], logs[:, half:])[0] - _fit(x[:half], logs[:, :half])[0], starts)
+    if bends[0] > BENT or bends[1] < -BENT:
+        return None
+    growth = min(CLASSES, key=lambda name: abs(CLASSES[name] - slope))
+    others = (value for name, value in CLASSES.items() if name != growth)
+    if not low - NEAR <= CLASSES[growth] <= high + NEAR or any(low <= value <= high for value in others):
+        return None
+    return growth, times[late][0], slope, (low, high)
+
+
+def _levelled(shares: Array, weights: Array) -> Array:
+    """Half the log of the mean share with each start scaled to its own mean, shape (resamples, samples).
+
+    weights: of the starts, shape (resamples, starts); the shares that the own means refer to are the resample's.
+    """
+    import numpy
+
+    mean = weights @ shares
+    # a start's own mean is taken relative to all: again with the scaled ones, until large ones do not lead
+    for _ in range(_ROUNDS):
+        own = (1 / mean) @ shares.T
+        mean = numpy.divide(weights, own, out=numpy.zeros_like(own), where=own > 0) @ shares
+    found: Array = numpy.log(mean) / 2
+    return found
+
+
+def _exponential(times: Array, rms: Array, shares: Array) -> _Found | None:
+    import numpy
+
+    if rms[-1] < rms[0] * 10**FEWEST_DECADES:
+        return None
+    weights, starts = numpy.gradient(times), len(shares)
+    logs = numpy.log(rms) + numpy.log(resampled(starts) @ shares) / 2
+    powers, off_power = _fit(numpy.log(times), logs, weights)
+    rates, off_exponential = _fit(times, logs, weights)
+    if _interval(powers, starts)[0] <= CLASSES["t^2"] or (off_exponential < off_power).mean() < 0.95:
+        return None
+    return "exponential", times[0], float(_fit(times, numpy.log(rms), weights)[0]), _interval(rates, starts)
+
+
+def _lost(ensemble: Ensemble, growth: Growth, slope: float, times: Array, rms: Array) -> str | None:
+    """When the RMS is a tenth of the size: the first sample where it is, else by the class from the last samples on."""
+    import numpy
+
+    beyond = numpy.flatnonzero(ensemble.rms() >= LOST * ensemble.size)
+    if len(beyond):
+        return f"{ensemble.times[beyond[0]]:.3g}"
+    if growth == "bounded":
+        return None
+    # the last quarter of the samples: there the law is nearest
+    late = slice(-(len(times) // 4), None)
+    missing = numpy.log(LOST * ensemble.size) - numpy.log(rms[late]).mean()
+    if growth == "exponential":
+        return f"{times[late].mean() + missing / slope:.3g}"
+    return f"{numpy.exp(numpy.log(times[late]).mean() + missing / CLASSES[growth]):.3g}"

@@ -1,0 +1,217 @@
+"""Laws of growth on synthetic ensembles whose law is known: what is recognised, how sure it is, what is refused."""
+
+import collections
+
+import numpy
+import pytest
+
+from heavytop.measure.growth import FEWEST_STARTS, Ensemble, band, law
+
+STEP = 0.5
+EPS = 2.0**-52
+TIMES = 10 ** (numpy.arange(8 * 5 + 1) / 8)
+NAMES = {"walk": "t^0.5", "linear": "t", "integrated": "t^1.5", "quadratic": "t^2", "bounded": "bounded"}
+EXPONENT = {"walk": 0.5, "linear": 1, "integrated": 1.5, "quadratic": 2, "bounded": 0}
+
+
+def walks(rng, starts: int, times=TIMES):
+    """A random walk of EPS a step and its sum, exactly at the times: shape (2, starts, samples)."""
+    walk, total, done = numpy.zeros(starts), numpy.zeros(starts), 0
+    found = []
+    for steps in numpy.round(times / STEP):
+        n = steps - done
+        rise, bridge = rng.normal(size=(2, starts))
+        # n steps at once: the sum of a walk given its end has mean n/2 of it and variance n³/12
+        total = total + n * walk + n**1.5 * (rise / 2 + bridge / 12**0.5)
+        walk, done = walk + rise * n**0.5, steps
+        found.append((walk, total))
+    return EPS * numpy.moveaxis(numpy.array(found), 0, 2)
+
+
+def synthetic(kind: str, rng, starts: int = 64, times=TIMES):
+    """|error|, shape (starts, samples), with amplitudes that scatter over the starts by a factor 2."""
+    amplitude = numpy.exp(0.7 * rng.normal(size=(starts, 1)))
+    phase = rng.uniform(0, 6.28, size=(starts, 1))
+    if kind in ("walk", "integrated"):
+        values = walks(rng, starts, times)[int(kind == "integrated")] * amplitude
+    elif kind == "bounded":
+        values = 1e-12 * amplitude * numpy.sin(1.3 * times + phase)
+    else:
+        values = EPS * amplitude * (times / STEP) ** EXPONENT[kind] * (1 + 0.3 * numpy.sin(1.7 * times + phase))
+    # the sample is rounded to a number of the format
+    return numpy.abs(numpy.round(values / EPS) * EPS)
+
+
+def chaotic(rng, starts: int, rate: float = 0.15, times=TIMES):
+    grown = EPS * numpy.abs(rng.normal(size=(starts, 1))) * numpy.exp(numpy.minimum(rate * times, 60))
+    return numpy.where(grown < 1, grown, 1) * numpy.exp(0.5 * rng.normal(size=(starts, len(times))))
+
+
+@pytest.mark.parametrize("kind", NAMES)
+def test_every_power_is_recognised(kind: str) -> None:
+    rng = numpy.random.default_rng(5)
+    found = collections.Counter(law(Ensemble(TIMES, synthetic(kind, rng), STEP)).growth for _ in range(40))
+    assert found[NAMES[kind]] >= 38, found
+
+
+@pytest.mark.parametrize(("kind", "starts"), [("walk", 24), ("walk", 64), ("integrated", 64)])
+def test_the_interval_holds_the_exponent_in_95_of_100_trials(kind: str, starts: int) -> None:
+    rng = numpy.random.default_rng(11)
+    laws = [law(Ensemble(TIMES, synthetic(kind, rng, starts), STEP)) for _ in range(200)]
+    inside = sum(each.low <= EXPONENT[kind] <= each.high for each in laws)
+    assert 0.90 <= inside / 200 <= 0.98
+    assert sum(each.growth == NAMES[kind] for each in laws) >= 190
+    # and it is not wide for nothing
+    assert numpy.mean([each.high - each.low for each in laws]) / 2 < 0.06 * (64 / starts) ** 0.5
+
+
+def test_chaos_is_exponential_though_it_saturates_early_and_its_rate_is_covered() -> None:
+    rng = numpy.random.default_rng(3)
+    laws = [law(Ensemble(TIMES, chaotic(rng, 64), STEP)) for _ in range(100)]
+    assert sum(each.growth == "exponential" for each in laws) >= 95
+    inside = sum(each.low <= 0.15 <= each.high for each in laws)
+    assert 90 <= inside <= 99
+    # 0.1 = EPS e^(0.15 t)
+    reached = numpy.log(0.1 / EPS) / 0.15
+    for each in laws:
+        assert float(each.last) < 300
+        assert float(each.lost_at) == pytest.approx(reached, rel=0.2)
+        assert each.detects is None
+
+
+def test_a_law_is_independent_of_the_format_and_of_the_horizon() -> None:
+    rng = numpy.random.default_rng(7)
+    errors = synthetic("integrated", rng)
+    double, quad = (law(Ensemble(TIMES, errors * scale, STEP)) for scale in (1.0, 2.0**-60))
+    assert (double.growth, double.exponent, double.low) == (quad.growth, quad.exponent, quad.low)
+    early = law(Ensemble(TIMES[:33], errors[:, :33], STEP))
+    assert early.growth == "t^1.5"
+    # the same law, extrapolated over one decade more
+    assert float(early.lost_at) == pytest.approx(float(double.lost_at), rel=1)
+    tiny = law(Ensemble(TIMES, errors * 1e-280, STEP))
+    assert (tiny.growth, tiny.exponent) == (double.growth, pytest.approx(double.exponent, abs=1e-6))
+
+
+def test_the_fit_ends_before_saturation_and_says_when_the_format_is_lost() -> None:
+    rng = numpy.random.default_rng(2)
+    # t² from 1e-12: 0.1 is reached at t = STEP √(0.1/1e-12 ...)
+    errors = 1e-10 * (TIMES / STEP) ** 2 * numpy.exp(0.1 * rng.normal(size=(32, 1)))
+    wrapped = numpy.abs(numpy.sin(errors))
+    found = law(Ensemble(TIMES, wrapped, STEP))
+    assert found.growth == "t^2"
+    assert float(found.last) < STEP * (0.1 / 1e-10) ** 0.5
+    assert float(found.lost_at) == pytest.approx(STEP * (0.1 / 1e-10) ** 0.5, rel=0.2)
+    small = law(Ensemble(TIMES, wrapped / 1000, STEP, size=1 / 1000))
+    assert (small.growth, small.last, small.lost_at) == (found.growth, found.last, found.lost_at)
+
+
+def test_a_bounded_error_has_no_horizon() -> None:
+    found = law(Ensemble(TIMES, synthetic("bounded", numpy.random.default_rng(1)), STEP))
+    assert found.growth == "bounded"
+    assert found.lost_at is None
+
+
+@pytest.mark.parametrize("power", [0.25, 0.75, 1.25, 1.75, 3.0])
+def test_a_power_between_the_classes_is_unresolved(power: float) -> None:
+    rng = numpy.random.default_rng(4)
+    errors = EPS * TIMES**power * numpy.exp(0.5 * rng.normal(size=(64, 1)) + 0.2 * rng.normal(size=(64, len(TIMES))))
+    assert law(Ensemble(TIMES, errors, STEP)).growth == "unresolved"
+
+
+@pytest.mark.parametrize("second", ["linear", "integrated", "quadratic"])
+def test_two_laws_that_cross_are_not_taken_for_one(second: str) -> None:
+    rng = numpy.random.default_rng(6)
+    walk, later = synthetic("walk", rng), synthetic(second, rng)
+    middle = numpy.searchsorted(TIMES, 10**3.5)
+    crossing = walk + later * (_rms(walk[:, middle]) / _rms(later[:, middle]))
+    assert law(Ensemble(TIMES, crossing, STEP)).growth == "unresolved"
+    # a second law that is far below the first throughout leaves it alone
+    hidden = walk + later * (_rms(walk[:, -1]) / _rms(later[:, -1]) / 30)
+    assert law(Ensemble(TIMES, hidden, STEP)).growth == "t^0.5"
+
+
+@pytest.mark.parametrize(
+    ("starts", "samples"),
+    [(FEWEST_STARTS - 1, slice(None)), (64, slice(24)), (64, slice(None, None, 8)), (0, slice(None))],
+    ids=["few starts", "few decades", "few samples", "no start"],
+)
+def test_too_little_is_unresolved_and_no_number(starts: int, samples: slice) -> None:
+    times = TIMES[samples]
+    errors = synthetic("walk", numpy.random.default_rng(1), 64, times)[:starts]
+    found = law(Ensemble(times, errors, STEP))
+    assert found.growth == "unresolved"
+    assert (found.exponent, found.low, found.high, found.detects, found.lost_at) == (None,) * 5
+    assert found.starts == starts
+
+
+def test_failed_starts_are_left_out_and_counted() -> None:
+    errors = synthetic("walk", numpy.random.default_rng(9))
+    alone = law(Ensemble(TIMES, errors[4:], STEP))
+    spoilt = errors.copy()
+    spoilt[:4, 25:] = [[numpy.nan], [numpy.inf], [numpy.nan], [numpy.nan]]
+    found = law(Ensemble(TIMES, spoilt, STEP))
+    assert found == alone
+    assert found.starts == 60
+    assert law(Ensemble(TIMES, numpy.full((64, len(TIMES)), numpy.nan), STEP)).growth == "unresolved"
+
+
+def test_what_the_reference_does_not_resolve_is_not_fitted() -> None:
+    errors = synthetic("integrated", numpy.random.default_rng(9))
+    ensemble = Ensemble(TIMES, errors, STEP, resolution=1e-12)
+    rms = ensemble.rms()
+    assert numpy.isnan(rms[0])
+    assert (rms[numpy.isfinite(rms)] >= 1e-11).all()
+    found = law(ensemble)
+    assert found.growth == "unresolved" or rms[numpy.searchsorted(TIMES, float(found.first))] >= 1e-11
+    assert law(Ensemble(TIMES, errors, STEP, resolution=1.0)).growth == "unresolved"
+
+
+def test_zeros_are_not_growth() -> None:
+    errors = synthetic("walk", numpy.random.default_rng(9))
+    errors[:, TIMES < 40] = 0
+    found = law(Ensemble(TIMES, errors, STEP))
+    assert found.growth == "t^0.5"
+    assert float(found.first) >= 40
+    never = law(Ensemble(TIMES, errors * 0, STEP))
+    assert (never.growth, never.exponent, never.lost_at) == ("bounded", None, None)
+
+
+@pytest.mark.parametrize("kind", ["walk", "integrated"])
+def test_a_fault_above_the_detection_power_is_told_and_one_well_below_is_not(kind: str) -> None:
+    rng = numpy.random.default_rng(8)
+    order = 2 if kind == "integrated" else 1
+    n = TIMES[-1] / STEP
+    told = {3.0: 0, 0.2: 0}
+    for _ in range(50):
+        healthy, *others = (walks(rng, 64)[order - 1, :, -1] for _ in range(3))
+        errors = numpy.abs(numpy.tile(healthy[:, None], len(TIMES)) * (TIMES / TIMES[-1]) ** (order - 0.5))
+        power = float(law(Ensemble(TIMES, errors, STEP, accumulates=order)).detects)
+        for factor, other in zip(told, others, strict=True):
+            faulty = numpy.abs(other + factor * power * n**order / order)
+            apart = numpy.log10(_rms(faulty) / _rms(healthy))
+            told[factor] += apart > band(numpy.abs(healthy)) + band(faulty)
+    assert told[3.0] >= 45, told
+    assert told[0.2] <= 3, told
+
+
+def _rms(values) -> float:
+    return float((values**2).mean() ** 0.5)
+
+
+def test_the_band_holds_the_rms_of_other_starts() -> None:
+    rng = numpy.random.default_rng(1)
+    inside = 0
+    for _ in range(200):
+        values = numpy.abs(rng.normal(size=64))
+        inside += abs(numpy.log10(_rms(values))) <= band(values)
+    assert 180 <= inside <= 198
+    # 64 squares of normal numbers: the RMS is known to 1.96/√128
+    assert band(values) == pytest.approx(1.96 / 128**0.5 / numpy.log(10), rel=0.3)
+    assert band(values[:3]) is None
+    assert band(values * 0) is None
+    assert band(numpy.where(values > 1, values, numpy.nan)) is None
+
+
+def test_the_same_starts_give_the_same_bits() -> None:
+    errors = synthetic("walk", numpy.random.default_rng(9))
+    assert law(Ensemble(TIMES, errors, STEP)) == law(Ensemble(TIMES, errors.copy(), STEP))

@@ -1,0 +1,182 @@
+"""Rows of growth measurements, with small ensembles: what they hold, what they are held against, what is refused."""
+
+from dataclasses import replace
+from fractions import Fraction
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from heavytop.errors import InputError
+from heavytop.exact.catalogue import matches
+from heavytop.records import Report
+from heavytop.report.text import summary
+from heavytop.suite.cases import CASES
+from heavytop.suite.measurements import ensembles, measure
+from heavytop.suite.plan import expand, load
+from heavytop.suite.starts import random_starts
+from heavytop.top.equations import GYROSTAT
+from heavytop.top.heavy_top import cross
+from heavytop.top.integrals import holding
+
+CLASSES = ("euler", "lagrange", "kovalevskaya", "generic", "gyrostat")
+
+
+def tasks(tmp_path: Path, cases: str, run: str):
+    file = tmp_path / "plan.toml"
+    file.write_text(f'name = "own"\n[[measure]]\nkind = "growth"\ncases = [{cases}]\nruns = [{{ {run} }}]\n', "utf-8")
+    return expand(load(str(file))[0])
+
+
+def row(tmp_path: Path, case: str, run: str):
+    (task,) = tasks(tmp_path, f'"{case}"', f'precision = "double", {run}')
+    return measure(task)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_random_starts_are_exact_of_the_class_and_the_same_for_the_same_seed(name: str) -> None:
+    case = CASES[name]
+    starts = random_starts(case, 20, 3)
+    assert starts == random_starts(case, 30, 3)[:20]
+    assert len({start.flat for start in (*starts, *random_starts(case, 20, 4))}) == 40
+    known = [type(form) for form in matches(case.top, case.start, case.system)]
+    for start in starts:
+        start.require_unit_gamma()
+        assert max(abs(w) for w in start.omega) <= 3 * max(abs(w) for w in case.start.omega)
+        assert [type(form) for form in matches(case.top, start, case.system)] == known
+        assert [i.name for i in holding(case.top, start, case.system)] == [
+            i.name for i in holding(case.top, case.start, case.system)
+        ]
+        if case.system is GYROSTAT:
+            assert not any(cross(case.top.angular_momentum(start.omega), start.gamma))
+
+
+@pytest.mark.parametrize("name", ["pendulum", "delone", "ershkov-partial-2"])
+def test_a_special_motion_has_no_random_starts(name: str) -> None:
+    with pytest.raises(InputError, match="is one motion"):
+        random_starts(CASES[name], 8, 1)
+
+
+def test_integrals_walk_and_the_phase_grows_faster(tmp_path: Path) -> None:
+    found = row(tmp_path, "gyrostat", 'horizon = "2e3", starts = 24, decades = 4')
+    assert (found.outcome, found.finite, found.starts) == ("success", True, 24)
+    assert found.metrics["starts_failed"].value == "0"
+    assert "24 of 24 starts certified at t = 2" in found.against
+    assert found.against.startswith("known: closed form: gyrostat")
+    assert (
+        set(found.laws)
+        == set(found.series)
+        == {
+            *(f"drift_{name}" for name in ("gamma_squared", "area", "momentum_squared", "gyrostat_energy")),
+            *(f"solution_error_{name}" for name in ("along", "across", "omega", "gamma")),
+        }
+    )
+    for name in ("drift_area", "drift_momentum_squared", "solution_error_across"):
+        law = found.laws[name]
+        assert law.growth == "t^0.5"
+        assert law.low < law.exponent < law.high
+        # one rounding is 1e-16; over 4000 steps a thousandth of it each time would have been told
+        assert Fraction(1, 10**22) < Fraction(law.detects) < Fraction(1, 10**17)
+    assert found.laws["solution_error_along"].growth == "t^1.5"
+    final = found.metrics["drift_area_final"]
+    assert Fraction(final.value) <= Fraction(found.metrics["drift_area_max"].value) < Fraction(1, 10**12)
+    assert 0 < final.band < 0.5
+    assert found.series["drift_area"].values[-1] == final.value
+    assert found.series["drift_area"].times[-1] == found.horizon == "2000"
+
+
+def test_the_same_task_gives_the_same_row(tmp_path: Path) -> None:
+    one, two = (row(tmp_path, "euler", 'horizon = "50", starts = 9, decades = 3') for _ in range(2))
+    one.seconds = two.seconds = {}
+    assert one == two
+
+
+def test_an_integrator_that_truncates_makes_integrals_grow_like_t(tmp_path: Path) -> None:
+    found = row(tmp_path, "lagrange", 'horizon = "5e4", starts = 12, samples = 8, decades = 4, tolerance = "1e-9"')
+    assert found.integrator.endswith(" tolerance 1e-9")
+    assert found.laws["drift_energy"].growth == "t"
+    assert found.laws["solution_error_along"].growth == "t^2"
+
+
+def test_a_wrong_coefficient_is_seen_as_bounded_integrals_and_a_phase_like_t(tmp_path: Path) -> None:
+    found = row(tmp_path, "euler", 'horizon = "2e3", starts = 12, samples = 8, decades = 4, bias = "1e-12"')
+    assert found.flags["bias"] == "1e-12"
+    law = found.laws["drift_energy"]
+    assert law.growth == "bounded"
+    assert law.lost_at is None
+    assert Fraction(1, 10**14) < Fraction(found.metrics["drift_energy_max"].value) < Fraction(1, 10**11)
+    assert found.laws["solution_error_along"].growth == "t"
+
+
+def test_chaos_is_exponential_and_takes_every_digit(tmp_path: Path) -> None:
+    found = row(tmp_path, "generic", 'horizon = "600", starts = 12, samples = 24, reference = "extended"')
+    assert "computed, not proven: heyoka in extended" in found.against
+    assert "against quad on 8 starts up to |t| = 97, its error is" in found.against
+    law = found.laws["solution_error_along"]
+    assert law.growth == "exponential"
+    assert 0.02 < law.low < law.exponent < law.high < 0.3
+    assert 100 < float(law.lost_at) < 600
+    assert found.laws["drift_energy"].growth in ("t^0.5", "unresolved")
+
+
+def test_without_a_closed_form_or_a_wider_format_there_is_drift_alone(tmp_path: Path) -> None:
+    found = row(tmp_path, "kovalevskaya", 'horizon = "20", starts = 8, decades = 2')
+    assert set(found.laws) == {f"drift_{name}" for name in ("gamma_squared", "area", "energy", "kovalevskaya")}
+    assert {law.growth for law in found.laws.values()} == {"unresolved"}
+    assert "no closed form" in found.against
+
+
+def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def with_a_wild_one(case, count, seed):
+        first, *rest = random_starts(case, count, seed)
+        return [replace_omega(first), *rest]
+
+    def replace_omega(start):
+        return type(start)([Fraction(10) ** 140, Fraction(10) ** 140, 1], start.gamma)
+
+    plain = row(tmp_path, "kovalevskaya", 'horizon = "20", starts = 10, decades = 2')
+    monkeypatch.setattr(ensembles, "random_starts", with_a_wild_one)
+    found = row(tmp_path, "kovalevskaya", 'horizon = "20", starts = 10, decades = 2')
+    assert plain.metrics["starts_failed"].value == "0"
+    assert found.metrics["starts_failed"].value == "1"
+    assert (found.outcome, found.finite, found.time_reached) == ("non_finite", False, "0")
+    assert found.laws["drift_energy"].starts == 9
+    assert Fraction(found.metrics["drift_energy_max"].value) < Fraction(1, 10**13)
+
+
+def test_the_laws_are_said_in_words(tmp_path: Path) -> None:
+    console = Console(width=160, record=True, file=StringIO())
+    (task,) = tasks(tmp_path, '"kovalevskaya"', 'precision = "double", horizon = "2e3", starts = 9, decades = 4')
+    console.print(summary(Report("s", {"name": "own"}, {}, [measure(replace(task, name="mine"))])))
+    text = console.export_text()
+    assert "Growth laws" in text
+    (line,) = [line for line in text.splitlines() if "energy" in line]
+    assert line.split()[:5] == ["mine", "double", "energy", "9", "t^0.5"]
+
+
+@pytest.mark.parametrize(
+    ("cases", "run", "message"),
+    [
+        ('"euler"', 'precision = "double", horizon = "0"', "horizon"),
+        ('"euler"', 'precision = "double", horizon = "10", starts = 0', "starts = 0"),
+        ('"euler"', 'precision = "double", horizon = "10", samples = 1', "samples = 1"),
+        ('"euler"', 'precision = "double", horizon = "10", decades = 99', "decades = 99"),
+        ('"euler"', 'precision = "double", horizon = "10", tolerance = "-1"', "tolerance"),
+        ('"euler"', 'precision = "double", horizon = "10", bias = "x"', "not a finite number"),
+        ('"generic"', 'precision = "extended", horizon = "10", reference = "double"', "is no reference"),
+        ('"euler"', 'precision = "real:2000", horizon = "10"', "up to real:900"),
+        ('"pendulum"', 'precision = "double", horizon = "10"', "is one motion"),
+        ('"euler"', 'precision = "double", horizon = "10", wrong = 1', "wrong"),
+    ],
+)
+def test_an_impossible_ensemble_is_refused(tmp_path: Path, cases: str, run: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        tasks(tmp_path, cases, run)
+
+
+def test_the_plan_growth_plants_its_faults() -> None:
+    runs = [task.ensemble for task in expand(load("growth")[0])]
+    assert {run.tolerance for run in runs} == {None, "1e-9"}
+    assert {run.bias for run in runs} == {None, "1e-12"}
+    assert {run.high_accuracy for run in runs} == {False, True}
