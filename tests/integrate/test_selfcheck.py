@@ -5,12 +5,14 @@ from fractions import Fraction
 import numpy
 import pytest
 
-from heavytop.errors import Contradiction
+from heavytop.errors import Contradiction, InputError
 from heavytop.exact.validated import Validated
 from heavytop.integrate import taylor
 from heavytop.integrate.selfcheck import _GAMMA, _OMEGA, _PARAMETERS, check, derivatives
-from heavytop.integrate.taylor import compiled
+from heavytop.integrate.taylor import compiled, propagate
+from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
+from heavytop.suite.cases import CASES
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -99,3 +101,22 @@ def test_a_wrong_field_is_refused_before_its_first_use(monkeypatch: pytest.Monke
     with pytest.raises(Contradiction, match="Taylor coefficient 1"):
         compiled(HEAVY_TOP, DOUBLE)
     assert not taylor._compiled
+
+
+def test_code_with_the_numbers_of_a_top_is_checked_with_these_and_computes_the_same_motion() -> None:
+    case = CASES["kovalevskaya"]
+    given = Problem.of(case.top, case.start, DOUBLE).parameters
+    runs = [propagate(case.top, case.start, [10], DOUBLE, constants=each) for each in (None, given)]
+    assert [run.flags["coefficients"] for run in runs] == ["par", "constants"]
+    assert numpy.allclose(runs[0].states[0], runs[1].states[0], rtol=1e-12, atol=1e-14)
+    engine = compiled(HEAVY_TOP, DOUBLE, constants=given).engine
+    other = given._replace(inertia=(given.inertia[0] * (1 + Fraction(1, 10**12)), *given.inertia[1:]))
+    with pytest.raises(Contradiction, match="Taylor coefficient"):
+        check(engine, HEAVY_TOP, DOUBLE, other)
+
+
+def test_constants_are_for_double_alone() -> None:
+    case = CASES["euler"]
+    given = Problem.of(case.top, case.start, QUAD).parameters
+    with pytest.raises(InputError, match="double"):
+        compiled(HEAVY_TOP, QUAD, constants=given)

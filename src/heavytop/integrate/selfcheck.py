@@ -27,49 +27,48 @@ _COEFFICIENT_EPS = 8
 _COEFFICIENT_EPS_AN_ORDER = Fraction(1, 4)
 _SUM_EPS = 4
 _STEP_ERROR = 1e-12
+Exact = int | Fraction
 
 
 class Derivatives:
-    """A quantity by its derivatives at t = 0, exact integers: a ring in which the fields can be evaluated.
+    """A quantity by its derivatives at t = 0, exact: a ring in which the fields can be evaluated.
 
     at: the n-th derivative, for n in turn.
     """
 
-    def __init__(self, at: Callable[[int], int]) -> None:
+    def __init__(self, at: Callable[[int], Exact]) -> None:
         self.at = at
 
-    def __add__(self, other: Derivatives | int) -> Derivatives:
-        if isinstance(other, int):
+    def __add__(self, other: Derivatives | Exact) -> Derivatives:
+        if not isinstance(other, Derivatives):
             return Derivatives(lambda n: self.at(n) + (0 if n else other))
         return Derivatives(lambda n: self.at(n) + other.at(n))
 
     def __sub__(self, other: Derivatives) -> Derivatives:
         return Derivatives(lambda n: self.at(n) - other.at(n))
 
-    def __mul__(self, other: Derivatives | int) -> Derivatives:
-        if isinstance(other, int):
+    def __mul__(self, other: Derivatives | Exact) -> Derivatives:
+        if not isinstance(other, Derivatives):
             return Derivatives(lambda n: self.at(n) * other)
         return Derivatives(lambda n: sum(comb(n, k) * self.at(k) * other.at(n - k) for k in range(n + 1)))
 
     __rmul__ = __mul__
 
-    def __truediv__(self, divisor: int) -> Derivatives:
-        def at(n: int) -> int:
-            quotient, rest = divmod(self.at(n), divisor)
-            if rest:
-                raise ArithmeticError("the known start does not keep its derivatives whole")
-            return quotient
+    def __truediv__(self, divisor: Exact) -> Derivatives:
+        def at(n: int) -> Exact:
+            quotient = Fraction(self.at(n)) / divisor
+            return quotient.numerator if quotient.denominator == 1 else quotient
 
         return Derivatives(at)
 
 
-def derivatives(system: System, attitude: bool, count: int) -> Iterator[list[int]]:
-    """y, y', y'', ... at the known start, from the field: ``count`` lists of six integers, or nine with ξ."""
-    values = [[first] for first in (*_OMEGA, *_GAMMA, *(_XI if attitude else ()))]
+def derivatives(system: System, attitude: bool, count: int, p: Parameters = _PARAMETERS) -> Iterator[list[Exact]]:
+    """y, y', y'', ... at the known start, from the field: ``count`` lists of six exact numbers, or nine with ξ."""
+    values: list[list[Exact]] = [[first] for first in (*_OMEGA, *_GAMMA, *(_XI if attitude else ()))]
     y = [Derivatives(column.__getitem__) for column in values]
-    rates = system.field(_PARAMETERS, y[:6])
+    rates = system.field(p, y[:6])
     if attitude:
-        rates = (*rates, *system.attitude(_PARAMETERS, y[:6], y[6:]))
+        rates = (*rates, *system.attitude(p, y[:6], y[6:]))
     for n in range(count):
         yield [column[n] for column in values]
         following = [rate.at(n) for rate in rates]
@@ -77,13 +76,14 @@ def derivatives(system: System, attitude: bool, count: int) -> Iterator[list[int
             column.append(value)
 
 
-def check(engine: Any, system: System, precision: Precision) -> None:
+def check(engine: Any, system: System, precision: Precision, constants: Parameters | None = None) -> None:
     """One step of a compiled integrator, scalar or batch, held against what is known; its time and state are reset.
 
     Taylor coefficients (the first 100) against the exact ones; the length of the step against Jorba and Zou's rule;
     the new state and the dense output against the polynomial summed here.  Raises Contradiction.
+    constants: exact parameters that were compiled in; None where the engine takes any.
     """
-    p = _PARAMETERS
+    p = constants or _PARAMETERS
     lanes = engine.state.shape[1:]
     size = engine.state.shape[0]
 
@@ -92,11 +92,12 @@ def check(engine: Any, system: System, precision: Precision) -> None:
             target[index] = number(Fraction(value), precision)
 
     _reset(engine, precision)
-    set_to((*p.inertia, p.rotor) if system is GYROSTAT else (*p.inertia, *p.moment), engine.pars)
+    if constants is None:
+        set_to((*p.inertia, p.rotor) if system is GYROSTAT else (*p.inertia, *p.moment), engine.pars)
     set_to((*_OMEGA, *_GAMMA, *_XI)[:size], engine.state)
     engine.step(write_tc=True)
     eps, order = precision.eps, engine.order
-    known = list(derivatives(system, size == 9, min(order + 1, _MOST_DERIVATIVES)))
+    known = list(derivatives(system, size == 9, min(order + 1, _MOST_DERIVATIVES), p))
     half = number(Fraction(1, 2), precision)
     steps = numpy.reshape(numpy.array(engine.last_h), (-1,))
     dense = engine.update_d_output(engine.last_h * half)
@@ -104,7 +105,9 @@ def check(engine: Any, system: System, precision: Precision) -> None:
         at = (..., lane) if lanes else ...
         coefficients, h = engine.tc[at], steps[lane]
         for n, column in enumerate(known):
-            limit = (_COEFFICIENT_EPS + n * _COEFFICIENT_EPS_AN_ORDER) * eps * max(abs(value) for value in column)
+            limit = (
+                (_COEFFICIENT_EPS + n * _COEFFICIENT_EPS_AN_ORDER) * eps * max(abs(Fraction(value)) for value in column)
+            )
             for computed, value in zip(coefficients[:, n], column, strict=True):
                 off = abs(_number(computed) * factorial(n) - value)
                 _require(off <= limit, f"Taylor coefficient {n}", precision)
@@ -114,8 +117,7 @@ def check(engine: Any, system: System, precision: Precision) -> None:
             total = coefficients[:, order]
             for n in reversed(range(order)):
                 total = total * time + coefficients[:, n]
-            scale = max(abs(value) for value in total)
-            limit = _SUM_EPS * number(eps, precision) * scale
+            limit = _SUM_EPS * number(eps, precision) * max(abs(value) for value in total)
             _require(all(abs(a - b) <= limit for a, b in zip(result, total, strict=True)), what, precision)
     _reset(engine, precision)
 

@@ -20,7 +20,7 @@ import numpy
 from heavytop.errors import InputError
 from heavytop.integrate.selfcheck import check
 from heavytop.integrate.trajectory import Outcome, Place, Problem, TaylorStep, Trajectory
-from heavytop.precision import Precision, exact, number, require
+from heavytop.precision import DOUBLE, Precision, exact, number, require
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, VARIABLES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import check_times
@@ -62,11 +62,14 @@ class Compiled:
 _compiled: dict[tuple[Any, ...], Compiled] = {}
 
 
-def expressions(system: System, attitude: bool) -> list[tuple[Any, Any]]:
-    """The field as heyoka expressions with par[0..2] = I and par[3..5] = P r, or par[3] = λ for the gyrostat."""
+def expressions(system: System, attitude: bool, constants: Parameters | None = None) -> list[tuple[Any, Any]]:
+    """The field as heyoka expressions with par[0..2] = I and par[3..5] = P r, or par[3] = λ for the gyrostat.
+
+    constants: doubles in the place of all par[i].
+    """
     names = VARIABLES + (_XI if attitude else ())
     y = heyoka.make_vars(*names)
-    p = Parameters(
+    p = constants or Parameters(
         [heyoka.par[i] for i in range(3)],
         [heyoka.par[i] for i in range(3, 6)],
         heyoka.par[3] if system is GYROSTAT else None,
@@ -86,8 +89,12 @@ def compiled(
     high_accuracy: bool = False,
     compact_mode: bool | None = None,
     lanes: int | None = None,
+    constants: Parameters | None = None,
 ) -> Compiled:
     """The integrator for this system and format, compiled at its first use.
+
+    constants: exact parameters of one top, compiled into the code, in double only (heyoka demotes all constants to it);
+    None for code that serves every top.
 
     lanes: that many motions at once in SIMD lanes, in double only; None for a scalar integrator, whose bits differ.
     tolerance: None for the format's eps.  compact_mode: None for off in double and extended (faster to run) and on in
@@ -97,7 +104,9 @@ def compiled(
     """
     require(precision)
     compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
-    key = (system.name, precision, attitude, tolerance, high_accuracy, compact, lanes)
+    if constants is not None and precision != DOUBLE:
+        raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")
+    key = (system.name, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
     if key not in _compiled:
         one, zero = number(Fraction(1), precision), number(Fraction(0), precision)
         size = 9 if attitude else 6
@@ -107,18 +116,23 @@ def compiled(
         if precision.family == "real":
             options["prec"] = precision.bits
         build, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))
+        if constants is None:
+            options["pars"] = numpy.full((4 if system is GYROSTAT else 6, *shape), one)
         before = perf_counter()
         engine = build(
-            expressions(system, attitude),
+            expressions(system, attitude, constants and _doubles(constants)),
             numpy.full((size, *shape), zero),
-            pars=numpy.full((4 if system is GYROSTAT else 6, *shape), one),
             fp_type=type(one),
             **options,
         )
         seconds = perf_counter() - before
-        check(engine, system, precision)
+        check(engine, system, precision, constants)
         _compiled[key] = Compiled(engine, seconds, _flags(engine))
     return _compiled[key]
+
+
+def _doubles(p: Parameters) -> Parameters:
+    return Parameters([float(v) for v in p.inertia], [float(v) for v in p.moment], float(p.rotor))
 
 
 def _flags(engine: Any) -> dict[str, str]:
@@ -134,7 +148,7 @@ def _flags(engine: Any) -> dict[str, str]:
         "force_avx512": code.force_avx512,
         "slp_vectorize": code.slp_vectorize,
         "code_cache": "none",
-        "coefficients": "par",
+        "coefficients": "par" if len(engine.pars) else "constants",
     }
     if hasattr(engine, "batch_size"):
         values["batch_size"] = engine.batch_size
@@ -393,7 +407,9 @@ def first_steps(
 
 def load(engine: Any, problem: Problem) -> None:
     """Set an engine to the beginning of a problem."""
-    engine.pars[:], engine.state[:] = arrays(problem)
+    parameters, engine.state[:] = arrays(problem)
+    if len(engine.pars):
+        engine.pars[:] = parameters
     engine.time = number(Fraction(0), problem.precision)
 
 

@@ -30,6 +30,7 @@ Peer = Callable[..., Trajectory]
 
 BUILT_IN = {
     "heyoka": f"{HERE}.heyoka_taylor:heyoka",
+    "heyoka:constants": f"{HERE}.heyoka_taylor:constants",
     "heyoka:lanes": f"{HERE}.heyoka_taylor:lanes",
     "scipy:DOP853": f"{HERE}.scipy_ivp:dop853",
     "scipy:LSODA": f"{HERE}.scipy_ivp:lsoda",

@@ -1,4 +1,4 @@
-"""heyoka's Taylor method in the peers' call, alone and eight motions at once; its order follows from its tolerance."""
+"""heyoka's Taylor method in the peers' call: for any top, for one top, eight motions at once."""
 
 from __future__ import annotations
 
@@ -27,6 +27,21 @@ def heyoka(
 ) -> Trajectory:
     """heyoka in any format; tolerance None is the eps of the format."""
     return propagate(top, start, times, precision, system=system, tolerance=tolerance)
+
+
+def constants(
+    top: HeavyTop,
+    start: State,
+    times: Sequence[Fraction],
+    precision: Precision = DOUBLE,
+    *,
+    system: System = HEAVY_TOP,
+    tolerance: Fraction | None = None,
+) -> Trajectory:
+    """heyoka with the top's numbers compiled into its code, as the compiled peers have them: compiled anew for each."""
+    given = Problem.of(top, start, precision, system).parameters
+    run = propagate(top, start, times, precision, system=system, tolerance=tolerance, constants=given)
+    return replace(run, integrator="heyoka:constants")
 
 
 LANES = 8
