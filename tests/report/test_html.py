@@ -295,7 +295,7 @@ def test_show_writes_a_page(tmp_path: Path) -> None:
     assert Page(tmp_path / "page.html").all("svg")
     refused = subprocess.run([*command, "no/page.html"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert refused.returncode == 2
-    assert "Give the page a file in a writable folder" in refused.stderr
+    assert "Give a file in a writable folder" in refused.stderr
 
 
 def test_every_number_of_the_results_is_in_the_page(pages: dict[str, Page]) -> None:
