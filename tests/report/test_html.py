@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.records import Law, Metric, Report, Series
+from heavytop.records import SCHEMA, Law, Metric, Report, Series
 from heavytop.report import claim_verdict, html, plots, store, work_plots
 from heavytop.report.compare import compare
 from heavytop.report.policy import Policy
@@ -240,6 +240,22 @@ def test_work_and_precision_says_what_is_faster_and_what_failed(pages: dict[str,
     assert "1 run of work against precision gave up" in pages["report"].text
 
 
+def test_rows_without_a_number_anywhere_make_a_page_all_the_same(tmp_path: Path) -> None:
+    words = ("nan", "0", "unresolved", "missing")
+    rows = []
+    for word in words:
+        for each in full_report().rows:
+            series = {name: Series(held.times, [word] * len(held.times)) for name, held in each.series.items()}
+            metrics = {
+                name: Metric(word, None) if metric.kind == "error" and "break" not in name else metric
+                for name, metric in each.metrics.items()
+            }
+            rows.append(msgspec.structs.replace(each, case=f"{each.case} {word}", series=series, metrics=metrics))
+    rows += [row(case="empty", series={"drift_energy": Series([], [])}, metrics={}, horizon="0")]
+    html.write_report(Report(SCHEMA, {}, {}, rows), tmp_path / "page.html")
+    assert len(Page(tmp_path / "page.html").all("section")) > 3
+
+
 def test_a_comparison_draws_both_and_lists_the_worst_first(pages: dict[str, Page]) -> None:
     text = pages["comparison"].text
     assert "double, baseline" in text
@@ -279,7 +295,7 @@ def test_show_writes_a_page(tmp_path: Path) -> None:
     assert Page(tmp_path / "page.html").all("svg")
     refused = subprocess.run([*command, "no/page.html"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert refused.returncode == 2
-    assert "Give the page a file in a writable folder" in refused.stderr
+    assert "Give a file in a writable folder" in refused.stderr
 
 
 def test_every_number_of_the_results_is_in_the_page(pages: dict[str, Page]) -> None:

@@ -64,11 +64,13 @@ def claim_error(sources: Sources) -> Section | None:
             title = f"{clip(case.removesuffix('/forward'), 40)}: error of {symbol}"
             if heard:
                 box = axes.dataLim
-                axes.set_ylim(max(box.y0 - 1, _LOWEST), max(box.y1, _LOWEST) + 1)
+                if math.isfinite(box.y0):
+                    axes.set_ylim(max(box.y0 - 1, _LOWEST), max(box.y1, _LOWEST) + 1)
                 section.pictures.append(finish(axes, title, spoken(heard), f"claim-{number}-{quantity}"))
     return section
 
 
+_LARGEST = 150.0
 _LOWEST = -26
 """No smaller error of a formula in floating point is drawn: where Ω itself tends to 0, so does its error."""
 
@@ -139,7 +141,7 @@ def break_away(sources: Sources) -> Section | None:
         for row in report.rows:
             if row.measure == "homoclinic" and row.outcome == "success":
                 metric = row.metrics.get("break_away_time")
-                if metric is not None and metric.log10 is not None:
+                if metric is not None and metric.log10 is not None and metric.log10 < _LARGEST:
                     found.setdefault((row.case, source), {})[row.bits] = exact(metric.value)
             elif row.measure == "break_away_law":
                 values = [row.metrics[f"break_away_slope{end}"].value for end in ("", "_expected")]
@@ -170,7 +172,7 @@ def break_away(sources: Sources) -> Section | None:
         bits, times = [float(b) for b, _ in pairs], [float(t) for _, t in pairs]
         draw(axes, key, bits, times, 5.5)
         measured, expected = slopes.get((case, source), ("", ""))
-        if expected and not old:
+        if logarithm(expected) is not None and not old:
             slope, middle = float(exact(expected)), (sum(bits) / len(bits), sum(times) / len(times))
             axes.plot(
                 bits, [middle[1] + slope * (b - middle[0]) for b in bits], color=COLOURS[place], lw=1.2, ls=DASHED

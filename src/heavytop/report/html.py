@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError
 from heavytop.records import Report, Row
 from heavytop.report import claim_plots, claim_verdict, plots, work_plots
 from heavytop.report.compare import Comparison
@@ -54,7 +53,7 @@ def write_report(report: Report, path: Path) -> None:
         commands=commands(report),
         dirty=str(report.environment.get("commit")).endswith("-dirty"),
     )
-    _write(path, page)
+    replace(path, page.encode())
 
 
 def write_comparison(baseline: Report, candidate: Report, comparison: Comparison, path: Path) -> None:
@@ -77,14 +76,7 @@ def write_comparison(baseline: Report, candidate: Report, comparison: Comparison
         differences=[[clip(part, 200) for part in each] for each in comparison.environment],
         environment=candidate.environment,
     )
-    _write(path, page)
-
-
-def _write(path: Path, page: str) -> None:
-    try:
-        replace(path, page.encode())
-    except InputError as error:
-        raise InputError(error.cause, "Give the page a file in a writable folder with space.") from None
+    replace(path, page.encode())
 
 
 def sections(sources: Sources, first: Sequence[str] | dict[str, None] = ()) -> list[Section]:

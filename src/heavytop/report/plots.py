@@ -87,7 +87,7 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "Correct decimal digits of γ at the end of each run, −log10 of its error against the known motion; since "
             "|γ| = 1 the error is relative. A thin line leads from the digits that the format has to those it kept."
         ],
-        columns=["case", "format", "T", "digits", "kept", "lost", "±"],
+        columns=["case", "format", "T", "digits", "kept", "lost", "± digits"],
     )
     formats = _formats(sources)
     wanted = set(first)
