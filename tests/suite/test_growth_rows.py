@@ -59,7 +59,7 @@ def test_a_special_motion_has_no_random_starts(name: str) -> None:
 
 
 def test_integrals_walk_and_the_phase_grows_faster(tmp_path: Path) -> None:
-    found = row(tmp_path, "gyrostat", 'horizon = "2e3", starts = 24, decades = 4')
+    found = row(tmp_path, "gyrostat", 'horizon = "1e4", starts = 24, samples = 8')
     assert (found.outcome, found.finite, found.starts) == ("success", True, 24)
     assert found.metrics["starts_failed"].value == "0"
     assert "24 of 24 starts certified at t = 2" in found.against
@@ -76,14 +76,14 @@ def test_integrals_walk_and_the_phase_grows_faster(tmp_path: Path) -> None:
         law = found.laws[name]
         assert law.growth == "t^0.5"
         assert law.low < law.exponent < law.high
-        # one rounding is 1e-16; over 4000 steps a thousandth of it each time would have been told
+        # one rounding is 1e-16; over 20000 steps a thousandth of it each time would have been told
         assert Fraction(1, 10**22) < Fraction(law.detects) < Fraction(1, 10**17)
     assert found.laws["solution_error_along"].growth == "t^1.5"
     final = found.metrics["drift_area_final"]
     assert Fraction(final.value) <= Fraction(found.metrics["drift_area_max"].value) < Fraction(1, 10**12)
     assert 0 < final.band < 0.5
     assert found.series["drift_area"].values[-1] == final.value
-    assert found.series["drift_area"].times[-1] == found.horizon == "2000"
+    assert found.series["drift_area"].times[-1] == found.horizon == "10000"
 
 
 def test_the_same_task_gives_the_same_row(tmp_path: Path) -> None:
@@ -93,7 +93,7 @@ def test_the_same_task_gives_the_same_row(tmp_path: Path) -> None:
 
 
 def test_an_integrator_that_truncates_makes_integrals_grow_like_t(tmp_path: Path) -> None:
-    found = row(tmp_path, "lagrange", 'horizon = "5e4", starts = 12, samples = 8, decades = 4, tolerance = "1e-9"')
+    found = row(tmp_path, "lagrange", 'horizon = "1e5", starts = 12, samples = 8, decades = 4, tolerance = "1e-9"')
     assert found.integrator.endswith(" tolerance 1e-9")
     assert found.laws["drift_energy"].growth == "t"
     assert found.laws["solution_error_along"].growth == "t^2"

@@ -24,7 +24,7 @@ _MOST_ON_A_PAGE = 5000
 
 @command
 def run(
-    plan: Annotated[str, typer.Option(help="smoke, default, long, peers, or a TOML file.")] = "default",
+    plan: Annotated[str, typer.Option(help="smoke, default, growth, long, peers, or a TOML file.")] = "default",
     out: Annotated[Path | None, typer.Option(help="New folder for the report.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the rows that --out already holds.")] = False,
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
