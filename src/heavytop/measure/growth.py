@@ -70,12 +70,12 @@ class Ensemble:
         if not len(kept):
             return numpy.full(len(self.times), numpy.nan)
         limits = numpy.broadcast_to(self.resolution, self.errors.shape)[self.healthy]
-        rms, blur = (_root_mean_square(values) for values in (kept, limits))
+        rms, blur = (root_mean_square(values) for values in (kept, limits))
         return numpy.where(rms >= RESOLVED * blur, rms, numpy.nan)
 
 
-def _root_mean_square(values: Array) -> Array:
-    """Over axis 0, without underflow of the squares."""
+def root_mean_square(values: Array) -> Array:
+    """Of finite values over axis 0, which is not empty, without underflow of the squares."""
     import numpy
 
     largest: Array = numpy.abs(values).max(axis=0)

@@ -17,7 +17,7 @@ from heavytop.exact.balls import ball, working_precision
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift, Running
-from heavytop.measure.growth import RESOLVED, Ensemble, band, law
+from heavytop.measure.growth import RESOLVED, Ensemble, band, law, root_mean_square
 from heavytop.measure.known import Known, certified, closed_form
 from heavytop.measure.scalar import GUARD_BITS, UNRESOLVED, of_fraction
 from heavytop.measure.solution_error import SolutionError
@@ -202,7 +202,8 @@ def _own_error(
     truth, reference = (
         propagate_ensemble([replace(problem, precision=p) for problem in true], early) for p in (widest, wider)
     )
-    part = _distance(reference, truth) / _distance(propagate_ensemble(given, early, **options), truth)
+    off = _distance(propagate_ensemble(given, early, **options), truth)
+    part = _distance(reference, truth) / off if off else float("inf")
     return part, (
         f"against {widest.name} on {len(true)} starts up to |t| = {float(early[-1]):.3g}, "
         f"its error is {part:.1e} of the error measured"
@@ -210,24 +211,17 @@ def _own_error(
 
 
 def _distance(runs: Sequence[Trajectory], truth: Sequence[Trajectory]) -> float:
-    """The root mean square over starts of the largest distance of any component."""
+    """The root mean square over starts of the largest distance of any component; NaN if none came to the end."""
     gaps = [
-        max(
-            abs(exact(a) - exact(b))
-            for x, y in zip(run.states, other.states, strict=True)
-            for a, b in zip(x, y, strict=True)
-        )
+        max(_gap(a, b) for a, b in zip(run.states, other.states, strict=True))
         for run, other in zip(runs, truth, strict=True)
+        if run.outcome is other.outcome is Outcome.SUCCESS
     ]
-    return _rms(numpy.array([float(gap) for gap in gaps]))
+    return float(root_mean_square(numpy.array(gaps))) if gaps else float("nan")
 
 
-def _rms(values: Array) -> float:
-    """Root mean square of finite values, shape (starts,); NaN of none."""
-    largest = float(numpy.abs(values).max(initial=0.0))
-    if not len(values) or largest == 0:
-        return 0.0 if len(values) else float("nan")
-    return float(largest * ((values / largest) ** 2).mean() ** 0.5)
+def _gap(one: Any, other: Any) -> float:
+    return float(max(abs(exact(a) - exact(b)) for a, b in zip(one, other, strict=True)))
 
 
 def _values(times: Sequence[Fraction], runnings: Iterable[Running]) -> Array:
@@ -245,7 +239,9 @@ def _add(row: Row, name: str, quantity: _Quantity, times: Sequence[Fraction], st
         accumulates=quantity.accumulates,
     )
     kept = quantity.values[ensemble.healthy]
-    ensemble = replace(ensemble, size=_rms(quantity.sizes[ensemble.healthy]) or 1.0)
+    if len(kept):
+        size = float(root_mean_square(quantity.sizes[ensemble.healthy]))
+        ensemble = replace(ensemble, size=size or 1.0)
     rms = ensemble.rms()
     row.series[name] = Series([time_text(time) for time in times], [_text(value, len(kept) > 0) for value in rms])
     for part, values in (("max", kept.max(axis=1)), ("final", kept[:, -1])):
@@ -263,7 +259,7 @@ def _text(value: float, measured: bool) -> str:
 def _metric(values: Array, resolved: bool) -> Metric:
     if not len(values):
         return Metric("missing", None)
-    value = _rms(values)
+    value = float(root_mean_square(values))
     if not resolved:
         return Metric(UNRESOLVED, None, bound=decimal_text(Fraction(value), 3))
     metric = of_fraction(Fraction(value), words=decimal_text(Fraction(value), _DIGITS))
