@@ -242,3 +242,12 @@ def test_rows_that_cannot_be_are_refused(tmp_path: Path, change) -> None:
     store.write(report(row(**change)), tmp_path)
     with pytest.raises(InputError, match=r"euler|rows\[0\].bits"):
         store.read(tmp_path)
+
+
+def test_a_list_in_the_environment_differs_by_what_one_of_the_two_lacks() -> None:
+    from heavytop.report.compare import _differences
+
+    old, new = {"cpu": {"features": ["a", "b"]}}, {"cpu": {"features": ["b", "c", "d"]}}
+    assert _differences(old, new) == [("cpu.features", "a", "c d")]
+    assert _differences({}, new) == [("cpu.features", "absent", "3 known")]
+    assert _differences(new, new) == []

@@ -255,17 +255,26 @@ def _timed(policy: Policy, old: dict[str, Any], new: dict[str, Any]) -> bool:
 
 
 def _differences(old: dict[str, Any], new: dict[str, Any]) -> list[tuple[str, str, str]]:
-    flat_old, flat_new = dict(_flatten(old)), dict(_flatten(new))
+    flat_old, flat_new = dict(flatten(old)), dict(flatten(new))
     names = sorted(set(flat_old) | set(flat_new))
     pairs = ((n, flat_old.get(n, "absent"), flat_new.get(n, "absent")) for n in names)
-    return [(name, a, b) for name, a, b in pairs if a != b]
+    return [(name, *_apart(a, b)) for name, a, b in pairs if a != b]
 
 
-def _flatten(block: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+def _apart(old: Any, new: Any) -> tuple[str, str]:
+    """Two entries that differ; of two lists what only one of them holds."""
+    if isinstance(old, list) and isinstance(new, list):
+        only = ([part for part in one if part not in other] for one, other in ((old, new), (new, old)))
+        first, second = (" ".join(map(str, parts)) or "nothing else" for parts in only)
+        return first, second
+    first, second = (f"{len(entry)} known" if isinstance(entry, list) else str(entry) for entry in (old, new))
+    return first, second
+
+
+def flatten(block: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """The entries of an environment, those of inner blocks with the names before them."""
     for name, value in block.items():
         if isinstance(value, dict):
-            yield from _flatten(value, f"{prefix}{name}.")
-        elif isinstance(value, list):
-            yield from ((f"{prefix}{name}.{part}", "present") for part in value)
+            yield from flatten(value, f"{prefix}{name}.")
         else:
-            yield f"{prefix}{name}", str(value)
+            yield f"{prefix}{name}", value
