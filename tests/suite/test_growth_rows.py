@@ -11,6 +11,8 @@ from rich.console import Console
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
 from heavytop.records import Report
+from heavytop.report.compare import compare
+from heavytop.report.policy import Policy
 from heavytop.report.text import summary
 from heavytop.suite.cases import CASES
 from heavytop.suite.measurements import ensembles, measure
@@ -90,6 +92,15 @@ def test_the_same_task_gives_the_same_row(tmp_path: Path) -> None:
     one, two = (row(tmp_path, "euler", 'horizon = "50", starts = 9, decades = 3') for _ in range(2))
     one.seconds = two.seconds = {}
     assert one == two
+
+
+def test_other_starts_are_the_same_law_and_no_alarm(tmp_path: Path) -> None:
+    text = 'horizon = "1e4", starts = 16'
+    (task,) = tasks(tmp_path, '"lagrange"', f'precision = "double", {text}')
+    rows = [measure(replace(task, seed=seed)) for seed in (0, 5)]
+    assert rows[0].metrics != rows[1].metrics
+    reports = [Report("heavytop-report/1", {}, {}, [row]) for row in rows]
+    assert compare(*reports, Policy()).verdict == "same"
 
 
 def test_an_integrator_that_truncates_makes_integrals_grow_like_t(tmp_path: Path) -> None:

@@ -82,7 +82,7 @@ class _Sampled:
 def growth(task: Task) -> Row:
     case, precision, run = case_of(task), parse(task.precision), task.ensemble
     assert run is not None
-    starts = random_starts(case, run.starts, run.seed)
+    starts = random_starts(case, run.starts, run.seed + task.seed)
     true = [Problem.of(case.top, start, precision, case.system) for start in starts]
     given = [_biased(problem, run.bias) for problem in true]
     times = [exact(number(time, precision)) for time in task.times]
@@ -290,7 +290,7 @@ def _row(task: Task, motions: list[Trajectory], against: str, seconds: dict[str,
         "root mean square over them",
         against=against,
         order=first.order,
-        flags=first.flags | {"seed": str(run.seed), "bias": run.bias or "none"},
+        flags=first.flags | {"bias": run.bias or "none"},
         input_rounding=decimal_text(rounding, 3),
         starts=len(motions),
         seconds=seconds,
