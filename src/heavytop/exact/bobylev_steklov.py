@@ -26,6 +26,7 @@ from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm, balls, half_angle, instant, sign
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.motion import kept
+from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
 
@@ -45,14 +46,16 @@ class BobylevSteklov(ClosedForm):
         p, w2, w3 = self.start.omega
         remedy = "`bobylev_steklov_motion` builds a top with such a motion."
         if n[0] == 0 or n[1] != 0 or n[2] != 0:
-            raise NotInClass(f"Bobylev-Steklov needs r on axis 1, P r != 0; P r = ({', '.join(map(str, n))}).", remedy)
+            raise NotInClass(
+                f"Bobylev-Steklov needs r on axis 1, P r != 0; P r = ({', '.join(map(shown, n))}).", remedy
+            )
         if i1 != 2 * i3:
-            raise NotInClass(f"Bobylev-Steklov needs I1 = 2 I3, but I1 - 2 I3 = {i1 - 2 * i3}.", remedy)
+            raise NotInClass(f"Bobylev-Steklov needs I1 = 2 I3, but I1 - 2 I3 = {shown(i1 - 2 * i3)}.", remedy)
         if w2 != 0:
-            raise NotInClass(f"Bobylev-Steklov needs Omega2 = 0, but Omega2 = {w2}.", remedy)
+            raise NotInClass(f"Bobylev-Steklov needs Omega2 = 0, but Omega2 = {shown(w2)}.", remedy)
         off = n[0] * self.start.gamma[2] - i3 * p * w3
         if off != 0:
-            raise NotInClass(f"P a gamma3 - I3 Omega1 Omega3 = {off}, not 0.", remedy)
+            raise NotInClass(f"P a gamma3 - I3 Omega1 Omega3 = {shown(off)}, not 0.", remedy)
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -133,7 +136,7 @@ def bobylev_steklov_motion(
     γ = (cos tilt cos azimuth, cos tilt sin azimuth, sin tilt).  Raises InputError for a or p = 0.
     """
     if moment == 0 or rate == 0:
-        raise InputError(f"a = {moment}, p = {rate}.", "Give a centre of mass and a rate that are not 0.")
+        raise InputError(f"a = {shown(moment)}, p = {shown(rate)}.", "Give a centre of mass and a rate that are not 0.")
     i2, i3 = inertia
     (across, up), (cosine, sine) = half_angle(tilt), half_angle(azimuth)
     gamma: Vector = (across * cosine, across * sine, up)

@@ -21,6 +21,7 @@ from heavytop.exact.pendulum import Pendulum
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.staude import Staude
 from heavytop.exact.validated import Validated
+from heavytop.precision import shown
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -41,7 +42,10 @@ def _ershkov_partial(top: HeavyTop, start: State) -> ExactSolution:
 def _same(found: ExactSolution, top: HeavyTop, start: State) -> ExactSolution:
     """The motion found; raises NotInClass unless its top and start are these, exactly."""
     if (found.top, found.start) != (top, start):
-        raise NotInClass(f"{found.method} is of another top or start.", f"It starts from {found.start.flat}.")
+        raise NotInClass(
+            f"{found.method} is of another top or start.",
+            f"It starts from ({', '.join(map(shown, found.start.flat))}).",
+        )
     return found
 
 

@@ -39,6 +39,7 @@ from heavytop.exact.balls import FUNCTIONS, ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, balls, constant, instant, series_length, tanh_sech
 from heavytop.exact.motion import kept
 from heavytop.exact.quartic import PreparedMotion, QuarticMotion
+from heavytop.precision import shown
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -61,13 +62,16 @@ class Delone(ClosedForm):
         (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
         remedy = "The class is I1 = I2 = 2 I3, c = 0, (Omega1 + i Omega2)^2 = (P/I3) (a + ib) (gamma1 + i gamma2)."
         if i1 != i2 or i1 != 2 * i3:
-            raise NotInClass(f"Delone needs I1 = I2 = 2 I3; I1 - I2 = {i1 - i2}, I1 - 2 I3 = {i1 - 2 * i3}.", remedy)
+            differences = f"I1 - I2 = {shown(i1 - i2)}, I1 - 2 I3 = {shown(i1 - 2 * i3)}"
+            raise NotInClass(f"Delone needs I1 = I2 = 2 I3; {differences}.", remedy)
         if n3 != 0 or n1 == n2 == 0:
-            raise NotInClass(f"Delone needs P c = 0 and P r != 0, but P r = ({n1}, {n2}, {n3}).", remedy)
+            raise NotInClass(
+                f"Delone needs P c = 0 and P r != 0, but P r = ({', '.join(map(shown, (n1, n2, n3)))}).", remedy
+            )
         (w1, w2, _), (g1, g2, _) = self.start.omega, self.start.gamma
         xi = w1 * w1 - w2 * w2 - (n1 * g1 - n2 * g2) / i3, 2 * w1 * w2 - (n1 * g2 + n2 * g1) / i3
         if any(xi):
-            raise NotInClass(f"Delone needs xi = 0, but xi = {xi[0]} + i ({xi[1]}).", remedy)
+            raise NotInClass(f"Delone needs xi = 0, but xi = {shown(xi[0])} + i ({shown(xi[1])}).", remedy)
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -139,7 +143,7 @@ class DeloneHomoclinic(ClosedForm):
 
     def __post_init__(self) -> None:
         if self.alpha <= 0 or self.i1 <= 0:
-            raise NotInClass(f"alpha = {self.alpha}, I1 = {self.i1}.", "Both must be positive.")
+            raise NotInClass(f"alpha = {shown(self.alpha)}, I1 = {shown(self.i1)}.", "Both must be positive.")
 
     @property
     def top(self) -> HeavyTop:

@@ -20,6 +20,7 @@ from flint import arb, arb_series
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, instant, tanh_sech
+from heavytop.precision import shown
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -51,9 +52,11 @@ class ErshkovPartial(ClosedForm):
 
     def __post_init__(self) -> None:
         if self.alpha <= 0:
-            raise NotInClass(f"alpha = {self.alpha} is not positive.", "The partial case needs alpha > 0.")
+            raise NotInClass(f"alpha = {shown(self.alpha)} is not positive.", "The partial case needs alpha > 0.")
         if not self.i1 > self.i3 > 0:
-            raise NotInClass(f"I1 = {self.i1}, I3 = {self.i3}.", "The partial case (4.1) needs I1 = I2 > I3 > 0.")
+            raise NotInClass(
+                f"I1 = {shown(self.i1)}, I3 = {shown(self.i3)}.", "The partial case (4.1) needs I1 = I2 > I3 > 0."
+            )
 
     @property
     def rate(self) -> Fraction:

@@ -36,6 +36,7 @@ from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign
 from heavytop.exact.jacobi import Jacobi, Wave, jacobi, legendre_f, wave
 from heavytop.exact.motion import kept
 from heavytop.exact.weierstrass import imag, real
+from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
@@ -54,7 +55,7 @@ class Euler(WithAttitude):
 
     def __post_init__(self) -> None:
         if any(self.top.moment):
-            moment = ", ".join(str(n) for n in self.top.moment)
+            moment = ", ".join(map(shown, self.top.moment))
             raise NotInClass(
                 f"Euler-Poinsot needs P r = 0, but P r = ({moment}).", "Set the weight or the centre of mass to 0."
             )

@@ -22,6 +22,7 @@ from typing import Any
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, half_angle
+from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
@@ -40,17 +41,20 @@ class Grioli(WithAttitude):
         remedy = "`grioli_motion` builds a top with such a motion."
         if n[1] != 0 or not any(n) or i1 == i3:
             raise NotInClass(
-                f"Grioli needs P b = 0, P r != 0, I1 != I3; here P b = {n[1]}, I1 - I3 = {i1 - i3}.", remedy
+                f"Grioli needs P b = 0, P r != 0, I1 != I3; here P b = {shown(n[1])}, I1 - I3 = {shown(i1 - i3)}.",
+                remedy,
             )
         section = (i2 - i3) * n[0] ** 2 - (i1 - i2) * n[2] ** 2
         if section != 0:
-            raise NotInClass(f"Grioli needs (I2 - I3) a^2 = (I1 - I2) c^2; times P^2 it is off by {section}.", remedy)
+            raise NotInClass(
+                f"Grioli needs (I2 - I3) a^2 = (I1 - I2) c^2; times P^2 it is off by {shown(section)}.", remedy
+            )
         rates = dot(omega, omega) * dot(n, n) - 2 * dot(omega, n) ** 2
         if rates != 0 or not any(omega):
-            raise NotInClass(f"Spin and precession differ: |Omega|^2 |n|^2 - 2 (Omega·n)^2 = {rates}.", remedy)
+            raise NotInClass(f"Spin and precession differ: |Omega|^2 |n|^2 - 2 (Omega·n)^2 = {shown(rates)}.", remedy)
         off = [g - wanted for g, wanted in zip(self.start.gamma, _gamma(self.top, omega), strict=True)]
         if any(off):
-            raise NotInClass(f"gamma is off Grioli's by ({', '.join(map(str, off))}).", remedy)
+            raise NotInClass(f"gamma is off Grioli's by ({', '.join(map(shown, off))}).", remedy)
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""

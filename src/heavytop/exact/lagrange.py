@@ -34,6 +34,7 @@ from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion, Winding
 from heavytop.exact.weierstrass import imag, real
+from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, Parameters, System, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
@@ -56,11 +57,13 @@ class Lagrange:
     def __post_init__(self) -> None:
         i1, i2, _ = self.top.inertia
         if i1 != i2:
-            raise NotInClass(f"I1 - I2 = {i1 - i2}, not 0.", "Lagrange's top has I1 = I2: rename the axes if need be.")
+            raise NotInClass(
+                f"I1 - I2 = {shown(i1 - i2)}, not 0.", "Lagrange's top has I1 = I2: rename the axes if need be."
+            )
         if any(self.top.moment[:2]):
             n1, n2, _ = self.top.moment
             raise NotInClass(
-                f"P a = {n1}, P b = {n2}, not 0.",
+                f"P a = {shown(n1)}, P b = {shown(n2)}, not 0.",
                 "Lagrange's top has its centre of mass on axis 3, that of symmetry.",
             )
 

@@ -27,6 +27,7 @@ from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.motion import kept
+from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
 
@@ -52,11 +53,12 @@ class Pendulum(WithAttitude):
             omega, moment, gamma = self.start.omega, self.top.moment, self.start.gamma
             turning = [k for k in range(3) if omega[k] != 0]
             if len(turning) > 1:
-                cause = f"Omega = ({', '.join(map(str, omega))}) is not along a principal axis."
+                cause = f"Omega = ({', '.join(map(shown, omega))}) is not along a principal axis."
             elif turning:
                 k = turning[0]
                 cause = (
-                    f"About axis {k + 1}, (P r)_{k + 1} = {moment[k]} and gamma_{k + 1} = {gamma[k]} are not both 0."
+                    f"About axis {k + 1}, (P r)_{k + 1} = {shown(moment[k])} and gamma_{k + 1} = {shown(gamma[k])} "
+                    "are not both 0."
                 )
             else:
                 cause = "At rest, P r and gamma do not lie in one plane across a principal axis."

@@ -23,6 +23,7 @@ from flint import arb, fmpq, fmpq_mat, fmpq_poly
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, turned
+from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot, vector
 
@@ -40,7 +41,7 @@ class Staude(WithAttitude):
         field = self.system.field(self.system.parameters(self.top, self.start), self.start.flat)
         if any(field):
             raise NotInClass(
-                f"Not a permanent rotation: (Omega', gamma') = ({', '.join(map(str, field))}), not 0.",
+                f"Not a permanent rotation: (Omega', gamma') = ({', '.join(map(shown, field))}), not 0.",
                 "`staude_rotations` finds those of a top.",
             )
 
@@ -73,13 +74,13 @@ def staude_rate_squared(top: HeavyTop, gamma: Vector) -> Fraction | None:
     if not any(turning) or any(off):
         cone = dot(turning, top.moment)
         raise NotInClass(
-            f"No permanent rotation about ({', '.join(map(str, gamma))}): P r·(I gamma x gamma) = {cone}"
+            f"No permanent rotation about ({', '.join(map(shown, gamma))}): P r·(I gamma x gamma) = {shown(cone)}"
             + ("." if any(turning) else ", and P r is not along this principal axis."),
             "`staude_directions` gives rational directions on Staude's cone.",
         )
     square: Fraction = dot(turning, torque) / dot(turning, turning)
     if square < 0:
-        raise NotInClass(f"The permanent rotation needs omega^2 = {square} >= 0.", "Turn gamma to -gamma.")
+        raise NotInClass(f"The permanent rotation needs omega^2 = {shown(square)} >= 0.", "Turn gamma to -gamma.")
     return square
 
 

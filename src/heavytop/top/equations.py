@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from heavytop.errors import InputError
+from heavytop.precision import shown
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
 VARIABLES = ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3")
@@ -91,7 +92,7 @@ def rotor(top: HeavyTop, start: State) -> Any:
     a, _, c = top.centre
     if top.weight != 0 and (a != 0 or c != 0):
         raise InputError(
-            f"The gyrostat needs the centre of mass on axis 2, but a = {a}, c = {c}.",
+            f"The gyrostat needs the centre of mass on axis 2, but a = {shown(a)}, c = {shown(c)}.",
             "Give --centre 0,b,0: the paper assumes a = c = 0.",
         )
     momentum = top.angular_momentum(start.omega)
