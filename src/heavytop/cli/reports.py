@@ -127,7 +127,8 @@ def show(
         show_on_terminal(text.summary(found))
         return 0
     if parquet is not None:
-        tables.write(parquet, found.rows, found.plan)
+        with _writing():
+            tables.write(parquet, found.rows, found.plan)
         print(parquet)
     if html is not None:
         from heavytop.report.html import write_report

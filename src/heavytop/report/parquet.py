@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 from itertools import islice
@@ -11,6 +10,7 @@ from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Row
+from heavytop.suite.files import whole
 
 FILE = "rows.parquet"
 _GROUP = 1 << 15
@@ -73,23 +73,11 @@ def write(path: Path, rows: Iterable[Row], plan: dict[str, str]) -> None:
 
     about = {"heavytop.schema": SCHEMA} | {f"heavytop.plan.{key}": value for key, value in plan.items()}
     schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in COLUMNS.items()], about)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
     lines = _lines(rows)
-    try:
-        with temporary.open("wb") as file:
-            with ParquetWriter(file, schema, compression="zstd") as writer:
-                while group := list(islice(lines, _GROUP)):
-                    columns = [pyarrow.array(c, f.type) for c, f in zip(zip(*group, strict=True), schema, strict=True)]
-                    writer.write_batch(pyarrow.record_batch(columns, schema=schema))
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be written: {error.strerror}.", "Choose a writable place with space."
-        ) from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    with whole(path) as file, ParquetWriter(file, schema, compression="zstd") as writer:
+        while group := list(islice(lines, _GROUP)):
+            columns = [pyarrow.array(c, f.type) for c, f in zip(zip(*group, strict=True), schema, strict=True)]
+            writer.write_batch(pyarrow.record_batch(columns, schema=schema))
 
 
 def _lines(rows: Iterable[Row]) -> Iterator[tuple[Any, ...]]:

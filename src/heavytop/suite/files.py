@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from heavytop.errors import InputError
 
@@ -27,13 +28,24 @@ def replace(path: Path, content: bytes | Iterable[bytes]) -> str:
 
     Raises InputError where it cannot be written; then nothing is left behind.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
     digest = hashlib.sha256()
+    with whole(path) as file:
+        for piece in [content] if isinstance(content, bytes) else content:
+            file.write(piece)
+            digest.update(piece)
+    return digest.hexdigest()
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[BinaryIO]:
+    """A file that takes the name ``path`` when all of it is written, and leaves nothing behind where that fails.
+
+    Raises InputError where it cannot be written.
+    """
+    temporary = path.parent / f".{path.name}.{os.getpid()}.partial"
     try:
         with temporary.open("wb") as file:
-            for piece in [content] if isinstance(content, bytes) else content:
-                file.write(piece)
-                digest.update(piece)
+            yield file
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
@@ -45,4 +57,3 @@ def replace(path: Path, content: bytes | Iterable[bytes]) -> str:
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
-    return digest.hexdigest()
