@@ -70,6 +70,8 @@ def test_nothing_is_written_where_a_report_is_wrong(reports, monkeypatch, capsys
         (["compare", "old", "same", "--loss", "-1"], "loss_bits = -1 is negative"),
         (["compare", "old", "same", "--floor", "x"], "not a finite number"),
         (["compare", "old", "same", "--policy", "none.toml"], "cannot be read"),
+        (["compare", "old", "same", "--loss", "1e400"], "too large"),
+        (["compare", "old", "same", "--junit", ""], "cannot be written"),
         (["history", "old"], "two reports or more"),
         (["history", "old", "same", "--metric", "[x"], "no glob pattern"),
         (["history", "old", "same", "--svg", "x.svg"], "cannot be drawn"),

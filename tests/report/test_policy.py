@@ -44,6 +44,7 @@ def drift(value: str, band: float | None = None, **changes) -> Row:
         ("[[rule]]\nmetric = 'drift_[ab'", "no glob pattern"),
         ("[[rule]]\nlimit = '-1e-9'", "limit = -1e-9 is negative"),
         ("suspicious_digits = nan", "not a finite number"),
+        ("loss_bits = '1e400'", "too large"),
         ("floor = ", "not valid"),
     ],
 )

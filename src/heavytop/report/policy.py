@@ -12,7 +12,7 @@ from typing import Literal
 import msgspec
 
 from heavytop.errors import InputError
-from heavytop.precision import exact, log10
+from heavytop.precision import exact, log10, physical
 
 BITS = math.log10(2)
 """Decades in one bit."""
@@ -187,7 +187,7 @@ def _limits(rule: Rule, policy: Policy) -> Limits:
 
 
 def _not_negative(name: str, given: str | float) -> None:
-    if exact(given) < 0:
+    if physical(exact(given), name) < 0:
         shown = f"{given:g}" if isinstance(given, float) else given
         raise InputError(f"{name} = {shown} is negative.", "Give 0 or more.")
 

@@ -111,7 +111,7 @@ def _durations(old: Metric, new: Metric, limits: Limits) -> Judged:
     if old.log10 is None:
         return Verdict.BETTER, f"now at {new.value}"
     ratio = 10 ** min(size(new) - old.log10, 300.0)
-    luck = 10 ** (limits.noise * band(old, new))
+    luck = 10 ** min(limits.noise * band(old, new), 300.0)
     if ratio * luck < 1 and ratio < 1 - limits.duration:
         return Verdict.WORSE, f"{1 - ratio:.0%} earlier"
     if ratio > luck and ratio > 1 + limits.duration:
@@ -127,7 +127,7 @@ def _values(old: Metric, new: Metric, limits: Limits) -> Judged:
     if "never" in (old.value, new.value) or UNRESOLVED in (old.value, new.value):
         return differs
     a, b = exact(old.value), exact(new.value)
-    off = max(limits.value, 10 ** (limits.noise * band(old, new)) - 1)
+    off = max(limits.value, 10 ** min(limits.noise * band(old, new), 300.0) - 1)
     return SAME if abs(a - b) <= Fraction(off) * max(abs(a), abs(b)) else differs
 
 
