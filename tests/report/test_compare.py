@@ -7,7 +7,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import Metric, Row
+from heavytop.records import Metric, Row, Series
 from heavytop.report import store
 from heavytop.report.compare import compare
 from heavytop.report.policy import Policy
@@ -78,6 +78,11 @@ def test_a_failure_another_horizon_format_flag_or_reference_is_incomparable(chan
         assert result.exit_code == 3
     if "outcome" in change:
         assert verdicts(row(**change), row(**change)) == {"": Verdict.INCOMPARABLE}
+
+
+def test_a_row_that_is_no_longer_finite_is_not_the_same() -> None:
+    assert compare(report(row()), report(row(finite=False)), Policy()).verdict == "incomparable"
+    assert compare(report(row(finite=False)), report(row()), Policy()).verdict == "same"
 
 
 def test_missing_and_new_rows_and_metrics() -> None:
@@ -234,6 +239,7 @@ def test_a_duration_may_start_from_0() -> None:
         {"bits": -1},
         {"measure": "homoclinic", "metrics": {}},
         {"measure": "claim_evaluation"},
+        {"series": {"drift_energy": Series(["1", "2"], ["1e-12"])}},
         {"metrics": {"drift_energy_max": Metric("never", None)}},
         {"metrics": {"break_away_time": Metric("unresolved", None, "duration")}},
     ],

@@ -203,6 +203,8 @@ class _Rows:
             ]
         if old.laws or new.laws:
             found += self._laws(key, rules, old, new)
+        if old.finite and not new.finite and not self.ignores(old):
+            found.append(Finding(key, "", Verdict.INCOMPARABLE, "finite", "not finite", "a value is no longer finite"))
         if self.timed:
             for name in sorted(old.seconds.keys() & new.seconds.keys()):
                 if not self.lookup.metric(rules, f"seconds {name}").ignore:

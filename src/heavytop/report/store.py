@@ -134,6 +134,10 @@ def read(path: Path) -> Report:
     file, report = _read(path, Report)
     _check_keys(file, report.rows)
     _check_rows(file, report.rows)
+    for row in report.rows:
+        for name, series in row.series.items():
+            if len(series.times) != len(series.values):
+                raise InputError(f"{_where(file, row)}, {name[:60]}: not one value for each time.", _REMEDY)
     return report
 
 
@@ -162,6 +166,8 @@ def _read(path: Path, kind: type[_Kind]) -> tuple[Path, _Kind]:
             if schema != SCHEMA:
                 raise InputError(f"{file} has the schema {schema[:60]!r}, not {SCHEMA!r}.", _REMEDY)
         raise InputError(f"{file} is not a whole report: {problem}.", _REMEDY)
+    if not isinstance(report.environment.get("packages", {}), dict):
+        raise InputError(f"{file} does not say which packages it was made with.", _REMEDY)
     return file, report
 
 
