@@ -27,6 +27,8 @@ _COLUMNS = ("t", *VARIABLES)
 _VECTORS = ("inertia", "centre", "omega", "gamma")
 _NAME = 200
 _MOST = 100_000
+_WIDEST = 20_000
+"""Exponents of 2 in a file, up to that: quad has 16,384, and powers of what is larger take minutes."""
 _SLACK = 8
 """γ may be off the unit sphere by so many bits of rounding."""
 
@@ -168,9 +170,9 @@ def _text(document: dict[str, Any], key: str, default: str | None = None) -> str
 
 
 def _name(text: str, what: str) -> str:
-    if len(text) > _NAME or not text.isprintable():
+    if not 0 < len(text) <= _NAME or not text.isprintable():
         raise InputError(
-            f"The {what} of {len(text)} characters begins {text[:40]!r}.", f"Use at most {_NAME} printable characters."
+            f"The {what} of {len(text)} characters begins {text[:40]!r}.", f"Use 1 to {_NAME} printable characters."
         )
     return text
 
@@ -184,10 +186,13 @@ def _number(value: Any, what: str) -> Fraction | None:
         return None
     hexadecimal = _HEX.fullmatch(text)
     if hexadecimal is None:
-        return exact(text)
-    sign, whole, part, power = hexadecimal.groups()
-    magnitude = Fraction(int(whole + part, 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
-    return -magnitude if sign == "-" else magnitude
+        number = exact(text)
+    else:
+        sign, whole, part, power = hexadecimal.groups()
+        number = Fraction(int(f"{sign}{whole}{part}", 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
+    if number and abs(number.numerator.bit_length() - number.denominator.bit_length()) > _WIDEST:
+        raise InputError(f"{what} is {text[:60]!r}.", f"Sizes go from 2^-{_WIDEST} to 2^{_WIDEST}.")
+    return number
 
 
 def _finite(value: Any, what: str) -> Fraction:
@@ -199,8 +204,8 @@ def _finite(value: Any, what: str) -> Fraction:
 
 def _integer(value: Any, what: str) -> int:
     number = _finite(value, what)
-    if number < 0 or number.denominator != 1:
-        raise InputError(f"{what} = {shown(number)} is not a count.", "Give an integer that is not negative.")
+    if number < 0 or number.denominator != 1 or number >= 1 << 63:
+        raise InputError(f"{what} = {shown(number)} is not a count.", "Give an integer from 0 to 2^63 - 1.")
     return int(number)
 
 
