@@ -11,6 +11,10 @@ from heavytop.suite.plan import BUILT_IN, expand, load
 from heavytop.suite.tables import log_spaced
 
 MEASURE = '[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "double", horizon = "10" }]\n'
+TOP = (
+    '[[top]]\nname = "mine"\ninertia = ["3", "2", "1"]\nweight = "1"\ncentre = ["0", "0", "1/3"]\n'
+    'omega = ["1", "0.5", "-2/3"]\ngamma = ["3/5", "0", "4/5"]\n'
+)
 
 
 def plan_of(tmp_path: Path, text: str):
@@ -69,6 +73,7 @@ def test_homoclinic_cases_have_dyadic_data(name: str) -> None:
         (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 0 }')}", "0 samples"),
         (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 1.5 }')}", "Expected `int`"),
         (f"name = 'x'\n{MEASURE}{MEASURE}", "twice"),
+        (f"name = 'x'\n{TOP}{TOP}{MEASURE}", "two tops 'mine'"),
         ("name = 'x'\n[[measure]", "not valid"),
         ("", "name"),
         (f"name = '../evil'\n{MEASURE}", "letters, digits"),
@@ -85,17 +90,13 @@ def test_what_is_impossible_is_refused_and_named(tmp_path: Path, text: str, mess
 
 
 def test_a_top_of_one_s_own_is_measured_under_its_name(tmp_path: Path) -> None:
-    own = (
-        '[[top]]\nname = "mine"\ninertia = ["3", "2", "1"]\nweight = "1"\ncentre = ["0", "0", "1/3"]\n'
-        'omega = ["1", "0.5", "-2/3"]\ngamma = ["3/5", "0", "4/5"]\n'
-    )
-    (task,) = plan_of(tmp_path, f"name = 'x'\n{own}{MEASURE.replace('euler', 'mine')}")
+    (task,) = plan_of(tmp_path, f"name = 'x'\n{TOP}{MEASURE.replace('euler', 'mine')}")
     assert task.name == "mine"
     assert task.case.start.omega[2] == Fraction(-2, 3)
     with pytest.raises(InputError, match="not a unit vector"):
-        plan_of(tmp_path, f"name = 'x'\n{own.replace('3/5', '2/5')}{MEASURE}")
+        plan_of(tmp_path, f"name = 'x'\n{TOP.replace('3/5', '2/5')}{MEASURE}")
     with pytest.raises(InputError, match="built-in"):
-        plan_of(tmp_path, f"name = 'x'\n{own.replace('mine', 'euler')}{MEASURE}")
+        plan_of(tmp_path, f"name = 'x'\n{TOP.replace('mine', 'euler')}{MEASURE}")
 
 
 def test_unknown_plans_are_refused() -> None:

@@ -82,7 +82,11 @@ def expand(plan: Plan, seed: int = 0) -> Sequence[Task]:
     """
     if not 0 <= seed <= MOST_SEEDS:
         raise InputError(f"There is no seed {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
-    own = {top.name: _own_case(top) for top in plan.top}
+    own: dict[str, Case] = {}
+    for top in plan.top:
+        if top.name in own:
+            raise InputError(f"The plan {plan.name} has two tops {top.name[:60]!r}.", _RENAME)
+        own[top.name] = _own_case(top)
     swept = _swept(plan)
     known = own | {name: cases[0] for name, cases in swept.items()}
     parts = [
