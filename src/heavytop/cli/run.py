@@ -44,12 +44,14 @@ def run(
     tasks = expand(loaded, seed)
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers are processes here, --scheduler has its own.", "Give one of them.")
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
     identity = {"name": loaded.name, "sha256": digest, "seed": str(seed)}
     directory = out or _new_folder(loaded.name)
     if resume and _is_finished(directory):
-        return _show_finished(directory, identity)
+        return _show_finished(directory, identity, parquet)
     _require_fit(directory, resume)
     where = {"workers": workers or os.cpu_count() or 1, "scheduler": scheduler}
     return _run(tasks, identity, directory, resume, save_every, where, parquet)
@@ -146,12 +148,15 @@ def _is_finished(directory: Path) -> bool:
     return (directory / REPORT).exists() and not (directory / FILE).exists()
 
 
-def _show_finished(directory: Path, plan: dict[str, str]) -> int:
+def _show_finished(directory: Path, plan: dict[str, str], parquet: bool) -> int:
+    from heavytop.report import parquet as tables
     from heavytop.report import store, text
     from heavytop.suite.checkpoint import require_same
 
     report = store.read(directory)
     require_same(report.plan, plan, directory)
+    if parquet:
+        tables.write(directory / tables.FILE, report.rows, report.plan)
     show_on_terminal(text.overview(report, report.rows))
     print(f"\nReport: {directory / store.FILE} (was finished already)")
     return 0 if text.all_good(report.rows) else 3
