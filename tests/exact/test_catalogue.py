@@ -18,6 +18,7 @@ from heavytop.exact.lagrange import Lagrange
 from heavytop.exact.pendulum import Pendulum
 from heavytop.exact.staude import Staude, staude_motion
 from heavytop.exact.validated import Validated
+from heavytop.precision import round_to
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -92,3 +93,9 @@ def test_a_generic_motion_is_left_to_the_enclosure():
 def test_what_the_gyrostat_does_not_admit_is_an_input_error():
     with pytest.raises(InputError, match="a = 1"):
         find(HeavyTop((3, 2, 1), 1, (1, 0, 0)), State((1, 0, 0), (1, 0, 0)), GYROSTAT)
+
+
+def test_data_of_any_length_are_refused_in_words():
+    third = round_to(Fraction(1, 3), 20_000)
+    top = HeavyTop((3 + third, 2, 1), 1, (third, 0, third))
+    assert list(matches(top, State((third, 1, third), (third, third, third)))) == []
