@@ -144,6 +144,7 @@ def test_a_history_is_drawn_with_its_steps() -> None:
     tracks = [t for t in history(reports, Policy()) if t.metric.endswith("_max")]
     picture = history_svg(names, tracks)
     assert ElementTree.fromstring(picture.encode()).tag.endswith("svg")
+    assert "a$b_{$c" in history_svg(["a$b_{$c", *names[1:]], tracks)
     for wrong in ([], tracks * 10):
         with pytest.raises(InputError, match="cannot be drawn"):
             history_svg(names, wrong)

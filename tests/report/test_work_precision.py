@@ -124,6 +124,11 @@ def test_the_picture_shows_every_line_and_each_failure_as_a_cross_on_the_edge() 
     assert svg(growth_figure(report)).count("<svg") == 1
 
 
+def test_a_case_without_any_error_is_drawn_empty() -> None:
+    for rows in ([row("heyoka tolerance=1", None, 1.0)], FAILED):
+        assert "<svg" in svg(work_precision_figure(Report(SCHEMA, {"name": "x"}, {}, rows)))
+
+
 def test_the_pictures_are_files(tmp_path) -> None:
     growth = [row(f"{name} tolerance=1e-5", -5, 1.0) for name in ("heyoka", "cyrk:DOP853")] + SPLITTING
     files = draw_work_precision(Report(SCHEMA, {"name": "peers"}, {}, growth), tmp_path / "new")
@@ -142,7 +147,7 @@ def test_without_such_rows_there_is_no_picture() -> None:
 
 
 def test_a_hostile_name_is_text() -> None:
-    rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{')]
+    rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{$')]
     drawn = svg(work_precision_figure(Report(SCHEMA, {"name": "x"}, {}, rows)))
     assert "<script" not in drawn
     assert "<b>" not in drawn

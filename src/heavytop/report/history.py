@@ -14,6 +14,7 @@ from heavytop.errors import InputError
 from heavytop.precision import exact
 from heavytop.report.compare import AnyReport, compare
 from heavytop.report.policy import Policy
+from heavytop.report.svg import plain
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
 
@@ -117,14 +118,14 @@ def history_svg(names: Sequence[str], tracks: Sequence[Track]) -> str:
     for track in drawn:
         heights = [_height(value) for value in track.values]
         points = [float("nan") if height is None else height for height in heights]
-        (line,) = axes.plot(range(1, len(names) + 1), points, marker="o", label=f"{track.key[1]} {track.metric}")
+        (line,) = axes.plot(range(1, len(names) + 1), points, marker="o", label=plain(f"{track.key[1]} {track.metric}"))
         steps = [number for number in track.steps if heights[number] is not None]
         axes.plot(
             [number + 1 for number in steps], [points[n] for n in steps], "D", markersize=11, fillstyle="none",
             color=line.get_color(),
         )  # fmt: skip
     axes.set_yscale("log")
-    axes.set_xticks(range(1, len(names) + 1), [name[-24:] for name in names], rotation=20, ha="right")
+    axes.set_xticks(range(1, len(names) + 1), [plain(name[-24:]) for name in names], rotation=20, ha="right")
     axes.set_ylabel("value, in the units of the metric")
     axes.set_title("Diamonds mark steps beyond noise", fontsize="medium")
     axes.grid(alpha=0.3)

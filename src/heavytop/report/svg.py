@@ -78,6 +78,11 @@ def new_axes(x: str, y: str, height: float = 2.8, left: float = 0.17) -> Any:
     return axes
 
 
+def plain(name: str) -> str:
+    """A name in which matplotlib reads no formula."""
+    return name.replace("$", r"\$")
+
+
 def decades(axis: Any, ticks: int = 7) -> None:
     """Ticks 10⁻⁵, 1, 10, ... on an axis that carries decimal logarithms."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator

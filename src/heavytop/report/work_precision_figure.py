@@ -9,6 +9,7 @@ from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.records import Report, Row
+from heavytop.report.svg import plain
 from heavytop.report.work_precision import Line, leads, panels
 
 # Okabe and Ito's colours, one a family; markers and dashes tell its members apart
@@ -73,11 +74,15 @@ def work_precision_axes(axes: Any, lines: Sequence[Line], styles: dict[str, dict
         style = styles[line.label]
         points = sorted(line.points, key=lambda point: point.log10)
         errors = [10**point.log10 for point in points]
-        axes.plot(errors, [point.seconds for point in points], markersize=4, label=line.label, **style)
+        axes.plot(errors, [point.seconds for point in points], markersize=4, label=plain(line.label), **style)
         if line.failures:
             edge = axes.get_yaxis_transform()
             cross = _CROSS | {"color": style["color"], "clip_on": False}
             axes.plot([1.0] * len(line.failures), line.failures, transform=edge, **cross)
+    if not any(line.points for line in lines):  # no run reached the end, or no error is known: nothing sets a span
+        axes.set(xlim=(1e-16, 1.0))
+        if not any(line.failures for line in lines):
+            axes.set(ylim=(1e-3, 1.0))
     axes.set(xscale="log", yscale="log", xlabel="largest error of a component on the way", ylabel="seconds")
     axes.grid(True, color="#dddddd")
     axes.spines[["top", "right"]].set_visible(False)
@@ -97,7 +102,7 @@ def work_precision_figure(report: Report, metric: str = "error_max") -> Any:
     for axes, (case, lines) in zip(grid, cases.items(), strict=False):
         work_precision_axes(axes, lines, styles)
         found = lead.get(case)
-        title = case.replace("/T=", ", up to t = ")
+        title = plain(case.replace("/T=", ", up to t = "))
         if found is not None and found.ratio is not None:
             title += f"\nat 1e{found.log10:g} {found.name} is {found.ratio:.1f} × as fast as {found.peer}"
         axes.set_title(title, fontsize=10)
@@ -128,12 +133,14 @@ def growth_figure(report: Report) -> Any:
             held = row.series[series]
             values = [(float(t), float(v)) for t, v in zip(held.times, held.values, strict=True) if _positive(v)]
             colour = _COLOURS.get(row.integrator.partition(" ")[0].partition(":")[0], _OTHER)
-            axes.plot(*zip(*values, strict=True), marker=marker, markersize=4, color=colour, label=row.integrator)
+            axes.plot(
+                *zip(*values, strict=True), marker=marker, markersize=4, color=colour, label=plain(row.integrator)
+            )
         axes.set(xscale="log", yscale="log", xlabel="t", ylabel=label)
         axes.grid(True, color="#dddddd")
         axes.spines[["top", "right"]].set_visible(False)
         axes.legend(fontsize=8, frameon=False)
-    figure.suptitle(chosen[0].case.replace("/T=", ", up to t = "), fontsize=10)
+    figure.suptitle(plain(chosen[0].case.replace("/T=", ", up to t = ")), fontsize=10)
     return figure
 
 
