@@ -42,6 +42,8 @@ def whole(path: Path) -> Iterator[BinaryIO]:
 
     Raises InputError where it cannot be written.
     """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(f"{path} cannot be written: it is a device or a pipe.", "Give the name of a file.")
     temporary = path.parent / f".{path.name}.{os.getpid()}.partial"
     try:
         with temporary.open("wb") as file:
