@@ -152,7 +152,7 @@ FAULTS = {
         options={"high_accuracy": True},
         detectable=False,
     ),
-    "clock": Integrator("time summed in one double", stepping=_ClockInOneWord),
+    "clock": Integrator("time summed in one double", stepping=_ClockInOneWord, detectable=False),
     "axes": Integrator("axes 1 and 2 swapped in what is handed over", states=_swapped),
     "frozen": Integrator("the state stands still from the middle on", states=_frozen),
     "nan": Integrator("the last state is NaN", states=_not_a_number),

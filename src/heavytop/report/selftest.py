@@ -30,7 +30,8 @@ class Trial:
     """What the comparison said of one fault.
 
     caught_by: measures and metrics that raised an alarm, with the cases where they did, strongest first.
-    shift: the metric that moved most without an alarm, and by how many decades; None where something was caught.
+    shift: the metric that moved most without an alarm, improvements first, and by how many decades; None where something
+    was caught.
     """
 
     fault: str
@@ -93,7 +94,7 @@ def _report(measured: Sequence[Row]) -> Report:
 
 def _trial(name: str, comparison: Comparison) -> Trial:
     alarms: dict[str, list[tuple[float, str]]] = {}
-    quiet: list[tuple[float, str]] = []
+    quiet: list[tuple[bool, float, str]] = []
     for finding in comparison.findings:
         measure, case = finding.key[:2]
         label = f"{measure}: {finding.metric or finding.reason}"
@@ -101,7 +102,7 @@ def _trial(name: str, comparison: Comparison) -> Trial:
         if finding.verdict in _ALARMS:
             alarms.setdefault(label, []).append((moved, case))
         else:
-            quiet.append((moved, f"{label} of {case}"))
+            quiet.append((finding.verdict is Verdict.BETTER, moved, f"{label} of {case}"))
     strongest = sorted(alarms.items(), key=lambda item: -max(item[1])[0])
     shift = max(quiet) if quiet and not alarms else None
     if name == CONTROL:
@@ -114,7 +115,7 @@ def _trial(name: str, comparison: Comparison) -> Trial:
         detectable,
         comparison.verdict,
         [(label, [case for _, case in cases]) for label, cases in strongest],
-        None if shift is None else (shift[1], shift[0]),
+        None if shift is None else (shift[2], shift[1]),
     )
 
 

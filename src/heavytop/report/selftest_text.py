@@ -35,4 +35,5 @@ def _words(trial: Trial) -> str:
         return "\n".join(lines + ([f"and {more} more"] if more > 0 else []))
     if trial.shift is None or trial.shift[1] == 0:
         return "nothing moved"
-    return f"nothing: {trial.shift[0]} moved most, by {trial.shift[1]:.2f} decades, inside its allowance"
+    taken = "read as an improvement" if trial.verdict == "better" else "inside its allowance"
+    return f"nothing: {trial.shift[0]} moved most, by {trial.shift[1]:.2f} decades, {taken}"
