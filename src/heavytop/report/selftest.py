@@ -30,8 +30,8 @@ class Trial:
     """What the comparison said of one fault.
 
     caught_by: measures and metrics that raised an alarm, with the cases where they did, strongest first.
-    shift: the metric that moved most without an alarm, improvements first, and by how many decades; None where something
-    was caught.
+    shift: the metric that moved most without an alarm, improvements first, and by how many decades; None where one was
+    caught.
     """
 
     fault: str
