@@ -5,17 +5,20 @@ from fractions import Fraction
 from io import StringIO
 from pathlib import Path
 
+import numpy
 import pytest
 from rich.console import Console
 
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
+from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.records import Report
 from heavytop.report.compare import compare
 from heavytop.report.policy import Policy
 from heavytop.report.text import summary
 from heavytop.suite.cases import CASES
-from heavytop.suite.measurements import ensembles, measure
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.measurements import ensemble_reference, ensembles, measure
 from heavytop.suite.plan import expand, load
 from heavytop.suite.starts import random_starts
 from heavytop.top.equations import GYROSTAT
@@ -191,3 +194,75 @@ def test_the_plan_growth_plants_its_faults() -> None:
     assert {run.tolerance for run in runs} == {None, "1e-9"}
     assert {run.bias for run in runs} == {None, "1e-12"}
     assert {run.high_accuracy for run in runs} == {False, True}
+
+
+@pytest.mark.parametrize(
+    ("case", "run"),
+    [
+        ("euler", 'precision = "double", horizon = "20", starts = 20, samples = 4'),
+        ("lagrange", 'precision = "quad", horizon = "4", starts = 3, samples = 4'),
+        ("kovalevskaya", 'precision = "double", horizon = "20", starts = 12, samples = 4, reference = "extended"'),
+    ],
+)
+def test_a_row_goes_on_behind_the_starts_that_are_done(tmp_path: Path, monkeypatch, case: str, run: str) -> None:
+    (task,) = tasks(tmp_path, f'"{case}"', run)
+    whole = measure(task)
+
+    class Killed(Exception):
+        pass
+
+    class Dying(Saved):
+        """Dies as a kill would, behind its third save and behind each third one after."""
+
+        saves = 0
+
+        def save(self, content: dict) -> None:
+            super().save(content)
+            self.saves += 1
+            if self.saves == 3:
+                raise Killed
+
+    asked = []
+
+    def watched(problems, *args, **options):
+        if options.get("finished"):
+            asked.append(len(problems))
+        return propagate_ensemble(problems, *args, **options)
+
+    for module in (ensembles, ensemble_reference):
+        monkeypatch.setattr(module, "propagate_ensemble", watched)
+    path = tmp_path / "row-0.partial"
+    deaths = 0
+    while True:
+        ensemble_reference._shared.cache_clear()  # as in a process of its own
+        try:
+            row = measure(task, Dying(path, "this plan", every=0))
+            break
+        except Killed:
+            deaths += 1
+    total = task.ensemble.starts * (2 if task.ensemble.reference else 1)
+    assert deaths == total // 3
+    assert asked[0] == task.ensemble.starts
+    # what was done is not done again
+    assert asked[-1] <= 3
+    row.seconds = whole.seconds = {}
+    assert row == whole
+
+
+def _with_a_nan(problems, times, *, observer, **options):
+    def spoilt(index, time, state):
+        observer(index, time, state * numpy.nan if (index, time) == (0, times[-1]) else state)
+
+    return propagate_ensemble(problems, times, observer=spoilt, **options)
+
+
+def test_a_start_that_is_not_finite_is_kept_as_it_is(tmp_path: Path, monkeypatch) -> None:
+    (task,) = tasks(tmp_path, '"euler"', 'precision = "double", horizon = "20", starts = 9, samples = 4')
+    monkeypatch.setattr(ensembles, "propagate_ensemble", _with_a_nan)
+    saved = Saved(tmp_path / "row-0.partial", "this plan", every=0)
+    one = measure(task, saved)
+    again = measure(task, saved)
+    one.seconds = again.seconds = {}
+    assert one == again
+    assert (one.outcome, one.finite, one.metrics["starts_failed"].value) == ("non_finite", False, "1")
+    assert one.laws["drift_energy"].starts == 8

@@ -20,6 +20,7 @@ from heavytop.precision import DOUBLE, exact, number
 from heavytop.top.times import check_times
 
 Observer = Callable[[int, Fraction, Any], None]
+Finished = Callable[[int, Trajectory], None]
 
 
 def propagate_ensemble(
@@ -27,6 +28,7 @@ def propagate_ensemble(
     times: Sequence[Any],
     *,
     observer: Observer | None = None,
+    finished: Finished | None = None,
     threads: int | None = None,
     lanes: int = 8,
     step_limit: int | None = None,
@@ -38,6 +40,7 @@ def propagate_ensemble(
     times: exact numbers of one sign, strictly monotone away from 0 (0 itself may come first).
     observer: called with (index of the problem, exact time, native state) in place of keeping the states; by the thread
     that calls this, the times of each problem in order, the problems mixed.
+    finished: called with (index of the problem, its motion) as each ends, by the same thread, behind its samples.
     threads: None for one per processor that this process may use.
     lanes: motions side by side in a batch engine, in double; other formats have none, and give the bits of
     :func:`heavytop.integrate.taylor.propagate`.
@@ -62,6 +65,7 @@ def propagate_ensemble(
     tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
     pending = deque(enumerate(problems))
     work = Work(tool, targets, [exact(target) for target in targets], step_limit, observer is not None, pending)
+    done: dict[int, Trajectory] = {}
     threads = min(threads, -(-len(problems) // (lanes if batch else 1)))
     with ThreadPoolExecutor(threads) as pool:
         try:
@@ -72,12 +76,16 @@ def propagate_ensemble(
                 if isinstance(item, Future):
                     item.result()
                     threads -= 1
+                elif isinstance(item[1], Trajectory):
+                    done[item[0]] = item[1]
+                    if finished is not None:
+                        finished(*item)
                 elif observer is not None:
                     work.room.release()
                     observer(*item)
         finally:
             work.stop.set()
-    return [work.done[index] for index in range(len(problems))]
+    return [done[index] for index in range(len(problems))]
 
 
 def _processors() -> int:
@@ -97,7 +105,8 @@ def _one_by_one(work: Work) -> None:
         while taken := work.take():
             index, problem = taken
             observer = partial(work.observe, index) if work.observed else None
-            work.done[index] = follow(work.tool, engine, problem, work.targets, work.step_limit, observer, work.check)
+            run = follow(work.tool, engine, problem, work.targets, work.step_limit, observer, work.check)
+            work.finish(index, run)
 
 
 def _one_kind(problems: Sequence[Problem]) -> Problem:

@@ -41,7 +41,7 @@ class Work:
     """What the threads of an ensemble share.
 
     targets: native times in order; times: their exact values.  pending: problems that no thread has taken yet.
-    inbox: samples on their way to the observer, at most as many as there is room for, and threads that ended.
+    inbox: samples on their way to the observer, at most as many as there is room for, motions and threads that ended.
     """
 
     tool: Compiled
@@ -50,7 +50,6 @@ class Work:
     step_limit: int | None
     observed: bool
     pending: deque[tuple[int, Problem]]
-    done: dict[int, Trajectory] = field(default_factory=dict)
     stop: Event = field(default_factory=Event)
     inbox: SimpleQueue[Any] = field(default_factory=SimpleQueue)
     room: Semaphore = field(default_factory=lambda: Semaphore(_ROOM))
@@ -67,6 +66,10 @@ class Work:
         while not self.room.acquire(timeout=CHUNK_SECONDS):
             self.check()
         self.inbox.put((index, time, state))
+
+    def finish(self, index: int, run: Trajectory) -> None:
+        """Hand in a motion that ended, behind its samples."""
+        self.inbox.put((index, run))
 
     def check(self) -> None:
         """Raise StoppedError if the ensemble was given up."""
@@ -280,7 +283,7 @@ class Lanes:
 
     def _finish(self, run: _Run, outcome: Outcome, reached: Fraction, steps: int) -> None:
         tool = self.work.tool
-        self.work.done[run.index] = Trajectory(
+        ended = Trajectory(
             run.problem,
             "heyoka:batch",
             tuple(run.times),
@@ -292,3 +295,4 @@ class Lanes:
             {"compile": tool.seconds, "run": perf_counter() - run.began},
             tool.flags,
         )
+        self.work.finish(run.index, ended)

@@ -16,10 +16,10 @@ _MEASURES: dict[str, Callable[[Task], Row]] = {
     "homoclinic": computed.homoclinic,
     "local_error": computed.local_error,
     "work_precision": work_precision.work_precision,
-    "growth": ensembles.growth,
 }
 _LONG: dict[str, Callable[[Task, Saved], Row]] = {
     "drift": computed.drift,
+    "growth": ensembles.growth,
 }
 """Measurements that keep their place on the way."""
 
