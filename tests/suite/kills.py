@@ -1,4 +1,7 @@
-"""Kill a run again and again, go on, and compare: ``python tests/suite/kills.py PLAN KILLS [WORKERS]``."""
+"""Kill a run again and again, go on, and compare: ``python tests/suite/kills.py PLAN KILLS [WORKERS [PART]]``.
+
+PART: of the time that a whole run takes, within which each process is killed; 1.1.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +51,9 @@ def comparable(folder: Path) -> bytes:
     return json.dumps(report).encode()
 
 
-def kill_and_resume(plan: str, kills: int, workers: int = 1, seed: int = 1) -> list[tuple[int, bool]]:
+def kill_and_resume(
+    plan: str, kills: int, workers: int = 1, part: float = 1.1, seed: int = 1
+) -> list[tuple[int, bool]]:
     """(kills that a run lived through, whether its report is that of a run left alone), for each run."""
     rng = random.Random(seed)
     found = []
@@ -64,7 +69,7 @@ def kill_and_resume(plan: str, kills: int, workers: int = 1, seed: int = 1) -> l
             while killed < missing:
                 process = start(plan, out, workers, "--resume", "--save-every", "0.02")
                 try:
-                    _, errors = process.communicate(timeout=rng.uniform(0, 1.1 * span))
+                    _, errors = process.communicate(timeout=rng.uniform(0, part * span))
                     assert process.returncode == 0, errors.decode()
                     break
                 except subprocess.TimeoutExpired:
@@ -80,6 +85,7 @@ def kill_and_resume(plan: str, kills: int, workers: int = 1, seed: int = 1) -> l
 
 
 if __name__ == "__main__":
-    runs = kill_and_resume(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 1)
+    plan, kills, *rest = sys.argv[1:]
+    runs = kill_and_resume(plan, int(kills), *(kind(text) for kind, text in zip((int, float), rest, strict=False)))
     killed = sum(number for number, _ in runs)
     print(f"{killed} kills in {len(runs)} runs: {sum(same for _, same in runs)} of {len(runs)} reports identical")
