@@ -42,12 +42,14 @@ def _format_key(name: str, place: int, source: str, line: bool = True) -> Key:
 
 
 def _lane(row: Row) -> tuple[str, ...]:
-    return row.case, row.integrator, row.measure, row.system
+    # lanes and threads side by side are how heyoka computes an ensemble, in double and in wider formats
+    return row.case, row.integrator.replace("heyoka:batch", "heyoka"), row.measure, row.system
 
 
 def _lane_name(lane: tuple[str, ...], most: int = 40) -> str:
     case, integrator, measure, _ = lane
-    extra = ", ".join(part for part, usual in ((integrator, "heyoka"), (measure, "drift")) if part != usual)
+    usual = {"drift": "", "growth": "many starts"}.get(measure, measure)
+    extra = integrator.removeprefix("heyoka").strip() or usual
     return clip(case, most) + (f" ({clip(extra, most)})" if extra else "")
 
 
