@@ -72,6 +72,18 @@ def on_paper(renderable: object) -> str:
 def shown() -> Report:
     made = baseline()
     made.rows[0].series = {"drift_energy": Series(["1", "10"], ["1e-14", "1e-13"])}
+    steps = {
+        "local_error_ulp_max": error("0.65"),
+        "local_error_ulp_rms": error("0.28"),
+        "observed_order": of_fraction(exact("19"), "value"),
+    }
+    made.rows += [
+        row(measure="local_error", metrics=steps, order=20),
+        row(measure="local_error", metrics={}, outcome="step_limit", time_reached="7.5"),
+        row(measure="score", integrator="rk4.f90"),
+        row(measure="growth", laws={"drift_area": Law("t", 64, 1.0), "drift_energy": Law("t", 64, 1.0, 0.9, 1.1)}),
+        row(measure="of a later version"),
+    ]
     return made
 
 

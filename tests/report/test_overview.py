@@ -5,7 +5,7 @@ from io import StringIO
 from rich.console import Console
 
 from heavytop.records import SCHEMA, Metric, Report, Row
-from heavytop.report.text import MOST_ROWS, overview
+from heavytop.report.overview import MOST_ROWS, overview
 
 
 def row(index: int, value: str, log10: float | None, outcome: str = "success") -> Row:

@@ -77,7 +77,7 @@ def _run(
         )
 
     from heavytop.records import SCHEMA, Report, Row
-    from heavytop.report import html, store, text
+    from heavytop.report import html, overview, store
     from heavytop.report.environment import environment
     from heavytop.report.parquet import FILE as PARQUET
     from heavytop.report.parquet import write as write_parquet
@@ -103,8 +103,8 @@ def _run(
             path, page = store.write(report, directory, rows()), directory / _PAGE
             if len(tasks) <= _MOST_ON_A_PAGE:
                 html.write_report(replace(report, rows=list(rows())), page)
-            summary = text.overview(report, rows())
-            good = text.all_good(rows())
+            summary = overview.overview(report, rows())
+            good = overview.all_good(rows())
     except OSError as error:
         raise InputError(
             f"{directory} cannot be written: {error}.",
@@ -149,17 +149,17 @@ def _is_finished(directory: Path) -> bool:
 
 
 def _show_finished(directory: Path, plan: dict[str, str], parquet: bool) -> int:
+    from heavytop.report import overview, store
     from heavytop.report import parquet as tables
-    from heavytop.report import store, text
     from heavytop.suite.checkpoint import require_same
 
     report = store.read(directory)
     require_same(report.plan, plan, directory)
     if parquet:
         tables.write(directory / tables.FILE, report.rows, report.plan)
-    show_on_terminal(text.overview(report, report.rows))
+    show_on_terminal(overview.overview(report, report.rows))
     print(f"\nReport: {directory / store.FILE} (was finished already)")
-    return 0 if text.all_good(report.rows) else 3
+    return 0 if overview.all_good(report.rows) else 3
 
 
 def _require_fit(directory: Path, resume: bool) -> None:

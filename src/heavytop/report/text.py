@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from decimal import Decimal
 from fractions import Fraction
-from itertools import chain, islice
-from math import inf
 
 from msgspec import structs
 from rich.console import Group, RenderableType
@@ -17,7 +14,7 @@ from rich.text import Text
 from heavytop.errors import InputError
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import decimal_text, exact
-from heavytop.records import Report, Row
+from heavytop.records import Law, Report, Row
 from heavytop.report.work_precision import leads, panels
 
 
@@ -35,69 +32,32 @@ def short(value: str, digits: int = 3) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
-MOST_ROWS = 200
-"""More rows than these are summed up after a run, not listed."""
-
-
-def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
-    """The summary of ``report`` with these rows; where they are too many to read, the worst for each measure.
-
-    The rows may be a stream of any length: none is held but the first.
-    """
-    stream = iter(rows)
-    first = list(islice(stream, MOST_ROWS + 1))
-    if len(first) <= MOST_ROWS:
-        return summary(structs.replace(report, rows=first))
-    counts: dict[tuple[str, str], Counter[str]] = {}
-    worst: dict[tuple[str, str], dict[str, tuple[float, str, str]]] = {}
-    words: dict[tuple[str, str, str], Counter[str]] = {}
-    for row in chain(first, stream):
-        group = row.measure, row.precision
-        counts.setdefault(group, Counter())[row.outcome] += 1
-        found = worst.setdefault(group, {})
-        for name, metric in row.metrics.items():
-            if metric.kind != "error":
-                continue
-            if metric.log10 is None and metric.value != "0":
-                words.setdefault((*group, name), Counter())[metric.value] += 1
-            size = inf if metric.value == "nan" else -inf if metric.log10 is None else metric.log10
-            if name not in found or size > found[name][0]:
-                found[name] = size, metric.value, row.case
-    parts: list[RenderableType] = [_head(report, sum(count.total() for count in counts.values()))]
-    for group, found in worst.items():
-        outcomes = ", ".join(f"{number} {outcome}" for outcome, number in sorted(counts[group].items()))
-        parts += [Text(), _title(f"{' in '.join(filter(None, group))}: {outcomes}; the largest errors")]
-        lines = [
-            [name, short(value), case, ", ".join(f"{n} {word}" for word, n in words.get((*group, name), {}).items())]
-            for name, (_, value, case) in found.items()
-        ]
-        parts.append(_table(["metric", "largest", "in", "no number"], lines))
-    return Group(*parts, Text(), Text("`heavytop show` lists every row."))
-
-
-def all_good(rows: Iterable[Row]) -> bool:
-    """Whether every run reached its horizon; that a peer gives up is what the work-precision rows are there to show."""
-    return all(row.outcome == "success" for row in rows if row.measure != "work_precision")
-
-
 def summary(report: Report) -> RenderableType:
     """What is known, what the claim gets wrong and from when on, digits kept and drift per format."""
     by_measure: dict[str, list[Row]] = {}
     for row in report.rows:
         by_measure.setdefault(row.measure, []).append(row)
-    parts: list[RenderableType] = [_head(report, len(report.rows))]
-    for name, section in (
-        ("audit", _audit),
-        ("claim_model", _claim_model),
-        ("claim_evaluation", _claim_evaluation),
-        ("homoclinic", _homoclinic),
-        ("break_away_law", _laws),
-        ("drift", _drift),
-        ("work_precision", _work_precision),
-        ("growth", _growth),
-    ):
+    parts: list[RenderableType] = [head(report, len(report.rows))]
+    sections = {
+        "audit": _audit,
+        "claim_model": _claim_model,
+        "claim_evaluation": _claim_evaluation,
+        "homoclinic": _homoclinic,
+        "break_away_law": _laws,
+        "local_error": _local_error,
+        "drift": _drift,
+        "score": _scored,
+        "work_precision": _work_precision,
+        "growth": _growth,
+    }
+    for name, section in sections.items():
         if name in by_measure:
             parts += [Text(), *section(by_measure[name])]
+    for name in (name for name in by_measure if name not in sections):
+        parts += [
+            Text(),
+            Text(f"Rows of {name or 'no measure'}: {len(by_measure[name])}, listed on the page (--html FILE)"),
+        ]
     failed = [row for row in report.rows if row.outcome != "success" and row.measure != "work_precision"]
     if failed:
         parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
@@ -108,27 +68,30 @@ def summary(report: Report) -> RenderableType:
     return Group(*parts)
 
 
-def _head(report: Report, rows: int) -> Text:
+def head(report: Report, rows: int) -> Text:
+    """The plan, how many measurements, and with which versions."""
     packages = report.environment.get("packages", {})
     versions = ", ".join(f"{n} {packages[n]}" for n in ("heavytop", "heyoka", "numpy", "python-flint") if n in packages)
     return Text(f"Plan {report.plan.get('name', '?')}: {rows} measurements ({versions})")
 
 
-def _title(text: str) -> Text:
+def title(text: str) -> Text:
+    """The first line of a section."""
     return Text(text, style="bold")
 
 
-def _table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    table = Table(box=None, pad_edge=True, header_style="dim")
+def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    """A table without lines; its first column is words, the others are numbers."""
+    made = Table(box=None, pad_edge=True, header_style="dim")
     for index, column in enumerate(columns):
-        table.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
+        made.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
-    return table
+        made.add_row(*(Text(cell) for cell in row))
+    return made
 
 
 def _audit(rows: Sequence[Row]) -> list[RenderableType]:
-    parts: list[RenderableType] = [_title("Verdict on the paper's solution, equation by equation (heavytop audit)")]
+    parts: list[RenderableType] = [title("Verdict on the paper's solution, equation by equation (heavytop audit)")]
     for row in rows:
         refuted = [name for name, metric in row.metrics.items() if metric.value == "0"]
         undecided = [name for name, metric in row.metrics.items() if metric.value == UNRESOLVED]
@@ -146,7 +109,7 @@ def _audit(rows: Sequence[Row]) -> list[RenderableType]:
 
 def _claim_model(rows: Sequence[Row]) -> list[RenderableType]:
     parts: list[RenderableType] = [
-        _title("Claim against truth: the paper's (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0"),
+        title("Claim against truth: the paper's (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0"),
         Text("  Error of Ω, largest component; the same for γ. Exactly evaluated: no rounding is in these numbers."),
     ]
     times = [time for time in ("0.1", "1", "2", "5") if any(_at(row, "omega", time) for row in rows)]
@@ -167,7 +130,7 @@ def _claim_model(rows: Sequence[Row]) -> list[RenderableType]:
         ]
         for row in rows
     ]
-    parts.append(_table(columns, both(lines)))
+    parts.append(table(columns, both(lines)))
     parts += [Text(f"  {case}: {against}", style="dim") for case, against in dict(_truths(rows)).items()]
     return parts
 
@@ -198,8 +161,8 @@ def _claim_evaluation(rows: Sequence[Row]) -> list[RenderableType]:
     ]
     columns = ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω from |t|"]
     return [
-        _title("Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated"),
-        _table(columns, both(lines)),
+        title("Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated"),
+        table(columns, both(lines)),
     ]
 
 
@@ -222,9 +185,9 @@ def _homoclinic(rows: Sequence[Row]) -> list[RenderableType]:
         error = row.metrics[f"{prefix}_omega_max"].value if f"{prefix}_omega_max" in row.metrics else "-"
         lines.append([row.case, row.precision, short(error), short(row.metrics["break_away_time"].value), row.outcome])
     return [
-        _title("Integrators on a homoclinic motion, against its closed form"),
+        title("Integrators on a homoclinic motion, against its closed form"),
         Text("  Ω error while rate·|t| <= 10; break-away: Ω wrong by 1e-3 α, where the saddle has eaten every digit."),
-        _table(["case", "format", "Ω error", "break-away |t|", "outcome"], both(lines)),
+        table(["case", "format", "Ω error", "break-away |t|", "outcome"], both(lines)),
     ]
 
 
@@ -239,12 +202,48 @@ def _laws(rows: Sequence[Row]) -> list[RenderableType]:
         for row in rows
     ]
     return [
-        _title("Break-away time gained per bit of the format"),
-        _table(["case", "measured", "ln 2 / rate", "off by"], both(lines)),
+        title("Break-away time gained per bit of the format"),
+        table(["case", "measured", "ln 2 / rate", "off by"], both(lines)),
+    ]
+
+
+def _local_error(rows: Sequence[Row]) -> list[RenderableType]:
+    names = ("local_error_ulp_max", "local_error_ulp_rms", "observed_order")
+    lines = [
+        [
+            row.case,
+            row.precision,
+            str(row.steps),
+            *(short(row.metrics[name].value) if name in row.metrics else "-" for name in names),
+            "-" if row.order is None else str(row.order),
+            row.outcome,
+        ]
+        for row in rows
+    ]
+    return [
+        title("Single steps, each against the proven motion from where it starts"),
+        Text("  Error in eps of the format times the largest component of the state; the order as the steps show it."),
+        table(["case", "format", "steps", "largest", "rms", "order seen", "order asked", "outcome"], lines),
     ]
 
 
 def _drift(rows: Sequence[Row]) -> list[RenderableType]:
+    return [
+        title("Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals"),
+        Text("  Both absolute and largest on the way: an invariant that holds is no proof that the motion is right."),
+        _motions(rows),
+    ]
+
+
+def _scored(rows: Sequence[Row]) -> list[RenderableType]:
+    return [
+        title("Motions computed elsewhere: distance from the true motion, and drift of the first integrals"),
+        Text("  Both absolute and largest on the way."),
+        _motions([structs.replace(row, case=f"{row.case} {row.integrator}") for row in rows]),
+    ]
+
+
+def _motions(rows: Sequence[Row]) -> Table:
     lines = []
     for row in rows:
         worst = [
@@ -260,27 +259,14 @@ def _drift(rows: Sequence[Row]) -> list[RenderableType]:
             for name in ("along", "across")
         )
         lines.append([row.case, row.precision, row.horizon, str(row.steps), row.outcome, error, across, cells])
-    columns = [
-        "case",
-        "format",
-        "T",
-        "steps",
-        "outcome",
-        "error along",
-        "across",
-        "largest drift of each first integral",
-    ]
-    table = _table(columns, lines)
-    table.columns[-1].justify = "left"
-    return [
-        _title("Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals"),
-        Text("  Both absolute and largest on the way: an invariant that holds is no proof that the motion is right."),
-        table,
-    ]
+    columns = ["case", "format", "T", "steps", "outcome", "error along", "across", "largest drift of each integral"]
+    made = table(columns, lines)
+    made.columns[-1].justify = "left"
+    return made
 
 
 def _work_precision(rows: Sequence[Row]) -> list[RenderableType]:
-    parts: list[RenderableType] = [_title("Work against precision: seconds that an error takes, whole horizon")]
+    parts: list[RenderableType] = [title("Work against precision: seconds that an error takes, whole horizon")]
     for case, lines in panels(rows).items():
         cells = []
         for line in lines:
@@ -290,7 +276,7 @@ def _work_precision(rows: Sequence[Row]) -> list[RenderableType]:
             found += ["-" if seconds is None else f"{seconds:.2g} s" for seconds in at]
             cells.append([line.label, *found, str(len(line.failures) or "")])
         columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "gave up"]
-        parts += [_table(columns, cells), Text()]
+        parts += [table(columns, cells), Text()]
     parts += [Text(f"  {lead.text}", style="bold") for lead in leads(rows)]
     return parts
 
@@ -303,7 +289,7 @@ def _growth(rows: Sequence[Row]) -> list[RenderableType]:
             name.removeprefix("drift_").replace("solution_error_", "error "),
             f"{law.starts} of {row.starts}" if law.starts < row.starts else str(law.starts),
             law.growth,
-            "-" if law.exponent is None else f"{law.exponent:.3f} [{law.low:.3f}, {law.high:.3f}]",
+            _exponent(law),
             short(law.detects or "-", 2),
             short(law.lost_at or "-", 2),
         ]
@@ -321,9 +307,13 @@ def _growth(rows: Sequence[Row]) -> list[RenderableType]:
         "lost at |t|",
     ]
     return [
-        _title(
-            "Growth laws: root mean square over random starts, drift of the first integrals and distance from truth"
-        ),
+        title("Growth laws: root mean square over random starts, drift of the first integrals and distance from truth"),
         Text("  Detects: the smallest relative fault a step that these starts would have told from the healthy law."),
-        _table(columns, lines),
+        table(columns, lines),
     ]
+
+
+def _exponent(law: Law) -> str:
+    if law.exponent is None:
+        return "-"
+    return f"{law.exponent:.3f}" + ("" if law.low is None or law.high is None else f" [{law.low:.3f}, {law.high:.3f}]")

@@ -1,0 +1,59 @@
+"""The summary of a run of any number of rows, of which only the first are held."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from itertools import chain, islice
+from math import inf
+
+from msgspec import structs
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from heavytop.records import Report, Row
+from heavytop.report.text import head, short, summary, table, title
+
+MOST_ROWS = 200
+"""More rows than these are summed up after a run, not listed."""
+
+
+def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
+    """The summary of ``report`` with these rows; where they are too many to read, the worst for each measure.
+
+    The rows may be a stream of any length: none is held but the first.
+    """
+    stream = iter(rows)
+    first = list(islice(stream, MOST_ROWS + 1))
+    if len(first) <= MOST_ROWS:
+        return summary(structs.replace(report, rows=first))
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    worst: dict[tuple[str, str], dict[str, tuple[float, str, str]]] = {}
+    words: dict[tuple[str, str, str], Counter[str]] = {}
+    for row in chain(first, stream):
+        group = row.measure, row.precision
+        counts.setdefault(group, Counter())[row.outcome] += 1
+        found = worst.setdefault(group, {})
+        for name, metric in row.metrics.items():
+            if metric.kind != "error":
+                continue
+            if metric.log10 is None and metric.value != "0":
+                words.setdefault((*group, name), Counter())[metric.value] += 1
+            size = inf if metric.value == "nan" else -inf if metric.log10 is None else metric.log10
+            if name not in found or size > found[name][0]:
+                found[name] = size, metric.value, row.case
+    parts: list[RenderableType] = [head(report, sum(count.total() for count in counts.values()))]
+    for group, found in worst.items():
+        outcomes = ", ".join(f"{number} {outcome}" for outcome, number in sorted(counts[group].items()))
+        parts += [Text(), title(f"{' in '.join(filter(None, group))}: {outcomes}; the largest errors")]
+        lines = [
+            [name, short(value), case, ", ".join(f"{n} {word}" for word, n in words.get((*group, name), {}).items())]
+            for name, (_, value, case) in found.items()
+        ]
+        parts.append(table(["metric", "largest", "in", "no number"], lines))
+    return Group(*parts, Text(), Text("`heavytop show` lists every row."))
+
+
+def all_good(rows: Iterable[Row]) -> bool:
+    """Whether every run reached its horizon; that a peer gives up is what the work-precision rows are there to show."""
+    return all(row.outcome == "success" for row in rows if row.measure != "work_precision")
