@@ -13,6 +13,8 @@ SCHEMA = "heavytop-report/1"
 
 Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Starts = Annotated[int, msgspec.Meta(ge=1)]
+Count = Annotated[int, msgspec.Meta(ge=0)]
+Seconds = Annotated[float, msgspec.Meta(ge=0)]
 Kind = Literal["error", "duration", "value"]
 """How two values of a metric compare: a smaller error is better, a longer duration is better, a value must agree."""
 
@@ -54,7 +56,7 @@ class Law(msgspec.Struct):
     """
 
     growth: Growth
-    starts: int
+    starts: Count
     exponent: float | None = None
     low: float | None = None
     high: float | None = None
@@ -81,20 +83,20 @@ class Row(msgspec.Struct):
     outcome: str
     horizon: str
     time_reached: str
-    steps: int
+    steps: Count
     finite: bool
     metrics: dict[str, Metric]
     measure: str = ""
     measured: str = ""
     against: str = ""
-    order: int | None = None
+    order: Count | None = None
     flags: dict[str, str] = {}
     input_rounding: str | None = None
     series: dict[str, Series] = {}
     starts: Starts = 1
     laws: dict[str, Law] = {}
-    seconds: dict[str, float] = {}
-    evaluations: int | None = None
+    seconds: dict[str, Seconds] = {}
+    evaluations: Count | None = None
 
     @property
     def key(self) -> tuple[str, ...]:

@@ -7,13 +7,15 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import Metric, Row, Series
+from heavytop.records import Law, Metric, Row, Series
 from heavytop.report import store
 from heavytop.report.compare import compare
 from heavytop.report.policy import Policy
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
 from small_reports import error, report, row
+
+RESULTS = Path(__file__).parents[2] / "results"
 
 
 def verdicts(old: Row, new: Row, **policy) -> dict[str, Verdict]:
@@ -242,12 +244,52 @@ def test_a_duration_may_start_from_0() -> None:
         {"series": {"drift_energy": Series(["1", "2"], ["1e-12"])}},
         {"metrics": {"drift_energy_max": Metric("never", None)}},
         {"metrics": {"break_away_time": Metric("unresolved", None, "duration")}},
+        {"steps": -1},
+        {"seconds": {"run": -0.5}},
+        {"seconds": {"run": float("inf")}},
+        {"order": -1},
+        {"evaluations": -1},
+        {"outcome": "fine"},
+        {"bits": 0},
+        {"time_reached": "101"},
+        {"outcome": "step_limit", "time_reached": "101"},
+        {"outcome": "step_limit", "time_reached": "-1"},
+        {"horizon": "x"},
+        {"laws": {"energy": Law("t", 8, 1.0, 1.1, 0.9)}},
+        {"laws": {"energy": Law("t", 8, 1.0, 0.9)}},
+        {"laws": {"energy": Law("t", 8, None, 0.9, 1.1)}},
+        {"laws": {"energy": Law("t", 8, 1.0, detects="-1e-19")}},
+        {"laws": {"energy": Law("t", 8, 1.0, lost_at="soon")}},
+        {"laws": {"energy": Law("t", -8, 1.0)}},
+        {"metrics": {"drift_energy_max": Metric("-1e-12", -12.0)}},
+        {"metrics": {"drift_energy_max": Metric("unresolved", None, "error", "-1e-12")}},
+        {"series": {"drift_energy": Series(["soon"], ["1e-12"])}},
+        {"series": {"drift_energy": Series(["1"], ["little"])}},
     ],
 )
-def test_rows_that_cannot_be_are_refused(tmp_path: Path, change) -> None:
-    store.write(report(row(**change)), tmp_path)
-    with pytest.raises(InputError, match=r"euler|rows\[0\].bits"):
-        store.read(tmp_path)
+def test_rows_that_cannot_be_are_refused_with_row_and_field(tmp_path: Path, change) -> None:
+    file = store.write(report(row(), row(case="lagrange", **change)), tmp_path)
+    (tmp_path / "report.json.sha256").unlink()
+    inner = {"drift_energy_max", "break_away_time", "drift_energy", "energy", "homoclinic", "claim_evaluation"}
+    fields = "|".join({*change, *inner, "null"})
+    with pytest.raises(InputError, match=rf"(lagrange|rows\[1\]).*({fields})"):
+        store.read(file)
+    if not change.keys() & {"series", "order", "evaluations"}:  # a comparison looks at none of these
+        with pytest.raises(InputError, match=rf"(lagrange|row 2).*({fields})"):
+            list(store.read_brief(file).rows)
+
+
+@pytest.mark.parametrize("folder", sorted(path.parent.name for path in RESULTS.glob("*/report.json")))
+def test_what_the_program_wrote_is_read(folder: str) -> None:
+    found = store.read(RESULTS / folder)
+    assert [row.key for row in store.read_brief(RESULTS / folder).rows] == [row.key for row in found.rows]
+
+
+def test_a_run_that_failed_on_rounded_times_is_read(tmp_path: Path) -> None:
+    third = str(float(1 / 3))
+    made = row(horizon="0.33333333333333333333", outcome="incomplete", time_reached="0.33333333333333337034")
+    file = store.write(report(made, row(case="b", horizon="-1e-3", outcome="non_finite", time_reached="0")), tmp_path)
+    assert store.read(file).rows[0].time_reached > third
 
 
 def test_a_list_in_the_environment_differs_by_what_one_of_the_two_lacks() -> None:

@@ -196,6 +196,29 @@ def test_exponents_differ_where_their_intervals_do_not_meet_and_a_lost_law_is_mi
     assert found(drift("1e-12"), grows(0.9, 1.0)) is Verdict.NEW
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "verdict"),
+    [
+        ((0.5,), (0.5,), Verdict.SAME),
+        ((0.5,), (0.7,), Verdict.INCOMPARABLE),
+        ((0.7,), (0.5,), Verdict.INCOMPARABLE),
+        ((0.5, 0.4, 0.6), (0.55,), Verdict.SAME),
+        ((0.5, 0.4, 0.6), (0.61,), Verdict.INCOMPARABLE),
+        ((0.39,), (0.5, 0.4, 0.6), Verdict.INCOMPARABLE),
+        ((0.5, 0.4, 0.6), (), Verdict.INCOMPARABLE),
+        ((), (0.5,), Verdict.INCOMPARABLE),
+        ((), (), Verdict.SAME),
+    ],
+)
+def test_exponents_without_an_interval_are_never_silently_the_same(old, new, verdict) -> None:
+    def grows(numbers: tuple[float, ...]) -> Row:
+        return drift("1e-12", laws={"drift_energy": Law("t^0.5", 64, *numbers)})
+
+    (found,) = (f for f in compare(report(grows(old)), report(grows(new)), Policy()).findings if "growth" in f.metric)
+    assert found.verdict is verdict
+    assert bool(found.reason) == (verdict is not Verdict.SAME)
+
+
 def test_an_ensemble_is_not_compared_with_one_run() -> None:
     assert verdicts(drift("1e-12"), drift("1e-12", starts=64), Policy()) == {"": Verdict.INCOMPARABLE}
 

@@ -140,19 +140,30 @@ def law_text(law: Law) -> str:
 
 
 def judge_law(old: Law, new: Law) -> Judged:
-    """A change of class is never noise; within a class, exponents whose intervals do not meet."""
+    """A change of class is never noise; within a class, exponents whose intervals do not meet.
+
+    An exponent without an interval is the same as one that it equals or whose interval holds it; else nobody can tell.
+    """
     if old.growth != new.growth:
         if "unresolved" in (old.growth, new.growth):
             return Verdict.INCOMPARABLE, "the growth is resolved in one report only"
         worse = _GROWTH.index(new.growth) > _GROWTH.index(old.growth)
         return (Verdict.WORSE if worse else Verdict.BETTER), f"grows like {new.growth}, not {old.growth}"
-    if old.low is None or old.high is None or new.low is None or new.high is None:
+    if old.exponent is None or new.exponent is None:
+        known = old.exponent is not None or new.exponent is not None
+        return (Verdict.INCOMPARABLE, "an exponent in one report only") if known else SAME
+    (low, high), (new_low, new_high) = _interval(old), _interval(new)
+    if new_low <= high and new_high >= low:
         return SAME
-    if new.low > old.high:
-        return Verdict.WORSE, "a larger exponent"
-    if new.high < old.low:
-        return Verdict.BETTER, "a smaller exponent"
-    return SAME
+    if old.low is None or new.low is None:
+        return Verdict.INCOMPARABLE, "another exponent, and no interval to tell luck from it"
+    return (Verdict.WORSE, "a larger exponent") if new_low > high else (Verdict.BETTER, "a smaller exponent")
+
+
+def _interval(law: Law) -> tuple[float, float]:
+    """That of the exponent; where it has none, the exponent alone."""
+    assert law.exponent is not None
+    return (law.exponent, law.exponent) if law.low is None or law.high is None else (law.low, law.high)
 
 
 def judge_seconds(old: float, new: float, timings: Timings) -> Judged:
