@@ -197,6 +197,52 @@ def test_exponents_differ_where_their_intervals_do_not_meet_and_a_lost_law_is_mi
 
 
 @pytest.mark.parametrize(
+    ("measure", "name", "value"),
+    [
+        ("local_error", "local_error_ulp_max", "0.4"),
+        ("local_error", "local_error_ulp_rms", "0.2"),
+        ("claim_evaluation", "claim_evaluation_error_omega_max_finite", "2e-8"),
+        ("score", "solution_error_gamma_max", "1e-13"),
+        ("score", "drift_energy_max", "1e-14"),
+        ("work_precision", "error_max", "1e-10"),
+        ("work_precision", "drift_energy_max", "1e-12"),
+    ],
+)
+def test_rows_without_a_band_may_lose_two_bits_and_no_more(measure: str, name: str, value: str) -> None:
+    def one(factor: str) -> Row:
+        needed = {f"claim_evaluation_error_{q}_max_finite": error("0") for q in ("omega", "theta", "psi")}
+        return row(measure=measure, metrics=needed | {name: error(str(exact(value) * exact(factor)))})
+
+    for factor, verdict in (("5", Verdict.WORSE), ("3", Verdict.SAME), ("1/3", Verdict.SAME), ("1/5", Verdict.BETTER)):
+        assert verdicts(one("1"), one(factor), Policy())[name] is verdict, factor
+
+
+def test_work_against_precision_is_the_same_below_what_its_roundings_add_up_to() -> None:
+    def run(value: str, name: str = "error_max", measure: str = "work_precision") -> Row:
+        return row(measure=measure, steps=10_000, metrics={name: error(value)})
+
+    def found(old: str, new: str, *kind: str) -> Verdict:
+        (verdict,) = verdicts(run(old, *kind), run(new, *kind), Policy()).values()
+        return verdict
+
+    # eps = 2.2e-16: 4 n eps = 8.9e-12, 4 √n eps = 8.9e-14
+    assert found("1e-13", "8e-12") is Verdict.SAME
+    assert found("1e-13", "4e-11") is Verdict.WORSE
+    assert found("1e-15", "8e-14", "drift_area_max") is Verdict.SAME
+    assert found("1e-15", "4e-13", "drift_area_max") is Verdict.WORSE
+    assert found("1e-13", "8e-12", "error_max", "drift") is Verdict.WORSE
+
+
+def test_a_model_of_a_claim_agrees_to_a_millionth_whichever_way_it_went() -> None:
+    def off(factor: str) -> Row:
+        value = msgspec.structs.replace(error(str(exact("0.25") * exact(factor))), kind="value")
+        return row(measure="claim_model", metrics={"claim_model_error_omega_max": value})
+
+    for factor, verdict in (("1.0000001", Verdict.SAME), ("5", Verdict.WORSE), ("1/5", Verdict.WORSE)):
+        assert verdicts(off("1"), off(factor), Policy())["claim_model_error_omega_max"] is verdict
+
+
+@pytest.mark.parametrize(
     ("old", "new", "verdict"),
     [
         ((0.5,), (0.5,), Verdict.SAME),

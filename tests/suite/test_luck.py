@@ -67,6 +67,40 @@ def test_the_same_seed_is_the_same_row(reports: list[Report]) -> None:
     assert again.metrics == reports[2].rows[-1].metrics
 
 
+UNBANDED = msgspec.convert(
+    {
+        "name": "unbanded",
+        "measure": [
+            {"kind": "local_error", "cases": ["euler"], "precisions": ["double"], "horizon": "3"},
+            {
+                "kind": "claim_evaluation",
+                "cases": ["ershkov-partial-2"],
+                "precisions": ["double"],
+                "rate_times": ["1", "8", "40"],
+            },
+            {
+                "kind": "work_precision",
+                "cases": ["euler"],
+                "horizon": "100",
+                "samples": 4,
+                "ladders": [{"integrator": "heyoka", "tolerances": ["1e-8", "eps"]}],
+            },
+        ],
+    },
+    Plan,
+)
+
+
+def test_rows_without_a_band_are_the_same_with_other_roundings_too() -> None:
+    made = [Report(SCHEMA, {"name": "unbanded"}, {}, [measure(t) for t in expand(UNBANDED, s)]) for s in range(3)]
+    assert all(metric.band is None for row in made[0].rows for metric in row.metrics.values())
+    for other in made[1:]:
+        assert compare(made[0], other, Policy()).verdict == "same"
+        for one, two in zip(made[0].rows, other.rows, strict=True):
+            # the formulas of a claim are evaluated from its own data: no rounding of theirs changes
+            assert (one.metrics == two.metrics) == (one.measure == "claim_evaluation")
+
+
 def planted(row: Row, factor: str) -> Row:
     metrics = {
         name: msgspec.structs.replace(of_fraction(exact(m.value) * exact(factor)), band=m.band)

@@ -44,6 +44,17 @@ def least(metrics: Mapping[str, Any], name: str) -> float:
     return -math.inf if rms is None or rms.log10 is None else float(rms.log10)
 
 
+def accumulated(measure: str, name: str, steps: int) -> float:
+    """log10 of how many eps the roundings of ``steps`` steps add up to, where a row of one run has no bands.
+
+    Rows of work against precision are such: √n for a first integral, whose roundings walk at random, and n for the
+    distance from the true motion, in which drift adds up along the flow.  0 for all other rows.
+    """
+    if measure != "work_precision" or steps < 1:
+        return 0.0
+    return math.log10(steps) * (0.5 if name.startswith("drift_") else 1.0)
+
+
 def bands(runs: Sequence[Mapping[str, Metric]], floor: float, own: Mapping[str, Metric]) -> dict[str, float]:
     """The band of each error over runs that differ in their roundings alone: half its 95 % interval, in decades.
 

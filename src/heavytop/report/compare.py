@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from heavytop.errors import InputError
-from heavytop.measure.luck import least
+from heavytop.measure.luck import accumulated, least
 from heavytop.precision import exact
 from heavytop.records import Report, Row
 from heavytop.report.policy import BITS, Lookup, Policy
@@ -192,7 +192,7 @@ class _Rows:
                     found.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
                     continue
                 least_of = least(old.metrics, name), least(new.metrics, name)
-                eps = (1 - old.bits) * BITS
+                eps = (1 - old.bits) * BITS + accumulated(old.measure, name, old.steps)
                 verdict, why = judge(metric, match, limits, eps, self.policy.suspicious_digits, least_of)
                 found.append(Finding(key, name, verdict, metric.value, match.value, why))
         if new.metrics.keys() != old.metrics.keys():

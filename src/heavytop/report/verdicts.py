@@ -38,7 +38,8 @@ def judge(
 ) -> Judged:
     """Two values of one metric.
 
-    eps: log10 of the format's.  suspicious: digits.  least: what an error counts as at least, as log10, in each row.
+    eps: log10 of the format's, or of what its roundings add up to.  suspicious: digits.  least: what an error counts as
+    at least, as log10, in each row.
     """
     if old.kind != new.kind:
         return Verdict.INCOMPARABLE, f"kind {old.kind} against {new.kind}"
