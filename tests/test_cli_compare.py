@@ -55,6 +55,54 @@ def test_a_path_that_cannot_be_written_is_refused(reports, monkeypatch, capsys, 
     assert "nowhere/out cannot be written" in message
 
 
+WRITTEN = {"--html": "page.html", "--markdown": "out.md", "--junit": "out.xml"}
+
+
+@pytest.mark.parametrize("refused", WRITTEN)
+@pytest.mark.parametrize("name", ["nowhere/out", "old", "/dev/null", "same.out"])
+def test_all_files_are_written_or_none(reports, monkeypatch, capsys, refused: str, name: str) -> None:
+    given = {**WRITTEN, refused: name}
+    if name == "same.out":
+        given = dict.fromkeys(WRITTEN, "page.html")
+    before = {path: path.read_bytes() for path in reports.rglob("*") if path.is_file()}
+    assert heavytop(monkeypatch, "compare", "old", "worse", *(part for pair in given.items() for part in pair)) == 2
+    assert {path: path.read_bytes() for path in reports.rglob("*") if path.is_file()} == before
+    captured = capsys.readouterr()
+    assert ("is named twice" if name == "same.out" else f"{name} cannot be written") in captured.err
+    assert captured.out == ""
+
+
+@pytest.mark.parametrize("nth", [1, 2])
+def test_a_full_disk_leaves_no_file_behind(reports, monkeypatch, capsys, nth: int) -> None:
+    synced = []
+
+    def full(descriptor: int) -> None:
+        synced.append(descriptor)
+        if len(synced) == nth:
+            raise OSError(28, "No space left on device")
+
+    (reports / "out.md").write_text("of before")
+    before = sorted(reports.iterdir())
+    monkeypatch.setattr("os.fsync", full)
+    assert heavytop(monkeypatch, "compare", "old", "worse", "--junit", "out.xml", "--markdown", "out.md") == 2
+    assert len(synced) == nth
+    assert "No space left" in capsys.readouterr().err
+    assert sorted(reports.iterdir()) == before
+    assert (reports / "out.md").read_text() == "of before"
+
+
+def test_a_page_that_cannot_be_written_leaves_no_table(reports, monkeypatch, capsys) -> None:
+    pytest.importorskip("pyarrow")
+    for page, table in (("nowhere/page.html", "rows.parquet"), ("page.html", "nowhere/rows.parquet")):
+        before = sorted(reports.iterdir())
+        assert heavytop(monkeypatch, "show", "old", "--html", page, "--parquet", table) == 2
+        assert "cannot be written" in capsys.readouterr().err
+        assert sorted(reports.iterdir()) == before
+    assert heavytop(monkeypatch, "show", "old", "--html", "page.html", "--parquet", "rows.parquet") == 0
+    assert capsys.readouterr().out == "rows.parquet\npage.html\n"
+    assert Path("page.html").read_text("utf-8").rstrip().endswith("</html>")
+
+
 def test_nothing_is_written_where_a_report_is_wrong(reports, monkeypatch, capsys) -> None:
     content = (reports / "worse" / "report.json").read_text()
     (reports / "cut.json").write_text(content[:-40])

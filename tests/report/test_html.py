@@ -56,7 +56,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
     html.write_report(candidate, folder / "report.html")
     html.write_report(store.read(RESULTS), folder / "results.html")
     result = compare(baseline, candidate, Policy())
-    html.write_comparison(baseline, candidate, result, folder / "comparison.html")
+    (folder / "comparison.html").write_text(html.comparison_page(baseline, candidate, result), "utf-8")
     return {path.stem: Page(path) for path in folder.glob("*.html")}
 
 
@@ -269,7 +269,9 @@ def test_a_comparison_draws_both_and_lists_the_worst_first(pages: dict[str, Page
 def test_a_comparison_of_a_report_with_itself_says_so(tmp_path: Path) -> None:
     report = full_report()
     report.rows = [each for each in report.rows if each.outcome == "success"]
-    html.write_comparison(report, report, compare(report, report, Policy()), tmp_path / "page.html")
+    (tmp_path / "page.html").write_text(
+        html.comparison_page(report, report, compare(report, report, Policy())), "utf-8"
+    )
     assert "Every metric of every row is the same." in Page(tmp_path / "page.html").text
 
 

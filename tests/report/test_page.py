@@ -86,7 +86,9 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     candidate.rows[5].metrics["solution_error_gamma_final"] = error("1e-7")
     html.write_report(candidate, folder / "report.html")
     html.write_report(store.read(Path(__file__).parents[2] / "results" / "default"), folder / "results.html")
-    html.write_comparison(baseline, candidate, compare(baseline, candidate, Policy()), folder / "comparison.html")
+    (folder / "comparison.html").write_text(
+        html.comparison_page(baseline, candidate, compare(baseline, candidate, Policy())), "utf-8"
+    )
     return {name: folder / f"{name}.html" for name in PAGES}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -30,24 +30,25 @@ def compare(
     from heavytop.report.compare import compare as compare_reports
 
     rules = _policy(policy, floor, loss)
+    files: list[tuple[Path, str]] = []
     if html is not None:
+        from heavytop.report.html import comparison_page
+
         old, new = store.read(baseline), store.read(candidate)
         result = compare_reports(old, new, rules)
-        from heavytop.report.html import write_comparison
-
-        with _writing():
-            write_comparison(old, new, result, html)
+        files.append((html, comparison_page(old, new, result)))
     else:
         all_of_them = json or junit is not None
         result = compare_reports(store.read_brief(baseline), store.read_brief(candidate), rules, list_same=all_of_them)
     if markdown is not None:
         from heavytop.report.markdown import comparison_markdown
 
-        _write(markdown, comparison_markdown(result, html))
+        files.append((markdown, comparison_markdown(result, html)))
     if junit is not None:
         from heavytop.report.junit import comparison_junit
 
-        _write(junit, comparison_junit(result))
+        files.append((junit, comparison_junit(result)))
+    _write(files)
     if json:
         print_json(result.to_json())
     else:
@@ -80,7 +81,7 @@ def history(
         tracks = [track for track in tracks if track.steps]
     names = [str(path) for path in reports]
     if svg is not None:
-        _write(svg, over.history_svg(names, tracks))
+        _write([(svg, over.history_svg(names, tracks))])
     if json:
         print_json(over.history_json(names, tracks))
     else:
@@ -95,11 +96,11 @@ def _policy(file: Path | None, floor: str | None, loss: str | None) -> Any:
     return adjusted(Policy() if file is None else load(file), floor, loss)
 
 
-def _write(path: Path, text: str) -> None:
-    from heavytop.suite.files import replace
+def _write(files: list[tuple[Path, str]]) -> None:
+    from heavytop.suite.files import replace_all
 
     with _writing():
-        replace(path, text.encode())
+        replace_all([(path, text.encode()) for path, text in files])
 
 
 @contextmanager
@@ -119,6 +120,7 @@ def show(
     """Print the summary of a report, or write it as one self-contained page, or its rows as a table."""
     from heavytop.report import parquet as tables
     from heavytop.report import store, text
+    from heavytop.suite.files import whole
 
     if parquet is not None:
         tables.check_name(parquet)
@@ -126,14 +128,15 @@ def show(
     if html is None and parquet is None:
         show_on_terminal(text.summary(found))
         return 0
-    if parquet is not None:
-        with _writing():
-            tables.write(parquet, found.rows, found.plan)
-        print(parquet)
-    if html is not None:
-        from heavytop.report.html import write_report
+    with ExitStack() as stack:
+        stack.enter_context(_writing())
+        if html is not None:
+            from heavytop.report.html import report_page
 
-        with _writing():
-            write_report(found, html)
-        print(html)
+            page = report_page(found).encode()
+            stack.enter_context(whole(html)).write(page)
+        if parquet is not None:
+            tables.write(parquet, found.rows, found.plan)
+    for path in filter(None, (parquet, html)):
+        print(path)
     return 0

@@ -26,15 +26,17 @@ _ORDER = ("worse", "missing", "incomparable", "better", "new")
 
 
 def write_report(report: Report, path: Path) -> None:
-    """Write the page of ``report`` to ``path``; the same report gives the same bytes.
+    """Write the page of ``report`` to ``path``; raises InputError where it cannot be written."""
+    replace(path, report_page(report).encode())
 
-    Raises InputError where it cannot be written.
-    """
+
+def report_page(report: Report) -> str:
+    """The page of ``report``; the same report gives the same bytes."""
     rows, left_out = detailed(report.rows)
     found = claim_verdict.audited(report)
     failures = [row for row in report.rows if row.outcome != "success" and row.measure != "work_precision"]
     word, sentence = claim_verdict.headline(found)
-    page = _render(
+    return _render(
         "report.html.j2",
         report=report,
         word=word,
@@ -53,18 +55,14 @@ def write_report(report: Report, path: Path) -> None:
         commands=commands(report),
         dirty=str(report.environment.get("commit")).endswith("-dirty"),
     )
-    replace(path, page.encode())
 
 
-def write_comparison(baseline: Report, candidate: Report, comparison: Comparison, path: Path) -> None:
-    """Write the page of a comparison to ``path``: verdict, changed rows, both reports on the same axes.
-
-    Raises InputError where it cannot be written.
-    """
+def comparison_page(baseline: Report, candidate: Report, comparison: Comparison) -> str:
+    """The page of a comparison: verdict, changed rows, both reports on the same axes."""
     changed = [each for each in comparison.findings if each.verdict.value != "same"]
     changed.sort(key=lambda finding: _ORDER.index(finding.verdict.value))
     sources = [("baseline", baseline), ("candidate", candidate)]
-    page = _render(
+    return _render(
         "comparison.html.j2",
         report=candidate,
         baseline=baseline,
@@ -76,7 +74,6 @@ def write_comparison(baseline: Report, candidate: Report, comparison: Comparison
         differences=[[clip(part, 200) for part in each] for each in comparison.environment],
         environment=candidate.environment,
     )
-    replace(path, page.encode())
 
 
 def sections(sources: Sources, first: Sequence[str] | dict[str, None] = ()) -> list[Section]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -36,14 +36,33 @@ def replace(path: Path, content: bytes | Iterable[bytes]) -> str:
     return digest.hexdigest()
 
 
+def replace_all(contents: Sequence[tuple[Path, bytes]]) -> None:
+    """Write several files, all of them or none.
+
+    Raises InputError where one cannot be written, or is named twice.
+    """
+    names = [path.resolve() for path, _ in contents]
+    for number, (path, _) in enumerate(contents):
+        if names[number] in names[:number]:
+            raise InputError(f"{path} is named twice.", "Give each file a name of its own.")
+    with ExitStack() as stack:
+        for path, content in contents:
+            file = stack.enter_context(whole(path))
+            file.write(content)
+            # what a full disk refuses is known before the first file takes its name
+            file.flush()
+            os.fsync(file.fileno())
+
+
 @contextmanager
 def whole(path: Path) -> Iterator[BinaryIO]:
     """A file that takes the name ``path`` when all of it is written, and leaves nothing behind where that fails.
 
     Raises InputError where it cannot be written.
     """
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise InputError(f"{path} cannot be written: it is a device or a pipe.", "Give the name of a file.")
+    if path.exists() and not path.is_file():
+        what = "folder" if path.is_dir() else "device or a pipe"
+        raise InputError(f"{path} cannot be written: it is a {what}.", "Give the name of a file.")
     temporary = path.parent / f".{path.name}.{os.getpid()}.partial"
     try:
         with temporary.open("wb") as file:
