@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
+import msgspec
 import pytest
 from rich.console import Console
 
@@ -18,6 +19,7 @@ from heavytop.records import Law, Report, Series
 from heavytop.report.compare import Comparison, compare
 from heavytop.report.comparison_text import comparison
 from heavytop.report.history import history, history_json, history_svg, history_text
+from heavytop.report.html import comparison_page, report_page
 from heavytop.report.junit import comparison_junit
 from heavytop.report.markdown import comparison_markdown
 from heavytop.report.policy import Policy
@@ -157,9 +159,39 @@ def test_a_history_is_drawn_with_its_steps() -> None:
     picture = history_svg(names, tracks)
     assert ElementTree.fromstring(picture.encode()).tag.endswith("svg")
     assert "a$b_{$c" in history_svg(["a$b_{$c", *names[1:]], tracks)
+    assert picture == history_svg(names, tracks)
     for wrong in ([], tracks * 10):
         with pytest.raises(InputError, match="cannot be drawn"):
             history_svg(names, wrong)
+
+
+CONTROL = "a\x00\x1b[31m\x07\x9b1m\u202e\ufffe[/red]$b"
+
+
+def test_no_control_character_gets_out_to_a_terminal_or_breaks_xml() -> None:
+    metrics = {"error_max": error("1e-5"), CONTROL: error("1e-12")}
+    rows = [
+        row(case=CONTROL, integrator=CONTROL, measure=measure, metrics={**row().metrics, **metrics})
+        for measure in ("drift", "work_precision", "audit", "local_error", "score", CONTROL)
+    ]
+    rows.append(row(case=CONTROL, outcome="step_limit", time_reached="1", system=CONTROL, seconds={"least": 1.0}))
+    old, new = report(*rows), report(*(msgspec.structs.replace(each, metrics={CONTROL: error("1")}) for each in rows))
+    old.environment[CONTROL], old.plan = CONTROL, {"name": CONTROL}
+    found, tracks = compare(old, new, Policy()), history([old, new], Policy())
+    texts = [
+        on_paper(summary(old)),
+        on_paper(comparison(found)),
+        on_paper(history_text([CONTROL, "b"], tracks)),
+        comparison_markdown(found),
+        comparison_junit(found),
+        history_svg([CONTROL, "b"], tracks[:3]),
+        comparison_page(old, new, found),
+        report_page(old),
+    ]
+    for text in texts:
+        assert not set(text) & {chr(code) for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
+    for xml in (texts[4], texts[5]):
+        ElementTree.fromstring(xml.encode())
 
 
 if __name__ == "__main__":

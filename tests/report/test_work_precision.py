@@ -4,9 +4,10 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Metric, Report, Row, Series
+from heavytop.report.svg import document
 from heavytop.report.text import summary
 from heavytop.report.work_precision import Line, Point, leads, panels
-from heavytop.report.work_precision_figure import draw_work_precision, growth_figure, svg, work_precision_figure
+from heavytop.report.work_precision_figure import draw_work_precision, growth_figure, work_precision_figure
 
 
 def row(integrator: str, log10: float | None, seconds: float, *, case="top/T=9", precision="double", outcome="success"):
@@ -120,13 +121,13 @@ def test_the_picture_shows_every_line_and_each_failure_as_a_cross_on_the_edge() 
     looks = [(line.get_color(), line.get_marker(), line.get_linestyle()) for line in drawn.values()]
     assert len(set(looks)) == len(looks)
     assert "4.5 × as fast as cyrk:DOP853" in axes.get_title()
-    assert svg(figure) == svg(work_precision_figure(report))
-    assert svg(growth_figure(report)).count("<svg") == 1
+    assert document(figure) == document(work_precision_figure(report))
+    assert document(growth_figure(report)).count("<svg") == 1
 
 
 def test_a_case_without_any_error_is_drawn_empty() -> None:
     for rows in ([row("heyoka tolerance=1", None, 1.0)], FAILED):
-        assert "<svg" in svg(work_precision_figure(Report(SCHEMA, {"name": "x"}, {}, rows)))
+        assert "<svg" in document(work_precision_figure(Report(SCHEMA, {"name": "x"}, {}, rows)))
 
 
 def test_the_pictures_are_files(tmp_path) -> None:
@@ -148,6 +149,6 @@ def test_without_such_rows_there_is_no_picture() -> None:
 
 def test_a_hostile_name_is_text() -> None:
     rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{$')]
-    drawn = svg(work_precision_figure(Report(SCHEMA, {"name": "x"}, {}, rows)))
+    drawn = document(work_precision_figure(Report(SCHEMA, {"name": "x"}, {}, rows)))
     assert "<script" not in drawn
     assert "<b>" not in drawn

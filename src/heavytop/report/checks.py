@@ -15,6 +15,7 @@ from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
 from heavytop.records import Law, Metric, Row
+from heavytop.report.printable import printable
 
 if TYPE_CHECKING:
     from heavytop.report.store import BriefRow
@@ -29,7 +30,7 @@ def check_keys(file: Path, rows: Iterable[Row | BriefRow]) -> None:
     seen = set()
     for row in rows:
         if row.key in seen:
-            raise InputError(f"{file} holds the row {_shown(' '.join(filter(None, row.key)))} twice.", REMEDY)
+            raise InputError(f"{file} holds the row {printable(' '.join(filter(None, row.key)))[:60]} twice.", REMEDY)
         seen.add(row.key)
 
 
@@ -53,7 +54,7 @@ def check_rows(file: Path, rows: Sequence[Row] | Sequence[BriefRow]) -> None:
         for row in rows:
             for name, metric in row.metrics.items():
                 if id(metric) in doubtful:
-                    _check_metric(f"{_where(file, row)}, {_shown(name)}", metric, row.finite)
+                    _check_metric(f"{_where(file, row)}, {printable(name)[:60]}", metric, row.finite)
 
 
 def check_series(file: Path, rows: Iterable[Row]) -> None:
@@ -61,10 +62,10 @@ def check_series(file: Path, rows: Iterable[Row]) -> None:
     for row in rows:
         for name, series in row.series.items():
             if len(series.times) != len(series.values):
-                raise InputError(f"{_where(file, row)}, {_shown(name)}: not one value for each time.", REMEDY)
+                raise InputError(f"{_where(file, row)}, {printable(name)[:60]}: not one value for each time.", REMEDY)
             for text in (*series.times, *series.values):
                 if text not in WORDS["value"] and not _plain(text):
-                    _number(f"{_where(file, row)}, {_shown(name)}", text)
+                    _number(f"{_where(file, row)}, {printable(name)[:60]}", text)
 
 
 def _plain(text: str) -> bool:
@@ -88,20 +89,15 @@ def _doubtful(metrics: Sequence[Metric]) -> set[int]:
     return set() if plain.all() else {id(metrics[index]) for index in numpy.flatnonzero(~plain).tolist()}
 
 
-def _shown(text: str) -> str:
-    """A name in a message: one line, and short."""
-    return "".join(c if c.isprintable() else " " for c in text[:60])
-
-
 def _where(file: Path, row: Row | BriefRow) -> str:
-    return f"{file}, row {_shown(row.case)} ({_shown(row.precision)})"
+    return f"{file}, row {printable(row.case)[:60]} ({printable(row.precision)[:60]})"
 
 
 def _check_row(file: Path, row: Row | BriefRow) -> None:
     where = _where(file, row)
     horizon, reached = (_number(f"{where}, {name}", getattr(row, name)) for name in ("horizon", "time_reached"))
     if row.outcome not in _OUTCOMES:
-        raise InputError(f"{where}, outcome: {_shown(row.outcome)!r} is none.", REMEDY)
+        raise InputError(f"{where}, outcome: {printable(row.outcome)[:60]!r} is none.", REMEDY)
     if not row.bits and row.precision != "exact":
         raise InputError(f"{where}, bits: a format without any.", REMEDY)
     if row.outcome == "success" and abs(reached) < abs(horizon):
@@ -113,7 +109,7 @@ def _check_row(file: Path, row: Row | BriefRow) -> None:
     if lacking:
         raise InputError(f"{where}: a row of {row.measure} without {', '.join(lacking)}.", REMEDY)
     for name, law in row.laws.items():
-        _check_law(f"{where}, growth {_shown(name)}", law)
+        _check_law(f"{where}, growth {printable(name)[:60]}", law)
 
 
 def _check_law(where: str, law: Law) -> None:

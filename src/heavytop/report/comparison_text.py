@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from heavytop.report.compare import Comparison, Finding
+from heavytop.report.printable import printable
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
 
@@ -23,11 +24,11 @@ def comparison(result: Comparison) -> RenderableType:
         for finding in result.changed:
             cells = (row_name(finding), finding.metric, *values(finding), finding.reason)
             style = _STYLE.get(finding.verdict, "")
-            table.add_row(Text(finding.verdict.value, style=style), *map(Text, cells))
+            table.add_row(Text(finding.verdict.value, style=style), *map(Text, map(printable, cells)))
         parts.append(table)
     if result.environment:
         parts.append(Text("Environments differ:", style="bold"))
-        parts += [Text(f"  {name}: {old} -> {new}") for name, old, new in result.environment]
+        parts += [Text(printable(f"  {name}: {old} -> {new}")) for name, old, new in result.environment]
     return Group(*parts)
 
 

@@ -23,6 +23,7 @@ from heavytop.report.curves import (
     parting_time,
     true_curves,
 )
+from heavytop.report.svg import document
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.integrals import gyrostat_energy
 
@@ -56,7 +57,6 @@ def _quiet_style() -> Iterator[None]:
     import matplotlib
 
     settings: Any = {
-        "svg.hashsalt": "heavytop",
         "font.size": 11,
         "axes.spines.top": False,
         "axes.spines.right": False,
@@ -79,7 +79,7 @@ def _new(width: float, height: float) -> Any:
 
 def _save(figure: Any, stem: Path) -> list[Path]:
     svg, png = stem.with_suffix(".svg"), stem.with_suffix(".png")
-    figure.savefig(svg, metadata={"Date": None, "Creator": "heavytop"})
+    svg.write_text(document(figure), "utf-8")
     figure.savefig(png, dpi=110, metadata={"Software": "heavytop"})
     return [svg, png]
 

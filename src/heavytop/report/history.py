@@ -14,7 +14,9 @@ from heavytop.errors import InputError
 from heavytop.precision import exact
 from heavytop.report.compare import AnyReport, compare
 from heavytop.report.policy import Policy
-from heavytop.report.svg import plain
+from heavytop.report.printable import printable
+from heavytop.report.section import clip
+from heavytop.report.svg import document, quiet_style
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
 
@@ -83,7 +85,7 @@ def history_json(names: Sequence[str], tracks: Sequence[Track]) -> dict[str, Any
 
 def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableType:
     """A table with one column a report, steps marked."""
-    heads = [Text(f"{number}  {name}") for number, name in enumerate(names, 1)]
+    heads = [Text(printable(f"{number}  {name}")) for number, name in enumerate(names, 1)]
     if not tracks:
         return Group(*heads, Text("\nNo metric to show: none changed, or none matches.", style="bold"))
     table = Table(box=None, header_style="dim")
@@ -97,7 +99,8 @@ def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableTyp
             for n, value in enumerate(track.values)
         ]
         _, case, _, integrator, precision = track.key
-        table.add_row(*map(Text, (" ".join(filter(None, (case, integrator, precision))), track.metric, *cells)))
+        row = " ".join(filter(None, (case, integrator, precision)))
+        table.add_row(*(Text(printable(cell)) for cell in (row, track.metric, *cells)))
     return Group(*heads, Text(_LEGEND, style="dim"), Text(), table)
 
 
@@ -109,30 +112,27 @@ def history_svg(names: Sequence[str], tracks: Sequence[Track]) -> str:
             f"{len(drawn)} metrics cannot be drawn into one picture.",
             f"Choose 1 to {_MOST_LINES} of them with --metric and --case.",
         )
-    import io
-
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8, 4.5), layout="constrained")
-    axes = figure.subplots()
-    for track in drawn:
-        heights = [_height(value) for value in track.values]
-        points = [float("nan") if height is None else height for height in heights]
-        (line,) = axes.plot(range(1, len(names) + 1), points, marker="o", label=plain(f"{track.key[1]} {track.metric}"))
-        steps = [number for number in track.steps if heights[number] is not None]
-        axes.plot(
-            [number + 1 for number in steps], [points[n] for n in steps], "D", markersize=11, fillstyle="none",
-            color=line.get_color(),
-        )  # fmt: skip
-    axes.set_yscale("log")
-    axes.set_xticks(range(1, len(names) + 1), [plain(name[-24:]) for name in names], rotation=20, ha="right")
-    axes.set_ylabel("value, in the units of the metric")
-    axes.set_title("Diamonds mark steps beyond noise", fontsize="medium")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize="small")
-    file = io.StringIO()
-    figure.savefig(file, format="svg", metadata={"Date": None})
-    return file.getvalue()
+    with quiet_style():
+        figure = Figure(figsize=(8, 4.5), layout="constrained")
+        axes = figure.subplots()
+        for track in drawn:
+            heights = [_height(value) for value in track.values]
+            points = [float("nan") if height is None else height for height in heights]
+            label = clip(f"{track.key[1]} {track.metric}")
+            (line,) = axes.plot(range(1, len(names) + 1), points, marker="o", label=label)
+            steps = [number for number in track.steps if heights[number] is not None]
+            axes.plot(
+                [number + 1 for number in steps], [points[n] for n in steps], "D", markersize=11, fillstyle="none",
+                color=line.get_color(),
+            )  # fmt: skip
+        axes.set_yscale("log")
+        axes.set_xticks(range(1, len(names) + 1), [printable(name[-24:]) for name in names], rotation=20, ha="right")
+        axes.set_ylabel("value, in the units of the metric")
+        axes.set_title("Diamonds mark steps beyond noise", fontsize="medium")
+        axes.legend(fontsize="small")
+        return document(figure)
 
 
 def _height(value: str | None) -> float | None:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from xml.etree import ElementTree
 
 from heavytop.report.compare import Comparison
 from heavytop.report.comparison_text import row_name
+from heavytop.report.printable import printable
 from heavytop.report.verdicts import Verdict
 
 _FAILURE = {Verdict.WORSE}
 _ERROR = {Verdict.MISSING, Verdict.INCOMPARABLE}
-_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def comparison_junit(result: Comparison) -> str:
@@ -28,21 +27,16 @@ def comparison_junit(result: Comparison) -> str:
     )
     properties = ElementTree.SubElement(suite, "properties")
     for name, old, new in result.environment:
-        ElementTree.SubElement(properties, "property", name=_plain(name), value=_plain(f"{old} -> {new}"))
+        ElementTree.SubElement(properties, "property", name=printable(name), value=printable(f"{old} -> {new}"))
     for finding in result.findings:
         where = f"{finding.key[0]}.{row_name(finding)}"
         name = finding.metric or "whole row"
-        case = ElementTree.SubElement(suite, "testcase", classname=_plain(where), name=_plain(name), time="0")
+        case = ElementTree.SubElement(suite, "testcase", classname=printable(where), name=printable(name), time="0")
         message = f"{finding.verdict.value}: {finding.baseline or '-'} -> {finding.candidate or '-'}; {finding.reason}"
         if finding.verdict in _FAILURE | _ERROR:
             kind = "failure" if finding.verdict in _FAILURE else "error"
-            ElementTree.SubElement(case, kind, message=_plain(message), type=finding.verdict.value)
+            ElementTree.SubElement(case, kind, message=printable(message), type=finding.verdict.value)
         elif finding.verdict is not Verdict.SAME:
-            ElementTree.SubElement(case, "system-out").text = _plain(message)
+            ElementTree.SubElement(case, "system-out").text = printable(message)
     ElementTree.indent(suite)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, "unicode") + "\n"
-
-
-def _plain(text: str) -> str:
-    """Text without the characters that XML 1.0 does not have."""
-    return _NO_XML.sub("\ufffd", text)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from heavytop.report.compare import Comparison
 from heavytop.report.comparison_text import headline, row_name, values
+from heavytop.report.printable import printable
 from heavytop.report.verdicts import Verdict
 
 _MOST = 50
@@ -41,6 +42,6 @@ def comparison_markdown(result: Comparison, page: Path | None = None) -> str:
 
 def _cell(text: str) -> str:
     """Text that Markdown takes as it is, without line breaks."""
-    text = " ".join(text.split())
+    text = " ".join(printable(text).split())
     text = text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
     return re.sub(r"([\\`*_{}\[\]<>|#~@&])", r"\\\1", text)

@@ -9,9 +9,11 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from io import BytesIO
+from io import StringIO
 from typing import Any
 from xml.etree import ElementTree
+
+from heavytop.report.printable import printable
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#8c6d1f", "#555555")
 """Stand-ins that become the page's --c0, --c1, ..., which differ in light and dark."""
@@ -38,11 +40,10 @@ class Picture:
 
 @contextmanager
 def quiet_style() -> Iterator[None]:
-    """matplotlib without a display, a date, random ids or a reading of $ and \\ in names."""
+    """The look of the page's pictures, without a reading of $ and \\ in names."""
     import matplotlib
 
     settings: Any = {
-        "svg.hashsalt": "heavytop",
         "svg.fonttype": "none",
         "text.parse_math": False,
         "font.family": "DejaVu Sans",
@@ -79,8 +80,8 @@ def new_axes(x: str, y: str, height: float = 2.8, left: float = 0.17) -> Any:
 
 
 def plain(name: str) -> str:
-    """A name in which matplotlib reads no formula."""
-    return name.replace("$", r"\$")
+    """A name in which matplotlib reads no formula, and which XML can hold."""
+    return printable(name).replace("$", r"\$")
 
 
 def decades(axis: Any, ticks: int = 7) -> None:
@@ -96,11 +97,19 @@ def power_of_ten(exponent: int) -> str:
     return str(10**exponent) if 0 <= exponent <= 2 else "10" + str(exponent).translate(_SUPERSCRIPT)
 
 
+def document(figure: Any, **options: Any) -> str:
+    """The figure as an SVG document: no date, no random ids, so that the same figure gives the same bytes."""
+    import matplotlib
+
+    file = StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": "heavytop"}):
+        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": "heavytop"}, **options)
+    return file.getvalue()
+
+
 def finish(axes: Any, title: str, description: str, name: str, note: str = "") -> Picture:
     """The axes as markup.  ``name``: an identifier that no other picture of the page has."""
-    file = BytesIO()
-    axes.figure.savefig(file, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    root = ElementTree.fromstring(file.getvalue())
+    root = ElementTree.fromstring(document(axes.figure, transparent=True))
     return Picture(title, description, _inline(root, title, description, name), note)
 
 
@@ -118,7 +127,7 @@ def _inline(root: Any, title: str, description: str, name: str) -> str:
     root.set("aria-labelledby", f"{name}-title {name}-desc")
     for index, (tag, text) in enumerate((("title", title), ("desc", description))):
         child = ElementTree.Element(f"{{{_SVG}}}{tag}", {"id": f"{name}-{tag}"})
-        child.text = text
+        child.text = printable(text)
         root.insert(index, child)
     markup = ElementTree.tostring(root, encoding="unicode")
     return re.sub(r">\s+<", "><", markup)

@@ -15,6 +15,7 @@ from heavytop.errors import InputError
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import decimal_text, exact
 from heavytop.records import Law, Report, Row
+from heavytop.report.printable import printable
 from heavytop.report.work_precision import leads, panels
 
 
@@ -54,15 +55,15 @@ def summary(report: Report) -> RenderableType:
         if name in by_measure:
             parts += [Text(), *section(by_measure[name])]
     for name in (name for name in by_measure if name not in sections):
-        parts += [
-            Text(),
-            Text(f"Rows of {name or 'no measure'}: {len(by_measure[name])}, listed on the page (--html FILE)"),
-        ]
+        said = f"Measure {name or 'without a name'}: {len(by_measure[name])} rows, which the page lists (--html FILE)"
+        parts += [Text(), Text(printable(said))]
     failed = [row for row in report.rows if row.outcome != "success" and row.measure != "work_precision"]
     if failed:
         parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
         parts += [
-            Text(f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}")
+            Text(
+                printable(f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}")
+            )
             for row in failed
         ]
     return Group(*parts)
@@ -72,7 +73,7 @@ def head(report: Report, rows: int) -> Text:
     """The plan, how many measurements, and with which versions."""
     packages = report.environment.get("packages", {})
     versions = ", ".join(f"{n} {packages[n]}" for n in ("heavytop", "heyoka", "numpy", "python-flint") if n in packages)
-    return Text(f"Plan {report.plan.get('name', '?')}: {rows} measurements ({versions})")
+    return Text(printable(f"Plan {report.plan.get('name', '?')}: {rows} measurements ({versions})"))
 
 
 def title(text: str) -> Text:
@@ -84,9 +85,9 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
     """A table without lines; its first column is words, the others are numbers."""
     made = Table(box=None, pad_edge=True, header_style="dim")
     for index, column in enumerate(columns):
-        made.add_column(column, justify="left" if index == 0 else "right", overflow="fold")
+        made.add_column(Text(printable(column)), justify="left" if index == 0 else "right", overflow="fold")
     for row in rows:
-        made.add_row(*(Text(cell) for cell in row))
+        made.add_row(*(Text(printable(cell)) for cell in row))
     return made
 
 
@@ -98,7 +99,7 @@ def _audit(rows: Sequence[Row]) -> list[RenderableType]:
         verdict = "refuted" if refuted else "undecided" if undecided else "holds"
         smooth = " on the smooth branch" if row.system == "gyrostat" else ""
         held = len(row.metrics) - len(refuted) - len(undecided)
-        line = Text(f"  {row.case} as a motion of {row.system}: ")
+        line = Text(printable(f"  {row.case} as a motion of {row.system}: "))
         line.append(verdict, style={"refuted": "bold red", "holds": "bold green"}.get(verdict, "bold yellow"))
         line.append(f"{smooth} ({held} of {len(row.metrics)} equations proven, {len(refuted)} refuted")
         smooth_ones = sorted({name.split()[0] for name in refuted if " smooth " in name})
@@ -131,7 +132,7 @@ def _claim_model(rows: Sequence[Row]) -> list[RenderableType]:
         for row in rows
     ]
     parts.append(table(columns, both(lines)))
-    parts += [Text(f"  {case}: {against}", style="dim") for case, against in dict(_truths(rows)).items()]
+    parts += [Text(printable(f"  {case}: {against}"), style="dim") for case, against in dict(_truths(rows)).items()]
     return parts
 
 
@@ -277,7 +278,7 @@ def _work_precision(rows: Sequence[Row]) -> list[RenderableType]:
             cells.append([line.label, *found, str(len(line.failures) or "")])
         columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "gave up"]
         parts += [table(columns, cells), Text()]
-    parts += [Text(f"  {lead.text}", style="bold") for lead in leads(rows)]
+    parts += [Text(printable(f"  {lead.text}"), style="bold") for lead in leads(rows)]
     return parts
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.records import Report, Row
-from heavytop.report.svg import plain
+from heavytop.report.svg import document, plain
 from heavytop.report.work_precision import Line, leads, panels
 
 # Okabe and Ito's colours, one a family; markers and dashes tell its members apart
@@ -43,7 +42,7 @@ def draw_work_precision(report: Report, directory: Path) -> list[Path]:
     for name, figure in figures.items():
         if figure is not None:
             files += [directory / f"{name}.svg", directory / f"{name}.png"]
-            files[-2].write_text(svg(figure), "utf-8")
+            files[-2].write_text(document(figure), "utf-8")
             figure.savefig(files[-1], dpi=110, metadata={"Software": "heavytop"})
     return files
 
@@ -163,16 +162,6 @@ def _alike(rows: Sequence[Row]) -> list[Row]:
         if len(found) == len(_GROWTH):
             return found
     return []
-
-
-def svg(figure: Any) -> str:
-    """The figure as SVG text, the same for the same report."""
-    import matplotlib
-
-    out = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": "heavytop"}):
-        figure.savefig(out, format="svg", metadata={"Date": None, "Creator": "heavytop"})
-    return out.getvalue()
 
 
 def _figure(width: float, height: float) -> Any:
