@@ -233,6 +233,15 @@ def test_work_against_precision_is_the_same_below_what_its_roundings_add_up_to()
     assert found("1e-13", "8e-12", "error_max", "drift") is Verdict.WORSE
 
 
+def test_an_integrator_of_others_may_move_by_a_decade() -> None:
+    def run(value: str) -> Row:
+        return row(measure="work_precision", integrator="peer:A tolerance=1e-9", metrics={"error_max": error(value)})
+
+    for value, verdict in (("1e-8", Verdict.SAME), ("2e-8", Verdict.WORSE), ("5e-11", Verdict.BETTER)):
+        assert verdicts(run("1e-9"), run(value), Policy()) == {"error_max": verdict}
+    assert verdicts(run("1e-9"), run("5e-9"), Policy(noise=0)) == {"error_max": Verdict.WORSE}
+
+
 def test_a_model_of_a_claim_agrees_to_a_millionth_whichever_way_it_went() -> None:
     def off(factor: str) -> Row:
         value = msgspec.structs.replace(error(str(exact("0.25") * exact(factor))), kind="value")

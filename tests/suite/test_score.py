@@ -159,6 +159,9 @@ def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
         ({"name": "x" * 10_000}, "The name of 10000 characters"),
         ({"integrator": "a\x1b[31m"}, "The integrator of 6 characters"),
         ({"name": {}}, "name is a dict"),
+        ({"tolerence": "1e-9"}, "Unknown key 'tolerence'"),
+        ({"Weight": "1"}, "Unknown key 'Weight'"),
+        ({"mass": "1"}, "Unknown key 'mass'"),
     ],
 )
 def test_a_file_that_cannot_be_scored_is_refused_in_words(change: dict, message: str, tmp_path: Path) -> None:
@@ -189,6 +192,36 @@ def test_a_file_that_is_none_is_refused_in_words(name: str, content, message: st
         (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
     with pytest.raises(InputError, match=message):
         read(tmp_path / name)
+
+
+def test_a_misspelt_key_is_named_with_the_nearest_and_comments_stay_free(tmp_path: Path) -> None:
+    given = document()
+    for key, remedy in (("presicion", "Did you mean precision?"), ("colour", "docs/score.md")):
+        with pytest.raises(InputError, match=f"Unknown key '{key}'") as caught:
+            read(written(tmp_path, given | {key: "1"}))
+        assert remedy in caught.value.remedy
+    text = as_csv(given)
+    (tmp_path / "a.csv").write_text(f"# made on a Sunday\n# author: A. N. Other\n{text}", "utf-8")
+    plain = read(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_text(f"# tolerence: 1e-9\n{text}", "utf-8")
+    with pytest.raises(InputError, match="Unknown key 'tolerence'"):
+        read(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_text(text, "utf-8")
+    assert read(tmp_path / "a.csv").states == plain.states
+
+
+def test_what_no_body_has_and_states_in_another_order_are_warnings(tmp_path: Path) -> None:
+    given = document()
+    assert read(written(tmp_path, given)).warnings() == []
+    odd = given | {"inertia": ["1", "1", "3"], "centre": ["0", "0", "1"]}
+    (warning,) = read(written(tmp_path, odd)).warnings()
+    assert "I3 = 3 exceeds the sum 2" in warning
+    swapped = given | {"states": [[*state[3:], *state[:3]] for state in given["states"]]}
+    (warning,) = read(written(tmp_path, swapped)).warnings()
+    assert "are the states in the order omega1" in warning
+    said = command("score", str(written(tmp_path, swapped)), "--json")
+    assert said.stderr == f"heavytop: warning: {warning}\n"
+    assert json.loads(said.stdout)["measure"] == "score"
 
 
 def test_the_command_scores_writes_a_report_and_pipes(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,6 +26,8 @@ def score(
     if out is not None:
         require_new(out)
     given = read(trajectory)
+    for warning in given.warnings():
+        print(f"heavytop: warning: {warning}", file=sys.stderr)
     row = scored(given)
     if out is not None:
         _write_report(row, given.sha256, out)

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from heavytop.errors import InputError
-from heavytop.measure.luck import accumulated, least
+from heavytop.measure.luck import accumulated, assumed, least
 from heavytop.precision import exact
 from heavytop.records import Report, Row
 from heavytop.report.policy import BITS, Lookup, Policy
@@ -193,6 +193,8 @@ class _Rows:
                     continue
                 least_of = least(old.metrics, name), least(new.metrics, name)
                 eps = (1 - old.bits) * BITS + accumulated(old.measure, name, old.steps)
+                if metric.band is None and (luck := assumed(old.measure, old.integrator)):
+                    metric = msgspec.structs.replace(metric, band=luck)
                 verdict, why = judge(metric, match, limits, eps, self.policy.suspicious_digits, least_of)
                 found.append(Finding(key, name, verdict, metric.value, match.value, why))
         if new.metrics.keys() != old.metrics.keys():

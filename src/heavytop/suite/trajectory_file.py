@@ -9,6 +9,7 @@ import math
 import re
 import sys
 from dataclasses import dataclass
+from difflib import get_close_matches
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,15 @@ _HEX = re.compile(r"([+-]?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)\.?([0-9a-fA-F]*
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _COLUMNS = ("t", *VARIABLES)
 _VECTORS = ("inertia", "centre", "omega", "gamma")
+_FLAGS = ("language", "tolerance", "step")
+_KEYS = {*_VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
+_KEYS |= {"outcome", "steps"}
+_NOT_READ = {"time_reached", "order", "flags", "seconds", "metrics", "attitude", "angles"}
+"""What else `heavytop propagate --json` writes."""
+_LIKE = 0.75
+"""A key is a misspelling of another if so large a part of them is alike."""
+_ODD_GAMMA = Fraction(1, 10)
+"""A state whose |γ|² is off 1 by more is no rounding, and seldom a method."""
 _NAME = 200
 _MOST = 100_000
 _WIDEST = 20_000
@@ -54,12 +64,24 @@ class Given:
     flags: dict[str, str]
     sha256: str
 
+    def warnings(self) -> list[str]:
+        """What no rigid body can have, and a γ so far off the unit sphere that the columns may be in another order."""
+        found = self.top.warnings()
+        for time, state in zip(self.times, self.states, strict=True):
+            if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
+                found.append(
+                    f"|gamma|^2 is off 1 by {float(off):.3g} at t = {shown(time)}: "
+                    f"are the states in the order {' '.join(VARIABLES)}?"
+                )
+                break
+        return found
+
 
 def read(path: Path) -> Given:
     """The trajectory in a ``.json`` or ``.csv`` file, or ``-`` for either on standard input.
 
-    Raises InputError for a file that cannot be read or is neither, for a key or column that is missing, a number that
-    is none, times out of order, states of another shape or count, and data that no heavy top has.
+    Raises InputError for a file that cannot be read or is neither, for a key or column that is missing or unknown, a
+    number that is none, times out of order, states of another shape or count, and data that no heavy top has.
     """
     shown_path = str(path)[:_NAME]
     piped = str(path) == "-"
@@ -86,7 +108,19 @@ def _json(text: str) -> dict[str, Any]:
         raise InputError(f"This is not JSON: {error}.", _REMEDY) from None
     if not isinstance(document, dict):
         raise InputError("The document is not an object.", _REMEDY)
+    for key in document.keys() - _KEYS - _NOT_READ:
+        raise _unknown(key)
     return document
+
+
+def _nearest(key: str) -> str:
+    """The known key that an unknown one is a misspelling of, or nothing."""
+    return next(iter(get_close_matches(key.lower(), sorted(_KEYS), 1, _LIKE)), "")
+
+
+def _unknown(key: str) -> InputError:
+    near = _nearest(key)
+    return InputError(f"Unknown key {key[:60]!r}.", f"Did you mean {near}?" if near else _REMEDY)
 
 
 def _csv(text: str) -> dict[str, Any]:
@@ -97,6 +131,9 @@ def _csv(text: str) -> dict[str, Any]:
         if line.startswith("#"):
             key, _, value = line[1:].partition(":")
             key, value = key.strip(), value.strip()
+            # other comments may say what they like
+            if value and key not in _KEYS and _nearest(key):
+                raise _unknown(key)
             document[key] = [part.strip() for part in value.split(",")] if key in _VECTORS else value
     body = [line for line in lines if line.strip() and not line.startswith("#")]
     try:
@@ -145,7 +182,7 @@ def _given(document: dict[str, Any], stem: str, sha256: str) -> Given:
         states,
         Outcome.NON_FINITE if None in states else Outcome(word),
         steps,
-        {key: _name(_text(document, key), key) for key in ("language", "tolerance", "step") if key in document},
+        {key: _name(_text(document, key), key) for key in _FLAGS if key in document},
         sha256,
     )
 
