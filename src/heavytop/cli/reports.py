@@ -118,16 +118,19 @@ def show(
     parquet: Annotated[Path | None, typer.Option(help="Write its rows to that file instead.")] = None,
 ) -> int:
     """Print the summary of a report, or write it as one self-contained page, or its rows as a table."""
+    from heavytop.report import overview, store, text
     from heavytop.report import parquet as tables
-    from heavytop.report import store, text
     from heavytop.suite.files import whole
 
     if parquet is not None:
         tables.check_name(parquet)
-    found = store.read(report)
     if html is None and parquet is None:
-        show_on_terminal(text.summary(found))
+        brief = store.read_brief(report)
+        many = len(brief.rows) > overview.MOST_LISTED
+        hint = "Every row is in report.json; --parquet FILE writes all as a table."
+        show_on_terminal(overview.worst(brief, brief.rows, hint) if many else text.summary(store.read(report)))
         return 0
+    found = store.read(report)
     with ExitStack() as stack:
         stack.enter_context(_writing())
         if html is not None:

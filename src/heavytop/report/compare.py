@@ -11,13 +11,10 @@ import msgspec
 from heavytop.errors import InputError
 from heavytop.measure.luck import accumulated, assumed, least
 from heavytop.precision import exact
-from heavytop.records import Report, Row
 from heavytop.report.policy import BITS, Lookup, Policy
-from heavytop.report.store import Brief, BriefRow
+from heavytop.report.store import AnyReport, AnyRow
 from heavytop.report.verdicts import Judged, Verdict, judge, judge_law, judge_seconds, law_text
 
-AnyReport = Report | Brief
-AnyRow = Row | BriefRow
 _MACHINE = ("system", "machine", "processor", "simd_width_double", "cpu_features")
 
 

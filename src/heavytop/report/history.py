@@ -12,10 +12,11 @@ from rich.text import Text
 
 from heavytop.errors import InputError
 from heavytop.precision import exact
-from heavytop.report.compare import AnyReport, compare
+from heavytop.report.compare import compare
 from heavytop.report.policy import Policy
 from heavytop.report.printable import printable
 from heavytop.report.section import clip
+from heavytop.report.store import AnyReport
 from heavytop.report.svg import document, quiet_style
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict

@@ -12,10 +12,13 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from heavytop.records import Report, Row
+from heavytop.report.store import AnyReport, AnyRow
 from heavytop.report.text import head, short, summary, table, title
 
 MOST_ROWS = 200
 """More rows than these are summed up after a run, not listed."""
+MOST_LISTED = 5000
+"""More rows than these nobody reads: `show` sums them up too."""
 
 
 def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
@@ -27,13 +30,18 @@ def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
     first = list(islice(stream, MOST_ROWS + 1))
     if len(first) <= MOST_ROWS:
         return summary(structs.replace(report, rows=first))
+    return worst(report, chain(first, stream), f"`heavytop show` lists up to {MOST_LISTED} rows.")
+
+
+def worst(report: AnyReport, rows: Iterable[AnyRow], hint: str) -> RenderableType:
+    """The largest error of each metric, and how many rows ended how, by measure and format; then the hint."""
     counts: dict[tuple[str, str], Counter[str]] = {}
-    worst: dict[tuple[str, str], dict[str, tuple[float, str, str]]] = {}
+    largest: dict[tuple[str, str], dict[str, tuple[float, str, str]]] = {}
     words: dict[tuple[str, str, str], Counter[str]] = {}
-    for row in chain(first, stream):
+    for row in rows:
         group = row.measure, row.precision
         counts.setdefault(group, Counter())[row.outcome] += 1
-        found = worst.setdefault(group, {})
+        found = largest.setdefault(group, {})
         for name, metric in row.metrics.items():
             if metric.kind != "error":
                 continue
@@ -43,7 +51,7 @@ def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
             if name not in found or size > found[name][0]:
                 found[name] = size, metric.value, row.case
     parts: list[RenderableType] = [head(report, sum(count.total() for count in counts.values()))]
-    for group, found in worst.items():
+    for group, found in largest.items():
         outcomes = ", ".join(f"{number} {outcome}" for outcome, number in sorted(counts[group].items()))
         parts += [Text(), title(f"{' in '.join(filter(None, group))}: {outcomes}; the largest errors")]
         lines = [
@@ -51,7 +59,7 @@ def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
             for name, (_, value, case) in found.items()
         ]
         parts.append(table(["metric", "largest", "in", "no number"], lines))
-    return Group(*parts, Text(), Text("`heavytop show` lists every row."))
+    return Group(*parts, Text(), Text(hint))
 
 
 def all_good(rows: Iterable[Row]) -> bool:

@@ -267,6 +267,10 @@ def _law(axes: Any, key: Key, law: Law, x: Sequence[float], y: Sequence[float]) 
 
 
 def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid: Sequence[float]) -> list[float]:
+    """The heights over ``grid`` of a law with that slope through the middle of the points ``fitted``; all log10.
+
+    slope: exponent of a power, rate of an exponential, whose logarithm is no line over log10 |t|.
+    """
     shape: Callable[[float], float] = (lambda x: math.log10(math.e) * 10**x) if law.growth == "exponential" else float
     height = sum(b - slope * shape(a) for a, b in fitted) / len(fitted)
     return [height + slope * shape(x) for x in grid]

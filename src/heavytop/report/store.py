@@ -118,6 +118,10 @@ class _Rows:
             yield from rows
 
 
+AnyReport = Report | Brief
+AnyRow = Row | BriefRow
+
+
 _Kind = TypeVar("_Kind", Report, _Parts)
 
 

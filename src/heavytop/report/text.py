@@ -16,6 +16,7 @@ from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import decimal_text, exact
 from heavytop.records import Law, Report, Row
 from heavytop.report.printable import printable
+from heavytop.report.store import AnyReport
 from heavytop.report.work_precision import leads, panels
 
 
@@ -69,7 +70,7 @@ def summary(report: Report) -> RenderableType:
     return Group(*parts)
 
 
-def head(report: Report, rows: int) -> Text:
+def head(report: AnyReport, rows: int) -> Text:
     """The plan, how many measurements, and with which versions."""
     packages = report.environment.get("packages", {})
     versions = ", ".join(f"{n} {packages[n]}" for n in ("heavytop", "heyoka", "numpy", "python-flint") if n in packages)
