@@ -43,7 +43,7 @@ def test_files_are_written_beside_the_text_and_say_the_same(reports, monkeypatch
     assert heavytop(monkeypatch, "compare", "old", "worse", *names) == 1
     document = json.loads(capsys.readouterr().out)
     assert set(document) == {"verdict", "rows", "environment"}
-    assert "worse | euler heyoka double | drift\\_energy\\_max" in Path("out.md").read_text()
+    assert "worse | drift euler heyoka double | drift\\_energy\\_max" in Path("out.md").read_text()
     assert ElementTree.parse("out.xml").getroot().get("failures") == "1"
     assert {path.name for path in reports.iterdir()} == {"old", "worse", "same", "out.md", "out.xml"}
 
@@ -132,6 +132,21 @@ def test_bad_input_is_refused_in_words(reports, monkeypatch, capsys, arguments: 
     assert captured.out == ""
 
 
+def test_a_report_of_very_many_rows_is_shown_by_its_worst(reports, monkeypatch, capsys) -> None:
+    file = store.write(report(*(row(case=f"top[{i}]") for i in range(30))), reports / "old")
+    for most, count in ((30, 30), (29, 1)):
+        monkeypatch.setattr("heavytop.report.overview.MOST_LISTED", most)
+        assert heavytop(monkeypatch, "show", "old") == 0
+        text = capsys.readouterr().out
+        assert "30 measurements" in text
+        assert text.count("top[") == count
+    assert "--parquet" in text
+    file.write_text(file.read_text().replace('"top[7]"', '"top[8]"'))
+    (reports / "old" / "report.json.sha256").unlink()
+    assert heavytop(monkeypatch, "show", "old") == 2
+    assert "twice" in capsys.readouterr().err
+
+
 def test_a_history_shows_what_changed_or_what_is_asked_for(reports, monkeypatch, capsys) -> None:
     assert heavytop(monkeypatch, "history", "old", "same", "worse") == 0
     text = capsys.readouterr().out
@@ -143,4 +158,4 @@ def test_a_history_shows_what_changed_or_what_is_asked_for(reports, monkeypatch,
     assert [track["metric"] for track in document["tracks"]] == ["break_away_time"]
     assert Path("h.svg").read_text().lstrip().startswith("<?xml")
     assert heavytop(monkeypatch, "history", "old", "same") == 0
-    assert "none changed" in capsys.readouterr().out
+    assert "Nothing changed" in capsys.readouterr().out

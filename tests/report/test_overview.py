@@ -1,15 +1,10 @@
 """What a run of very many rows prints."""
 
 from io import StringIO
-from pathlib import Path
 
-import pytest
 from rich.console import Console
 
-from heavytop.cli.reports import show
-from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Metric, Report, Row
-from heavytop.report import store
 from heavytop.report.overview import MOST_ROWS, overview
 
 
@@ -40,22 +35,6 @@ def test_many_rows_are_summed_up_with_the_worst_of_each_metric() -> None:
     worst = shown(iter(rows))
     assert "top[9]" in worst
     assert "1 nan" in worst
-
-
-def test_a_report_of_very_many_rows_is_shown_by_its_worst(tmp_path: Path, monkeypatch, capsys) -> None:
-    store.write(Report(SCHEMA, {"name": "many"}, {}, []), tmp_path, (row(i, "1e-14", -14.0) for i in range(30)))
-    for most, count in ((30, 30), (29, 1)):
-        monkeypatch.setattr("heavytop.report.overview.MOST_LISTED", most)
-        assert show(tmp_path) == 0
-        text = capsys.readouterr().out
-        assert "30 measurements" in text
-        assert text.count("top[") == count
-    assert "--parquet" in text
-    broken = (tmp_path / "report.json").read_text().replace('"top[7]"', '"top[8]"')
-    (tmp_path / "report.json").write_text(broken)
-    (tmp_path / "report.json.sha256").unlink()
-    with pytest.raises(InputError, match="twice"):
-        show(tmp_path)
 
 
 def test_few_rows_are_listed() -> None:

@@ -17,6 +17,8 @@ from heavytop.report.verdicts import Judged, Verdict, judge, judge_law, judge_se
 
 _MACHINE = ("system", "machine", "processor", "simd_width_double", "cpu_features")
 
+_FIRST = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Verdict.NEW)
+
 
 class Finding(msgspec.Struct, frozen=True, gc=False):
     """One metric of one row: verdict, the two values as text, and why.
@@ -52,7 +54,8 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 class Comparison:
     """All findings, and the differences of the plans and environments.
 
-    same: how many metrics are the same, where these are not among the findings.  changed: all findings but the same.
+    same: how many metrics are the same, where these are not among the findings.  changed: all findings but the
+    same, the worst first.
     """
 
     findings: list[Finding]
@@ -61,7 +64,8 @@ class Comparison:
     changed: list[Finding] = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "changed", [f for f in self.findings if f.verdict is not Verdict.SAME])
+        changed = [finding for finding in self.findings if finding.verdict is not Verdict.SAME]
+        object.__setattr__(self, "changed", sorted(changed, key=lambda finding: _FIRST.index(finding.verdict)))
 
     @property
     def tally(self) -> dict[Verdict, int]:

@@ -10,22 +10,29 @@ from heavytop.report.compare import Comparison, Finding
 from heavytop.report.printable import printable
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
+from heavytop.top.equations import HEAVY_TOP
 
+_MOST = 200
+"""Findings of the table: more scroll away."""
 _STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}
 
 
 def comparison(result: Comparison) -> RenderableType:
     """Verdict first, then what changed, then the differences of the plans and environments."""
     parts: list[RenderableType] = [Text(headline(result), style="bold")]
+    if result.tally.keys() <= {Verdict.MISSING, Verdict.NEW}:
+        parts.append(Text("The two have no row in common. Were they made with the same plan?"))
     if result.changed:
         table = Table(box=None, header_style="dim")
         for column in ("verdict", "row", "metric", "baseline", "candidate", "why"):
             table.add_column(column, overflow="fold")
-        for finding in result.changed:
-            cells = (row_name(finding), finding.metric, *values(finding), finding.reason)
+        for finding in result.changed[:_MOST]:
+            cells = (row_name(finding.key), metric_name(finding), *values(finding), finding.reason)
             style = _STYLE.get(finding.verdict, "")
             table.add_row(Text(finding.verdict.value, style=style), *map(Text, map(printable, cells)))
         parts.append(table)
+        if len(result.changed) > _MOST:
+            parts.append(Text(f" and {len(result.changed) - _MOST} more: --json lists all, --html FILE draws them"))
     if result.environment:
         parts.append(Text("Environments differ:", style="bold"))
         parts += [Text(printable(f"  {name}: {old} -> {new}")) for name, old, new in result.environment]
@@ -38,10 +45,14 @@ def headline(result: Comparison) -> str:
     return f"Verdict: {result.verdict} ({tally})"
 
 
-def row_name(finding: Finding) -> str:
-    """The row of a finding in a few words."""
-    _, case, _, integrator, precision = finding.key
-    return " ".join(filter(None, (case, integrator, precision)))
+def row_name(key: tuple[str, ...]) -> str:
+    """A row in a few words: its measure, case, system where it is not the heavy top, integrator and format."""
+    return " ".join(part for part in key if part and part != HEAVY_TOP.name)
+
+
+def metric_name(finding: Finding) -> str:
+    """The metric of a finding, or that it is about the row as a whole."""
+    return finding.metric or "whole row"
 
 
 def values(finding: Finding) -> tuple[str, str]:

@@ -13,13 +13,14 @@ from rich.text import Text
 from heavytop.errors import InputError
 from heavytop.precision import exact
 from heavytop.report.compare import compare
+from heavytop.report.comparison_text import row_name
 from heavytop.report.policy import Policy
 from heavytop.report.printable import printable
 from heavytop.report.section import clip
 from heavytop.report.store import AnyReport
 from heavytop.report.svg import document, quiet_style
 from heavytop.report.text import short
-from heavytop.report.verdicts import Verdict
+from heavytop.report.verdicts import Verdict, law_text
 
 _MARK = {
     Verdict.WORSE: "▲",
@@ -50,18 +51,22 @@ def history(reports: Sequence[AnyReport], policy: Policy) -> list[Track]:
     def track(key: tuple[str, ...], metric: str) -> Track:
         return tracks.setdefault((key, metric), Track(key, metric, [None] * len(reports), {}))
 
+    outcomes: list[dict[tuple[str, ...], str]] = [{} for _ in reports]
     for number, report in enumerate(reports):
         for row in report.rows:
+            outcomes[number][row.key] = row.outcome
+            for name, law in row.laws.items():
+                track(row.key, f"growth {name}").values[number] = law_text(law)
             for name, metric in row.metrics.items():
                 track(row.key, name).values[number] = metric.value
     for number in range(1, len(reports)):
         for finding in compare(reports[number - 1], reports[number], policy).changed:
             found = track(finding.key, finding.metric)
             found.steps[number] = finding.verdict, finding.reason
-            if found.values[number] is None:
-                found.values[number] = finding.candidate
-            if found.values[number - 1] is None:
-                found.values[number - 1] = finding.baseline
+            if not finding.metric:
+                found.values[:] = [outcome.get(finding.key) for outcome in outcomes]
+            elif finding.metric.startswith("seconds "):
+                found.values[number - 1], found.values[number] = finding.baseline, finding.candidate
     return list(tracks.values())
 
 
@@ -88,7 +93,10 @@ def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableTyp
     """A table with one column a report, steps marked."""
     heads = [Text(printable(f"{number}  {name}")) for number, name in enumerate(names, 1)]
     if not tracks:
-        return Group(*heads, Text("\nNo metric to show: none changed, or none matches.", style="bold"))
+        return Group(
+            *heads,
+            Text("\nNothing changed, or nothing matches. --metric '*' shows what did not change too.", style="bold"),
+        )
     table = Table(box=None, header_style="dim")
     for column in ("row", "metric"):
         table.add_column(column, overflow="fold")
@@ -99,9 +107,8 @@ def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableTyp
             f"{short(value or '-')} {_MARK[track.steps[n][0]] if n in track.steps else ' '}"
             for n, value in enumerate(track.values)
         ]
-        _, case, _, integrator, precision = track.key
-        row = " ".join(filter(None, (case, integrator, precision)))
-        table.add_row(*(Text(printable(cell)) for cell in (row, track.metric, *cells)))
+        cells = [row_name(track.key), track.metric or "whole row", *cells]
+        table.add_row(*(Text(printable(cell)) for cell in cells))
     return Group(*heads, Text(_LEGEND, style="dim"), Text(), table)
 
 

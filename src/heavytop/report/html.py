@@ -10,6 +10,7 @@ from typing import Any
 from heavytop.records import Report, Row
 from heavytop.report import claim_plots, claim_verdict, plots, work_plots
 from heavytop.report.compare import Comparison
+from heavytop.report.comparison_text import row_name
 from heavytop.report.plots import digits_at_end
 from heavytop.report.section import Section, Sources, clip
 from heavytop.report.svg import quiet_style
@@ -22,7 +23,6 @@ MOST_WORST = 50
 MOST_FAILURES = 50
 MOST_METRICS = 100
 MOST_FINDINGS = 500
-_ORDER = ("worse", "missing", "incomparable", "better", "new")
 
 
 def write_report(report: Report, path: Path) -> None:
@@ -59,8 +59,7 @@ def report_page(report: Report) -> str:
 
 def comparison_page(baseline: Report, candidate: Report, comparison: Comparison) -> str:
     """The page of a comparison: verdict, changed rows, both reports on the same axes."""
-    changed = [each for each in comparison.findings if each.verdict.value != "same"]
-    changed.sort(key=lambda finding: _ORDER.index(finding.verdict.value))
+    changed = comparison.changed
     sources = [("baseline", baseline), ("candidate", candidate)]
     return _render(
         "comparison.html.j2",
@@ -136,6 +135,6 @@ def _render(template: str, **context: Any) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"clip": clip, "short": short}
+    environment.filters |= {"clip": clip, "short": short, "row_name": row_name}
     environment.globals |= {"most_metrics": MOST_METRICS}
     return environment.get_template(template).render(**context)

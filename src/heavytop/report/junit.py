@@ -5,7 +5,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 from heavytop.report.compare import Comparison
-from heavytop.report.comparison_text import row_name
+from heavytop.report.comparison_text import metric_name, row_name
 from heavytop.report.printable import printable
 from heavytop.report.verdicts import Verdict
 
@@ -29,8 +29,8 @@ def comparison_junit(result: Comparison) -> str:
     for name, old, new in result.environment:
         ElementTree.SubElement(properties, "property", name=printable(name), value=printable(f"{old} -> {new}"))
     for finding in result.findings:
-        where = f"{finding.key[0]}.{row_name(finding)}"
-        name = finding.metric or "whole row"
+        where = f"{finding.key[0]}.{row_name(finding.key[1:])}"
+        name = metric_name(finding)
         case = ElementTree.SubElement(suite, "testcase", classname=printable(where), name=printable(name), time="0")
         message = f"{finding.verdict.value}: {finding.baseline or '-'} -> {finding.candidate or '-'}; {finding.reason}"
         if finding.verdict in _FAILURE | _ERROR:

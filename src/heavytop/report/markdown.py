@@ -6,25 +6,23 @@ import re
 from pathlib import Path
 
 from heavytop.report.compare import Comparison
-from heavytop.report.comparison_text import headline, row_name, values
+from heavytop.report.comparison_text import headline, metric_name, row_name, values
 from heavytop.report.printable import printable
-from heavytop.report.verdicts import Verdict
 
 _MOST = 50
 """Rows of the table; a comment of a forge takes no more than 65,536 characters."""
 _LONGEST = 120
-_FIRST = [Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Verdict.NEW]
 
 
 def comparison_markdown(result: Comparison, page: Path | None = None) -> str:
     """Verdict, what changed with the worst first, differences of the environments, and a link to the page."""
     lines = ["### heavytop: " + headline(result), ""]
-    changed = sorted(result.changed, key=lambda finding: _FIRST.index(finding.verdict))
+    changed = result.changed
     if changed:
         lines += ["| verdict | row | metric | baseline | candidate | why |", "|---|---|---|---:|---:|---|"]
         lines += [
             "| "
-            + " | ".join(map(_cell, (f.verdict.value, row_name(f), f.metric or "whole row", *values(f), f.reason)))
+            + " | ".join(map(_cell, (f.verdict.value, row_name(f.key), metric_name(f), *values(f), f.reason)))
             + " |"
             for f in changed[:_MOST]
         ]

@@ -104,7 +104,7 @@ def _audit(rows: Sequence[Row]) -> list[RenderableType]:
         line.append(verdict, style={"refuted": "bold red", "holds": "bold green"}.get(verdict, "bold yellow"))
         line.append(f"{smooth} ({held} of {len(row.metrics)} equations proven, {len(refuted)} refuted")
         smooth_ones = sorted({name.split()[0] for name in refuted if " smooth " in name})
-        line.append(f"; on the smooth branch: {', '.join(smooth_ones)})" if smooth_ones else ")")
+        line.append(f"; refuted on the smooth branch: {', '.join(smooth_ones)})" if smooth_ones else ")")
         parts.append(line)
     return parts
 
