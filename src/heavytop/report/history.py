@@ -55,10 +55,10 @@ def history(reports: Sequence[AnyReport], policy: Policy) -> list[Track]:
     for number, report in enumerate(reports):
         for row in report.rows:
             outcomes[number][row.key] = row.outcome
-            for name, law in row.laws.items():
-                track(row.key, f"growth {name}").values[number] = law_text(law)
             for name, metric in row.metrics.items():
                 track(row.key, name).values[number] = metric.value
+            for name, law in row.laws.items():
+                track(row.key, f"growth {name}").values[number] = law_text(law)
     for number in range(1, len(reports)):
         for finding in compare(reports[number - 1], reports[number], policy).changed:
             found = track(finding.key, finding.metric)
