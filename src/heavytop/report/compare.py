@@ -69,10 +69,10 @@ class Comparison:
 
     @property
     def tally(self) -> dict[Verdict, int]:
-        """How many findings of each verdict, in the order of the verdicts."""
+        """How many findings of each verdict, the worst first and the same last."""
         verdicts = [finding.verdict for finding in self.changed]
         same = self.same + len(self.findings) - len(self.changed)
-        counts = {verdict: verdicts.count(verdict) for verdict in Verdict} | {Verdict.SAME: same}
+        counts = {verdict: verdicts.count(verdict) for verdict in _FIRST} | {Verdict.SAME: same}
         return {verdict: count for verdict, count in counts.items() if count}
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -66,7 +65,7 @@ def comparison_page(baseline: Report, candidate: Report, comparison: Comparison)
         report=candidate,
         baseline=baseline,
         comparison=comparison,
-        tally=Counter(finding.verdict.value for finding in comparison.findings),
+        tally={verdict.value: count for verdict, count in comparison.tally.items()},
         changed=changed[:MOST_FINDINGS],
         left_out=max(0, len(changed) - MOST_FINDINGS),
         sections=sections(sources, dict.fromkeys(finding.key[1] for finding in changed)),

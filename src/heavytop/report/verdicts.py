@@ -92,7 +92,7 @@ def _errors(
     lost = b - a
     if abs(lost) <= allowed:
         return SAME
-    luck = f", luck moves it by {noise:.2g} digits" if noise > limits.loss else ""
+    luck = f", luck moves it by {noise / BITS:.1f} bits" if noise > limits.loss else ""
     if lost > 0:
         return Verdict.WORSE, f"{lost / BITS:.1f} bits lost{luck}"
     odd = "; suspicious: look for a reason" if -lost > suspicious else ""
