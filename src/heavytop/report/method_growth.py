@@ -49,7 +49,7 @@ class Trend:
     def text(self) -> str:
         """The exponent and the law in words."""
         law = self.law if self.law in ("bounded", "unresolved") else f"like {self.law}"
-        return f"{law}, exponent {self.exponent:.2f} ± {self.half_width:.2f}"
+        return f"{law}, exponent {self.exponent:z.2f} ± {self.half_width:.2f}"
 
 
 def trend(series: Series) -> Trend | None:
@@ -99,7 +99,7 @@ def growth_axes(axes: Any, rows: Sequence[tuple[Key, Row]], name: str) -> list[t
         x, y = points(held)
         found = trend(held)
         if x:
-            draw(axes, key, x, y, 4.2)
+            draw(axes, key, x, y, 4.2, every=None)
         if found is not None:
             ends = [found.height + found.exponent * t for t in found.span]
             axes.plot(found.span, ends, color=COLOURS[key.colour], lw=1.2, ls=DASHED)
@@ -139,7 +139,7 @@ def method_growth(sources: Sources) -> Section | None:
         for key, row, found, last in growth_axes(axes, chosen, name):
             section.key(key)
             heard.append(f"{key.label}: {found.text if found else 'too few samples for a law'}.")
-            exponent = f"{found.exponent:.2f} ± {found.half_width:.2f}" if found else ""
+            exponent = f"{found.exponent:z.2f} ± {found.half_width:.2f}" if found else ""
             error, law = short(row.metrics["error_max"].value), found.law if found else ""
             section.rows.append([key.label, error, title, short(row.time_reached), last, exponent, law])
         said = [f"{row[0]}: {row[4]} at |t| = {row[3]}." for row in section.rows if row[2] == title]

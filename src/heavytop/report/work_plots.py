@@ -82,7 +82,7 @@ def _picture(
         key = section.key(_key(keys, source, line))
         points = sorted((point.log10, math.log10(point.seconds)) for point in line.points)
         if points:
-            draw(axes, key, [x for x, _ in points], [y for _, y in points], 4.2)
+            draw(axes, key, [x for x, _ in points], [y for _, y in points], 4.2, every=None)
             heard.append(f"{key.label}: {scientific(points[0][0])} in {scientific(points[0][1])} s.")
         failures = [math.log10(seconds) for seconds in line.failures if seconds > 0]
         if line.failures:
