@@ -18,8 +18,8 @@ from heavytop.report.text import short
 
 METHODS = ("heyoka", "cyrk:DOP853", "splitting:4")
 QUANTITIES = (
-    ("drift_energy", "energy drift", "|E(t) − E(0)| (energy)"),
-    ("solution_error_along", "error along the flow (phase)", "error along the flow"),
+    ("drift_energy", "energy drift", "|E(t) − E(0)| (units of the energy)"),
+    ("solution_error_along", "error along the flow (phase)", "error along the flow (units of Ω and γ)"),
 )
 _LOG10 = -5.0
 """The error that the rungs of the methods are to have."""
