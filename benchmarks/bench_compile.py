@@ -6,7 +6,7 @@ Run: python -m pytest benchmarks/bench_compile.py --benchmark-enable
 import heyoka
 import pytest
 
-from heavytop.integrate import taylor
+from heavytop.integrate import engines
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 
@@ -15,9 +15,9 @@ from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(237)], ids=lambda p: p.name)
 def test_compile(benchmark, system, precision) -> None:
     def forget() -> None:
-        taylor._compiled.clear()
+        engines._compiled.clear()
         heyoka.llvm_state.clear_memcache()
 
-    tool = benchmark.pedantic(lambda: taylor.compiled(system, precision), setup=forget, rounds=3)
+    tool = benchmark.pedantic(lambda: engines.compiled(system, precision), setup=forget, rounds=3)
     benchmark.extra_info["order"] = tool.flags["order"]
     benchmark.extra_info["compact_mode"] = tool.flags["compact_mode"]

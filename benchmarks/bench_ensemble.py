@@ -12,8 +12,8 @@ from time import perf_counter, process_time
 import numpy
 import pytest
 
+from heavytop.integrate.engines import arrays, compiled
 from heavytop.integrate.ensemble import propagate_ensemble
-from heavytop.integrate.taylor import arrays, compiled
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.drift import Drift
 from heavytop.precision import DOUBLE

@@ -11,7 +11,8 @@ import heyoka
 import numpy
 import pytest
 
-from heavytop.integrate.taylor import compiled, expressions, propagate
+from heavytop.integrate.engines import compiled, expressions
+from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.drift import Drift
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real

@@ -20,13 +20,13 @@ def child(cache: str, forced: bool, checked: bool) -> None:
     import heyoka
 
     from heavytop import DOUBLE, HeavyTop, State, propagate
-    from heavytop.integrate import taylor
+    from heavytop.integrate import engines
 
     heyoka.llvm_state.set_diskcache_path(cache)
     if forced:
         heyoka.llvm_state.set_diskcache_enabled(True)
     if not checked:
-        taylor.check = lambda *_: None
+        engines.check = lambda *_: None
     top, start = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
     run = propagate(top, start, range(1, 101), DOUBLE, step_limit=100_000)
     print(json.dumps([run.outcome.value, [[float(value).hex() for value in state] for state in run.states]]))

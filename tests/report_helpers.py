@@ -121,6 +121,29 @@ WORK = [
 ]
 
 
+LONG = [f"{10 ** (1 + 3 * i / 24):.4g}" for i in range(25)]
+
+
+def law(exponent: float, last: float) -> Series:
+    """last·(t/10⁴)^exponent at LONG."""
+    return Series(LONG, [f"{last * (float(time) / 1e4) ** exponent:.6e}" for time in LONG])
+
+
+def method(integrator: str, energy: Series, phase: Series, end: str = "1e-5", **changes: object) -> Row:
+    """A long run, of one of the methods whose laws of growth are held side by side."""
+    series = {"drift_energy": energy, "solution_error_along": phase}
+    made = work(integrator, end, 0.02)
+    long = {"case": "lagrange/T=10000", "horizon": "10000", "time_reached": "10000", "series": series}
+    return msgspec.structs.replace(made, **(long | changes))
+
+
+GROWTH = [
+    method("heyoka tolerance=1e-9", law(1, 1e-9), law(2, 1e-5)),
+    method("cyrk:DOP853 tolerance=1e-11", law(1, 1e-8), law(2, 1e-5)),
+    method("splitting:4 step=1/40", law(0, 1e-8), law(1, 1e-5)),
+]
+
+
 def full_report(name: str = "test") -> Report:
     """Every section of the page has something to show; one run failed, one case has a hostile name."""
     early = row(case="lagrange", outcome="time_limit", time_reached="1", finite=False)
@@ -132,6 +155,7 @@ def full_report(name: str = "test") -> Report:
         early,
         *WORK,
         row(case=HOSTILE, metrics={**row().metrics, HOSTILE: error("1e-997")}),
+        *GROWTH,
     ]
     environment = {"packages": {"heavytop": "0.1.0"}, "commit": "0" * 40, HOSTILE: HOSTILE}
     return Report(SCHEMA, {"name": name, "sha256": "0" * 64}, environment, rows)

@@ -7,9 +7,10 @@ import pytest
 
 from heavytop.errors import Contradiction, InputError
 from heavytop.exact.validated import Validated
-from heavytop.integrate import taylor
+from heavytop.integrate import engines
+from heavytop.integrate.engines import compiled
 from heavytop.integrate.selfcheck import _GAMMA, _OMEGA, _PARAMETERS, check, derivatives
-from heavytop.integrate.taylor import compiled, propagate
+from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
 from heavytop.suite.cases import CASES
@@ -30,7 +31,7 @@ def test_the_known_derivatives_are_those_of_the_enclosed_motion() -> None:
 
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
 def test_every_kind_of_integrator_passes_and_is_at_time_0_again(system, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(taylor, "_compiled", {})
+    monkeypatch.setattr(engines, "_compiled", {})
     for precision in (EXTENDED, QUAD, real(24), real(150)):
         engine = compiled(system, precision, attitude=True).engine
         assert engine.time == 0
@@ -90,17 +91,17 @@ def test_a_part_in_a_million_million_is_found(what: str, message: str) -> None:
 
 
 def test_a_wrong_field_is_refused_before_its_first_use(monkeypatch: pytest.MonkeyPatch) -> None:
-    healthy = taylor.expressions
+    healthy = engines.expressions
 
     def biased(*args):
         (first, rate), *rest = healthy(*args)
         return [(first, rate * (1 + 1e-13)), *rest]
 
-    monkeypatch.setattr(taylor, "expressions", biased)
-    monkeypatch.setattr(taylor, "_compiled", {})
+    monkeypatch.setattr(engines, "expressions", biased)
+    monkeypatch.setattr(engines, "_compiled", {})
     with pytest.raises(Contradiction, match="Taylor coefficient 1"):
         compiled(HEAVY_TOP, DOUBLE)
-    assert not taylor._compiled
+    assert not engines._compiled
 
 
 def test_code_with_the_numbers_of_a_top_is_checked_with_these_and_computes_the_same_motion() -> None:

@@ -7,7 +7,9 @@ import numpy
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.integrate.taylor import Stepper, compiled, propagate
+from heavytop.integrate.engines import compiled
+from heavytop.integrate.stepper import Stepper
+from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Place, Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.top.angles import perpendicular

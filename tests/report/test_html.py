@@ -17,7 +17,8 @@ from heavytop.report import claim_verdict, html, plots, store, work_plots
 from heavytop.report.compare import compare
 from heavytop.report.policy import Policy
 from heavytop.report.section import MOST_PLOTS, points
-from report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row
+from heavytop.report.svg import decades, new_axes
+from report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row, work
 
 RESULTS = Path(__file__).parents[2] / "results" / "default"
 
@@ -103,6 +104,7 @@ def test_the_verdict_comes_first_then_the_sections_in_their_order(pages: dict[st
         "growth",
         "break-away",
         "work-precision",
+        "method-growth",
         "rows",
         "environment",
         "reproduce",
@@ -141,7 +143,7 @@ def test_how_wrong_and_from_when_on(pages: dict[str, Page]) -> None:
 
 
 def test_a_run_that_failed_is_a_verdict_and_no_number(pages: dict[str, Page]) -> None:
-    assert "12 of 14 measurements reached their horizon" in pages["report"].text
+    assert "15 of 17 measurements reached their horizon" in pages["report"].text
     assert "Runs that did not reach their horizon" in pages["report"].text
     section = plots.digits([("", full_report())])
     said = {line[0]: line[4:6] for line in section.rows}
@@ -232,9 +234,10 @@ def test_work_and_precision_says_what_is_faster_and_what_failed(pages: dict[str,
     section = work_plots.work_precision([("", full_report())])
     assert "3.0 times faster than the best peer that gets there, peer:A" in section.text[1]
     assert section.text[1] in pages["report"].text
-    assert list(section.legend) == ["heyoka double", "peer:A", "peer:B"]
-    assert len(section.pictures) == 2
-    for picture in section.pictures:
+    assert list(section.legend) == ["heyoka double", "peer:A", "peer:B", "cyrk:DOP853", "splitting:4"]
+    assert len(section.pictures) == 4
+    assert section.pictures[0].note == "At 1e-10 heyoka double is 3.0 × as fast as peer:A."
+    for picture in section.pictures[:2]:
         assert "peer:B: gave up (1)." in picture.description
     assert work_plots.work_precision([("", Report("", {}, {}, [row()]))]) is None
     assert "1 run of work against precision gave up" in pages["report"].text
@@ -305,3 +308,26 @@ def test_every_number_of_the_results_is_in_the_page(pages: dict[str, Page]) -> N
     for each in (report.rows[4], report.rows[-10]):
         for metric in each.metrics.values():
             assert metric.value in pages["results"].text
+
+
+def test_every_rung_has_its_marker_and_one_alone_is_seen() -> None:
+    rungs = [work("heyoka tolerance=1e-8", f"{n}e-9", 0.001) for n in range(10, 20)]
+    alone = work("mpmath:odefun tolerance=eps", "1e-60", 6.0, precision="real:237", bits=237)
+    (picture, _) = work_plots.work_precision([("", Report("", {}, {}, [*rungs, alone]))]).pictures
+    data = picture.svg.replace("><", ">\n<")
+    # markers are used shapes; the ticks of the axes are too, and black
+    assert len(re.findall(r"<use [^>]*fill: var\(--c0\)", data)) == len(rungs)
+    assert len(re.findall(r"<use [^>]*fill: var\(--c1\)", data)) == 1
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"), [(-20, 0, {"10⁻¹⁵", "1"}), (-4.4, -3.9, {"10⁻⁴", "6.3·10⁻⁵"}), (-1000, -990, {"10⁻⁹⁹⁶"})]
+)
+def test_ticks_of_long_and_short_logarithmic_axes(low: float, high: float, words: set[str]) -> None:
+    axes = new_axes("x", "y")
+    decades(axes.xaxis)
+    axes.set_xlim(low, high)
+    axes.figure.canvas.draw()
+    found = [tick.get_text() for tick in axes.get_xticklabels()]
+    assert words <= set(found)
+    assert len(set(found)) == len(found)

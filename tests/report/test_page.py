@@ -126,7 +126,8 @@ return [...document.querySelectorAll('main figure svg')].map(svg => ({
 }));
 """
 UNITS = re.compile(
-    r"case|.+ \((bits|rad|1/time unit|units of ε|units of Ω and γ|s|correct decimal digits|time units of the data)\)"
+    r"case|.+ \((bits|rad|1/time unit|units of ε|units of Ω and γ|units of the energy|s|correct decimal digits"
+    r"|time units of the data)\)"
 )
 
 

@@ -10,13 +10,23 @@ from heavytop.report.work_precision import Line, Point, leads, panels
 from heavytop.report.work_precision_figure import draw_work_precision, growth_figure, work_precision_figure
 
 
-def row(integrator: str, log10: float | None, seconds: float, *, case="top/T=9", precision="double", outcome="success"):
+def row(
+    integrator: str,
+    log10: float | None,
+    seconds: float,
+    *,
+    case: str = "top/T=9",
+    precision: str = "double",
+    outcome: str = "success",
+    compile: float = 0.0,
+) -> Row:
     metrics = {"error_max": Metric("1", log10) if log10 is not None else Metric("missing", None)}
     metrics["error_final"] = Metric("1", None if log10 is None else log10 - 1)
     series = Series(["1", "2"], ["1e-9", "unresolved"])
     return Row(
         case, "heavy_top", integrator, precision, 53, outcome, "9", "9", 5, True, metrics, "work_precision",
-        seconds={"run": 99.0, "least": seconds}, series={"drift_energy": series, "solution_error_along": series},
+        seconds={"run": 99.0, "least": seconds, "compile": compile},
+        series={"drift_energy": series, "solution_error_along": series},
     )  # fmt: skip
 
 
@@ -48,7 +58,39 @@ def test_the_lead_is_over_the_best_peer_that_gets_there() -> None:
     assert lead.ours == pytest.approx(2)
     assert lead.ratio == pytest.approx(4.5)
     assert "is 4.5 times faster than the best peer that gets there, cyrk:DOP853" in lead.text
-    assert lead.text.endswith("(2 s against 9 s; a motion in lanes takes 1 ms)")
+    assert lead.text.endswith("(2 s against 9 s); a motion in lanes takes 1 ms")
+    assert lead.short == "At 1e-10 heyoka double is 4.5 × as fast as cyrk:DOP853"
+
+
+def compiled_in(seconds: float, log10: float = -11.0) -> Row:
+    return row("heyoka:constants tolerance=1e-11", log10, seconds, compile=0.25)
+
+
+def test_the_best_scalar_form_of_heyoka_leads_and_the_general_one_is_stated_beside_it() -> None:
+    ours = [row("heyoka tolerance=1e-8", -8, 1.0, compile=0.125), row("heyoka tolerance=1e-12", -12, 4.0, compile=0.5)]
+    (lead,) = leads([*ours, compiled_in(1.0), *CYRK])
+    assert lead.text == (
+        "top/T=9: heyoka:constants at error 1e-10 is 9.0 times faster than the best peer that gets there, cyrk:DOP853 "
+        "(1 s against 9 s); heyoka double, one code for every top, is 4.5 times faster (2 s); "
+        "to compile, at most: heyoka double 500 ms, heyoka:constants 250 ms"
+    )
+    assert lead.short == "At 1e-10 heyoka:constants is 9.0 × as fast as cyrk:DOP853 (heyoka double 4.5 ×)"
+
+
+def test_constants_that_are_no_gain_or_alone_or_too_coarse_change_no_claim() -> None:
+    slower, alone, coarse = (
+        leads([*ours, *CYRK])[0]
+        for ours in ([*OURS, compiled_in(3.0)], [OURS[0], compiled_in(1.0)], [*OURS, compiled_in(1.0, -9.0)])
+    )
+    assert (slower.name, slower.ratio, slower.general) == ("heyoka double", pytest.approx(4.5), None)
+    assert (alone.name, alone.general) == ("heyoka:constants", ("heyoka double", None))
+    assert "heyoka double, one code for every top, does not get there" in alone.text
+    assert alone.short.endswith("cyrk:DOP853")
+    assert (coarse.name, coarse.ratio) == ("heyoka double", pytest.approx(4.5))
+
+
+def test_an_error_that_nobody_reaches_makes_no_lead() -> None:
+    assert leads([OURS[0], CYRK[0]]) == []
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Report
 from heavytop.report.compare import Policy, compare
+from heavytop.report.method_growth import trend
 from heavytop.report.work_precision import panels
 from heavytop.suite.cases import CASES
 from heavytop.suite.measurements import measure, work_precision
@@ -34,8 +35,8 @@ def tasks(tmp_path: Path, text: str) -> list:
     return expand(load(str(file))[0])
 
 
-def rows(tmp_path: Path, case: str, horizon: str, *ladders: str) -> list:
-    text = f'cases = ["{case}"]\nhorizon = "{horizon}"\nsamples = 10\nladders = [{", ".join(ladders)}]\n'
+def rows(tmp_path: Path, case: str, horizon: str, *ladders: str, samples: int = 10) -> list:
+    text = f'cases = ["{case}"]\nhorizon = "{horizon}"\nsamples = {samples}\nladders = [{", ".join(ladders)}]\n'
     return [measure(task) for task in tasks(tmp_path, text)]
 
 
@@ -90,6 +91,18 @@ def test_the_way_back_of_a_symmetric_method_says_nothing_about_its_error(tmp_pat
     assert error(splitting, "error_max") > 1e-6
     assert error(splitting, "return_error") < 1e-12
     assert error(lsoda, "error_max") / 100 < error(lsoda, "return_error") < error(lsoda, "error_max") * 100
+
+
+def test_a_splitting_bounds_the_energy_and_its_phase_grows_more_slowly(tmp_path: Path) -> None:
+    ladders = [
+        '{ integrator = "heyoka", tolerances = ["1e-9"] }',
+        '{ integrator = "splitting:4", steps = ["1/40"] }',
+    ]
+    laws = [
+        [trend(row.series[name]).law for name in ("drift_energy", "solution_error_along")]
+        for row in rows(tmp_path, "lagrange", "3000", *ladders, samples=150)
+    ]
+    assert laws == [["t", "t^2"], ["bounded", "t"]]
 
 
 def test_a_run_that_gives_up_is_a_failure_and_no_point(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import sympy
 from flint import arb, fmpq
 
 from heavytop.exact.balls import ball, working_precision
-from heavytop.integrate.taylor import expressions
+from heavytop.integrate.engines import expressions
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State, cross
 from helpers import fraction, positive, unit_vector, vector

@@ -15,7 +15,9 @@ import numpy
 
 from heavytop.errors import InputError
 from heavytop.integrate import taylor
-from heavytop.integrate.taylor import Observer, Stepper, compiled
+from heavytop.integrate.engines import compiled
+from heavytop.integrate.stepper import Stepper
+from heavytop.integrate.taylor import Observer
 from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
 from heavytop.precision import DOUBLE, Precision
 from heavytop.top.equations import HEAVY_TOP, System
@@ -90,7 +92,7 @@ def _not_a_number(states: Sequence[Any]) -> list[Any]:
 class Integrator:
     """heyoka in double, and what is wrong with it.
 
-    options: those of `taylor.compiled` that differ.  top: what is integrated in the place of the one asked for.
+    options: those of `engines.compiled` that differ.  top: what is integrated in the place of the one asked for.
     stepping: how steps are taken.  states: what is handed over in the place of the states.  stops: the part of the
     samples that is reached; silent: the run says nothing of having stopped.  detectable: whether the suite's detectors
     are known to see it.

@@ -13,8 +13,9 @@ from typing import Any
 import numpy
 
 from heavytop.errors import InputError
+from heavytop.integrate.engines import compiled
 from heavytop.integrate.lanes import Lanes, Work
-from heavytop.integrate.taylor import compiled, follow
+from heavytop.integrate.taylor import follow
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.precision import DOUBLE, exact, number
 from heavytop.top.times import check_times
@@ -45,7 +46,7 @@ def propagate_ensemble(
     lanes: motions side by side in a batch engine, in double; other formats have none, and give the bits of
     :func:`heavytop.integrate.taylor.propagate`.
     step_limit: for each motion; the times reached until then are returned.
-    options: tolerance, high_accuracy, compact_mode as in :func:`heavytop.integrate.taylor.compiled`.
+    options: tolerance, high_accuracy, compact_mode as in :func:`heavytop.integrate.engines.compiled`.
 
     Each motion has its own outcome; one that fails changes nothing in the others.  ``run`` of its seconds is the time
     that it was under way, beside others.

@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 import heyoka
 import numpy
 
-from heavytop.integrate.taylor import CHUNK_SECONDS, Compiled, arrays, at_rest
+from heavytop.integrate.engines import Compiled, arrays
+from heavytop.integrate.stepper import CHUNK_SECONDS, at_rest
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import exact
 

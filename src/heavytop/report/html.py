@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.records import Report, Row
-from heavytop.report import claim_plots, claim_verdict, plots, work_plots
+from heavytop.report import claim_plots, claim_verdict, method_growth, plots, work_plots
 from heavytop.report.compare import Comparison
 from heavytop.report.comparison_text import row_name
 from heavytop.report.plots import digits_at_end
@@ -83,6 +83,7 @@ def sections(sources: Sources, first: Sequence[str] | dict[str, None] = ()) -> l
             plots.growth(sources, first),
             claim_plots.break_away(sources),
             work_plots.work_precision(sources),
+            method_growth.method_growth(sources),
         ]
     found = [section for section in made if section]
     for section in found:

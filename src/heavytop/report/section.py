@@ -89,16 +89,18 @@ def points(series: Series, shift: float = 0.0, scale: float = 1.0) -> tuple[list
     return [x for x, _ in pairs], [y for _, y in pairs]
 
 
-def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6) -> None:
-    """One curve, or points, as its legend has it."""
+def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6, every: float | None = 0.07) -> None:
+    """One curve, or points, as its legend has it.
+
+    every: markers evenly along a curve, however dense its samples are, this part of the diagonal apart; None for all.
+    """
     colour = COLOURS[key.colour]
     face = "none" if key.old else colour
     if key.line:
         axes.plot(x, y, "-", color=colour, lw=4.5 if key.old else 1.6, alpha=0.35 if key.old else None)
-    # markers evenly along a curve, however dense its samples are
-    every = 0.07 if key.line else None
     size += 2 * key.old
-    axes.plot(x, y, key.marker, color=colour, mfc=face, mec=colour, ms=size, markevery=every)
+    spread = every if key.line and len(x) > 1 else None
+    axes.plot(x, y, key.marker, color=colour, mfc=face, mec=colour, ms=size, markevery=spread)
 
 
 def left_out(section: Section, count: int, what: str) -> None:

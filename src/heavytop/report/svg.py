@@ -5,6 +5,7 @@ Both axes of a logarithmic plot carry decimal logarithms, because errors such as
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -85,11 +86,17 @@ def plain(name: str) -> str:
 
 
 def decades(axis: Any, ticks: int = 7) -> None:
-    """Ticks 10⁻⁵, 1, 10, ... on an axis that carries decimal logarithms."""
+    """Ticks 10⁻⁵, 1, 10, ... on an axis that carries decimal logarithms; 3.2·10⁻⁵ where it is a short one."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     axis.set_major_locator(MaxNLocator(ticks, integer=True, steps=[1, 2, 5, 10]))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(round(value))))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
+
+
+def _power(logarithm: float) -> str:
+    exponent = math.floor(logarithm + 1e-6)
+    mantissa = f"{10 ** (logarithm - exponent):.1f}"
+    return power_of_ten(exponent) if mantissa == "1.0" else f"{mantissa}·{power_of_ten(exponent)}"
 
 
 def power_of_ten(exponent: int) -> str:

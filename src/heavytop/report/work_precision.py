@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from heavytop.records import Row
 
 OURS = "heyoka"
+CONSTANTS = "heyoka:constants"
+"""heyoka in double as well, with the numbers of the top compiled into its code."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,12 +31,14 @@ class Line:
     """One integrator in one format, from coarse to fine as the plan has it.
 
     failures: the seconds that rungs took which did not reach the end; they have no error.
+    compile: seconds that compiling took, at most over the rungs; 0 where none is known.
     """
 
     integrator: str
     precision: str
     points: list[Point] = field(default_factory=list)
     failures: list[float] = field(default_factory=list)
+    compile: float = 0.0
 
     @property
     def label(self) -> str:
@@ -64,6 +68,8 @@ class Lead:
     """How heyoka compares with the best peer that reaches an error, on one case.
 
     log10: of the error.  ours, theirs, lanes: seconds, None where none reaches it.  name, peer: who took them.
+    general: label and seconds of heyoka with one code for every top, where ``name`` is compiled for this one.
+    compile: seconds to compile, at most, of each of the two forms.
     """
 
     case: str
@@ -73,11 +79,25 @@ class Lead:
     peer: str
     theirs: float | None
     lanes: float | None = None
+    general: tuple[str, float | None] | None = None
+    compile: dict[str, float] = field(default_factory=dict)
 
     @property
     def ratio(self) -> float | None:
         """How many times faster heyoka is."""
-        return None if self.ours is None or self.theirs is None else self.theirs / self.ours
+        return self._ratio(self.ours)
+
+    def _ratio(self, seconds: float | None) -> float | None:
+        return None if seconds is None or self.theirs is None else self.theirs / seconds
+
+    @property
+    def short(self) -> str:
+        """The ratios in a line; "" where there is none."""
+        if self.ratio is None:
+            return ""
+        other = self.general and self._ratio(self.general[1])
+        more = f" ({self.general[0]} {other:.1f} ×)" if self.general and other else ""
+        return f"At 1e{self.log10:g} {self.name} is {self.ratio:.1f} × as fast as {self.peer}{more}"
 
     @property
     def text(self) -> str:
@@ -86,11 +106,23 @@ class Lead:
         if self.ours is None:
             return f"{goal}: not reached"
         if self.ratio is None or self.theirs is None:
-            return f"{goal} takes {_time(self.ours)}; no peer gets there"
-        speed = f"{self.ratio:.1f} times faster" if self.ratio >= 1 else f"{1 / self.ratio:.1f} times slower"
-        pair = f"{_time(self.ours)} against {_time(self.theirs)}"
-        more = "" if self.lanes is None else f"; a motion in lanes takes {_time(self.lanes)}"
-        return f"{goal} is {speed} than the best peer that gets there, {self.peer} ({pair}{more})"
+            parts = [f"{goal} takes {_time(self.ours)}; no peer gets there"]
+        else:
+            pair = f"{_time(self.ours)} against {_time(self.theirs)}"
+            parts = [f"{goal} is {_speed(self.ratio)} than the best peer that gets there, {self.peer} ({pair})"]
+        if self.general is not None:
+            parts.append(f"{self.general[0]}, one code for every top, {self._general_said(self.general[1])}")
+        if self.lanes is not None:
+            parts.append(f"a motion in lanes takes {_time(self.lanes)}")
+        if self.compile:
+            parts.append("to compile, at most: " + ", ".join(f"{name} {_time(s)}" for name, s in self.compile.items()))
+        return "; ".join(parts)
+
+    def _general_said(self, seconds: float | None) -> str:
+        if seconds is None:
+            return "does not get there"
+        ratio = self._ratio(seconds)
+        return f"takes {_time(seconds)}" if ratio is None else f"is {_speed(ratio)} ({_time(seconds)})"
 
 
 def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Line]]:
@@ -107,11 +139,14 @@ def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Lin
             line.failures.append(seconds)
         elif error is not None and error.log10 is not None and seconds > 0:
             line.points.append(Point(error.log10, seconds, setting))
+            line.compile = max(line.compile, row.seconds.get("compile", 0.0))
     return {case: list(lines.values()) for case, lines in found.items()}
 
 
 def leads(rows: Sequence[Row]) -> list[Lead]:
-    """heyoka against the best peer, for each case that has both: in double at 1e-10, and beyond extended at 1e-30."""
+    """heyoka's best scalar line against the best peer, for each case that has both and an error that one of them
+    reaches: in double at 1e-10, and beyond extended at 1e-30.
+    """
     return [
         lead
         for case, lines in panels(rows).items()
@@ -121,18 +156,37 @@ def leads(rows: Sequence[Row]) -> list[Lead]:
 
 
 def _lead(case: str, log10: float, lines: Sequence[Line]) -> Lead | None:
-    ours = [line for line in lines if line.integrator == OURS]
+    ours = [line for line in lines if line.integrator in (OURS, CONSTANTS)]
     lanes = [line for line in lines if line.integrator == f"{OURS}:lanes"]
     peers = [line for line in lines if line.integrator.partition(":")[0] != OURS]
     if not ours or not peers:
         return None
     (mine, name), (theirs, peer), (side_by_side, _) = (_quickest(group, log10) for group in (ours, peers, lanes))
-    return Lead(case, log10, name or ours[0].label, mine, peer, theirs, side_by_side)
+    if mine is None and theirs is None:
+        return None
+    name = name or ours[0].label
+    general = [(line.label, line.seconds_at(log10)) for line in ours if line.integrator == OURS]
+    two_forms = any(line.integrator == CONSTANTS for line in ours)
+    return Lead(
+        case,
+        log10,
+        name,
+        mine,
+        peer,
+        theirs,
+        side_by_side,
+        general[0] if name == CONSTANTS and general else None,
+        {line.label: line.compile for line in ours if line.compile and two_forms},
+    )
 
 
 def _quickest(lines: Sequence[Line], log10: float) -> tuple[float | None, str]:
     times = [(seconds, line.label) for line in lines if (seconds := line.seconds_at(log10)) is not None]
     return min(times, default=(None, ""))
+
+
+def _speed(ratio: float) -> str:
+    return f"{ratio:.1f} times faster" if ratio >= 1 else f"{1 / ratio:.1f} times slower"
 
 
 def _time(seconds: float) -> str:

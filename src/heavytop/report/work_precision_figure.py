@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.records import Report, Row
-from heavytop.report.svg import document, plain
+from heavytop.records import Report
+from heavytop.report.method_growth import QUANTITIES, alike, growth_axes, keyed
+from heavytop.report.section import TIME, clip
+from heavytop.report.svg import COLOURS, document, plain, quiet_style
 from heavytop.report.work_precision import Line, leads, panels
 
 # Okabe and Ito's colours, one a family; markers and dashes tell its members apart
@@ -25,8 +27,6 @@ _OTHER = "#777777"
 _MARKERS = "osD^v<>pP*Xh"
 _DASHES = ("-", "--", ":", "-.")
 _CROSS: dict[str, Any] = {"linestyle": "", "marker": "x", "markersize": 9, "markeredgewidth": 2}
-_GROWTH = ("heyoka", "cyrk:DOP853", "splitting:4")
-_GROWTH_LOG10 = -5.0
 
 
 def draw_work_precision(report: Report, directory: Path) -> list[Path]:
@@ -102,8 +102,8 @@ def work_precision_figure(report: Report, metric: str = "error_max") -> Any:
         work_precision_axes(axes, lines, styles)
         found = lead.get(case)
         title = plain(case.replace("/T=", ", up to t = "))
-        if found is not None and found.ratio is not None:
-            title += f"\nat 1e{found.log10:g} {found.name} is {found.ratio:.1f} × as fast as {found.peer}"
+        if found is not None and found.short:
+            title += f"\n{plain(found.short)}"
         axes.set_title(title, fontsize=10)
         handles, names = axes.get_legend_handles_labels()
         labels |= dict(zip(names, handles, strict=True))
@@ -116,62 +116,23 @@ def work_precision_figure(report: Report, metric: str = "error_max") -> Any:
 
 
 def growth_figure(report: Report) -> Any:
-    """Energy drift and error over time of three methods at about the same accuracy; None without such rows.
-
-    A splitting bounds the energy and its error grows like t; of the others both grow.
-    """
-    chosen = _alike(report.rows)
-    if len(chosen) < 2:
+    """Energy drift and phase error over time of three methods at about the same accuracy; None without such rows."""
+    chosen = keyed(alike(report.rows))
+    if not chosen:
         return None
-    figure = _figure(11, 4.2)
-    pair = figure.subplots(1, 2)
-    for axes, series, label in zip(
-        pair, ("drift_energy", "solution_error_along"), ("energy drift", "error along the flow (phase)"), strict=True
-    ):
-        for marker, row in zip(_MARKERS, chosen, strict=False):
-            held = row.series[series]
-            values = [(float(t), float(v)) for t, v in zip(held.times, held.values, strict=True) if _positive(v)]
-            colour = _COLOURS.get(row.integrator.partition(" ")[0].partition(":")[0], _OTHER)
-            axes.plot(
-                *zip(*values, strict=True), marker=marker, markersize=4, color=colour, label=plain(row.integrator)
-            )
-        axes.set(xscale="log", yscale="log", xlabel="t", ylabel=label)
-        axes.grid(True, color="#dddddd")
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(fontsize=8, frameon=False)
-    figure.suptitle(plain(chosen[0].case.replace("/T=", ", up to t = ")), fontsize=10)
+    with quiet_style():
+        figure = _figure(11, 4.6)
+        for axes, (name, title, unit) in zip(figure.subplots(1, 2), QUANTITIES, strict=True):
+            for key, _, found, _ in growth_axes(axes, chosen, name):
+                label = f"{key.label}: {found.text}" if found else key.label
+                axes.plot([], [], marker=key.marker, color=COLOURS[key.colour], label=label)
+            axes.set(title=title, xlabel=TIME, ylabel=unit)
+            axes.legend(fontsize=8, frameon=False)
+        figure.suptitle(clip(chosen[0][1].case.replace("/T=", ", up to t = ")), fontsize=10)
     return figure
-
-
-def _alike(rows: Sequence[Row]) -> list[Row]:
-    """On the first case that has them, of each method the rung whose error is nearest to 1e-5."""
-    wanted = [row for row in rows if row.measure == "work_precision" and "drift_energy" in row.series]
-    for case in dict.fromkeys(row.case for row in wanted):
-        found: list[Row] = []
-        for name in _GROWTH:
-            rungs = [
-                (abs(log10 - _GROWTH_LOG10), index, row)
-                for index, row in enumerate(wanted)
-                if (row.case, row.integrator.partition(" ")[0], row.precision) == (case, name, "double")
-                and row.outcome == "success"
-                and "error_max" in row.metrics
-                and (log10 := row.metrics["error_max"].log10) is not None
-            ]
-            if rungs:
-                found.append(min(rungs)[2])
-        if len(found) == len(_GROWTH):
-            return found
-    return []
 
 
 def _figure(width: float, height: float) -> Any:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
-
-
-def _positive(value: str) -> bool:
-    try:
-        return float(value) > 0
-    except ValueError:
-        return False

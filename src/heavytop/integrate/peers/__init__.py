@@ -16,6 +16,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from fractions import Fraction
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -72,17 +73,22 @@ def peer(name: str) -> Peer:
     return loaded  # type: ignore[no-any-return]
 
 
-def run(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
-    """``peer(name)(*problem, **options)`` with ``setting``, ("tolerance", 1e-9) or ("step", 1/50).
+def ready(name: str, setting: tuple[str, Fraction] | None = None) -> Peer:
+    """The peer of that name with ``setting``, ("tolerance", 1e-9) or ("step", 1/50): nothing is looked up in its calls.
 
     Raises InputError for a setting that this peer does not have.
     """
     chosen = peer(name)
     if setting is None:
-        return chosen(*problem, **options)
+        return chosen
     if setting[0] not in inspect.signature(chosen).parameters:
         raise InputError(f"The integrator {name} has no {setting[0]}.", "Fixed steps take a step, others a tolerance.")
-    return chosen(*problem, **options, **dict([setting]))
+    return partial(chosen, **dict([setting]))
+
+
+def run(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
+    """``ready(name, setting)(*problem, **options)``."""
+    return ready(name, setting)(*problem, **options)
 
 
 def available() -> dict[str, str | None]:

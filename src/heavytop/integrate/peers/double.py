@@ -68,56 +68,24 @@ def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") ->
     The peer raises InputError for a format other than double, for times out of order and for a setting out of range.
     """
 
-    def integrate(
-        top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision, system: System, setting: Fraction
-    ) -> Trajectory:
-        import numpy
-
-        if precision != DOUBLE:
-            raise InputError(f"{name} has no {precision.name}.", "Use double.")
-        if not 0 < setting <= 1:
-            raise InputError(f"{name} cannot use the {knob} {float(setting):.6g}.", "Give one between 0 and 1.")
-        problem = Problem.of(top, start, precision, system)
-        grid = numpy.array([number(time, precision) for time in check_times(times)])
-        p = problem.parameters
-        numbers = numpy.array(problem.native([*p.inertia, *p.moment, p.rotor]), dtype=float)
-        given = Given(system, numpy.array(problem.native(problem.start.flat)), grid, numbers, float(setting))
+    def integrate(problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Trajectory:
+        given = _given(name, knob, problem, times, setting)
         began = perf_counter()
         solved = solve(given)
-        seconds = perf_counter() - began - solved.compile
-        states = numpy.asarray(solved.states, dtype=float).reshape(-1, 6)[: len(grid)]
-        finite = numpy.isfinite(states).all(axis=1)
-        count = len(states) if finite.all() else int(finite.argmin())
-        reached = grid[-1] if count == len(grid) else solved.reached
-        outcome = solved.outcome if count == len(states) and numpy.isfinite(reached) else Outcome.NON_FINITE
-        return Trajectory(
-            problem,
-            name,
-            tuple(exact(time) for time in grid[:count]),
-            tuple(states[:count]),
-            Outcome.SUCCESS if count == len(grid) else outcome,
-            exact(reached if numpy.isfinite(reached) else grid[count - 1] if count else 0.0),
-            solved.steps,
-            order,
-            {"compile": solved.compile, "run": seconds},
-            {knob: repr(float(setting)), "field": field_kind()},
-            solved.evaluations,
-        )
+        seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
+        flags = {knob: repr(given.setting), "field": field_kind()}
+        return _judged(problem, name, order, given.times, solved, seconds, flags)
 
-    if knob == "step":
-
-        def with_step(
-            top: HeavyTop,
-            start: State,
-            times: Sequence[Fraction],
-            precision: Precision = DOUBLE,
-            *,
-            system: System = HEAVY_TOP,
-            step: Fraction = Fraction(1, 100),
-        ) -> Trajectory:
-            return integrate(top, start, times, precision, system, step)
-
-        return with_step
+    def with_step(
+        top: HeavyTop,
+        start: State,
+        times: Sequence[Fraction],
+        precision: Precision = DOUBLE,
+        *,
+        system: System = HEAVY_TOP,
+        step: Fraction = Fraction(1, 100),
+    ) -> Trajectory:
+        return integrate(Problem.of(top, start, precision, system), times, step)
 
     def with_tolerance(
         top: HeavyTop,
@@ -128,9 +96,54 @@ def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") ->
         system: System = HEAVY_TOP,
         tolerance: Fraction | None = None,
     ) -> Trajectory:
-        return integrate(top, start, times, precision, system, FINEST if tolerance is None else tolerance)
+        return integrate(Problem.of(top, start, precision, system), times, FINEST if tolerance is None else tolerance)
 
-    return with_tolerance
+    return with_step if knob == "step" else with_tolerance
+
+
+def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Given:
+    import numpy
+
+    if problem.precision != DOUBLE:
+        raise InputError(f"{name} has no {problem.precision.name}.", "Use double.")
+    if not 0 < setting <= 1:
+        raise InputError(f"{name} cannot use the {knob} {float(setting):.6g}.", "Give one between 0 and 1.")
+    grid = numpy.array([number(time, DOUBLE) for time in check_times(times)])
+    p = problem.parameters
+    numbers = numpy.array(problem.native([*p.inertia, *p.moment, p.rotor]), dtype=float)
+    return Given(problem.system, numpy.array(problem.native(problem.start.flat)), grid, numbers, float(setting))
+
+
+def _judged(
+    problem: Problem,
+    name: str,
+    order: int,
+    times: Any,
+    solved: Solved,
+    seconds: dict[str, float],
+    flags: dict[str, str],
+) -> Trajectory:
+    """What was solved, up to the first state that is not finite."""
+    import numpy
+
+    states = numpy.asarray(solved.states, dtype=float).reshape(-1, 6)[: len(times)]
+    finite = numpy.isfinite(states).all(axis=1)
+    count = len(states) if finite.all() else int(finite.argmin())
+    reached = times[-1] if count == len(times) else solved.reached
+    outcome = solved.outcome if count == len(states) and numpy.isfinite(reached) else Outcome.NON_FINITE
+    return Trajectory(
+        problem,
+        name,
+        tuple(exact(time) for time in times[:count]),
+        tuple(states[:count]),
+        Outcome.SUCCESS if count == len(times) else outcome,
+        exact(reached if numpy.isfinite(reached) else times[count - 1] if count else 0.0),
+        solved.steps,
+        order,
+        seconds,
+        flags,
+        solved.evaluations,
+    )
 
 
 @cache

@@ -1,0 +1,151 @@
+"""How the errors of different methods grow at about the same accuracy: one that preserves structure beside two others.
+
+Read off the rows of work against precision; drawn on the page and as a figure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from heavytop.measure.growth import CLASSES, FEWEST_SAMPLES, NEAR
+from heavytop.records import Row, Series
+from heavytop.report.section import DASHED, TIME, Key, Section, Sources, clip, draw, points, scientific
+from heavytop.report.svg import COLOURS, MARKERS, decades, finish, new_axes, spoken
+from heavytop.report.text import short
+
+METHODS = ("heyoka", "cyrk:DOP853", "splitting:4")
+QUANTITIES = (
+    ("drift_energy", "energy drift", "|E(t) − E(0)| (units of the energy)"),
+    ("solution_error_along", "error along the flow (phase)", "error along the flow (units of Ω and γ)"),
+)
+_LOG10 = -5.0
+"""The error that the rungs of the methods are to have."""
+DECADES = 2.0
+_FEWEST_DECADES = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """A power of t through the largest error so far: log10 error = height + exponent log10 t between ``span``.
+
+    half_width: twice the standard error of the exponent.
+    """
+
+    exponent: float
+    half_width: float
+    height: float
+    span: tuple[float, float]
+
+    @property
+    def law(self) -> str:
+        """The class that the exponent tells from every other, else ``unresolved``."""
+        near = [name for name, value in CLASSES.items() if abs(self.exponent - value) <= self.half_width + NEAR]
+        return near[0] if len(near) == 1 else "unresolved"
+
+    @property
+    def text(self) -> str:
+        """The exponent and the law in words."""
+        law = self.law if self.law in ("bounded", "unresolved") else f"like {self.law}"
+        return f"{law}, exponent {self.exponent:z.2f} ± {self.half_width:.2f}"
+
+
+def trend(series: Series) -> Trend | None:
+    """The power by which the largest error so far grows, by least squares on logarithms over the last two decades of t.
+
+    The largest so far, because an error that is bounded goes through 0 again and again.  None for fewer than eight
+    samples, or less than one and a half decades, that have a logarithm.
+    """
+    import numpy
+
+    x, y = (numpy.array(part) for part in points(series))
+    late = x >= max(x, default=0.0) - DECADES - 1e-3
+    if late.sum() < FEWEST_SAMPLES or numpy.ptp(x[late]) < _FEWEST_DECADES:
+        return None
+    (slope, height), covariance = numpy.polyfit(x[late], numpy.maximum.accumulate(y)[late], 1, cov=True)
+    span = float(x[late][0]), float(x[late][-1])
+    return Trend(float(slope), 2 * float(covariance[0, 0]) ** 0.5, float(height), span)
+
+
+def alike(rows: Sequence[Row]) -> list[Row]:
+    """Of each method the rung whose error is nearest to 1e-5, on the case of the longest horizon that has them all."""
+    found: dict[tuple[str, str], dict[str, list[tuple[float, int]]]] = {}
+    for index, row in enumerate(rows):
+        name, error = row.integrator.partition(" ")[0], row.metrics.get("error_max")
+        if row.measure != "work_precision" or row.precision != "double" or row.outcome != "success":
+            continue
+        if name in METHODS and "drift_energy" in row.series and error is not None and error.log10 is not None:
+            rungs = found.setdefault((row.case, row.horizon), {}).setdefault(name, [])
+            rungs.append((abs(error.log10 - _LOG10), index))
+    whole = [case for case, methods in found.items() if len(methods) == len(METHODS)]
+    if not whole:
+        return []
+    chosen = found[max(whole, key=lambda case: Fraction(case[1]))]
+    return [rows[min(chosen[name])[1]] for name in METHODS]
+
+
+def growth_axes(axes: Any, rows: Sequence[tuple[Key, Row]], name: str) -> list[tuple[Key, Row, Trend | None, str]]:
+    """Draw the series ``name`` of each row over time on ``axes``, its trend dashed; both and the last value.
+
+    The axes carry decimal logarithms.
+    """
+    decades(axes.xaxis)
+    decades(axes.yaxis)
+    drawn = []
+    for key, row in rows:
+        held = row.series.get(name, Series([], []))
+        x, y = points(held)
+        found = trend(held)
+        if x:
+            draw(axes, key, x, y, 4.2, every=None)
+        if found is not None:
+            ends = [found.height + found.exponent * t for t in found.span]
+            axes.plot(found.span, ends, color=COLOURS[key.colour], lw=1.2, ls=DASHED)
+        drawn.append((key, row, found, scientific(y[-1]) if y else ""))
+    return drawn
+
+
+def keyed(rows: Sequence[Row], source: str = "") -> list[tuple[Key, Row]]:
+    """Each row with its entry of the legend."""
+    more = f", {source}" if source else ""
+    return [
+        (Key(clip(row.integrator + more, 50), place, MARKERS[place], old=source == "baseline"), row)
+        for place, row in enumerate(rows)
+    ]
+
+
+def method_growth(sources: Sources) -> Section | None:
+    """The section of the page: energy drift and phase error of the three methods, with the power of t of each."""
+    chosen = [pair for source, report in sources for pair in keyed(alike(report.rows), source)]
+    if not chosen:
+        return None
+    section = Section(
+        "method-growth",
+        "Growth by method",
+        [
+            f"{clip(chosen[0][1].case)}: a splitting, which preserves structure, beside two methods that do not, each "
+            "at the tolerance or step whose error is nearest to 1e-5. The difference is in the law of growth.",
+            "Dashed: a power of t through the largest error so far, by least squares over the last two decades of t. "
+            "The ± is twice the standard error of that fit; it is one motion, and says nothing of others.",
+        ],
+        columns=["integrator", "error on the way", "quantity", "last |t|", "last value", "exponent", "law"],
+        across=2,
+    )
+    for number, (name, title, unit) in enumerate(QUANTITIES):
+        axes = new_axes(TIME, unit)
+        heard = []
+        for key, row, found, last in growth_axes(axes, chosen, name):
+            section.key(key)
+            heard.append(f"{key.label}: {found.text if found else 'too few samples for a law'}.")
+            exponent = f"{found.exponent:z.2f} ± {found.half_width:.2f}" if found else ""
+            error, law = short(row.metrics["error_max"].value), found.law if found else ""
+            section.rows.append([key.label, error, title, short(row.time_reached), last, exponent, law])
+        said = [f"{row[0]}: {row[4]} at |t| = {row[3]}." for row in section.rows if row[2] == title]
+        heading = f"{title[0].upper()}{title[1:]} over time"
+        section.pictures.append(
+            finish(axes, heading, spoken([*said, *heard]), f"method-growth-{number}", " ".join(heard))
+        )
+    section.key(Key("fitted power of t", 5, "", "6 3"))
+    return section

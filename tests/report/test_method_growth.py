@@ -1,0 +1,143 @@
+"""The law of growth of each method, on series whose laws are known and on runs."""
+
+import math
+
+import numpy
+import pytest
+
+from heavytop.records import SCHEMA, Report, Series
+from heavytop.report.compare import compare
+from heavytop.report.html import write_comparison
+from heavytop.report.method_growth import alike, method_growth, trend
+from heavytop.report.policy import Policy
+from heavytop.report.work_precision_figure import growth_figure
+from report_helpers import GROWTH, HOSTILE, LONG, WORK, law, method
+
+T = numpy.array([float(time) for time in LONG])
+
+
+def series(values) -> Series:
+    return Series(LONG, [f"{value:.6e}" for value in values])
+
+
+@pytest.mark.parametrize(
+    ("exponent", "name"),
+    [(0, "bounded"), (0.5, "t^0.5"), (1, "t"), (1.5, "t^1.5"), (2, "t^2"), (0.25, "unresolved"), (2.5, "unresolved")],
+)
+def test_an_exact_power_has_its_exponent_and_the_law_it_is(exponent: float, name: str) -> None:
+    found = trend(law(exponent, 1e-9))
+    assert found.exponent == pytest.approx(exponent, abs=1e-5)
+    assert found.half_width < 1e-5
+    assert found.law == name
+    assert found.height + found.exponent * 4 == pytest.approx(-9, abs=1e-5)
+    assert found.span == pytest.approx((2, 4), abs=1e-3)
+
+
+def test_only_the_last_two_decades_count() -> None:
+    found = trend(series(numpy.where(T < 99, 1e-4, 1e-9 * T)))
+    assert found.law == "bounded"
+    found = trend(series(numpy.where(T < 99, 1e-12 * T**3, 1e-8 * T)))
+    assert found.exponent == pytest.approx(1, abs=1e-5)
+
+
+def test_an_error_that_swings_through_zero_is_bounded_and_one_that_swings_and_grows_is_not() -> None:
+    swing = abs(numpy.sin(7 * T)) + 1e-6
+    assert trend(series(1e-8 * swing)).law == "bounded"
+    growing = trend(series(1e-8 * T**2 * swing))
+    assert growing.half_width > 0.05
+    assert abs(growing.exponent - 2) < 2 * growing.half_width
+    assert growing.law != "bounded"
+
+
+def test_the_half_width_holds_the_exponent_of_noisy_powers_as_often_as_two_standard_errors_do() -> None:
+    """Noise on a steep power, which its largest so far follows closely."""
+    random = numpy.random.default_rng(3)
+    held = 0
+    for _ in range(200):
+        found = trend(series(1e-20 * T**4 * numpy.exp(0.05 * random.standard_normal(len(T)))))
+        held += abs(found.exponent - 4) <= found.half_width
+    assert 170 < held < 200
+
+
+def test_between_two_laws_none_is_told() -> None:
+    random = numpy.random.default_rng(1)
+    found = trend(series(1e-12 * T**1.75 * numpy.exp(0.3 * random.standard_normal(len(T)))))
+    assert found.half_width > 0.05
+    assert found.law == "unresolved"
+
+
+@pytest.mark.parametrize(
+    "held",
+    [
+        Series([], []),
+        Series(LONG[:5], ["1"] * 5),
+        Series(LONG, ["unresolved"] * len(LONG)),
+        Series(LONG, ["nan", "0"] * 12 + ["1e-9"]),
+        Series(LONG[-10:], ["1e-9"] * 10),
+    ],
+)
+def test_too_little_to_tell_a_law_from(held: Series) -> None:
+    assert trend(held) is None
+
+
+def test_the_rungs_nearest_to_the_same_error_on_the_longest_run_that_has_all() -> None:
+    other = [
+        method("heyoka tolerance=1e-7", law(1, 1), law(2, 1), "1e-3"),
+        method("splitting:4 step=1/80", law(1, 1), law(2, 1), "1e-6"),
+        method("cyrk:DOP853 tolerance=1e-12", law(1, 1), law(2, 1), "1e-5", outcome="step_limit"),
+        method("cyrk:DOP853 tolerance=1e-15", law(1, 1), law(2, 1), "missing"),
+    ]
+    short = [method(row.integrator, law(1, 1), law(2, 1), case="x/T=9", horizon="9") for row in GROWTH]
+    longer = [method(row.integrator, law(1, 1), law(2, 1), case="y/T=1e5", horizon="1e5") for row in GROWTH[:2]]
+    assert alike([*other, *short, *WORK, *longer, *GROWTH]) == GROWTH
+    assert alike(GROWTH[:2]) == []
+    assert method_growth([("", Report(SCHEMA, {}, {}, [*WORK, *GROWTH[1:]]))]) is None
+
+
+def test_the_section_says_each_law_to_eye_and_ear() -> None:
+    section = method_growth([("", Report(SCHEMA, {}, {}, GROWTH))])
+    energy, phase = section.pictures
+    assert "splitting:4 step=1/40: bounded, exponent 0.00 ± 0.00." in energy.note
+    assert "heyoka tolerance=1e-9: like t, exponent 1.00 ± 0.00." in energy.note
+    assert "splitting:4 step=1/40: like t, exponent 1.00 ± 0.00." in phase.note
+    assert "cyrk:DOP853 tolerance=1e-11: like t^2, exponent 2.00 ± 0.00." in phase.note
+    for picture in section.pictures:
+        assert picture.note in picture.description
+        assert picture.description in picture.svg
+    assert "heyoka tolerance=1e-9: 1e-9 at |t| = 10000." in energy.description
+    assert len(section.rows) == 6
+    assert [*section.legend][-1] == "fitted power of t"
+    assert "lagrange/T=10000" in section.text[0]
+
+
+def test_figure_and_page_draw_the_same_curves() -> None:
+    report = Report(SCHEMA, {}, {}, GROWTH)
+    figure = growth_figure(report)
+    assert len(figure.axes) == 2
+    drawn = figure.axes[0].get_lines()[0]
+    assert list(drawn.get_ydata()) == pytest.approx(
+        [math.log10(float(v)) for v in GROWTH[0].series["drift_energy"].values]
+    )
+    words = [text.get_text() for text in figure.axes[1].get_legend().get_texts()]
+    assert [" ".join(words).count(part) for part in ("like t^2", "like t,")] == [2, 1]
+    for picture in method_growth([("", report)]).pictures:
+        assert all(word.partition(":")[0] in picture.note for word in words)
+
+
+def test_a_comparison_draws_both_and_a_hostile_case_is_text(tmp_path) -> None:
+    rows = [method(r.integrator, *r.series.values(), case=HOSTILE) for r in GROWTH]
+    report = Report(SCHEMA, {"name": "x"}, {}, rows)
+    section = method_growth([("baseline", report), ("candidate", report)])
+    assert [key.old for key in section.legend.values()] == [True] * 3 + [False] * 4
+    write_comparison(report, report, compare(report, report, Policy()), tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text("utf-8")
+    assert "method-growth" in page
+    assert "<script" not in page
+    growth_figure(report).savefig(tmp_path / "x.png")
+
+
+def test_methods_that_cannot_be_fitted_are_drawn_without_a_law() -> None:
+    words = [method(r.integrator, Series(["1", "2"], ["1e-9", "nan"]), Series([], [])) for r in GROWTH]
+    section = method_growth([("", Report(SCHEMA, {}, {}, words))])
+    assert section.pictures[0].note.count("too few samples for a law") == 3
+    assert growth_figure(Report(SCHEMA, {}, {}, words)) is not None
