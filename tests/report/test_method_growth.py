@@ -7,7 +7,7 @@ import pytest
 
 from heavytop.records import SCHEMA, Report, Series
 from heavytop.report.compare import compare
-from heavytop.report.html import write_comparison
+from heavytop.report.html import comparison_page
 from heavytop.report.method_growth import alike, method_growth, trend
 from heavytop.report.policy import Policy
 from heavytop.report.work_precision_figure import growth_figure
@@ -129,8 +129,7 @@ def test_a_comparison_draws_both_and_a_hostile_case_is_text(tmp_path) -> None:
     report = Report(SCHEMA, {"name": "x"}, {}, rows)
     section = method_growth([("baseline", report), ("candidate", report)])
     assert [key.old for key in section.legend.values()] == [True] * 3 + [False] * 4
-    write_comparison(report, report, compare(report, report, Policy()), tmp_path / "page.html")
-    page = (tmp_path / "page.html").read_text("utf-8")
+    page = comparison_page(report, report, compare(report, report, Policy()))
     assert "method-growth" in page
     assert "<script" not in page
     growth_figure(report).savefig(tmp_path / "x.png")
