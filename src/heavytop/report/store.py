@@ -229,7 +229,7 @@ def _check_row(file: Path, row: Row | BriefRow) -> None:
     if row.outcome == "success" and reached < horizon:
         raise InputError(f"{where}: a success that reached only {row.time_reached} of {row.horizon}.", _REMEDY)
     lacking = [name for name in _NEEDED.get(row.measure, ()) if name not in row.metrics]
-    if lacking:
+    if lacking and (row.metrics or row.outcome == "success"):
         raise InputError(f"{where}: a row of {row.measure} without {', '.join(lacking)}.", _REMEDY)
 
 

@@ -84,6 +84,8 @@ def summary(report: Report) -> RenderableType:
     """What is known, what the claim gets wrong and from when on, digits kept and drift per format."""
     by_measure: dict[str, list[Row]] = {}
     for row in report.rows:
+        if row.outcome != "success" and not row.metrics:
+            continue  # nothing came of it: it stands among the failed ones alone
         by_measure.setdefault(row.measure, []).append(row)
     parts: list[RenderableType] = [_head(report, len(report.rows))]
     for name, section in (
@@ -101,11 +103,15 @@ def summary(report: Report) -> RenderableType:
     failed = [row for row in report.rows if row.outcome != "success" and row.measure != "work_precision"]
     if failed:
         parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
-        parts += [
-            Text(f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}")
-            for row in failed
-        ]
+        parts += [Text(_failure(row)) for row in failed]
     return Group(*parts)
+
+
+def _failure(row: Row) -> str:
+    if row.metrics:
+        return f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}"
+    which = f"{row.measure} of {row.case}, {row.integrator} in {row.precision}"
+    return f"  {which}: {row.outcome}, held against {row.against}"
 
 
 def _head(report: Report, rows: int) -> Text:

@@ -19,7 +19,7 @@ from operator import itemgetter
 from threading import Thread
 from typing import Any
 
-from heavytop.errors import HeavyTopError, InputError
+from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.task import Task
@@ -163,9 +163,16 @@ def _windowed(
 
 
 def _measure(task: Task, saved: Saved) -> Row:
+    """The row of ``task``, also where it cannot be known; raises InputError with its name for impossible data."""
     from heavytop.suite.measurements import measure
+    from heavytop.suite.measurements.shared import unmeasured
 
-    return measure(task, saved)
+    try:
+        return measure(task, saved)
+    except (OutOfReach, Contradiction) as error:
+        return unmeasured(task, error)
+    except InputError as error:
+        raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
 def _measure_as(expected: Versions, task: Task) -> Row:

@@ -21,7 +21,7 @@ from heavytop.measure.known import certified
 from heavytop.measure.scalar import largest, metric, of_fraction, text
 from heavytop.precision import parse
 from heavytop.records import Metric, Row, Series
-from heavytop.suite.measurements.shared import branch_of, claim_of, time_metric, time_text
+from heavytop.suite.measurements.shared import branch_of, claim_of, integrator_text, time_metric, time_text
 from heavytop.suite.task import Task
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP
@@ -51,7 +51,7 @@ def audit(task: Task) -> Row:
     return Row(
         case=task.name,
         system=task.form,
-        integrator="audit",
+        integrator=integrator_text(task),
         precision="exact",
         bits=0,
         outcome=Outcome.SUCCESS.value,
@@ -88,7 +88,7 @@ def claim_model(task: Task) -> Row:
     return Row(
         case=task.name,
         system=HEAVY_TOP.name,
-        integrator=f"claim:{branch}",
+        integrator=integrator_text(task),
         precision="exact",
         bits=claim_error.MODEL_BITS,
         outcome=Outcome.SUCCESS.value,
@@ -163,7 +163,7 @@ def claim_evaluation(task: Task) -> Row:
     return Row(
         case=task.name,
         system="gyrostat",
-        integrator=f"formula:{task.form}",
+        integrator=integrator_text(task),
         precision=precision.name,
         bits=precision.bits,
         outcome=Outcome.SUCCESS.value,
