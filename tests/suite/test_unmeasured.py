@@ -4,13 +4,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 
-from heavytop.errors import Contradiction, InputError
+from heavytop.errors import Contradiction, InputError, OutOfReach
 from heavytop.measure import known
+from heavytop.records import Metric
 from heavytop.report import store
 from heavytop.report.compare import compare
 from heavytop.report.policy import Policy
+from heavytop.report.text import all_good
+from heavytop.suite.measurements.shared import unmeasured
 from heavytop.suite.plan import expand, load
 from heavytop.suite.workers import rows
 
@@ -82,6 +86,16 @@ def test_a_contradiction_is_the_outcome_of_its_row_alone(tmp_path: Path, monkeyp
     ((_, row),) = rows(tasks_of(tmp_path, PLAN), 1, None)
     assert (row.outcome, row.against) == ("contradiction", "nothing: Two sources exclude each other.")
     assert row.key == ("drift", "euler", "heavy_top", "heyoka", "double")
+
+
+def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_one(tmp_path: Path) -> None:
+    ladder = '[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "5"\n'
+    ladder += 'ladders = [{ integrator = "heyoka", tolerances = ["eps"] }]\n'
+    (task,) = tasks_of(tmp_path, 'name = "work"\n' + ladder)
+    row = unmeasured(task, OutOfReach("Nothing is known there."))
+    assert row.key == ("work_precision", "euler/T=5", "heavy_top", "heyoka tolerance=eps", "double")
+    assert not all_good([row])
+    assert all_good([msgspec.structs.replace(row, metrics={"error_max": Metric("missing", None)})])
 
 
 def test_what_only_measuring_shows_to_be_impossible_names_the_row(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from heavytop.report.compare import Comparison
 from heavytop.report.plots import digits_at_end
 from heavytop.report.section import Section, Sources, clip
 from heavytop.report.svg import quiet_style
-from heavytop.report.text import short
+from heavytop.report.text import failed, short
 from heavytop.suite.files import replace
 from heavytop.suite.plan import BUILT_IN
 
@@ -32,7 +32,7 @@ def write_report(report: Report, path: Path) -> None:
     """
     rows, left_out = detailed(report.rows)
     found = claim_verdict.audited(report)
-    failures = [row for row in report.rows if row.outcome != "success" and row.measure != "work_precision"]
+    failures = [row for row in report.rows if failed(row)]
     word, sentence = claim_verdict.headline(found)
     page = _render(
         "report.html.j2",

@@ -76,8 +76,13 @@ def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
 
 
 def all_good(rows: Iterable[Row]) -> bool:
-    """Whether every run reached its horizon; that a peer gives up is what the work-precision rows are there to show."""
-    return all(row.outcome == "success" for row in rows if row.measure != "work_precision")
+    """Whether no row has :func:`failed`."""
+    return not any(map(failed, rows))
+
+
+def failed(row: Row) -> bool:
+    """Whether a run did not reach its horizon; that a peer gives up is what work-precision rows are there to show."""
+    return row.outcome != "success" and not (row.measure == "work_precision" and row.metrics)
 
 
 def summary(report: Report) -> RenderableType:
@@ -100,10 +105,9 @@ def summary(report: Report) -> RenderableType:
     ):
         if name in by_measure:
             parts += [Text(), *section(by_measure[name])]
-    failed = [row for row in report.rows if row.outcome != "success" and row.measure != "work_precision"]
-    if failed:
+    if failures := [row for row in report.rows if failed(row)]:
         parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
-        parts += [Text(_failure(row)) for row in failed]
+        parts += [Text(_failure(row)) for row in failures]
     return Group(*parts)
 
 
