@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from heavytop.errors import InputError
@@ -251,9 +252,11 @@ def test_rows_that_cannot_be_are_refused(tmp_path: Path, change) -> None:
 
 
 def test_a_list_in_the_environment_differs_by_what_one_of_the_two_lacks() -> None:
-    from heavytop.report.compare import _differences
+    def differences(*environments):
+        two = [msgspec.structs.replace(report(row()), environment=each) for each in environments]
+        return compare(*two, Policy()).environment
 
     old, new = {"cpu": {"features": ["a", "b"]}}, {"cpu": {"features": ["b", "c", "d"]}}
-    assert _differences(old, new) == [("cpu.features", "a", "c d")]
-    assert _differences({}, new) == [("cpu.features", "absent", "3 known")]
-    assert _differences(new, new) == []
+    assert differences(old, new) == [("cpu.features", "a", "c d")]
+    assert differences({}, new) == [("cpu.features", "absent", "3 known")]
+    assert differences(new, new) == []

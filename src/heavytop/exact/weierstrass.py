@@ -232,7 +232,7 @@ def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
     they do not decide it.
     """
     if not isinstance(g2, arb) and not isinstance(g3, arb):
-        return _exact_lattice(Fraction(g2), Fraction(g3), ctx.prec)
+        return exact_lattice(Fraction(g2), Fraction(g3), ctx.prec)
     g2, g3 = as_ball(g2), as_ball(g3)
     discriminant = g2**3 - 27 * g3**2
     if not (discriminant > 0 or discriminant < 0):
@@ -262,7 +262,8 @@ def from_roots(roots: Sequence[Exact | arb | acb]) -> AnyLattice:
 
 
 @lru_cache(maxsize=64)
-def _exact_lattice(g2: Fraction, g3: Fraction, bits: int) -> AnyLattice:
+def exact_lattice(g2: Fraction, g3: Fraction, bits: int) -> AnyLattice:
+    """:func:`from_invariants` of exact ones, once for each working precision."""
     with working_precision(bits):
         if g2**3 == 27 * g3**2:
             return DegenerateLattice(Fraction(-3, 2) * g3 / g2 if g2 else Fraction(0))

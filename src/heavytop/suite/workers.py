@@ -135,12 +135,8 @@ def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Ite
                         raise InputError(f"The scheduler {scheduler} has no such heavytop.", _SAME) from None
                     raise
                 yield index, row
-            pool.shutdown()
         except (CancelledError, OSError):
             raise HeavyTopError(f"The scheduler {scheduler} was lost.", f"{_RESUME}.") from None
-        except BaseException:
-            pool.shutdown(wait=False)
-            raise
 
 
 def _windowed(
@@ -205,7 +201,7 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
             yield pool
         except BrokenProcessPool:
             raise  # the pool ends its own processes then
-        except BaseException:
+        except BaseException:  # Ctrl-C, SIGTERM or an error: else the tasks under way are waited for, hours perhaps
             processes = list((pool._processes or {}).values())
             pool.shutdown(wait=False, cancel_futures=True)
             for process in processes:
