@@ -14,7 +14,6 @@ transformation that FLINT makes, and only the roots' difference costs working pr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -23,7 +22,7 @@ from typing import Any
 
 from flint import acb, acb_series, arb, arb_poly, arb_series, ctx, fmpz_poly
 
-from heavytop.errors import InputError, OutOfReach
+from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, working_precision
 from heavytop.exact.theta import Theta
 
@@ -136,11 +135,6 @@ class Lattice:
         scale = 2 * self.half_period * thetas(z, self.ratio)[0] / self.zero[0]
         return acb((-scale if turns % 2 else scale) * (self.quasi_period * u * u / (2 * self.half_period)).exp())
 
-    @property
-    def other_half_period(self) -> acb:
-        """τ ω: with ω a basis of the half-periods; on the imaginary axis where all roots are real."""
-        return self.ratio * self.half_period
-
 
 @dataclass(frozen=True, slots=True)
 class DegenerateLattice:
@@ -242,23 +236,6 @@ def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
         )
     near = _cubic_roots(*(Fraction(midpoint(g)) for g in (g2, g3)))
     return _from_roots([_enclose(root, g2, g3) for root in near])
-
-
-def from_roots(roots: Sequence[Exact | arb | acb]) -> AnyLattice:
-    """The lattice with these roots e (their sum 0): exact numbers or balls, all real or one real and a conjugate pair.
-
-    Raises InputError unless three, with a sum that can be 0; OutOfReach where balls do not tell two roots apart.
-    """
-    total = sum(roots)
-    if len(roots) != 3 or not (total == 0 if isinstance(total, (int, Fraction)) else total.contains(0)):
-        raise InputError(f"Roots with the sum {total}.", "Three roots e1 + e2 + e3 = 0 make a lattice.")
-    if all(isinstance(root, (int, Fraction)) for root in roots):
-        a, b, c = (Fraction(root) for root in roots)  # type: ignore[arg-type]
-        return from_invariants(-4 * (a * b + b * c + c * a), 4 * a * b * c)
-    balls = [root if isinstance(root, acb) else acb(as_ball(root)) for root in roots]
-    if any(a.overlaps(b) for a, b in ((balls[0], balls[1]), (balls[1], balls[2]), (balls[2], balls[0]))):
-        raise OutOfReach("Two roots cannot be told apart.", "Give the roots exactly, or as narrower balls.")
-    return _from_roots(balls)
 
 
 @lru_cache(maxsize=64)
