@@ -115,7 +115,8 @@ def _wave_parts(lattice: Lattice, shift: acb) -> tuple[arb_poly, ...]:
 def _imaginary_argument(lattice: Lattice, winding: Winding) -> acb:
     """V with ℘(V) = value on the imaginary axis, or beside it by ω; the sign of Im V follows ℘'(V).
 
-    ℘(iy; g2, g3) = −℘(y; g2, −g3), and y is Carlson's R_F (DLMF 19.25.35).  Beyond e3 ℘(V − ω) is taken, DLMF 23.10.4.
+    ℘(iy; g2, g3) = −℘(y; g2, −g3) (DLMF 23.10(iv)), and y is Carlson's R_F (DLMF 19.25.35).  Beyond e3 ℘(V − ω) is
+    taken, by the addition theorem, DLMF 23.10.1.
     """
     value, (e1, e2, e3) = acb(ball(winding.value)), lattice.roots
     beside = e2.imag == 0 and (value - e3).real > 0

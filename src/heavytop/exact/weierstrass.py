@@ -1,8 +1,8 @@
 """Weierstrass' functions of a real lattice, from its invariants or roots, as balls.
 
-℘'² = 4℘³ − g2 ℘ − g3 = 4 (℘ − e1)(℘ − e2)(℘ − e3), e1 + e2 + e3 = 0, real g2, g3 (DLMF 23.2, 23.3).  With half-periods
+℘'² = 4℘³ − g2 ℘ − g3 = 4 (℘ − e1)(℘ − e2)(℘ − e3), e1 + e2 + e3 = 0, real g2, g3 (DLMF 23.3.10).  With half-periods
 ω (real) and ω', τ = ω'/ω where all roots are real (e1 > e2 > e3), and the basis ω, (ω + ω')/2, τ = (1 + ω'/ω)/2, where
-two are complex, z = u/(2ω) and T(u) = 2ω θ1(z)/θ1'(0), everything is a theta quotient (DLMF 23.6.2-23.6.15):
+two are complex, z = u/(2ω) and T(u) = 2ω θ1(z)/θ1'(0), everything is a theta quotient (DLMF 23.6.5-23.6.9):
 
     ℘ = e1 + (θ2(z)/(θ2(0) T))²,   ℘' = −2 θ2(z)θ3(z)θ4(z)/(θ2(0)θ3(0)θ4(0) T³),   σ = T exp(η u²/(2ω))
 
@@ -138,7 +138,10 @@ class Lattice:
 
 @dataclass(frozen=True, slots=True)
 class DegenerateLattice:
-    """Discriminant 0: ℘ = d + κ²/sinh²(κu), κ² = 3d, double root d and simple root −2d (DLMF 23.10(iv))."""
+    """Discriminant 0: ℘ = d + κ²/sinh²(κu), κ² = 3d, double root d and simple root −2d.
+
+    ℘, ζ and σ are the limits of DLMF 23.12.1-23.12.3 for nome 0, with κ = iπ/(2ω).
+    """
 
     double: Scalar
 

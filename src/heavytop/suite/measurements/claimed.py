@@ -67,6 +67,11 @@ def audit(task: Task) -> Row:
 
 
 def claim_model(task: Task) -> Row:
+    """The largest errors of the claim (4.2)-(4.6), exactly evaluated, as a motion of the heavy top, and when it parts.
+
+    The task: a case with a claim, its ``form`` the branch, smooth or printed; exact times of one sign, t ≠ 0.
+    Errors of Ω in 1/time unit, of γ none, of the angles in rad.  Raises OutOfReach where the true motion is not proven.
+    """
     claim, branch = claim_of(task), branch_of(task)
     truth, against = true_motion(claim, task.times)
     errors = {time: claim_error.model_error(claim, time, truth, branch) for time in task.times}
@@ -105,7 +110,10 @@ def claim_model(task: Task) -> Row:
 
 
 def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_error.Truth, str]:
-    """The true heavy-top motion from the claim's own data, and what it is."""
+    """The true heavy-top motion from the claim's own data, and what it is: a closed form, an enclosure, or two runs.
+
+    times: those at which it will be asked for.  Raises OutOfReach where it is not known up to the last of them.
+    """
     bits = claim_error.MODEL_BITS
     if claim.i1 == 2 * claim.i3:
         known = DeloneHomoclinic(claim.alpha, claim.i1)
@@ -140,6 +148,11 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_er
 
 
 def claim_evaluation(task: Task) -> Row:
+    """The largest errors of the formulas (4.2)-(4.6) in a format, and from when on they give no number.
+
+    The task: a case with a claim, its ``form`` printed or stable, its times values of k t of one sign.  Errors of Ω in
+    1/time unit, of the angles in rad.  Raises OutOfReach where the formulas cannot be evaluated exactly.
+    """
     claim = claim_of(task)
     precision = parse(task.precision)
     rate = claim.solves.rate
