@@ -5,8 +5,8 @@ With x = πz and c = cos 2x, Chebyshev's polynomials take every angle to one var
     cos 2nx = T_n(c),   sin (2n+1)x = (U_n + U_(n−1))(c) sin x,   cos (2n+1)x = (U_n − U_(n−1))(c) cos x
 
 so the Fourier series of the thetas (DLMF 20.2.1-20.2.4) are polynomials in c times 1, sin x or cos x.  On the
-imaginary axis sin, cos become i sinh, cosh and nothing else changes.  Their coefficients fall like q^(n²): few terms are
-left.
+imaginary axis sin, cos become i sinh, cosh and nothing else changes.  Their coefficients fall like q^(n²): few terms
+are left.
 
 Tail: |U_n ± U_(n−1)|, |T_n| ≤ (2n + 1) g^n where |e^(2ix)| ≤ g, 1/g ≤ |e^(2ix)|.  If the weights are at most
 q^(n²) w^n, the terms from n = N on are below b_N = (2N + 1) q^(N²) (g w)^N and fall at least by the factor
