@@ -9,7 +9,7 @@ from flint import acb
 from heavytop.exact.balls import radius, radius_text, working_precision
 from heavytop.exact.gyrostat import Gyrostat
 from heavytop.exact.lagrange import Lagrange
-from heavytop.exact.weierstrass import _exact_lattice, thetas
+from heavytop.exact.weierstrass import exact_lattice, thetas
 from heavytop.top.heavy_top import HeavyTop, State
 
 START = State((Fraction(1, 3), 1, 2), (Fraction(3, 5), 0, Fraction(4, 5)))
@@ -35,7 +35,7 @@ def test_making_the_lattice(benchmark, name):
 
     def make():
         with working_precision(320):
-            return _exact_lattice.__wrapped__(g2, g3, 320)
+            return exact_lattice.__wrapped__(g2, g3, 320)
 
     lattice = benchmark(make)
     benchmark.extra_info["radius"] = radius_text(radius(lattice.half_period))

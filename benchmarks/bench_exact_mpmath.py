@@ -169,7 +169,7 @@ class OnEuler:
 
 
 class Wave:
-    """Functions of the second kind with one winding, as in exact/quartic.py."""
+    """Functions of the second kind with one winding, as in exact/second_kind.py."""
 
     def __init__(self, companions):
         wave = companions.wave

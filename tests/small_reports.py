@@ -4,31 +4,27 @@ from __future__ import annotations
 
 import msgspec
 
+import report_helpers
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import SCHEMA, Metric, Report, Row
+from heavytop.records import SCHEMA, Report, Row
+from report_helpers import error
 
-
-def error(value: str) -> Metric:
-    return of_fraction(exact(value))
+__all__ = ["error", "report", "row"]
 
 
 def row(**changes) -> Row:
-    basis = Row(
-        case="euler",
-        system="heavy_top",
-        integrator="heyoka",
-        precision="double",
-        bits=53,
-        outcome="success",
+    """A run of 100 time units in double, with an error and a duration, without series and laws."""
+    basis = report_helpers.row(
         horizon="100",
         time_reached="100",
         steps=10,
-        finite=True,
         metrics={"drift_energy_max": error("1e-12"), "break_away_time": of_fraction(exact("60"), "duration")},
-        measure="drift",
+        measured="",
         against="its own first integrals",
-        flags={"tolerance": "2e-16"},
+        series={},
+        laws={},
+        seconds={},
     )
     return msgspec.structs.replace(basis, **changes)
 

@@ -10,7 +10,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from heavytop.cli import app
 from helpers import VECTORS
 
 COMMAND = [sys.executable, "-m", "heavytop"]
@@ -134,6 +136,16 @@ def test_normalize_moves_gamma_onto_the_sphere() -> None:
     assert done.returncode == 0
     gamma = [Fraction(v) for v in json.loads(done.stdout)["states"][0][3:]]
     assert abs(sum(g * g for g in gamma) - 1) < Fraction(1, 10**13)
+
+
+def test_a_format_whose_steps_take_long_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("heavytop.cli.motions._SLOW_BITS", 100)
+    done = CliRunner().invoke(
+        app, ["propagate", *top_options(), "--precision", "real:100", "--max-steps", "1", "--json"]
+    )
+    assert done.exit_code == 3
+    assert "warning: in real:100 a step sums a Taylor series of order 35: seconds" in done.stderr
+    assert json.loads(done.stdout)["outcome"] == "step_limit"
 
 
 def test_moments_that_no_body_has_are_a_warning() -> None:

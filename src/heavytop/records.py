@@ -11,6 +11,9 @@ import msgspec
 
 SCHEMA = "heavytop-report/1"
 
+OUT_OF_REACH, CONTRADICTION = "out_of_reach", "contradiction"
+"""Outcomes of a row that came to nothing: it has no metrics."""
+
 Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Starts = Annotated[int, msgspec.Meta(ge=1)]
 Count = Annotated[int, msgspec.Meta(ge=0)]

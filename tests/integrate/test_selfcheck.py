@@ -9,7 +9,7 @@ from heavytop.errors import Contradiction, InputError
 from heavytop.exact.validated import Validated
 from heavytop.integrate import engines
 from heavytop.integrate.engines import compiled
-from heavytop.integrate.selfcheck import _GAMMA, _OMEGA, _PARAMETERS, check, derivatives
+from heavytop.integrate.selfcheck import GAMMA, OMEGA, PARAMETERS, check, derivatives
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
@@ -20,7 +20,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 def test_the_known_derivatives_are_those_of_the_enclosed_motion() -> None:
     """The enclosure has a recurrence of its own, in balls."""
-    top, start = HeavyTop(_PARAMETERS.inertia, 1, _PARAMETERS.moment), State(_OMEGA, _GAMMA)
+    top, start = HeavyTop(PARAMETERS.inertia, 1, PARAMETERS.moment), State(OMEGA, GAMMA)
     series = Validated(top, start, HEAVY_TOP).series(Fraction(0), 12, 200)
     factorial = 1
     for n, known in enumerate(derivatives(HEAVY_TOP, False, 12)):

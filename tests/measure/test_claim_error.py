@@ -1,7 +1,6 @@
 """The claim as a motion of the heavy top: how wrong, against truths that do not come from it."""
 
 from fractions import Fraction
-from functools import partial
 
 import pytest
 from flint import arb
@@ -10,7 +9,6 @@ from heavytop.claims.ershkov import PartialCase
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
-from heavytop.integrate.taylor import propagate
 from heavytop.measure.claim_error import claim_attitude, exact_claim, model_error
 from heavytop.measure.computed_reference import ComputedReference
 from heavytop.suite.measurements.claimed import CLAIM_XI, true_motion
@@ -69,7 +67,7 @@ def test_the_computed_truth_and_the_closed_form_agree_where_there_are_both() -> 
 
 
 def test_a_computed_reference_that_does_not_arrive_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heavytop.measure.computed_reference.propagate", partial(propagate, step_limit=2))
+    monkeypatch.setattr("heavytop.measure.computed_reference._MOST_STEPS", 2)
     with pytest.raises(OutOfReach, match="stopped at the step limit"):
         ComputedReference(SIX.solves.top, SIX.solves.start, [Fraction(10)])
 

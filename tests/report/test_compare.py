@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from heavytop.errors import InputError
@@ -293,9 +294,11 @@ def test_a_run_that_failed_on_rounded_times_is_read(tmp_path: Path) -> None:
 
 
 def test_a_list_in_the_environment_differs_by_what_one_of_the_two_lacks() -> None:
-    from heavytop.report.compare import _differences
+    def differences(*environments):
+        two = [msgspec.structs.replace(report(row()), environment=each) for each in environments]
+        return compare(*two, Policy()).environment
 
     old, new = {"cpu": {"features": ["a", "b"]}}, {"cpu": {"features": ["b", "c", "d"]}}
-    assert _differences(old, new) == [("cpu.features", "a", "c d")]
-    assert _differences({}, new) == [("cpu.features", "absent", "3 known")]
-    assert _differences(new, new) == []
+    assert differences(old, new) == [("cpu.features", "a", "c d")]
+    assert differences({}, new) == [("cpu.features", "absent", "3 known")]
+    assert differences(new, new) == []

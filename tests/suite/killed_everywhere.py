@@ -57,7 +57,7 @@ def run(out: Path, killed_at: int) -> int:
     sys.addaudithook(count)
     code = 99
     try:
-        code = command._run(TASKS, {"name": "x"}, out, True, 10.0, {"workers": 1, "scheduler": None})
+        code = command._run(TASKS, {"name": "x"}, out, True, 10.0, {"workers": 1, "scheduler": None}, False)
     finally:
         os._exit(code)
 

@@ -16,7 +16,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Metric, Report, Row
 from heavytop.report import store
-from heavytop.suite.checkpoint import Checkpoint, Saved, _locked
+from heavytop.suite.checkpoint import Checkpoint, Saved, locked
 from heavytop.suite.measurements import measure
 from heavytop.suite.plan import expand, load
 
@@ -153,6 +153,19 @@ def test_a_second_run_into_one_folder_is_refused(tmp_path: Path) -> None:
         kept.add(1, row("second"))
 
 
+def test_a_run_that_is_refused_or_interrupted_at_its_start_holds_no_lock(tmp_path: Path) -> None:
+    for stop in (InputError("Not fit."), KeyboardInterrupt()):
+
+        def check(stop: BaseException = stop) -> None:
+            raise stop
+
+        with pytest.raises(type(stop)), Checkpoint(tmp_path / "out", IDENTITY, check):
+            pass
+        assert not (tmp_path / "out").exists()
+    with checkpoint(tmp_path / "out") as kept:
+        kept.add(0, row("first"))
+
+
 def test_a_lock_whose_name_is_gone_locks_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run opens the lock file just before another, at its end, removes the name."""
     import fcntl
@@ -163,17 +176,17 @@ def test_a_lock_whose_name_is_gone_locks_nothing(tmp_path: Path, monkeypatch: py
         names.append(file)
         if len(names) == 1:
             (tmp_path / ".lock").unlink()
-            other = _locked(tmp_path)
+            other = locked(tmp_path)
             names.append(other)
             other.close()
         real(file, how)
 
     real = fcntl.flock
     monkeypatch.setattr(fcntl, "flock", slow)
-    with _locked(tmp_path) as file:
+    with locked(tmp_path) as file:
         assert os.path.samestat(os.fstat(file.fileno()), (tmp_path / ".lock").stat())
         with pytest.raises(InputError, match="Another run writes"):
-            _locked(tmp_path)
+            locked(tmp_path)
 
 
 def test_a_streamed_report_is_the_one_written_at_once_a_row_a_line(tmp_path: Path) -> None:

@@ -15,6 +15,16 @@ TOP = (
     '[[top]]\nname = "mine"\ninertia = ["3", "2", "1"]\nweight = "1"\ncentre = ["0", "0", "1/3"]\n'
     'omega = ["1", "0.5", "-2/3"]\ngamma = ["3/5", "0", "4/5"]\n'
 )
+WORK = (
+    "[[measure]]\nkind = 'work_precision'\ncases = ['euler']\nhorizon = '10'\n"
+    "ladders = [{ integrator = 'heyoka', tolerances = ['1e-3', '0.001'] }]\n"
+)
+ONE = WORK.replace(", '0.001'", "")
+GROWTH = (
+    "[[measure]]\nkind = 'growth'\ncases = ['euler']\nruns = [\n"
+    "{ precision = 'double', horizon = '10', tolerance = '1e-3' },\n"
+    "{ precision = 'double', horizon = '10', tolerance = '1.0e-3' },\n]\n"
+)
 
 
 def plan_of(tmp_path: Path, text: str):
@@ -74,6 +84,18 @@ def test_homoclinic_cases_have_dyadic_data(name: str) -> None:
         (f"name = 'x'\n{MEASURE.replace(' }', ', samples = 1.5 }')}", "Expected `int`"),
         (f"name = 'x'\n{MEASURE}{MEASURE}", "twice"),
         (f"name = 'x'\n{TOP}{TOP}{MEASURE}", "two tops 'mine'"),
+        (f"name = 'x'\n{TOP}{MEASURE}", "does not measure mine"),
+        (f"name = 'x'\n{TOP.replace('mine', 'my top')}{MEASURE}", "The top's name 'my top' is not letters, digits"),
+        (f"name = 'x'\n{MEASURE.replace('10', '1e-400')}", "drift euler double: 1E-403 is outside the exponent range"),
+        (f"name = 'x'\n{WORK}", "heyoka tolerance=0.001 double twice, also as work_precision euler/T=10 heyoka tol"),
+        (
+            f"name = 'x'\n{ONE}{ONE.replace('10', '1e1')}",
+            "twice, also as work_precision euler/T=10 heyoka tolerance=1e-3",
+        ),
+        (
+            f"name = 'x'\n{GROWTH}",
+            "growth euler tolerance 1.0e-3 double twice, also as growth euler tolerance 1e-3 double",
+        ),
         ("name = 'x'\n[[measure]", "not valid"),
         ("", "name"),
         (f"name = '../evil'\n{MEASURE}", "letters, digits"),

@@ -148,7 +148,11 @@ def test_swept_tasks_share_their_times_and_are_measured_under_their_names(tmp_pa
         ("count = 3", "count = 1_000_001", "The sweep r has 1000001 tops"),
         ("count = 3", "count = 0", "The sweep r has 0 tops"),
         ("count = 3", "count = 3\nspare = 1", "unknown field `spare`"),
-        ('name = "r"', 'name = "g"', "another sweep"),
+        ('name = "r"', 'name = "g"', "two sweeps 'g'"),
+        ('["3", "2", "2"]', '["6/2", "5/2", "3/2"]', "The sweep g lists the inertia 3, 5/2, 3/2 twice"),
+        ('weight = "3/2"', 'weight = ["1", "1.0"]', "The sweep g lists the weight 1 twice"),
+        (', "sweep:r"', "", "does not measure sweep:r"),
+        ("[[sweep]]", RANDOM.replace('"r"', '"s"') + "[[sweep]]", "The sweeps s and r are the same"),
         ('name = "r"', 'name = "r[0]"', "letters, digits"),
         ('"euler"', '"sweep:h"', "Unknown case 'sweep:h'"),
         ('"euler"', '"sweep:g"', "measures drift g[0,0] double twice"),
@@ -175,5 +179,5 @@ def test_a_grid_of_one_point_and_a_sweep_where_a_claim_is_needed_are_refused(tmp
     with pytest.raises(InputError, match=r"Nothing is claimed about the case r\[0\]"):
         plan_of(tmp_path, RANDOM + claim)
     taken = '[[top]]\nname = "r[1]"\n' + one.partition('name = "r"\n')[2]
-    with pytest.raises(InputError, match=r"or of a \[\[top\]\]"):
+    with pytest.raises(InputError, match=r"The top's name 'r\[1\]' is not letters"):
         plan_of(tmp_path, RANDOM + taken + MEASURE)

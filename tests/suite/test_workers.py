@@ -100,6 +100,28 @@ def test_only_a_few_tasks_are_under_way_at_a_time(tasks) -> None:
     assert Counting.most < 4 * 2
 
 
+class Slow(Poison):
+    """Keeps the process that reads it for some seconds, then leaves a file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self):
+        return exec, (f"import time; time.sleep(5); open({str(self.path)!r}, 'w').close()",)
+
+
+@pytest.mark.parametrize("stop", [GeneratorExit, KeyboardInterrupt, InputError])
+def test_a_run_that_is_stopped_does_not_wait_for_what_is_under_way(tasks, tmp_path: Path, stop) -> None:
+    slow = Task("drift", "slow", Slow(tmp_path / "done"), "double", "", tasks[0].times)
+    stream = rows([tasks[0], slow], 2, None)
+    next(stream)
+    with pytest.raises(stop):
+        stream.throw(stop("stopped"))
+    for process in active_children():
+        process.join()
+    assert not (tmp_path / "done").exists()
+
+
 def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     script = tmp_path / "parent.py"
     script.write_text(

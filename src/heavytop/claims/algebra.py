@@ -7,7 +7,7 @@ are taken on the expression before.  Reduction to 0 is a proof; anything else pr
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -150,46 +150,44 @@ class Field:
             return self.tower.power(self.tower.root(self.enter(base)), int(exponent.p))
         raise Unprovable(f"The power {exponent} is no small multiple of 1/2.")
 
-    def _base(self, kind: str, argument: Quotient) -> tuple[int, int] | None:
-        """(position, n) of the base that ``argument`` is n times of; None for a new one."""
-        for position, (known_kind, base, _) in enumerate(self._bases):
+    def _multiple(self, kind: str, argument: Quotient, make: Callable[[Quotient, int], int]) -> tuple[int, int]:
+        """(generator, n): the argument is n times the generator's base.
+
+        make: adds the generator of a new base, which is the argument over as much as has turned out to be needed.
+        """
+        for position, (known_kind, base, index) in enumerate(self._bases):
             if kind == known_kind:
                 ratio = self.tower.divide(argument, base)
                 if not used(ratio.numerator) and ratio.denominator == self.tower.one:
                     value = ratio.numerator.leading_coefficient()
-                    p, q = int(value.p), int(value.q)
-                    if q > 1:
-                        self._divisors[position] *= q
+                    if value.q > 1:
+                        self._divisors[position] *= int(value.q)
                         raise _Refine
-                    if abs(p) > _MAX_MULTIPLE:
-                        raise Unprovable(f"A multiple {p} of an argument.")
-                    return position, p
-        return None
-
-    def _new_base(self, kind: str, argument: Quotient) -> Quotient:
-        """The argument divided as far as it has turned out to be needed."""
+                    if abs(value.p) > _MAX_MULTIPLE:
+                        raise Unprovable(f"A multiple {value.p} of an argument.")
+                    return index, int(value.p)
         if len(self._divisors) <= len(self._bases):
             self._divisors.append(1)
         divisor = self._divisors[len(self._bases)]
-        return self.tower.product((argument, self.tower.number(Fraction(1, divisor))))
+        if divisor > _MAX_MULTIPLE:
+            raise Unprovable(f"A multiple {divisor} of an argument.")
+        base = self.tower.product((argument, self.tower.number(Fraction(1, divisor))))
+        self._bases.append((kind, base, make(base, divisor)))
+        return self._bases[-1][2], divisor
 
     def _exponential(self, argument: Quotient) -> Quotient:
         if not argument.numerator:
             return self.tower.number(1)
-        found = self._base("exp", argument)
-        if found is None:
-            base = self._new_base("exp", argument)
+
+        def make(base: Quotient, _divisor: int) -> int:
             meaning = sympy.exp(self.expression(base))
             index = self.tower.add(meaning, constant=self.is_constant(base), sign=1)
             self._expressions[index] = meaning
-            self._bases.append(("exp", base, index))
             self._declare_size(index, self.tower.sign(base))
-            found = self._base("exp", argument)
-            if found is None:
-                raise Unprovable("An exponential has no base.")
-        position, multiple = found
-        generator = self.tower.polynomial(self.tower.gens[self._bases[position][2]])
-        return self.tower.power(generator, multiple)
+            return index
+
+        index, multiple = self._multiple("exp", argument, make)
+        return self.tower.power(self.tower.polynomial(self.tower.gens[index]), multiple)
 
     def _declare_size(self, index: int, sign: int) -> None:
         """An exponential of known sign of the argument lies above or below 1."""
@@ -209,19 +207,15 @@ class Field:
         value = self.enter(argument)
         if not value.numerator:
             return self.tower.number(0), self.tower.number(1)
-        found = self._base("circle", value)
-        if found is None:
-            base = self._new_base("circle", value)
-            part = argument / self._divisors[len(self._bases)]
+
+        def make(base: Quotient, divisor: int) -> int:
+            part = argument / divisor
             index = self._add(sympy.sin(part), constant=self.is_constant(base))
             square = 1 - self.tower.gens[index] ** 2
             self._expressions[self.tower.add_root(("cos", part), square, sign=0)] = sympy.cos(part)
-            self._bases.append(("circle", base, index))
-            found = self._base("circle", value)
-            if found is None:
-                raise Unprovable("An angle has no base.")
-        position, multiple = found
-        index = self._bases[position][2]
+            return index
+
+        index, multiple = self._multiple("circle", value, make)
         sign = 1 if multiple > 0 else -1
         one = (
             self.tower.polynomial(self.tower.gens[index] * sign),

@@ -19,6 +19,9 @@ Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly
 SystemName = Annotated[str, typer.Option(help="heavy_top or gyrostat.")]
 Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]
 
+_SLOW_BITS = 2000
+"""From here on a single step takes seconds, and about 20 times as long with twice the bits."""
+
 
 @command
 def propagate(
@@ -45,6 +48,13 @@ def propagate(
     if max_steps is not None and max_steps < 1:
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top, start)
+    if form.bits >= _SLOW_BITS:
+        print(
+            f"heavytop: warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
+            f"seconds at real:{_SLOW_BITS}, 20 times as long with twice the bits; Ctrl-C waits for it.\n"
+            "  `heavytop reference` proves as many digits, at once where there is a closed form.",
+            file=sys.stderr,
+        )
 
     from heavytop.measure.motion import compute
 

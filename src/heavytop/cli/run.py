@@ -5,17 +5,21 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from heavytop.cli.app import command, show_on_terminal
 from heavytop.cli.progress import Progress
 from heavytop.errors import InputError
+
+if TYPE_CHECKING:
+    from heavytop.records import Report, Row
 
 _PAGE = "report.html"
 _MOST_ON_A_PAGE = 5000
@@ -64,47 +68,31 @@ def _run(
     resume: bool,
     save_every: float,
     where: dict[str, Any],
-    parquet: bool = False,
+    parquet: bool,
 ) -> int:
-    from msgspec.structs import replace
-
-    from heavytop.precision import available, parse
-
-    missing = {name for name in {task.precision for task in tasks} - {""} if available()[parse(name).family]}
-    if missing:
-        raise InputError(
-            f"The plan needs {', '.join(sorted(missing))}, which this platform lacks.", "`heavytop list` says why."
-        )
-
-    from heavytop.records import SCHEMA, Report, Row
-    from heavytop.report import html, overview, store
+    """Measure what is not there yet, write the report and show it."""
+    from heavytop.records import SCHEMA, Report
     from heavytop.report.environment import environment
-    from heavytop.report.parquet import FILE as PARQUET
-    from heavytop.report.parquet import write as write_parquet
+    from heavytop.report.store import FILE as REPORT
     from heavytop.suite.checkpoint import Checkpoint, identity_of
     from heavytop.suite.run import run as run_tasks
 
-    surroundings = environment()
-    report = Report(SCHEMA, plan, surroundings, [])
-    identity = identity_of(report)
+    report = Report(SCHEMA, plan, environment(), [])
+    fit = partial(_require_fit, directory, resume)
     try:
         with (
             _terminated_like_interrupted(),
-            Checkpoint(directory, identity, lambda: _require_fit(directory, resume), save_every) as checkpoint,
+            Checkpoint(directory, identity_of(report), fit, save_every) as checkpoint,
             Progress(tasks) as advance,
         ):
             laws = run_tasks(tasks, checkpoint, advance, **where)
-
-            def rows() -> Iterator[Row]:
-                return chain(checkpoint.rows(range(len(tasks))), laws)
-
-            if parquet:
-                write_parquet(directory / PARQUET, rows(), plan)
-            path, page = store.write(report, directory, rows()), directory / _PAGE
-            if len(tasks) <= _MOST_ON_A_PAGE:
-                html.write_report(replace(report, rows=list(rows())), page)
-            summary = overview.overview(report, rows())
-            good = overview.all_good(rows())
+            summary, good = _write(
+                report,
+                directory,
+                lambda: chain(checkpoint.rows(range(len(tasks))), laws),
+                len(tasks) <= _MOST_ON_A_PAGE,
+                parquet,
+            )
     except OSError as error:
         raise InputError(
             f"{directory} cannot be written: {error}.",
@@ -114,9 +102,30 @@ def _run(
         print(f"heavytop: interrupted; finished rows are kept: --out {directory} --resume goes on", file=sys.stderr)
         return 143 if isinstance(stop, _Terminated) else 130
     show_on_terminal(summary)
-    print(f"\nReport: {path}")
+    page = directory / _PAGE
+    print(f"\nReport: {directory / REPORT}")
     print(f"Page:   {page if page.exists() else f'none for so many rows; `heavytop show {directory} --html FILE`'}")
     return 0 if good else 3
+
+
+def _write(
+    report: Report, directory: Path, rows: Callable[[], Iterator[Row]], page: bool, parquet: bool
+) -> tuple[Any, bool]:
+    """Write all that a finished run leaves; returns its summary, and whether no row failed.
+
+    rows: a new stream of all rows at each call.  page: whether to make one.
+    """
+    from msgspec.structs import replace
+
+    from heavytop.report import html, overview, store
+    from heavytop.report import parquet as tables
+
+    if parquet:
+        tables.write(directory / tables.FILE, rows(), report.plan)
+    store.write(report, directory, rows())
+    if page:
+        html.write_report(replace(report, rows=list(rows())), directory / _PAGE)
+    return overview.overview(report, rows()), overview.all_good(rows())
 
 
 class _Terminated(KeyboardInterrupt):

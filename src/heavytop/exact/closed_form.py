@@ -6,14 +6,16 @@ are the series whose residual proves the form.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from flint import acb, acb_series, arb, arb_series, ctx
 
-from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.balls import FUNCTIONS, ball, to_bits
 from heavytop.exact.motion import initial_xi
+from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
@@ -83,8 +85,8 @@ def tanh_sech(argument: Any) -> tuple[Any, Any]:
     return side * (1 - decay * decay) / total, 2 * decay / total
 
 
-class ClosedForm:
-    """A motion given by one formula, :meth:`motion`, over power series.
+class ClosedForm(ABC):
+    """A motion given by one formula, :meth:`evaluate`, over power series.
 
     Mixed into the dataclass of each case, which brings ``top``, ``start`` and ``method``.
     """
@@ -100,14 +102,9 @@ class ClosedForm:
         @property
         def start(self) -> State: ...
 
-    def motion(self, time: Any) -> tuple[list[Any], Carry]:
-        """Ω at the number or series ``time``, and what carries vectors fixed in space there."""
-        raise NotImplementedError
-
+    @abstractmethod
     def evaluate(self, time: Fraction) -> list[Any]:
         """The six components at ``time`` + ε, at FLINT's working precision and length of series."""
-        omega, carry = self.motion(instant(time))
-        return [*omega, *carry(balls(self.start.gamma))]
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
@@ -128,9 +125,18 @@ class ClosedForm:
 
 
 class WithAttitude(ClosedForm):
-    """A closed form that also carries vectors fixed in space."""
+    """A closed form that carries all vectors fixed in space, and so γ, by one formula: :meth:`motion`."""
 
     __slots__ = ()
+
+    @abstractmethod
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+        """Ω at the number or series ``time``, and what carries vectors fixed in space there."""
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`ClosedForm`."""
+        omega, carry = self.motion(instant(time))
+        return [*omega, *carry(balls(self.start.gamma))]
 
     def attitude(self, time: Fraction, bits: int, initial: Sequence[Fraction] | None = None) -> list[arb]:
         """ξ, a unit vector fixed in space and ⟂ γ, in body components.
@@ -144,6 +150,25 @@ class WithAttitude(ClosedForm):
 
         with series_length(1):
             return to_bits(evaluate, bits, time)
+
+
+class WithAngles(ClosedForm):
+    """A closed form of the Euler angles too."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def angles(self, time: Fraction, bits: int) -> list[arb]:
+        """(φ, θ, ψ), continuous for all t."""
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, the space axis ⟂ γ in body components."""
+
+        def evaluate(working: int) -> list[arb]:
+            phi, theta, psi = self.angles(time, working)
+            return list(attitude_from_angles(phi, theta, psi, FUNCTIONS))
+
+        return to_bits(evaluate, bits)
 
 
 def constant(value: Any) -> arb:

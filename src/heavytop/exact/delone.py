@@ -35,12 +35,11 @@ from typing import Any
 from flint import arb, ctx
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import FUNCTIONS, ball, to_bits
-from heavytop.exact.closed_form import ClosedForm, balls, constant, instant, series_length, tanh_sech
+from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.closed_form import ClosedForm, WithAngles, balls, constant, instant, series_length, tanh_sech
 from heavytop.exact.motion import kept
 from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.precision import shown
-from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -130,7 +129,7 @@ def _prepared(case: Delone, _bits: int) -> PreparedMotion:
 
 
 @dataclass(frozen=True, slots=True)
-class DeloneHomoclinic(ClosedForm):
+class DeloneHomoclinic(WithAngles):
     """The heavy-top motion that (4.2)-(4.6) should have been for I1 = I2 = 2 I3.
 
     alpha: α > 0, 1/time.  i1: I1 = I2 = 2 I3 > 0.  Raises NotInClass outside.
@@ -171,21 +170,12 @@ class DeloneHomoclinic(ClosedForm):
         return [*omega, sin_theta * sin_phi, sin_theta * cos_phi, cos_theta]
 
     def angles(self, time: Fraction, bits: int) -> list[arb]:
-        """(φ, θ, ψ), continuous for all t: θ in [0, π/2), φ rising from 0 through π at t = 0 to 2π."""
+        """(φ, θ, ψ), continuous for all t: θ in [0, π/2), φ rising from 0 through π at t = 0, where ψ = 0, to 2π."""
 
         def evaluate(_working: int) -> list[arb]:
             with series_length(1):
                 sin_phi, cos_phi, sin_theta, cos_theta = self._sines(time)
             phi = arb.pi() + arb.atan2(-sin_phi, -cos_phi)
             return [phi, arb.atan2(sin_theta, cos_theta), ball(self.alpha * time)]
-
-        return to_bits(evaluate, bits)
-
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, the space axis ⟂ γ in body components; at t = 0 φ + ψ = π, so ξ = (−1, 0, 0)."""
-
-        def evaluate(working: int) -> list[arb]:
-            phi, theta, psi = self.angles(time, working)
-            return list(attitude_from_angles(phi, theta, psi, FUNCTIONS))
 
         return to_bits(evaluate, bits)

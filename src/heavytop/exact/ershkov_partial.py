@@ -19,9 +19,8 @@ from flint import arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
-from heavytop.exact.closed_form import ClosedForm, instant, tanh_sech
+from heavytop.exact.closed_form import WithAngles, instant, tanh_sech
 from heavytop.precision import shown
-from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -38,7 +37,7 @@ def hyperbolic_angles(s: Any, lib: Any) -> tuple[Any, Any]:
 
 
 @dataclass(frozen=True, slots=True)
-class ErshkovPartial(ClosedForm):
+class ErshkovPartial(WithAngles):
     """The homoclinic gyrostat motion from Ω = (0, 0, ρ α), γ = (0, 0, 1) at t = 0.
 
     alpha: α > 0, 1/time.  i1, i3: I1 = I2 > I3 > 0.  Raises NotInClass outside.
@@ -87,14 +86,5 @@ class ErshkovPartial(ClosedForm):
             s = ball(self.rate * time / 2)
             psi = ball(self.alpha * time * (self.i1 + self.i3) / (2 * self.i3))
             return [*hyperbolic_angles(s, FUNCTIONS), psi]
-
-        return to_bits(evaluate, bits)
-
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, the space axis ⟂ γ in body components."""
-
-        def evaluate(working: int) -> list[arb]:
-            phi, theta, psi = self.angles(time, working)
-            return list(attitude_from_angles(phi, theta, psi, FUNCTIONS))
 
         return to_bits(evaluate, bits)

@@ -18,7 +18,7 @@ Attitude (Jacobi): the projection of e_b across M, which never vanishes, turns a
 and μ from ψ' at u = 0.  Every vector fixed in space, γ among them, keeps its components on M, on that projection
 turned back by ψ, and across both.  Where Ω × M = 0 the rotation is steady and space turns about Ω at the rate |Ω|.
 
-Sources: Whittaker, Analytical Dynamics, chapter VI; Landau and Lifshitz, Mechanics, §37; DLMF 22.19(iv).
+Sources: Whittaker, Analytical Dynamics, chapter VI; Landau and Lifshitz, Mechanics, §37; DLMF 22.19.
 """
 
 from __future__ import annotations

@@ -30,7 +30,8 @@ from flint import arb, arb_series
 
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
-from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion, Winding
+from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
+from heavytop.exact.second_kind import Winding
 from heavytop.exact.weierstrass import Point, imag, real
 from heavytop.top.equations import GYROSTAT, Parameters, System, gyrostat, rotor
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot

@@ -10,7 +10,7 @@ and for larger m, by Jacobi's imaginary transformation, with the complementary n
 
 So the nome never exceeds 0.15.  Where it is 0 the thetas are sin πz, cos πz, 1, 1 (the common factor 2 q^(1/4)
 of θ1 and θ2 cancels everywhere): circular functions at m = 0, hyperbolic ones at m = 1.
-For larger m arguments are reduced modulo 2K before anything is evaluated.  DLMF 22.2, 20.7(viii).
+For larger m arguments are reduced modulo 2K before anything is evaluated.  DLMF 22.2.4-22.2.6, 20.7(viii).
 Numbers are put into the series of :mod:`heavytop.exact.theta`, power series into FLINT's own theta functions.
 """
 

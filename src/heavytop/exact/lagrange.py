@@ -32,7 +32,8 @@ from flint import acb, arb, arb_series
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
-from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion, Winding
+from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
+from heavytop.exact.second_kind import Winding
 from heavytop.exact.weierstrass import imag, real
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, Parameters, System, heavy_top

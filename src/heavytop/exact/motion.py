@@ -12,7 +12,8 @@ from flint import arb, arb_series, ctx, fmpq, fmpq_series
 
 from heavytop.errors import InputError
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.quartic import Pair, Winding
+from heavytop.exact.quartic import Pair
+from heavytop.exact.second_kind import Winding
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import Vector, dot

@@ -10,7 +10,7 @@ With N = |n||γ| and x the angle of γ from −n in the plane (i, j, k cyclic), 
     h > N:  sin(x/2) = σ sn u,     cos(x/2) = cn u,  x' = 2σ ω dn u,     m = 2N/(h + N),    ω² = (h + N)/(2 I_k)
 
 u = ω t + u0, and σ is the sign of x' at t = 0; h = N is the separatrix, m = 1.  Every vector fixed in space turns
-about e_k through x(t) − x(0).  Source: Whittaker, Analytical Dynamics, chapter IV; DLMF 22.19(i).
+about e_k through x(t) − x(0).  Source: Whittaker, Analytical Dynamics, chapter IV; DLMF 22.19.
 """
 
 from __future__ import annotations

@@ -4,8 +4,9 @@ With x = πz and c = cos 2x, Chebyshev's polynomials take every angle to one var
 
     cos 2nx = T_n(c),   sin (2n+1)x = (U_n + U_(n−1))(c) sin x,   cos (2n+1)x = (U_n − U_(n−1))(c) cos x
 
-so the Fourier series of the thetas (DLMF 20.2(i)) are polynomials in c times 1, sin x or cos x.  On the imaginary axis
-sin, cos become i sinh, cosh and nothing else changes.  Their coefficients fall like q^(n²): few terms are left.
+so the Fourier series of the thetas (DLMF 20.2.1-20.2.4) are polynomials in c times 1, sin x or cos x.  On the
+imaginary axis sin, cos become i sinh, cosh and nothing else changes.  Their coefficients fall like q^(n²): few terms
+are left.
 
 Tail: |U_n ± U_(n−1)|, |T_n| ≤ (2n + 1) g^n where |e^(2ix)| ≤ g, 1/g ≤ |e^(2ix)|.  If the weights are at most
 q^(n²) w^n, the terms from n = N on are below b_N = (2N + 1) q^(N²) (g w)^N and fall at least by the factor
@@ -68,7 +69,7 @@ class Theta:
         return self._sum(self.square.sqrt(), 2, _doubled(sign), 0, 2)
 
     def both(self) -> Any:
-        """θ3 θ4/θ4(0|2τ) = θ4(2z|2τ), as a polynomial in c."""
+        """θ3 θ4/θ4(0|2τ) = θ4(2z|2τ), DLMF 20.7.11, as a polynomial in c."""
         double = Theta(self.square * self.square, self.rate, self.hyperbolic, self.growth * self.growth)
         return double._sum(self.square, 2, _doubled(-1), 0, 2)(arb_poly([-1, 0, 2]))
 

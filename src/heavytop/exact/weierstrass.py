@@ -1,8 +1,8 @@
 """Weierstrass' functions of a real lattice, from its invariants or roots, as balls.
 
-℘'² = 4℘³ − g2 ℘ − g3 = 4 (℘ − e1)(℘ − e2)(℘ − e3), e1 + e2 + e3 = 0, real g2, g3 (DLMF 23.2, 23.3).  With half-periods
+℘'² = 4℘³ − g2 ℘ − g3 = 4 (℘ − e1)(℘ − e2)(℘ − e3), e1 + e2 + e3 = 0, real g2, g3 (DLMF 23.3.10).  With half-periods
 ω (real) and ω', τ = ω'/ω where all roots are real (e1 > e2 > e3), and the basis ω, (ω + ω')/2, τ = (1 + ω'/ω)/2, where
-two are complex, z = u/(2ω) and T(u) = 2ω θ1(z)/θ1'(0), everything is a theta quotient (DLMF 23.6.2-23.6.15):
+two are complex, z = u/(2ω) and T(u) = 2ω θ1(z)/θ1'(0), everything is a theta quotient (DLMF 23.6.5-23.6.9):
 
     ℘ = e1 + (θ2(z)/(θ2(0) T))²,   ℘' = −2 θ2(z)θ3(z)θ4(z)/(θ2(0)θ3(0)θ4(0) T³),   σ = T exp(η u²/(2ω))
 
@@ -14,7 +14,6 @@ transformation that FLINT makes, and only the roots' difference costs working pr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -23,7 +22,7 @@ from typing import Any
 
 from flint import acb, acb_series, arb, arb_poly, arb_series, ctx, fmpz_poly
 
-from heavytop.errors import InputError, OutOfReach
+from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, working_precision
 from heavytop.exact.theta import Theta
 
@@ -136,15 +135,13 @@ class Lattice:
         scale = 2 * self.half_period * thetas(z, self.ratio)[0] / self.zero[0]
         return acb((-scale if turns % 2 else scale) * (self.quasi_period * u * u / (2 * self.half_period)).exp())
 
-    @property
-    def other_half_period(self) -> acb:
-        """τ ω: with ω a basis of the half-periods; on the imaginary axis where all roots are real."""
-        return self.ratio * self.half_period
-
 
 @dataclass(frozen=True, slots=True)
 class DegenerateLattice:
-    """Discriminant 0: ℘ = d + κ²/sinh²(κu), κ² = 3d, double root d and simple root −2d (DLMF 23.10(iv))."""
+    """Discriminant 0: ℘ = d + κ²/sinh²(κu), κ² = 3d, double root d and simple root −2d.
+
+    ℘, ζ and σ are the limits of DLMF 23.12.1-23.12.3 for nome 0, with κ = iπ/(2ω).
+    """
 
     double: Scalar
 
@@ -232,7 +229,7 @@ def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
     they do not decide it.
     """
     if not isinstance(g2, arb) and not isinstance(g3, arb):
-        return _exact_lattice(Fraction(g2), Fraction(g3), ctx.prec)
+        return exact_lattice(Fraction(g2), Fraction(g3), ctx.prec)
     g2, g3 = as_ball(g2), as_ball(g3)
     discriminant = g2**3 - 27 * g3**2
     if not (discriminant > 0 or discriminant < 0):
@@ -244,25 +241,9 @@ def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
     return _from_roots([_enclose(root, g2, g3) for root in near])
 
 
-def from_roots(roots: Sequence[Exact | arb | acb]) -> AnyLattice:
-    """The lattice with these roots e (their sum 0): exact numbers or balls, all real or one real and a conjugate pair.
-
-    Raises InputError unless three, with a sum that can be 0; OutOfReach where balls do not tell two roots apart.
-    """
-    total = sum(roots)
-    if len(roots) != 3 or not (total == 0 if isinstance(total, (int, Fraction)) else total.contains(0)):
-        raise InputError(f"Roots with the sum {total}.", "Three roots e1 + e2 + e3 = 0 make a lattice.")
-    if all(isinstance(root, (int, Fraction)) for root in roots):
-        a, b, c = (Fraction(root) for root in roots)  # type: ignore[arg-type]
-        return from_invariants(-4 * (a * b + b * c + c * a), 4 * a * b * c)
-    balls = [root if isinstance(root, acb) else acb(as_ball(root)) for root in roots]
-    if any(a.overlaps(b) for a, b in ((balls[0], balls[1]), (balls[1], balls[2]), (balls[2], balls[0]))):
-        raise OutOfReach("Two roots cannot be told apart.", "Give the roots exactly, or as narrower balls.")
-    return _from_roots(balls)
-
-
 @lru_cache(maxsize=64)
-def _exact_lattice(g2: Fraction, g3: Fraction, bits: int) -> AnyLattice:
+def exact_lattice(g2: Fraction, g3: Fraction, bits: int) -> AnyLattice:
+    """:func:`from_invariants` of exact ones, once for each working precision."""
     with working_precision(bits):
         if g2**3 == 27 * g3**2:
             return DegenerateLattice(Fraction(-3, 2) * g3 / g2 if g2 else Fraction(0))

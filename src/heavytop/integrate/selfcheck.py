@@ -18,9 +18,9 @@ from heavytop.precision import Precision, exact, number
 from heavytop.top.equations import GYROSTAT, Parameters, System
 
 # Ω in multiples of I1 I2 I3 and γ in multiples of its square keep every division by a moment whole
-_PARAMETERS = Parameters((3, 2, 1), (2, -1, 3), 6)
-_OMEGA = (6, -12, 6)
-_GAMMA = (36, 72, -36)
+PARAMETERS = Parameters((3, 2, 1), (2, -1, 3), 6)
+OMEGA = (6, -12, 6)
+GAMMA = (36, 72, -36)
 _XI = (1, 2, -5)
 _MOST_DERIVATIVES = 100
 _COEFFICIENT_EPS = 8
@@ -62,9 +62,9 @@ class Derivatives:
         return Derivatives(at)
 
 
-def derivatives(system: System, attitude: bool, count: int, p: Parameters = _PARAMETERS) -> Iterator[list[Exact]]:
+def derivatives(system: System, attitude: bool, count: int, p: Parameters = PARAMETERS) -> Iterator[list[Exact]]:
     """y, y', y'', ... at the known start, from the field: ``count`` lists of six exact numbers, or nine with ξ."""
-    values: list[list[Exact]] = [[first] for first in (*_OMEGA, *_GAMMA, *(_XI if attitude else ()))]
+    values: list[list[Exact]] = [[first] for first in (*OMEGA, *GAMMA, *(_XI if attitude else ()))]
     y = [Derivatives(column.__getitem__) for column in values]
     rates = system.field(p, y[:6])
     if attitude:
@@ -83,7 +83,7 @@ def check(engine: Any, system: System, precision: Precision, constants: Paramete
     the new state and the dense output against the polynomial summed here.  Raises Contradiction.
     constants: exact parameters that were compiled in; None where the engine takes any.
     """
-    p = constants or _PARAMETERS
+    p = constants or PARAMETERS
     lanes = engine.state.shape[1:]
     size = engine.state.shape[0]
 
@@ -94,7 +94,7 @@ def check(engine: Any, system: System, precision: Precision, constants: Paramete
     _reset(engine, precision)
     if constants is None:
         set_to((*p.inertia, p.rotor) if system is GYROSTAT else (*p.inertia, *p.moment), engine.pars)
-    set_to((*_OMEGA, *_GAMMA, *_XI)[:size], engine.state)
+    set_to((*OMEGA, *GAMMA, *_XI)[:size], engine.state)
     engine.step(write_tc=True)
     eps, order = precision.eps, engine.order
     known = list(derivatives(system, size == 9, min(order + 1, _MOST_DERIVATIVES), p))

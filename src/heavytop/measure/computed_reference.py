@@ -18,11 +18,14 @@ from heavytop.precision import exact, real
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
+_MOST_STEPS = 10_000
+"""Some minutes of work; absurd starts and times would take for ever."""
+
 
 class ComputedReference:
     """States, and on request attitude vectors, at given times, from runs with ``bits`` and with 64 bits more.
 
-    Raises OutOfReach if either run does not reach the last time.
+    Raises OutOfReach if either run does not reach the last time in 10,000 steps.
     """
 
     def __init__(
@@ -34,7 +37,10 @@ class ComputedReference:
         system: System = HEAVY_TOP,
         xi: tuple[Fraction, ...] | None = None,
     ) -> None:
-        runs = [propagate(top, start, times, real(b), system=system, xi=xi) for b in (bits, bits + 64)]
+        runs = [
+            propagate(top, start, times, real(b), system=system, xi=xi, step_limit=_MOST_STEPS)
+            for b in (bits, bits + 64)
+        ]
         for run in runs:
             if run.outcome is not Outcome.SUCCESS:
                 raise OutOfReach(

@@ -61,7 +61,13 @@ def _audited(row: Row) -> Audited:
 
 def wrongness(report: Report, times: Sequence[str] = ("0.1", "1", "2", "5")) -> list[Wrongness]:
     """How wrong a claim is, per case; forward in time, and the smooth branch, where there are several."""
-    rows = [row for row in report.rows if row.measure == "claim_model" and not row.case.endswith("/backward")]
+    rows = [
+        row
+        for row in report.rows
+        if row.measure == "claim_model"
+        and "claim_parts_by_1_percent_at" in row.metrics
+        and not row.case.endswith("/backward")
+    ]
     smooth = {row.case for row in rows if row.integrator == "claim:smooth"}
     return [_wrongness(row, times) for row in rows if row.case not in smooth or row.integrator == "claim:smooth"]
 

@@ -13,7 +13,7 @@ from heavytop.report.comparison_text import row_name
 from heavytop.report.plots import digits_at_end
 from heavytop.report.section import Section, Sources, clip
 from heavytop.report.svg import quiet_style
-from heavytop.report.text import short
+from heavytop.report.text import failed, short
 from heavytop.suite.files import replace
 from heavytop.suite.plan import BUILT_IN
 
@@ -33,7 +33,7 @@ def report_page(report: Report) -> str:
     """The page of ``report``; the same report gives the same bytes."""
     rows, left_out = detailed(report.rows)
     found = claim_verdict.audited(report)
-    failures = [row for row in report.rows if row.outcome != "success" and row.measure != "work_precision"]
+    failures = [row for row in report.rows if failed(row)]
     word, sentence = claim_verdict.headline(found)
     return _render(
         "report.html.j2",

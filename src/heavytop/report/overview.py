@@ -13,7 +13,7 @@ from rich.text import Text
 
 from heavytop.records import Report, Row
 from heavytop.report.store import AnyReport, AnyRow
-from heavytop.report.text import head, short, summary, table, title
+from heavytop.report.text import failed, head, short, summary, table, title
 
 MOST_ROWS = 200
 """More rows than these are summed up after a run, not listed."""
@@ -63,5 +63,5 @@ def worst(report: AnyReport, rows: Iterable[AnyRow], hint: str) -> RenderableTyp
 
 
 def all_good(rows: Iterable[Row]) -> bool:
-    """Whether every run reached its horizon; that a peer gives up is what the work-precision rows are there to show."""
-    return all(row.outcome == "success" for row in rows if row.measure != "work_precision")
+    """Whether no row has :func:`failed`."""
+    return not any(map(failed, rows))

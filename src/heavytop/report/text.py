@@ -38,6 +38,8 @@ def summary(report: Report) -> RenderableType:
     """What is known, what the claim gets wrong and from when on, digits kept and drift per format."""
     by_measure: dict[str, list[Row]] = {}
     for row in report.rows:
+        if row.outcome != "success" and not row.metrics:
+            continue  # nothing came of it: it stands among the failed ones alone
         by_measure.setdefault(row.measure, []).append(row)
     parts: list[RenderableType] = [head(report, len(report.rows))]
     sections = {
@@ -58,16 +60,22 @@ def summary(report: Report) -> RenderableType:
     for name in (name for name in by_measure if name not in sections):
         said = f"Measure {name or 'without a name'}: {len(by_measure[name])} rows, which the page lists (--html FILE)"
         parts += [Text(), Text(printable(said))]
-    failed = [row for row in report.rows if row.outcome != "success" and row.measure != "work_precision"]
-    if failed:
+    if failures := [row for row in report.rows if failed(row)]:
         parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
-        parts += [
-            Text(
-                printable(f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}")
-            )
-            for row in failed
-        ]
+        parts += [Text(printable(_failure(row))) for row in failures]
     return Group(*parts)
+
+
+def failed(row: Row) -> bool:
+    """Whether a run did not reach its horizon; that a peer gives up is what work-precision rows are there to show."""
+    return row.outcome != "success" and not (row.measure == "work_precision" and row.metrics)
+
+
+def _failure(row: Row) -> str:
+    if row.metrics:
+        return f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}"
+    which = f"{row.measure} of {row.case}, {row.integrator} in {row.precision}"
+    return f"  {which}: {row.outcome}, held against {row.against}"
 
 
 def head(report: AnyReport, rows: int) -> Text:

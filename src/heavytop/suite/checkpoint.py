@@ -11,7 +11,7 @@ import hashlib
 import os
 import re
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -86,8 +86,9 @@ class Checkpoint:
         self._synced = 0.0
 
     def __enter__(self) -> Checkpoint:
-        self._lock = _locked(self.directory)
-        try:
+        self._lock = locked(self.directory)
+        with ExitStack() as unless_all_is_well:
+            unless_all_is_well.callback(self._leave)
             self.check()
             for leftover in self.directory.glob(".*.partial"):
                 leftover.unlink()
@@ -96,9 +97,7 @@ class Checkpoint:
             # unbuffered: a row is with the system when add returns, and a failed write leaves nothing to fail again
             self._file = self.path.open("r+b", buffering=0)
             self._read()
-        except BaseException:
-            self._leave()
-            raise
+            unless_all_is_well.pop_all()
         return self
 
     def _read(self) -> None:
@@ -195,7 +194,7 @@ def require_same(there: dict[str, str], here: dict[str, str], where: Path) -> No
         )
 
 
-def _locked(directory: Path) -> BinaryIO:
+def locked(directory: Path) -> BinaryIO:
     """The lock file of a directory, held; raises InputError where another process holds it."""
     import fcntl
 

@@ -15,7 +15,9 @@ from pathlib import Path
 import msgspec
 
 from heavytop.errors import InputError
+from heavytop.integrate.trajectory import Problem
 from heavytop.measure.luck import MOST_SEEDS
+from heavytop.precision import exact, number, parse, require
 from heavytop.suite.cases import CASES, Case, case, require_possible
 from heavytop.suite.sweeps import Lazy, Sweep
 from heavytop.suite.tables import Table
@@ -24,6 +26,8 @@ from heavytop.top.equations import system
 from heavytop.top.heavy_top import HeavyTop, State
 
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
+_SETTING = re.compile(r"((?<==)|(?<=tolerance )|(?<=bias ))[^ ]+")
+"""The numbers in a task's label: 1e-3 and 0.001 are the same work."""
 _RENAME = "Give it another name."
 BUILT_IN = ("smoke", "default", "growth", "long", "peers", "selftest")
 
@@ -77,28 +81,32 @@ def load(name: str) -> tuple[Plan, str]:
 def expand(plan: Plan, seed: int = 0) -> Sequence[Task]:
     """The plan's measurements in its order, with the roundings of a seed; those over a sweep are made when asked for.
 
-    Raises InputError for an unknown case or precision, an impossible value or seed, and two measurements that would
-    fill the same row.
+    Raises InputError for an unknown case or precision, an impossible value or seed, data that a format cannot hold, two
+    measurements of the same, and a top or sweep that nothing measures.
     """
     if not 0 <= seed <= MOST_SEEDS:
         raise InputError(f"There is no seed {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
-    own: dict[str, Case] = {}
-    for top in plan.top:
-        if top.name in own:
-            raise InputError(f"The plan {plan.name} has two tops {top.name[:60]!r}.", _RENAME)
-        own[top.name] = _own_case(top)
-    swept = _swept(plan)
+    own, swept = _own(plan), _swept(plan)
     known = own | {name: cases[0] for name, cases in swept.items()}
+    asked = {name for table in plan.measure for name in getattr(table, "cases", [])}
+    if unused := known.keys() - asked:
+        raise InputError(
+            f"The plan {plan.name} does not measure {', '.join(sorted(unused))}.",
+            "Name it in the cases of a [[measure]], or take it out.",
+        )
     parts = [
         ([replace(task, seed=seed) for task in table.tasks(lambda name: case(name, known))], cases)
         for whole in plan.measure
         for table, cases in _parts(whole, swept)
     ]
-    seen: set[str] = set()
+    seen: dict[str, str] = {}
     for task in (task for templates, _ in parts for task in templates):
-        if task.label in seen:
-            raise InputError(f"The plan {plan.name} measures {task.label} twice.", "Name each measurement once.")
-        seen.add(task.label)
+        work = _SETTING.sub(_exactly, task.label)
+        if work in seen:
+            other = "" if seen[work] == task.label else f", also as {seen[work]}"
+            raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "Name each measurement once.")
+        seen[work] = task.label
+        _require_fit(task)
     if not seen:
         raise InputError(f"The plan {plan.name} measures nothing.", "Give it at least one [[measure]] with cases.")
     ends = list(accumulate(len(templates) * len(cases or (None,)) for templates, cases in parts))
@@ -112,16 +120,55 @@ def expand(plan: Plan, seed: int = 0) -> Sequence[Task]:
     return Lazy(ends[-1], task_at)
 
 
+def _own(plan: Plan) -> dict[str, Case]:
+    """The plan's own tops by name."""
+    own: dict[str, Case] = {}
+    for top in plan.top:
+        _require_name(top.name, "top")
+        if top.name in own:
+            raise InputError(f"The plan {plan.name} has two tops {top.name!r}.", _RENAME)
+        if top.name in CASES:
+            raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", _RENAME)
+        body = HeavyTop(top.inertia, top.weight, top.centre)
+        case = Case(top.name, "from the plan", system(top.system), body, State(top.omega, top.gamma))
+        own[top.name] = require_possible(case)
+    return own
+
+
 def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
     """The cases of each sweep, by the name under which tables ask for them."""
     swept: dict[str, Sequence[Case]] = {}
-    for sweep in plan.sweep:
-        if not re.fullmatch(_NAME, sweep.name):
-            raise InputError(f"The sweep's name {sweep.name[:40]!r} is not letters, digits, '.', '_' and '-'.", _RENAME)
-        if f"sweep:{sweep.name}" in swept or any(top.name.startswith(f"{sweep.name}[") for top in plan.top):
-            raise InputError(f"The name {sweep.name} is that of another sweep, or of a [[top]].", _RENAME)
+    for place, sweep in enumerate(plan.sweep):
+        _require_name(sweep.name, "sweep")
+        for other in plan.sweep[:place]:
+            if sweep.name == other.name:
+                raise InputError(f"The plan {plan.name} has two sweeps {sweep.name!r}.", _RENAME)
+            if sweep == msgspec.structs.replace(other, name=sweep.name):
+                raise InputError(f"The sweeps {other.name} and {sweep.name} are the same.", "Take one of them out.")
         swept[f"sweep:{sweep.name}"] = sweep.cases()
     return swept
+
+
+def _require_name(name: str, what: str) -> None:
+    if not re.fullmatch(_NAME, name):
+        raise InputError(f"The {what}'s name {name[:40]!r} is not letters, digits, '.', '_' and '-'.", _RENAME)
+
+
+def _exactly(number: re.Match[str]) -> str:
+    return number[0] if number[0] == "eps" else str(exact(number[0]))
+
+
+def _require_fit(task: Task) -> None:
+    """Raises InputError, with the name of the task, where its format is not there or cannot hold its data."""
+    if task.case is None or not task.precision:
+        return
+    try:
+        precision = require(parse(task.precision))
+        Problem.of(task.case.top, task.case.start, precision, task.case.system)
+        for time in task.times[:1] + task.times[-1:]:
+            number(time, precision)
+    except InputError as error:
+        raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
 def _parts(table: Table, swept: dict[str, Sequence[Case]]) -> list[tuple[Table, Sequence[Case] | None]]:
@@ -130,10 +177,3 @@ def _parts(table: Table, swept: dict[str, Sequence[Case]]) -> list[tuple[Table, 
     if not swept.keys() & set(names):
         return [(table, None)]
     return [(msgspec.structs.replace(table, cases=[name]), swept.get(name)) for name in names]
-
-
-def _own_case(top: Top) -> Case:
-    if top.name in CASES:
-        raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", _RENAME)
-    body = HeavyTop(top.inertia, top.weight, top.centre)
-    return require_possible(Case(top.name, "from the plan", system(top.system), body, State(top.omega, top.gamma)))

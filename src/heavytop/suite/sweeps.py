@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from math import prod
@@ -12,12 +13,13 @@ import msgspec
 import numpy
 
 from heavytop.errors import InputError
-from heavytop.precision import exact
+from heavytop.precision import exact, shown
 from heavytop.suite.cases import Case, require_possible
 from heavytop.top.equations import HEAVY_TOP, system
 from heavytop.top.heavy_top import HeavyTop, State, vector
 
 _MOST = 1_000_000
+_AXES = ("inertia", "weight", "centre", "omega", "gamma")
 _T = TypeVar("_T")
 
 
@@ -63,9 +65,14 @@ class Grid(Strict, tag="grid"):
     def cases(self) -> Sequence[Case]:
         """The points.  What is wrong with any of them is said now."""
         which = system(self.system)
-        axes = [self._axis(what) for what in ("inertia", "weight", "centre", "omega", "gamma")]
+        axes = [self._axis(what) for what in _AXES]
         shape = [len(axis) for axis in axes]
         size = _bounded(self.name, prod(shape))
+        for what, axis in zip(_AXES, axes, strict=True):
+            if twice := [value for value, count in Counter(axis).items() if count > 1]:
+                raise InputError(
+                    f"The sweep {self.name} lists the {what} {_text(twice[0])} twice.", "List each value once."
+                )
         if not any(isinstance(axis, list) for axis in axes):
             raise InputError(f"The sweep {self.name} varies nothing.", "Give a list of values, or use [[top]].")
 
@@ -153,6 +160,10 @@ def _direction(draw: Callable[[], int]) -> list[Fraction]:
 
 
 Sweep = Grid | Random
+
+
+def _text(value: Fraction | Sequence[Fraction]) -> str:
+    return shown(value) if isinstance(value, Fraction) else ", ".join(map(shown, value))
 
 
 def _bounded(name: str, size: int) -> int:

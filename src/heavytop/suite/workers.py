@@ -19,7 +19,7 @@ from operator import itemgetter
 from threading import Thread
 from typing import Any
 
-from heavytop.errors import HeavyTopError, InputError
+from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.task import Task
@@ -135,12 +135,8 @@ def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Ite
                         raise InputError(f"The scheduler {scheduler} has no such heavytop.", _SAME) from None
                     raise
                 yield index, row
-            pool.shutdown()
         except (CancelledError, OSError):
             raise HeavyTopError(f"The scheduler {scheduler} was lost.", f"{_RESUME}.") from None
-        except BaseException:
-            pool.shutdown(wait=False)
-            raise
 
 
 def _windowed(
@@ -163,9 +159,16 @@ def _windowed(
 
 
 def _measure(task: Task, saved: Saved) -> Row:
+    """The row of ``task``, also where it cannot be known; raises InputError with its name for impossible data."""
     from heavytop.suite.measurements import measure
+    from heavytop.suite.measurements.shared import unmeasured
 
-    return measure(task, saved)
+    try:
+        return measure(task, saved)
+    except (OutOfReach, Contradiction) as error:
+        return unmeasured(task, error)
+    except InputError as error:
+        raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
 def _measure_as(expected: Versions, task: Task) -> Row:
@@ -198,7 +201,7 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
             yield pool
         except BrokenProcessPool:
             raise  # the pool ends its own processes then
-        except BaseException:
+        except BaseException:  # Ctrl-C, SIGTERM or an error: else the tasks under way are waited for, hours perhaps
             processes = list((pool._processes or {}).values())
             pool.shutdown(wait=False, cancel_futures=True)
             for process in processes:

@@ -21,7 +21,7 @@ from heavytop.measure.known import certified
 from heavytop.measure.scalar import largest, metric, of_fraction, text
 from heavytop.precision import parse
 from heavytop.records import Metric, Row, Series
-from heavytop.suite.measurements.shared import branch_of, claim_of, time_metric, time_text
+from heavytop.suite.measurements.shared import branch_of, claim_of, integrator_text, time_metric, time_text
 from heavytop.suite.task import Task
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP
@@ -51,7 +51,7 @@ def audit(task: Task) -> Row:
     return Row(
         case=task.name,
         system=task.form,
-        integrator="audit",
+        integrator=integrator_text(task),
         precision="exact",
         bits=0,
         outcome=Outcome.SUCCESS.value,
@@ -67,6 +67,11 @@ def audit(task: Task) -> Row:
 
 
 def claim_model(task: Task) -> Row:
+    """The largest errors of the claim (4.2)-(4.6), exactly evaluated, as a motion of the heavy top, and when it parts.
+
+    The task: a case with a claim, its ``form`` the branch, smooth or printed; exact times of one sign, t ≠ 0.
+    Errors of Ω in 1/time unit, of γ none, of the angles in rad.  Raises OutOfReach where the true motion is not proven.
+    """
     claim, branch = claim_of(task), branch_of(task)
     truth, against = true_motion(claim, task.times)
     errors = {time: claim_error.model_error(claim, time, truth, branch) for time in task.times}
@@ -88,7 +93,7 @@ def claim_model(task: Task) -> Row:
     return Row(
         case=task.name,
         system=HEAVY_TOP.name,
-        integrator=f"claim:{branch}",
+        integrator=integrator_text(task),
         precision="exact",
         bits=claim_error.MODEL_BITS,
         outcome=Outcome.SUCCESS.value,
@@ -105,7 +110,10 @@ def claim_model(task: Task) -> Row:
 
 
 def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_error.Truth, str]:
-    """The true heavy-top motion from the claim's own data, and what it is."""
+    """The true heavy-top motion from the claim's own data, and what it is: a closed form, an enclosure, or two runs.
+
+    times: those at which it will be asked for.  Raises OutOfReach where it is not known up to the last of them.
+    """
     bits = claim_error.MODEL_BITS
     if claim.i1 == 2 * claim.i3:
         known = DeloneHomoclinic(claim.alpha, claim.i1)
@@ -140,6 +148,11 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_er
 
 
 def claim_evaluation(task: Task) -> Row:
+    """The largest errors of the formulas (4.2)-(4.6) in a format, and from when on they give no number.
+
+    The task: a case with a claim, its ``form`` printed or stable, its times values of k t of one sign.  Errors of Ω in
+    1/time unit, of the angles in rad.  Raises OutOfReach where the formulas cannot be evaluated exactly.
+    """
     claim = claim_of(task)
     precision = parse(task.precision)
     rate = claim.solves.rate
@@ -163,7 +176,7 @@ def claim_evaluation(task: Task) -> Row:
     return Row(
         case=task.name,
         system="gyrostat",
-        integrator=f"formula:{task.form}",
+        integrator=integrator_text(task),
         precision=precision.name,
         bits=precision.bits,
         outcome=Outcome.SUCCESS.value,

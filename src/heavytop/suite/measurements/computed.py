@@ -33,6 +33,11 @@ _CERTIFIED_AT = 4
 
 
 def homoclinic(task: Task) -> Row:
+    """When a run leaves a homoclinic motion, and its error and drift before.
+
+    The task: a case with a homoclinic closed form, whose data the format takes exactly; uniform times of one sign.
+    Errors of Ω in 1/time unit, of γ none.  Raises OutOfReach where the closed form is not certified for the format.
+    """
     case, precision = case_of(task), parse(task.precision)
     closed = case.homoclinic
     assert closed is not None
@@ -80,6 +85,13 @@ def _as_tuples(case: Any) -> Parameters:
 
 
 def drift(task: Task, saved: Saved) -> Row:
+    """Drift of every first integral that holds, and the solution error where the motion is known at the last time.
+
+    The task: any case and format; uniform times of one sign, of which ``keep`` go into the series.
+    saved: the place that an interrupted run left, and where this one keeps its own.
+    Drift in units of each integral, errors of Ω in 1/time unit, of γ none.  Raises Contradiction where two proofs of
+    the known motion exclude each other, InputError for a place reached with other flags.
+    """
     case, precision = case_of(task), parse(task.precision)
     problem = Problem.of(case.top, case.start, precision, case.system)
     # samples are taken at the rounded times, so the series must be asked for by these
@@ -98,6 +110,10 @@ def drift(task: Task, saved: Saved) -> Row:
 
 
 def local_error(task: Task) -> Row:
+    """Errors of the single steps that begin before the last time, and the order that shows beyond them.
+
+    The task: any case and format, its last time > 0.  Raises OutOfReach where a step is not enclosed.
+    """
     case, precision = case_of(task), parse(task.precision)
     asked = integrator_of(task).first_steps
     run, steps = asked(case.top, case.start, task.times[-1], precision, system=case.system)
@@ -139,6 +155,11 @@ def streamed(
 def computed_row(
     task: Task, run: Trajectory, metrics: dict[str, Metric], series: dict[str, Series], against: str
 ) -> Row:
+    """The row of a run: where it ended, what made its bits, and what was measured of it.
+
+    A run that gives fewer samples than its task has times is incomplete, whatever it says of itself; finite only where
+    it reached the last time and every metric is a number.
+    """
     case, precision = case_of(task), run.problem.precision
     outcome = run.outcome
     if outcome is Outcome.SUCCESS and task.times and len(run.times) < len(task.times):

@@ -8,15 +8,17 @@ from fractions import Fraction
 from typing import Any
 
 from heavytop.claims.ershkov import Branch, PartialCase
+from heavytop.errors import Contradiction, OutOfReach
 from heavytop.integrate import taylor
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.luck import reroll
 from heavytop.measure.scalar import of_fraction
-from heavytop.precision import decimal_text
-from heavytop.records import Kind, Metric
+from heavytop.precision import decimal_text, parse
+from heavytop.records import CONTRADICTION, OUT_OF_REACH, Kind, Metric, Row
 from heavytop.suite.cases import Case
 from heavytop.suite.task import Task
+from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
 
@@ -54,6 +56,38 @@ def integrator_of(task: Task) -> Any:
     if task.integrator == "heyoka":
         return taylor
     return FAULTS[task.integrator]
+
+
+def integrator_text(task: Task) -> str:
+    """What is measured, as the row of a task names it."""
+    if task.kind == "claim_model":
+        return f"claim:{branch_of(task)}"
+    if task.kind == "claim_evaluation":
+        return f"formula:{task.form}"
+    if task.kind == "audit":
+        return "audit"
+    return task.form if task.kind == "work_precision" else f"{task.integrator} {task.form}".rstrip()
+
+
+def unmeasured(task: Task, reason: OutOfReach | Contradiction) -> Row:
+    """The row of a task that came to nothing: an outcome of its own, no metric, and why in the place of a reference."""
+    system = task.form if task.case is None else HEAVY_TOP.name if task.kind == "claim_model" else task.case.system.name
+    return Row(
+        case=task.name,
+        system=system,
+        integrator=integrator_text(task),
+        precision=task.precision or "exact",
+        bits=parse(task.precision).bits if task.precision else 0,
+        outcome=CONTRADICTION if isinstance(reason, Contradiction) else OUT_OF_REACH,
+        horizon=time_text(task.times[-1]) if task.times else "0",
+        time_reached="0",
+        steps=0,
+        finite=False,
+        metrics={},
+        measure=task.kind,
+        measured="nothing",
+        against=f"nothing: {reason.cause}",
+    )
 
 
 def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:

@@ -1,0 +1,113 @@
+"""A row that cannot be known: an outcome of its own, never the same as another, and the other rows are there."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from heavytop.errors import Contradiction, InputError, OutOfReach
+from heavytop.measure import known
+from heavytop.records import Metric
+from heavytop.report import store
+from heavytop.report.compare import compare
+from heavytop.report.policy import Policy
+from heavytop.report.text import all_good
+from heavytop.suite.measurements.shared import unmeasured
+from heavytop.suite.plan import expand, load
+from heavytop.suite.workers import rows
+
+PLAN = """name = "far"
+[[measure]]
+kind = "drift"
+cases = ["euler"]
+runs = [{ precision = "double", horizon = "5", samples = 5 }]
+"""
+FAR = """[[measure]]
+kind = "claim_model"
+cases = ["ershkov-partial-2"]
+times = ["1", "1e100"]
+directions = ["backward"]
+grid = 1
+[[measure]]
+kind = "claim_evaluation"
+cases = ["ershkov-partial-2"]
+precisions = ["double"]
+rate_times = ["1", "1e100"]
+directions = ["forward"]
+"""
+
+
+def tasks_of(folder: Path, text: str):
+    (folder / "plan.toml").write_text(text)
+    return expand(load(str(folder / "plan.toml"))[0])
+
+
+def heavytop(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "heavytop", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_a_plan_with_rows_out_of_reach_ends_with_all_others_and_exit_3(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(PLAN + FAR)
+    done = heavytop("run", "--plan", tmp_path / "plan.toml", "--out", tmp_path / "out", "--workers", 1)
+    assert (done.returncode, done.stderr) == (3, "")
+    assert "claim_model of ershkov-partial-2/backward, claim:smooth in exact: out_of_reach" in done.stdout
+    assert "Only 0 of 160 bits could be proven" in done.stdout
+    report = store.read(tmp_path / "out")
+    lost = [row for row in report.rows if row.outcome == "out_of_reach"]
+    assert [(row.measure, row.integrator) for row in lost] == [
+        ("claim_model", "claim:smooth"),
+        ("claim_evaluation", "formula:printed"),
+    ]
+    assert [row.outcome for row in report.rows if row not in lost] == ["success", "success"]
+    assert not any(row.finite or row.metrics for row in lost)
+    assert "Only 0 of 160 bits" in (tmp_path / "out" / "report.html").read_text()
+    comparison = compare(report, report, Policy())
+    assert comparison.exit_code == 3
+    assert {finding.key for finding in comparison.changed} == {row.key for row in lost}
+    assert heavytop("show", tmp_path / "out").returncode == 0
+
+
+def test_a_row_out_of_reach_has_the_key_that_it_has_within(tmp_path: Path) -> None:
+    far, near = (tasks_of(tmp_path, PLAN + FAR.replace("1e100", end)) for end in ("1e100", "2"))
+    keys, others = (
+        [row.key for _, row in sorted(rows(tasks, 1, None), key=lambda pair: pair[0])] for tasks in (far, near)
+    )
+    assert keys == others
+
+
+def test_a_contradiction_is_the_outcome_of_its_row_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def contradict(*_, **__):
+        raise Contradiction("Two sources exclude each other.")
+
+    monkeypatch.setattr(known, "certify", contradict)
+    ((_, row),) = rows(tasks_of(tmp_path, PLAN), 1, None)
+    assert (row.outcome, row.against) == ("contradiction", "nothing: Two sources exclude each other.")
+    assert row.key == ("drift", "euler", "heavy_top", "heyoka", "double")
+
+
+def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_one(tmp_path: Path) -> None:
+    ladder = '[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "5"\n'
+    ladder += 'ladders = [{ integrator = "heyoka", tolerances = ["eps"] }]\n'
+    (task,) = tasks_of(tmp_path, 'name = "work"\n' + ladder)
+    row = unmeasured(task, OutOfReach("Nothing is known there."))
+    assert row.key == ("work_precision", "euler/T=5", "heavy_top", "heyoka tolerance=eps", "double")
+    assert not all_good([row])
+    assert all_good([msgspec.structs.replace(row, metrics={"error_max": Metric("missing", None)})])
+
+
+def test_what_only_measuring_shows_to_be_impossible_names_the_row(tmp_path: Path) -> None:
+    sweep = """[[sweep]]
+kind = "grid"
+name = "g"
+inertia = ["3", "2", "2"]
+weight = ["1", "1e-400"]
+centre = ["0", "0", "1"]
+omega = ["0", "0", "1"]
+gamma = ["0", "0", "1"]
+"""
+    tasks = tasks_of(tmp_path, PLAN.replace("[[", f"{sweep}[[", 1).replace('"euler"', '"sweep:g"'))
+    with pytest.raises(InputError, match=r"^drift g\[1\] double: 1E-400 is outside the exponent range of double"):
+        list(rows(tasks, 1, None))
