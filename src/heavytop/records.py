@@ -11,8 +11,8 @@ import msgspec
 
 SCHEMA = "heavytop-report/1"
 
-OUT_OF_REACH, CONTRADICTION = "out_of_reach", "contradiction"
-"""Outcomes of a row that came to nothing: it has no metrics."""
+UNMEASURED = OUT_OF_REACH, CONTRADICTION = "out_of_reach", "contradiction"
+"""Outcomes of a row that came to nothing: it has no metrics, and says why in the place of a reference."""
 
 Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Starts = Annotated[int, msgspec.Meta(ge=1)]

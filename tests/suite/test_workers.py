@@ -101,13 +101,13 @@ def test_only_a_few_tasks_are_under_way_at_a_time(tasks) -> None:
 
 
 class Slow(Poison):
-    """Keeps the process that reads it for some seconds, then leaves a file."""
+    """Keeps the process that reads it for a minute, then leaves a file."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def __reduce__(self):
-        return exec, (f"import time; time.sleep(5); open({str(self.path)!r}, 'w').close()",)
+        return exec, (f"import time; time.sleep(60); open({str(self.path)!r}, 'w').close()",)
 
 
 @pytest.mark.parametrize("stop", [GeneratorExit, KeyboardInterrupt, InputError])

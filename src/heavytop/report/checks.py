@@ -14,7 +14,7 @@ from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
-from heavytop.records import CONTRADICTION, OUT_OF_REACH, Law, Metric, Row
+from heavytop.records import UNMEASURED, Law, Metric, Row
 from heavytop.report.printable import printable
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def _check_row(file: Path, row: Row | BriefRow) -> None:
     if reached * horizon < 0 or abs(reached) > abs(horizon) * (1 + Fraction(2, 2**row.bits)):
         raise InputError(f"{where}, time_reached: {row.time_reached} is beyond {row.horizon}.", REMEDY)
     lacking = [name for name in _NEEDED.get(row.measure, ()) if name not in row.metrics]
-    if lacking and (row.metrics or row.outcome == "success"):
+    if lacking and row.outcome not in UNMEASURED:
         raise InputError(f"{where}: a row of {row.measure} without {', '.join(lacking)}.", REMEDY)
     for name, law in row.laws.items():
         _check_law(f"{where}, growth {printable(name)[:60]}", law)
@@ -123,7 +123,7 @@ def _check_law(where: str, law: Law) -> None:
             raise InputError(f"{where}, {name}: {text} is negative.", REMEDY)
 
 
-_OUTCOMES = {outcome.value for outcome in Outcome} | {OUT_OF_REACH, CONTRADICTION}
+_OUTCOMES = {*(outcome.value for outcome in Outcome), *UNMEASURED}
 WORDS = {
     "error": ("nan", "missing", UNRESOLVED),
     "duration": ("nan", "missing", "never"),

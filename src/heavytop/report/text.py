@@ -14,7 +14,7 @@ from rich.text import Text
 from heavytop.errors import InputError
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import decimal_text, exact
-from heavytop.records import Law, Report, Row
+from heavytop.records import UNMEASURED, Law, Report, Row
 from heavytop.report.printable import printable
 from heavytop.report.store import AnyReport
 from heavytop.report.work_precision import leads, panels
@@ -38,9 +38,8 @@ def summary(report: Report) -> RenderableType:
     """What is known, what the claim gets wrong and from when on, digits kept and drift per format."""
     by_measure: dict[str, list[Row]] = {}
     for row in report.rows:
-        if row.outcome != "success" and not row.metrics:
-            continue  # nothing came of it: it stands among the failed ones alone
-        by_measure.setdefault(row.measure, []).append(row)
+        if row.outcome not in UNMEASURED:
+            by_measure.setdefault(row.measure, []).append(row)
     parts: list[RenderableType] = [head(report, len(report.rows))]
     sections = {
         "audit": _audit,
@@ -68,14 +67,13 @@ def summary(report: Report) -> RenderableType:
 
 def failed(row: Row) -> bool:
     """Whether a run did not reach its horizon; that a peer gives up is what work-precision rows are there to show."""
-    return row.outcome != "success" and not (row.measure == "work_precision" and row.metrics)
+    return row.outcome in UNMEASURED or (row.outcome != "success" and row.measure != "work_precision")
 
 
 def _failure(row: Row) -> str:
-    if row.metrics:
-        return f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}"
-    which = f"{row.measure} of {row.case}, {row.integrator} in {row.precision}"
-    return f"  {which}: {row.outcome}, held against {row.against}"
+    if row.outcome in UNMEASURED:
+        return f"  {row.measure} of {row.case}, {row.integrator} in {row.precision}: {row.outcome}, {row.against}"
+    return f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}"
 
 
 def head(report: AnyReport, rows: int) -> Text:
