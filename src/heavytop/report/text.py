@@ -28,9 +28,12 @@ def short(value: str, digits: int = 3) -> str:
         return value
     if number == 0:
         return "0"
-    if Fraction(1, 1000) <= abs(number) < 10**6:
+    if Fraction(1, 1000) <= abs(number) < 10**5:
         return f"{float(number):.{digits + 2}g}"
-    mantissa, _, exponent = f"{Decimal(decimal_text(number, digits)):.{digits - 1}E}".partition("E")
+    text = f"{Decimal(decimal_text(number, digits)):.{digits - 1}E}"
+    mantissa, _, exponent = text.partition("E")
+    if exact(text) == number:  # a time such as 10^6 has no more digits
+        mantissa = mantissa.rstrip("0").removesuffix(".")
     return f"{mantissa}e{int(exponent)}"
 
 
