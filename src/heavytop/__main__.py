@@ -1,13 +1,26 @@
 """``python -m heavytop`` and the ``heavytop`` command."""
 
+import os
+import signal
 import sys
 
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
+    signal.signal(signal.SIGINT, _interrupted)
     from heavytop.cli import run_command_line
 
     sys.exit(run_command_line())
+
+
+def _interrupted(*_: object) -> None:
+    """Leave at once: a KeyboardInterrupt in the midst of a library that loads or compiles is lost, or is another error.
+
+    `run` has rows to keep and handles the signal itself.
+    """
+    if sys.stderr.isatty():
+        os.write(2, b"\x1b[?25h\n")  # a progress bar had hidden the cursor
+    os._exit(130)
 
 
 if __name__ == "__main__":

@@ -77,11 +77,13 @@ def _run(
     from heavytop.suite.checkpoint import Checkpoint, identity_of
     from heavytop.suite.run import run as run_tasks
 
+    if where["workers"] == 1 and where["scheduler"] is None:
+        import heavytop.suite.measurements  # noqa: F401 - loads heyoka, while Ctrl-C still leaves at once
     report = Report(SCHEMA, plan, environment(), [])
     fit = partial(_require_fit, directory, resume)
     try:
         with (
-            _terminated_like_interrupted(),
+            _stopped_by_signals(),
             Checkpoint(directory, identity_of(report), fit, save_every) as checkpoint,
             Progress(tasks) as advance,
         ):
@@ -133,15 +135,19 @@ class _Terminated(KeyboardInterrupt):
 
 
 @contextmanager
-def _terminated_like_interrupted() -> Iterator[None]:
+def _stopped_by_signals() -> Iterator[None]:
+    """SIGINT and SIGTERM are exceptions, so that what is finished is kept and said."""
+
     def terminate(*_: object) -> None:
         raise _Terminated
 
-    before = signal.signal(signal.SIGTERM, terminate)
+    handlers: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: terminate}
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _new_folder(plan: str) -> Path:
