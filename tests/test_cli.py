@@ -209,6 +209,9 @@ def test_rows_as_parquet_come_with_the_run_or_from_its_report(finished: Path, tm
     refused = run("show", str(finished / "one"), "--parquet", "report.json", cwd=tmp_path)
     assert refused.returncode == 2
     assert "ends in .parquet" in refused.stderr
+    refused = run("show", str(finished / "one"), "--parquet", "x.parquet", "--html", "./x.parquet", cwd=tmp_path)
+    assert (refused.returncode, "is named twice" in refused.stderr) == (2, True)
+    assert not (tmp_path / "x.parquet").exists()
 
 
 def test_parquet_without_pyarrow_is_refused_before_anything_runs(tmp_path: Path) -> None:

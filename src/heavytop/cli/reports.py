@@ -124,6 +124,8 @@ def show(
 
     if parquet is not None:
         tables.check_name(parquet)
+        if html is not None and html.resolve() == parquet.resolve():
+            raise InputError(f"{html} is named twice.", "Give each file a name of its own.")
     if html is None and parquet is None:
         brief = store.read_brief(report)
         many = len(brief.rows) > overview.MOST_LISTED

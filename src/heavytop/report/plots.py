@@ -86,8 +86,9 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "digits",
         "Digits kept per format",
         [
-            "Correct decimal digits of γ at the end of each run, −log10 of its error against the known motion; since "
-            "|γ| = 1 the error is relative. A thin line leads from the digits that the format has to those it kept."
+            "Correct decimal digits of γ at the end of each run, −log10 of its error against the known motion, or for "
+            "many starts without one against runs in a wider format, which prove nothing; since |γ| = 1 the error is "
+            "relative. A thin line leads from the digits that the format has to those it kept."
         ],
         columns=["case", "format", "T", "digits", "kept", "lost", "± digits"],
     )

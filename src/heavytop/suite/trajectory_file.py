@@ -16,7 +16,7 @@ from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, exact, parse, real, round_to, shown
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, parse, real, round_to, shown
 from heavytop.top.equations import VARIABLES, System, system
 from heavytop.top.heavy_top import HeavyTop, State, dot, require_physical
 from heavytop.top.times import check_times
@@ -70,7 +70,7 @@ class Given:
         for time, state in zip(self.times, self.states, strict=True):
             if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
                 found.append(
-                    f"|gamma|^2 is off 1 by {float(off):.3g} at t = {shown(time)}: "
+                    f"|gamma|^2 is off 1 by {decimal_text(off, 3)} at t = {shown(time)}: "
                     f"are the states in the order {' '.join(VARIABLES)}?"
                 )
                 break
