@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from heavytop.measure.growth import CLASSES, FEWEST_SAMPLES, NEAR
+from heavytop.measure.growth import BENT, CLASSES, FEWEST_SAMPLES, NEAR
 from heavytop.records import Row, Series
 from heavytop.report.section import DASHED, TIME, Key, Section, Sources, clip, draw, points, scientific
 from heavytop.report.svg import COLOURS, MARKERS, decades, finish, new_axes, spoken
@@ -18,55 +18,74 @@ from heavytop.report.text import short
 
 METHODS = ("heyoka", "cyrk:DOP853", "splitting:4")
 QUANTITIES = (
-    ("drift_energy", "energy drift", "|E(t) − E(0)| (units of the energy)"),
-    ("solution_error_along", "error along the flow (phase)", "error along the flow (units of Ω and γ)"),
+    ("drift_energy", "energy drift", "|E(t) − E(0)| (units of the energy)", 0.5),
+    ("solution_error_along", "error along the flow (phase)", "error along the flow (units of Ω and γ)", 1.5),
 )
+"""Series, name, axis, and the power of the steps by which rounding errors alone grow."""
 _LOG10 = -5.0
 """The error that the rungs of the methods are to have."""
-DECADES = 2.0
-_FEWEST_DECADES = 1.5
+_DECADES, _FEWEST_DECADES = 2.0, 1.5
+_ABOVE_ROUNDING = 10
+"""Times the error that rounding may have made: below, the exponent of a single motion is luck."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trend:
     """A power of t through the largest error so far: log10 error = height + exponent log10 t between ``span``.
 
-    half_width: twice the standard error of the exponent.
+    halves: the exponents of the first and of the second half.  above: whether the error is well above what rounding
+    may have made of it.
     """
 
     exponent: float
-    half_width: float
+    halves: tuple[float, float]
     height: float
     span: tuple[float, float]
+    above: bool
 
     @property
     def law(self) -> str:
-        """The class that the exponent tells from every other, else ``unresolved``."""
-        near = [name for name, value in CLASSES.items() if abs(self.exponent - value) <= self.half_width + NEAR]
-        return near[0] if len(near) == 1 else "unresolved"
+        """The class that the exponent is within 0.12 of, if the halves differ by 0.25 at most; else ``unresolved``."""
+        for name, value in CLASSES.items():
+            if self.above and abs(self.exponent - value) <= NEAR and abs(self.halves[1] - self.halves[0]) <= BENT:
+                return name
+        return "unresolved"
 
     @property
     def text(self) -> str:
         """The exponent and the law in words."""
         law = self.law if self.law in ("bounded", "unresolved") else f"like {self.law}"
-        return f"{law}, exponent {self.exponent:z.2f} ± {self.half_width:.2f}"
+        return f"{law}, exponent {self.said}"
+
+    @property
+    def said(self) -> str:
+        """The exponent, and those of the halves in brackets."""
+        return f"{self.exponent:z.2f} ({self.halves[0]:z.2f}, then {self.halves[1]:z.2f})"
 
 
-def trend(series: Series) -> Trend | None:
+def trend(series: Series, rounding: float = 0.0) -> Trend | None:
     """The power by which the largest error so far grows, by least squares on logarithms over the last two decades of t.
 
     The largest so far, because an error that is bounded goes through 0 again and again.  None for fewer than eight
-    samples, or less than one and a half decades, that have a logarithm.
+    samples, four in either half, or less than one and a half decades, that have a logarithm.
+
+    rounding: what rounding alone may have made of the last error.
     """
     import numpy
 
     x, y = (numpy.array(part) for part in points(series))
-    late = x >= max(x, default=0.0) - DECADES - 1e-3
-    if late.sum() < FEWEST_SAMPLES or numpy.ptp(x[late]) < _FEWEST_DECADES:
+    late = x >= max(x, default=0.0) - _DECADES - 1e-3
+    times, errors = x[late], numpy.maximum.accumulate(y)[late]
+    if len(times) < FEWEST_SAMPLES or numpy.ptp(times) < _FEWEST_DECADES:
         return None
-    (slope, height), covariance = numpy.polyfit(x[late], numpy.maximum.accumulate(y)[late], 1, cov=True)
-    span = float(x[late][0]), float(x[late][-1])
-    return Trend(float(slope), 2 * float(covariance[0, 0]) ** 0.5, float(height), span)
+    middle = (times[0] + times[-1]) / 2
+    first, second = times <= middle, times >= middle
+    if min(first.sum(), second.sum()) < FEWEST_SAMPLES / 2:
+        return None
+    slope, height = numpy.polyfit(times, errors, 1)
+    halves = tuple(float(numpy.polyfit(times[half], errors[half], 1)[0]) for half in (first, second))
+    above = bool(10 ** errors[-1] > _ABOVE_ROUNDING * rounding)
+    return Trend(float(slope), (halves[0], halves[1]), float(height), (float(times[0]), float(times[-1])), above)
 
 
 def alike(rows: Sequence[Row]) -> list[Row]:
@@ -86,10 +105,12 @@ def alike(rows: Sequence[Row]) -> list[Row]:
     return [rows[min(chosen[name])[1]] for name in METHODS]
 
 
-def growth_axes(axes: Any, rows: Sequence[tuple[Key, Row]], name: str) -> list[tuple[Key, Row, Trend | None, str]]:
+def growth_axes(
+    axes: Any, rows: Sequence[tuple[Key, Row]], name: str, power: float
+) -> list[tuple[Key, Row, Trend | None, str]]:
     """Draw the series ``name`` of each row over time on ``axes``, its trend dashed; both and the last value.
 
-    The axes carry decimal logarithms.
+    The axes carry decimal logarithms.  power: of the steps, by which rounding errors grow.
     """
     decades(axes.xaxis)
     decades(axes.yaxis)
@@ -97,7 +118,7 @@ def growth_axes(axes: Any, rows: Sequence[tuple[Key, Row]], name: str) -> list[t
     for key, row in rows:
         held = row.series.get(name, Series([], []))
         x, y = points(held)
-        found = trend(held)
+        found = trend(held, 2.0 ** (1 - row.bits) * row.steps**power)
         if x:
             draw(axes, key, x, y, 4.2, every=None)
         if found is not None:
@@ -126,20 +147,21 @@ def method_growth(sources: Sources) -> Section | None:
         "Growth by method",
         [
             f"{clip(chosen[0][1].case)}: a splitting, which preserves structure, beside two methods that do not, each "
-            "at the tolerance or step whose error is nearest to 1e-5. The difference is in the law of growth.",
-            "Dashed: a power of t through the largest error so far, by least squares over the last two decades of t. "
-            "The ± is twice the standard error of that fit; it is one motion, and says nothing of others.",
+            "at the tolerance or step whose error is nearest to 1e-5.",
+            "Dashed: a power of t through the largest error so far, by least squares over the last two decades of t, "
+            "and in brackets that of each half. A law is named where the halves agree, and only where the error is ten "
+            "times what rounding may have made: below, the exponent of one motion is luck.",
         ],
         columns=["integrator", "error on the way", "quantity", "last |t|", "last value", "exponent", "law"],
         across=2,
     )
-    for number, (name, title, unit) in enumerate(QUANTITIES):
+    for number, (name, title, unit, power) in enumerate(QUANTITIES):
         axes = new_axes(TIME, unit)
         heard = []
-        for key, row, found, last in growth_axes(axes, chosen, name):
+        for key, row, found, last in growth_axes(axes, chosen, name, power):
             section.key(key)
             heard.append(f"{key.label}: {found.text if found else 'too few samples for a law'}.")
-            exponent = f"{found.exponent:z.2f} ± {found.half_width:.2f}" if found else ""
+            exponent = found.said if found else ""
             error, law = short(row.metrics["error_max"].value), found.law if found else ""
             section.rows.append([key.label, error, title, short(row.time_reached), last, exponent, law])
         said = [f"{row[0]}: {row[4]} at |t| = {row[3]}." for row in section.rows if row[2] == title]

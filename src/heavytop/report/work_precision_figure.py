@@ -122,8 +122,8 @@ def growth_figure(report: Report) -> Any:
         return None
     with quiet_style():
         figure = _figure(11, 4.6)
-        for axes, (name, title, unit) in zip(figure.subplots(1, 2), QUANTITIES, strict=True):
-            for key, _, found, _ in growth_axes(axes, chosen, name):
+        for axes, (name, title, unit, power) in zip(figure.subplots(1, 2), QUANTITIES, strict=True):
+            for key, _, found, _ in growth_axes(axes, chosen, name, power):
                 label = f"{key.label}: {found.text}" if found else key.label
                 axes.plot([], [], marker=key.marker, color=COLOURS[key.colour], label=label)
             axes.set(title=title, xlabel=TIME, ylabel=unit)
