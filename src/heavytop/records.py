@@ -35,7 +35,7 @@ class Metric(msgspec.Struct, gc=False):
     log10: float | None
     kind: Kind = "error"
     bound: str | None = None
-    band: Annotated[float, msgspec.Meta(ge=0)] | None = None
+    band: Annotated[float, msgspec.Meta(ge=0, le=100)] | None = None
 
 
 class Series(msgspec.Struct):

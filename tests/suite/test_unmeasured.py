@@ -87,6 +87,26 @@ def test_a_contradiction_is_the_outcome_of_its_row_alone(tmp_path: Path, monkeyp
     assert row.key == ("drift", "euler", "heavy_top", "heyoka", "double")
 
 
+def test_steps_of_a_top_at_rest_are_out_of_reach(tmp_path: Path) -> None:
+    plan = """name = "rest"
+[[top]]
+name = "rest"
+inertia = ["3", "2", "1"]
+weight = "1"
+centre = ["0", "0", "1"]
+omega = ["0", "0", "0"]
+gamma = ["0", "0", "1"]
+[[measure]]
+kind = "local_error"
+cases = ["rest"]
+precisions = ["double"]
+horizon = "1"
+"""
+    ((_, row),) = rows(tasks_of(tmp_path, plan), 1, None)
+    assert (row.outcome, row.metrics) == ("out_of_reach", {})
+    assert row.against == "nothing: rest rests, so its integrator takes no step."
+
+
 def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_one(tmp_path: Path) -> None:
     ladder = '[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "5"\n'
     ladder += 'ladders = [{ integrator = "heyoka", tolerances = ["eps"] }]\n'

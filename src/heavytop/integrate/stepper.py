@@ -39,12 +39,12 @@ class Stepper:
     _largest_step: float = 0.0
     _seconds_per_step: float = field(default=CHUNK_SECONDS)
     _one_by_one: bool = False
-    _at_rest: Any = None
+    rest: Any = None
     _before: Any = None
 
     def reach(self, target: Any) -> Outcome:
         """Step until the polynomial of the last step covers ``target``."""
-        while self._at_rest is None and not (self._covers and self._beyond(target)):
+        while self.rest is None and not (self._covers and self._beyond(target)):
             if self.step_limit is not None and self.steps >= self.step_limit:
                 return Outcome.STEP_LIMIT
             if self.between is not None:
@@ -81,7 +81,7 @@ class Stepper:
         if outcome == heyoka.taylor_outcome.err_nf_state or not numpy.isfinite(self.engine.time):
             if not at_rest(state, self.engine.tc):
                 return Outcome.NON_FINITE
-            self._at_rest = state
+            self.rest = state
             return Outcome.SUCCESS
         if self.engine.time == before:
             return Outcome.STEP_TOO_SMALL
@@ -130,8 +130,8 @@ class Stepper:
     def sample(self, target: Any) -> Any:
         """The state at ``target``, inside the last step; a copy, shape (6,) or (9,)."""
         self._one_by_one = False
-        if self._at_rest is not None:
-            return self._at_rest.copy()
+        if self.rest is not None:
+            return self.rest.copy()
         return self.engine.update_d_output(target).copy()
 
 

@@ -134,10 +134,10 @@ def first_steps(
     outcome = Outcome.SUCCESS
     began = perf_counter()
     end = number(until, precision)
-    while stepper.time < end and outcome is Outcome.SUCCESS and stepper._at_rest is None:
+    while stepper.time < end and outcome is Outcome.SUCCESS and stepper.rest is None:
         before = tool.engine.state.copy()
         outcome = stepper.single()
-        if outcome is Outcome.SUCCESS and stepper._at_rest is None:
+        if outcome is Outcome.SUCCESS and stepper.rest is None:
             after = tool.engine.state.copy()
             steps.append(TaylorStep(before, tool.engine.last_h, stepper.polynomial(), after))
             times.append(exact(tool.engine.time))

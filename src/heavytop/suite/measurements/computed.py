@@ -112,11 +112,14 @@ def drift(task: Task, saved: Saved) -> Row:
 def local_error(task: Task) -> Row:
     """Errors of the single steps that begin before the last time, and the order that shows beyond them.
 
-    The task: any case and format, its last time > 0.  Raises OutOfReach where a step is not enclosed.
+    The task: any case and format, its last time > 0.  Raises OutOfReach where a step is not enclosed, and at an
+    equilibrium, where there are no steps.
     """
     case, precision = case_of(task), parse(task.precision)
     asked = integrator_of(task).first_steps
     run, steps = asked(case.top, case.start, task.times[-1], precision, system=case.system)
+    if run.outcome is Outcome.SUCCESS and not steps:
+        raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
     error = LocalError(run.problem)
     for time, step in zip(run.times, steps, strict=True):
         error(time, step)
