@@ -1,13 +1,15 @@
-"""Kill a run again and again, go on, and compare: ``python tests/suite/kills.py PLAN KILLS [WORKERS [PART]]``.
+"""Kill a run again and again, go on, and compare: ``python tests/suite/kills.py PLAN KILLS [WORKERS [PART]] [each]``.
 
 PLAN: smoke, or kills.toml beside this, of middle size.
 PART: of the time that a whole run takes, within which each process is killed; 1.1.
+each: what each kill leaves behind is also copied, and the copy left alone to its end.
 """
 
 from __future__ import annotations
 
 import json
 import random
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -53,9 +55,12 @@ def comparable(folder: Path) -> bytes:
 
 
 def kill_and_resume(
-    plan: str, kills: int, workers: int = 1, part: float = 1.1, seed: int = 1
+    plan: str, kills: int, workers: int = 1, part: float = 1.1, each: bool = False, seed: int = 1
 ) -> list[tuple[int, bool]]:
-    """(kills that a run lived through, whether its report is that of a run left alone), for each run."""
+    """(kills that a run lived through, whether its report is that of a run left alone), for each run.
+
+    each: for each kill too, of a copy of what it left: (0, whether ...).
+    """
     rng = random.Random(seed)
     found = []
     with tempfile.TemporaryDirectory() as folder:
@@ -64,6 +69,11 @@ def kill_and_resume(
         finish(start(plan, left_alone, workers))
         span = time.monotonic() - before
         whole = comparable(left_alone)
+
+        def note(killed: int, out: Path) -> None:
+            found.append((killed, comparable(out) == whole))
+            print(*found[-1], flush=True)
+
         while (missing := kills - sum(number for number, _ in found)) > 0:
             out = Path(folder) / f"run{len(found)}"
             killed = 0
@@ -77,16 +87,21 @@ def kill_and_resume(
                     process.kill()
                     process.communicate()
                     killed += 1
+                if each and out.exists():
+                    copy = Path(folder) / f"copy{len(found)}"
+                    shutil.copytree(out, copy)
+                    finish(start(plan, copy, workers, "--resume"))
+                    note(0, copy)
             else:
                 finish(start(plan, out, workers, "--resume"))
             if killed:
-                found.append((killed, comparable(out) == whole))
-                print(*found[-1], flush=True)
+                note(killed, out)
     return found
 
 
 if __name__ == "__main__":
-    plan, kills, *rest = sys.argv[1:]
-    runs = kill_and_resume(plan, int(kills), *(kind(text) for kind, text in zip((int, float), rest, strict=False)))
+    plan, kills, *rest = (argument for argument in sys.argv[1:] if argument != "each")
+    options = (kind(text) for kind, text in zip((int, float), rest, strict=False))
+    runs = kill_and_resume(plan, int(kills), *options, each="each" in sys.argv)
     killed = sum(number for number, _ in runs)
-    print(f"{killed} kills in {len(runs)} runs: {sum(same for _, same in runs)} of {len(runs)} reports identical")
+    print(f"{killed} kills, {len(runs)} reports: {sum(same for _, same in runs)} of them identical")
