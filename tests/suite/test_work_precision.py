@@ -98,11 +98,11 @@ def test_a_splitting_bounds_the_energy_and_its_phase_grows_more_slowly(tmp_path:
         '{ integrator = "heyoka", tolerances = ["1e-9"] }',
         '{ integrator = "splitting:4", steps = ["1/40"] }',
     ]
-    laws = [
-        [trend(row.series[name]).law for name in ("drift_energy", "solution_error_along")]
+    powers = [
+        [trend(row.series[name]).exponent for name in ("drift_energy", "solution_error_along")]
         for row in rows(tmp_path, "lagrange", "3000", *ladders, samples=150)
     ]
-    assert laws == [["t", "t^2"], ["bounded", "t"]]
+    assert powers == [pytest.approx([1, 2], abs=0.25), pytest.approx([0, 1], abs=0.25)]
 
 
 def test_a_run_that_gives_up_is_a_failure_and_no_point(tmp_path: Path) -> None:
