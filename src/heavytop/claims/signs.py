@@ -191,7 +191,7 @@ class Signs:
             rest = tuple(0 if index in self.numbers else power for index, power in enumerate(monomial))
             groups.setdefault(rest, {})[number] = coefficient
         signs = [self._of_term(rest, numbers) for rest, numbers in groups.items()]
-        return signs[0] if len(signs) == 1 else _sum_of(signs)
+        return signs[0] if len(signs) == 1 else sum_of(signs)
 
     def _of_term(self, monomial: Any, numbers: dict[Any, Any]) -> Sign:
         coefficient = self._tower.context.from_dict(numbers)
@@ -287,7 +287,7 @@ class Signs:
     def _as_polynomial_in(self, index: int, p: Any, parts: dict[int, Any]) -> Iterator[Sign]:
         g, degree = self._tower.generators[index], max(parts)
         if len(parts) > 1:
-            yield _sum_of(
+            yield sum_of(
                 self.of(part).times(Sign(g.sign if power % 2 else 1, g.strict or not power))
                 for power, part in parts.items()
             )
@@ -351,13 +351,13 @@ class Signs:
                 quotient, rest = divmod(p, part)
                 if quotient and rest and len(rest) < len(p) + len(fact):
                     fact_sign = sign if part is fact else Sign(-sign.value, sign.strict)
-                    found = _sum_of((self.of(quotient).times(fact_sign), self.of(rest)))
+                    found = sum_of((self.of(quotient).times(fact_sign), self.of(rest)))
                     if found.value:
                         return found
         return UNKNOWN
 
 
-def _sum_of(signs: Iterable[Sign]) -> Sign:
+def sum_of(signs: Iterable[Sign]) -> Sign:
     """The sign of a sum: that of its parts where they have one and the same."""
     values, strict = set(), False
     for value, part_strict in signs:

@@ -16,12 +16,13 @@ from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
 from heavytop.claims.from_file import ClaimFile, MotionTable, sample_rows
 from heavytop.claims.judge import Finding, judge, verdict_of
+from heavytop.claims.prover import shortest
 from heavytop.claims.signs import Unprovable
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Setting, Statement
 from heavytop.claims.statements import SYMBOLIC, SYSTEMS, Motion, Triple, attitude, motion_statements
 from heavytop.errors import InputError
 from heavytop.precision import exact
-from heavytop.top.angles import gamma_from_angles, omega_from_angles
+from heavytop.top.angles import omega_from_angles
 from heavytop.top.equations import GYROSTAT, Parameters, System
 
 TIME = sympy.Symbol("t", real=True)
@@ -150,7 +151,8 @@ class UserMotion:
     def __post_init__(self) -> None:
         object.__setattr__(self, "ground", lay_ground(self.content, [TIME]))
         assert self.content.motion is not None
-        object.__setattr__(self, "motion", _read_motion(self.content, self.content.motion, self.ground))
+        motion = _read_motion(self.content, self.content.motion, self.ground)
+        object.__setattr__(self, "motion", motion)
 
     @property
     def name(self) -> str:
@@ -183,8 +185,7 @@ class UserMotion:
     def _angles_give_gamma(self) -> Iterator[Statement]:
         table = self.content.motion
         if table is not None and table.angles is not None and table.gamma is not None:
-            phi, theta, _ = _expressions(_three(table.angles, self.ground.names, "motion.angles"))
-            turned = gamma_from_angles(phi, theta, SYMBOLIC)
+            turned = self.motion.attitude[:3]
             for component, (ours, theirs) in enumerate(zip(turned, self.motion.gamma, strict=True), 1):
                 text = "(3.2): gamma of the angles is gamma"
                 formulas = self.motion.angle_formulas
@@ -205,7 +206,12 @@ def _read_motion(content: ClaimFile, table: MotionTable, ground: Ground) -> Moti
     def rate(value: sympy.Expr) -> sympy.Expr:
         return sympy.diff(value, TIME)
 
-    names, needs = ground.names, ground.needs
+    names, needs, domain = ground.names, ground.needs, _domain(content)
+
+    def reduced(formulas: Triple) -> Triple:
+        first, second, third = (shortest(formula, setting_of(ground, TIME), domain) for formula in formulas)
+        return first, second, third
+
     if table.angles is None and (table.omega is None or table.gamma is None):
         raise InputError("[motion] has neither angles nor both omega and gamma.", "Give omega and gamma, or angles.")
     phi = rates = None
@@ -213,21 +219,20 @@ def _read_motion(content: ClaimFile, table: MotionTable, ground: Ground) -> Moti
     angle_needs: frozenset[Need] = frozenset()
     if table.angles is not None:
         formulas = _three(table.angles, names, "motion.angles")
-        phi, theta, psi = _expressions(formulas)
+        phi, theta, psi = reduced(_expressions(formulas))
         rates, turned = (rate(phi), rate(theta), rate(psi)), attitude(phi, theta, psi)
         angle_needs = needs_of(formulas)
     gamma: Triple
     if table.gamma is not None:
         formulas = _three(table.gamma, names, "motion.gamma")
-        gamma, needs = _expressions(formulas), needs | needs_of(formulas)
+        gamma, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
     else:
         gamma, needs = turned[:3], needs | angle_needs
     if table.omega is not None:
         formulas = _three(table.omega, names, "motion.omega")
-        omega, needs = _expressions(formulas), needs | needs_of(formulas)
+        omega, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
     else:
         omega, needs = omega_from_angles(gamma, phi, rates, SYMBOLIC), needs | angle_needs
-    domain = _domain(content)
     return Motion(
         "smooth", domain, omega, gamma, rate, phi, rates, needs=needs, attitude=turned, angle_needs=angle_needs
     )
