@@ -142,6 +142,11 @@ class Prover:
         formulas = statement.formulas
         if not all(need.is_met(place) for need in formulas.sampled or formulas.needs | formulas.angle_needs):
             return False
+        # a derivative of |u| is none where u is 0
+        if any(
+            Need(Kind.NONZERO, kink.args[0]).is_met(place) is not True for kink in statement.residual.atoms(sympy.sign)
+        ):
+            return False
         try:
             return bool(evaluate(statement.residual, place, NUMBER_BITS).is_finite())
         except Unprovable:

@@ -59,6 +59,7 @@ class Signs:
         self._forms: dict[int, Any] = {}
         self._below_one: set[int] = set()
         self._facts: list[tuple[Any, Sign]] = []
+        self._products: list[tuple[Any, Sign]] = []
         self._known: dict[str, tuple[Sign, int]] = {}
         self._factors: dict[str, Any] = {}
         self._left = _BUDGET
@@ -82,7 +83,7 @@ class Signs:
         self._below_one.add(index)
 
     def declare(self, p: Any, sign: Sign) -> None:
-        """The claim assumes this sign of ``p``: it is that of the one factor whose sign nothing else tells."""
+        """The claim assumes this sign of ``p``: it is that of the factors whose sign nothing else tells."""
         constant, factors = self.factors(p)
         total = Sign(1 if constant > 0 else -1, True)
         open_factors = []
@@ -93,9 +94,15 @@ class Signs:
                 open_factors.append(factor)
             else:
                 total = total.times(known if power % 2 else Sign(1, True))
+        known = Sign(sign.value * total.value, sign.strict)
         if len(open_factors) == 1:
-            self._facts.append((open_factors[0], Sign(sign.value * total.value, sign.strict)))
-            self._known.clear()
+            self._facts.append((open_factors[0], known))
+        elif open_factors:
+            product = self._tower.one
+            for factor in open_factors:
+                product = product * factor
+            self._products.append((product, known))
+        self._known.clear()
 
     def factors(self, p: Any) -> Any:
         """(constant, [(factor, power)]), made once."""
@@ -114,6 +121,10 @@ class Signs:
             self._left = _BUDGET
         if self._depth > _DEPTH or self._left <= 0 or len(p) > _MAX_TERMS or max(p.degrees()) > _MAX_DEGREE:
             return UNKNOWN
+        for product, sign in self._products:
+            quotient, rest = divmod(p, product)
+            if not rest:
+                return self.of(quotient).times(sign)
         self._depth += 1
         try:
             constant, factors = self.factors(p)

@@ -64,25 +64,40 @@ def _sign_of_sum(e: sympy.Expr) -> Sign:
     return sum_of(signs) if constant >= 0 else UNKNOWN
 
 
-def with_integrals_named(
-    e: sympy.Expr,
-    state: frozenset[sympy.Symbol],
-    is_constant: Callable[[sympy.Expr], bool],
-    names: dict[sympy.Expr, sympy.Symbol],
-) -> sympy.Expr:
-    """``e`` with each polynomial of the state that is constant in time replaced by a symbol; ``names`` grows."""
-    if not e.free_symbols & state:
-        return e
-    if e.is_polynomial(*state):
-        if e not in names and is_constant(e):
-            names[e] = sympy.Symbol(f"integral{len(names) + 1}", positive=e.is_positive, real=True)
-        if e in names:
-            return names[e]
-    if not e.args:
-        return e
-    if e.is_Add:
-        plain = [part for part in e.args if part.is_polynomial(*state)]
-        if plain and len(plain) < len(e.args):
-            rest = [with_integrals_named(part, state, is_constant, names) for part in e.args if part not in plain]
-            return sympy.Add(with_integrals_named(sympy.Add(*plain), state, is_constant, names), *rest)
-    return e.func(*(with_integrals_named(part, state, is_constant, names) for part in e.args))
+class Names:
+    """Symbols for the polynomials of the state that are constant in time, the smallest first."""
+
+    def __init__(self, state: frozenset[sympy.Symbol], is_constant: Callable[[sympy.Expr], bool]) -> None:
+        self._state = state
+        self._is_constant = is_constant
+        self._names: dict[sympy.Expr, sympy.Symbol | None] = {}
+
+    @property
+    def symbols(self) -> list[sympy.Symbol]:
+        """Those given so far."""
+        return [name for name in self._names.values() if name is not None]
+
+    def put_into(self, e: sympy.Expr) -> sympy.Expr:
+        """``e`` with its first integrals replaced by their symbols."""
+        if not e.free_symbols & self._state:
+            return e
+        if not e.args:
+            return self._name(e)
+        if e.is_Add:
+            return self._into_sum(e)
+        named = e.func(*(self.put_into(part) for part in e.args))
+        return self._name(e) if e.is_Mul and named.free_symbols & self._state else named
+
+    def _into_sum(self, e: sympy.Expr) -> sympy.Expr:
+        parts = {part: self.put_into(part) for part in e.args}
+        left = [part for part, named in parts.items() if named.free_symbols & self._state]
+        done = [named for part, named in parts.items() if part not in left]
+        whole = sympy.Add(*left)
+        name = self._name(whole) if left else whole
+        return sympy.Add(*done, name) if name != whole else sympy.Add(*parts.values())
+
+    def _name(self, e: sympy.Expr) -> sympy.Expr:
+        if e not in self._names:
+            constant = e.is_polynomial(*self._state) and self._is_constant(e)
+            self._names[e] = sympy.Dummy(f"integral{len(self.symbols) + 1}", real=True) if constant else None
+        return self._names[e] or e

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -15,7 +15,7 @@ from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
 from heavytop.claims.from_file import ClaimFile, MotionTable, sample_rows
-from heavytop.claims.judge import Finding, judge, verdict_of
+from heavytop.claims.judge import Finding, Row, judge, verdict_of
 from heavytop.claims.prover import shortest
 from heavytop.claims.signs import Unprovable
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Setting, Statement
@@ -45,6 +45,11 @@ class Ground:
     rotor: sympy.Expr | None
     needs: frozenset[Need]
     rotor_needs: frozenset[Need]
+
+    @property
+    def systems(self) -> tuple[System, ...]:
+        """The systems that the claim says something about."""
+        return tuple(system for system in SYSTEMS if system is not GYROSTAT or self.rotor is not None)
 
     def parameters(self, system: System) -> Parameters:
         """Parameters of the field; raises InputError where `gyrostat` is asked for and the file gives no rotor."""
@@ -191,15 +196,14 @@ class UserMotion:
                 formulas = self.motion.angle_formulas
                 yield Statement("3.2", component, "smooth", self.motion.domain, ours - theirs, text, formulas)
 
-    def explain(self) -> tuple[list[Finding], tuple[str, ...]]:
+    def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
         """No steps; the systems whose (1.1), (1.2) are proven."""
-        solves = []
-        for system in SYSTEMS:
-            if system is not GYROSTAT or self.ground.rotor is not None:
-                rows = judge([s for s in self.statements(system) if s.equation in ("1.1", "1.2")], self.setting)
-                if verdict_of(rows) == "holds":
-                    solves.append(system.name)
-        return [], tuple(solves)
+        return [], tuple(s.name for s in self.ground.systems if self._verdict(s, about, rows) == "holds")
+
+    def _verdict(self, system: System, about: System, rows: Sequence[Row]) -> str:
+        if system is about:
+            return verdict_of([row for row in rows if row.equation in ("1.1", "1.2")])
+        return verdict_of(judge([s for s in self.statements(system) if s.equation in ("1.1", "1.2")], self.setting))
 
 
 def _read_motion(content: ClaimFile, table: MotionTable, ground: Ground) -> Motion:

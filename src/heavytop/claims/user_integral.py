@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -12,11 +12,10 @@ from heavytop.claims.algebra import Assumptions, Field
 from heavytop.claims.conditions import Need
 from heavytop.claims.expression import Formula, parse
 from heavytop.claims.from_file import ClaimFile, IntegralTable
-from heavytop.claims.judge import Finding, judge, verdict_of
+from heavytop.claims.judge import Finding, Row, judge, verdict_of
 from heavytop.claims.signs import Unprovable
 from heavytop.claims.statement import ALL, Flow, Formulas, Setting, Statement
-from heavytop.claims.statements import SYSTEMS
-from heavytop.claims.structure import with_integrals_named
+from heavytop.claims.structure import Names
 from heavytop.claims.user_claim import STATE, TIME, Ground, lay_ground, needs_of, setting_of
 from heavytop.precision import exact
 from heavytop.top.equations import GYROSTAT, System
@@ -101,29 +100,18 @@ class UserIntegral:
         if self.kind == "relation":
             return value, needs, []
         assumptions = self.setting.assumptions(0)
-        known: dict[sympy.Expr, bool] = {}
-
-        def is_constant(e: sympy.Expr) -> bool:
-            if e not in known:
-                known[e] = _is_constant(rate(e), assumptions)
-            return known[e]
-
-        names: dict[sympy.Expr, sympy.Symbol] = {}
         state = frozenset(STATE)
-        named = with_integrals_named(value, state, is_constant, names)
+        names = Names(state, lambda e: _is_constant(rate(e), assumptions))
+        named = names.put_into(value)
         if named.free_symbols & state:
             return value, needs, []
-        renamed = frozenset(
-            Need(need.kind, with_integrals_named(need.expression, state, is_constant, names), need.text)
-            for need in needs
-        )
-        return named, renamed, list(names.values())
+        renamed = frozenset(Need(need.kind, names.put_into(need.expression), need.text) for need in needs)
+        return named, renamed, names.symbols
 
-    def explain(self) -> tuple[list[Finding], tuple[str, ...]]:
-        """No steps; the systems that conserve it, by proof."""
-        systems = [system for system in SYSTEMS if system is not GYROSTAT or self.ground.rotor is not None]
-        proven = [s.name for s in systems if verdict_of(judge(self.statements(s), self.setting)) == "holds"]
-        return [], tuple(proven)
+    def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
+        """No steps; the systems that keep it, by proof."""
+        found = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.ground.systems}
+        return [], tuple(name for name, rows in found.items() if verdict_of(rows) == "holds")
 
 
 def _is_constant(rate: sympy.Expr, assumptions: Assumptions) -> bool:
