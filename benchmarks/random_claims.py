@@ -429,7 +429,7 @@ def compiled(text: str) -> Callable[[dict[str, Any]], Any]:
 
     def value(names: dict[str, Any]) -> Any:
         try:
-            found = eval(code, {**_FUNCTIONS, "half": mpmath.mpf(1) / 2}, names)  # noqa: S307 - texts of this file
+            found = eval(code, {**_FUNCTIONS, "half": mpmath.mpf(1) / 2}, names)
         except ZeroDivisionError:
             raise Undefined from None
         if not mpmath.isfinite(found) or mpmath.im(found) != 0:
