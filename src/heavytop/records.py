@@ -75,6 +75,7 @@ class Row(msgspec.Struct):
     measured: what is held (known, claimed or computed); against: what it is held against, with method and radius.
     outcome, time_reached, steps, finite travel with every number.  seconds: timings, not compared.
     evaluations: of the field, where the integrator counts them.
+    samples: how many times the largest values are over; 0 where that is not said.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     """
 
@@ -96,6 +97,7 @@ class Row(msgspec.Struct):
     flags: dict[str, str] = {}
     input_rounding: str | None = None
     series: dict[str, Series] = {}
+    samples: Count = 0
     starts: Starts = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, Seconds] = {}

@@ -61,7 +61,10 @@ def test_the_files_are_complete_and_the_same_every_time(tmp_path):
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes()
         if one.name == "truth-ratio2.svg":
-            for said in ("as printed: Ω off by 1 % of α at t = 0.0100", "smooth branch: Ω off by 1 % of α at t = 0.2014"):
+            for said in (
+                "as printed: Ω off by 1 % of α at t = 0.0100",
+                "smooth branch: Ω off by 1 % of α at t = 0.2014",
+            ):
                 assert said in one.read_text("utf-8")
         if one.suffix == ".svg":
             assert ElementTree.parse(one).getroot().tag.endswith("svg")

@@ -129,7 +129,7 @@ class _Motion:
             # ½ I Ω² <= C1 + |P r| along the truth, and along the claim as well, which keeps (1.3)
             most = 2 * (case.c1 + sum(map(abs, given.moment)))
             omega = [ball(most / each).sqrt().abs_upper() for each in given.inertia]
-            everywhere = [arb(0, bound) for bound in (*omega, 1, 1, 1)]
+            everywhere = [arb(0, bound) for bound in (*omega, *[arb(1)] * 3)]
             self.fastest = [rate.abs_upper() for rate in self.field(self.parameters, everywhere)]
 
     def rates(self, time: Fraction, step: Fraction) -> list[arb]:

@@ -77,7 +77,7 @@ def claim_model(task: Task) -> Row:
             for name in names
         }
         parted = parting(claim, task.times[-1], branch)
-        metrics["claim_parts_by_1_percent_at"] = time_metric(parted and parted.time, "value")
+        metrics["claim_parts_by_1_percent_at"] = time_metric(None if parted is None else parted.time, "value")
         series = {
             f"claim_model_error_{name}": Series(
                 [time_text(t) for t in task.keep], [text(abs(getattr(errors[t], name)), 12) for t in task.keep]
@@ -100,6 +100,7 @@ def claim_model(task: Task) -> Row:
         measured=f"{CLAIM}, {branch} branch, exactly evaluated",
         against=against,
         series=series,
+        samples=len(task.times),
     )
 
 
@@ -181,4 +182,5 @@ def claim_evaluation(task: Task) -> Row:
         measured=f"{CLAIM}, {task.form} form, evaluated in {precision.name}; times of the series are k t",
         against="the same form exactly evaluated from the same rounded data",
         series=series,
+        samples=len(times),
     )
