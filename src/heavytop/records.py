@@ -11,8 +11,10 @@ import msgspec
 
 SCHEMA = "heavytop-report/1"
 
-UNMEASURED = OUT_OF_REACH, CONTRADICTION = "out_of_reach", "contradiction"
-"""Outcomes of a row that came to nothing: it has no metrics, and says why in the place of a reference."""
+UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED = "out_of_reach", "contradiction", "failed"
+"""Outcomes of a row that came to nothing: it has no metrics, and says why in the place of a reference.
+
+failed: an integrator of others raised an error, or gave back what is no motion."""
 
 Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Starts = Annotated[int, msgspec.Meta(ge=1)]

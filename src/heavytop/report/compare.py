@@ -11,6 +11,7 @@ import msgspec
 from heavytop.errors import InputError
 from heavytop.measure.luck import accumulated, assumed, least
 from heavytop.precision import exact
+from heavytop.records import UNMEASURED
 from heavytop.report.policy import BITS, Lookup, Policy
 from heavytop.report.store import AnyReport, AnyRow
 from heavytop.report.verdicts import Judged, Verdict, judge, judge_law, judge_seconds, law_text
@@ -234,7 +235,8 @@ class _Rows:
         """Why two rows cannot be compared; empty where they can."""
         for row, which in ((old, "baseline"), (new, "candidate")):
             if row.outcome != "success":
-                return f"the {which} ended as {row.outcome} at t = {row.time_reached}"
+                why = f": {row.against.removeprefix('nothing: ')}" if row.outcome in UNMEASURED else ""
+                return f"the {which} ended as {row.outcome} at t = {row.time_reached}{why}"
         if old.horizon != new.horizon and exact(old.horizon) != exact(new.horizon):
             return f"horizon {old.horizon} against {new.horizon}"
         if old.bits != new.bits:

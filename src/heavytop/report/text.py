@@ -15,7 +15,7 @@ from heavytop.errors import InputError
 from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import decimal_text, exact
-from heavytop.records import UNMEASURED, Law, Metric, Report, Row
+from heavytop.records import FAILED, UNMEASURED, Law, Metric, Report, Row
 from heavytop.report.printable import printable
 from heavytop.report.store import AnyReport
 from heavytop.report.work_precision import leads, panels
@@ -94,6 +94,8 @@ def failed(row: Row) -> bool:
 
 
 def _failure(row: Row) -> str:
+    if row.outcome == FAILED:
+        return f"  {row.against.removeprefix('nothing: ')} in {row.precision}"
     if row.outcome in UNMEASURED:
         return f"  {row.measure} of {row.case}, {row.integrator} in {row.precision}: {row.outcome}, {row.against}"
     return f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}"
