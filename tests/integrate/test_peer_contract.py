@@ -62,6 +62,7 @@ rude, mute, refuses = raises(Rude("stop")), raises(Mute()), raises(InputError("N
 told = raises(ValueError("two\\nlines \\x1b[31m" + 5000 * "x"))
 deep = lambda *a, **k: deep(*a, **k)
 leaves = lambda *_, **__: sys.exit("goodbye")
+dies = lambda *_, **__: os._exit(9)
 
 
 def changed(**changes):
@@ -200,7 +201,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     info = tmp_path / "others-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: others\nVersion: 1.0\n")
-    lines = [f"mine:{name} = others:{name}" for name in (*FAILURES, *HARMLESS)]
+    lines = [f"mine:{name} = others:{name}" for name in (*FAILURES, *HARMLESS, "dies")]
     lines += ["mine:exits = others_broken:x", "mine:absent = nowhere:x", "mine:lacks = others:not_there"]
     (info / "entry_points.txt").write_text("[heavytop.peers]\n" + "\n".join(lines))
     monkeypatch.syspath_prepend(tmp_path)
@@ -273,6 +274,18 @@ def test_the_command_ends_with_exit_3_no_traceback_and_all_rows(package: Path) -
     assert "so much to say" not in done.stdout
     document = json.loads((package / "out" / "report.json").read_text("utf-8"))
     assert [row["outcome"] for row in document["rows"]] == ["success", "failed", "success", "failed"]
+
+
+def test_a_peer_that_ends_its_process_fails_its_own_row_alone(package: Path) -> None:
+    file = plan(package, "mine:dies", "heyoka")
+    line = [sys.executable, "-m", "heavytop", "run", "--plan", file, "--out", package / "out", "--workers", "2"]
+    done = subprocess.run(
+        line, capture_output=True, text=True, timeout=240, check=False, env={"PYTHONPATH": str(package), "PATH": ""}
+    )
+    assert (done.returncode, done.stderr) == (3, "")
+    document = json.loads((package / "out" / "report.json").read_text("utf-8"))
+    assert [row["outcome"] for row in document["rows"]] == ["failed", "success"]
+    assert document["rows"][0]["against"] == "nothing: mine:dies ended its process 3 times in euler/T=2 tolerance=1e-9"
 
 
 def test_what_is_a_mistake_of_the_plan_stays_an_error(package: Path) -> None:

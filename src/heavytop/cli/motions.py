@@ -14,7 +14,7 @@ Inertia = Annotated[str, typer.Option(help="Principal moments A,B,C at the fixed
 Weight = Annotated[str, typer.Option(help="Weight P.")]
 Centre = Annotated[str, typer.Option(help="Centre of mass a,b,c.")]
 Omega = Annotated[str, typer.Option(help="Angular velocity x,y,z at t = 0.")]
-Gamma = Annotated[str, typer.Option(help="Unit vector x,y,z pointing vertically up, in body axes, at t = 0.")]
+Gamma = Annotated[str, typer.Option(help="x,y,z at t = 0: unit vector pointing vertically up, in body axes.")]
 Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly away from 0.")]
 SystemName = Annotated[str, typer.Option(help="heavy_top or gyrostat.")]
 Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]

@@ -1,6 +1,7 @@
 """The two vector fields, written once over any ring.  The order of the state and every sign are decided here.
 
-State y = (Ω1, Ω2, Ω3, γ1, γ2, γ3); γ is the unit vector pointing vertically up, in body axes.  The same functions serve heyoka expressions, Fractions, mpf, balls, power series
+State y = (Ω1, Ω2, Ω3, γ1, γ2, γ3); γ is the unit vector pointing vertically up, in body axes.
+The same functions serve heyoka expressions, Fractions, mpf, balls, power series
 and sympy symbols: they use +, -, * and division by the principal moments, and no literals.
 """
 

@@ -90,6 +90,12 @@ def unmeasured(task: Task, reason: OutOfReach | Contradiction | PeerFailed) -> R
     )
 
 
+def peer_failure(task: Task, cause: str) -> Row:
+    """The row of work against precision whose integrator failed: ``cause``, and in which case at which setting."""
+    setting = task.form.partition(" ")[2]
+    return unmeasured(task, PeerFailed(f"{cause} in {task.name} {setting}"))
+
+
 def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:
     """The largest relative rounding of the data that the run was given: not charged to it, but said."""
     given = problem.system.parameters(top, start)

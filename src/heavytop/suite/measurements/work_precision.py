@@ -22,7 +22,7 @@ from heavytop.measure.solution_error import SolutionError
 from heavytop.precision import exact, number, parse
 from heavytop.records import Metric, Row
 from heavytop.suite.measurements.computed import computed_row
-from heavytop.suite.measurements.shared import case_of, time_text, unmeasured
+from heavytop.suite.measurements.shared import case_of, peer_failure, time_text
 from heavytop.suite.task import Task
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import State
@@ -46,8 +46,7 @@ def work_precision(task: Task) -> Row:
     try:
         return _measured(task)
     except PeerFailed as error:
-        setting = task.form.partition(" ")[2]
-        return unmeasured(task, PeerFailed(f"{error.cause} in {task.name} {setting}"))
+        return peer_failure(task, error.cause)
 
 
 def _measured(task: Task) -> Row:
