@@ -102,10 +102,10 @@ def _in_processes(
             queue.extendleft(reversed(lost))
             worst, times = max(deaths.items(), key=itemgetter(1), default=(0, 0))
             if times > 2:
-                if (row := _ended_by_peer(tasks[worst], times)) is not None:
+                if (ended := _ended_by_peer(tasks[worst], times)) is not None:
                     queue.remove(worst)
                     del deaths[worst]
-                    yield worst, row
+                    yield worst, ended
                     continue
                 raise HeavyTopError(
                     f"A worker process died {times} times during {tasks[worst].label}.",
@@ -181,7 +181,7 @@ def _measure(task: Task, saved: Saved) -> Row:
 
 
 def _ended_by_peer(task: Task, times: int) -> Row | None:
-    """The row of a task that ended its process so many times, where it runs an integrator of another package; or None."""
+    """The failed row of a task that ended its process, where an integrator of another package ran in it; else None."""
     from heavytop.integrate.peers import BUILT_IN
     from heavytop.suite.measurements.shared import peer_failure
 
