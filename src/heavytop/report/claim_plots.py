@@ -137,7 +137,7 @@ def _claim_curve(
         ]
     )
     tail = f", no number from |t| = {scientific(lost[0])}" if lost else ""
-    return [f"{key.label}: at most {largest}{tail}."]
+    return [f"{key.label}: largest sample {largest}{tail}."]
 
 
 def break_away(sources: Sources) -> Section | None:

@@ -13,7 +13,7 @@ from heavytop.report.work_precision import Line, leads, panels
 
 _NO_RUN = ("success", *UNMEASURED)
 """Outcomes that are no giving up: a run to the end, and none at all."""
-_METRICS = (("error_max", "largest on the way"), ("error_final", "at the end"))
+_METRICS = (("error_max", "largest over the samples"), ("error_final", "at the end"))
 
 
 def work_precision(sources: Sources) -> Section | None:
