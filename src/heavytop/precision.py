@@ -228,7 +228,7 @@ def decimal_text(value: Fraction, digits: int) -> str:
     """``value`` as decimal text with ``digits`` significant digits, rounded to nearest."""
     context = Context(prec=digits, Emax=MAX_EMAX, Emin=MIN_EMIN)
     quotient = context.divide(Decimal(value.numerator), Decimal(value.denominator))
-    return str(quotient) if quotient else "0"
+    return context.to_sci_string(quotient) if quotient else "0"
 
 
 def log10(value: Fraction) -> float | None:

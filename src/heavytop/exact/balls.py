@@ -57,7 +57,7 @@ def radius_text(value: Fraction) -> str:
     """A radius as decimal text of three digits, rounded up: it stays an upper bound."""
     context = Context(prec=3, rounding=ROUND_CEILING, Emax=MAX_EMAX, Emin=MIN_EMIN)
     quotient = context.divide(Decimal(value.numerator), Decimal(value.denominator))
-    return str(quotient) if quotient else "0"
+    return context.to_sci_string(quotient) if quotient else "0"
 
 
 def ball_text(value: arb) -> str:
