@@ -32,14 +32,14 @@ from heavytop.top.integrals import holding
 F = Fraction
 FORMATS = (DOUBLE, EXTENDED, QUAD, real(100), real(237))
 DIGITS = (15, 40, 120, 300)
-SPINS = ((0, 0, 0), (0, 0, F(1, 3)), (F(1, 2), 0, F(1, 5)))
-"""Centres of mass: Euler's and Lagrange's tops have closed forms, the third is enclosed."""
+CENTRES = (*3 * ((0, 0, 0), (0, 0, F(1, 3))), (F(1, 2), 0, F(1, 5)))
+"""Euler's and Lagrange's tops have closed forms; the last has none and is enclosed, at 40 digits at the most."""
 
 
 def some_top(rng: random.Random) -> tuple[HeavyTop, State]:
     side, up = F(rng.randint(20, 39), rng.randint(11, 19)), F(rng.randint(20, 39), rng.randint(11, 19))
     omega = [F(rng.randint(-14, 14), rng.randint(7, 13)) for _ in range(3)]
-    return HeavyTop((side, side, up), 1, rng.choice(SPINS)), State(omega, (F(3, 5), 0, F(4, 5)))
+    return HeavyTop((side, side, up), 1, rng.choice(CENTRES)), State(omega, (F(3, 5), 0, F(4, 5)))
 
 
 def call(seed: int) -> tuple[str, str]:
@@ -54,7 +54,7 @@ def call(seed: int) -> tuple[str, str]:
         run = propagate(top, start, times, precision, xi=xi)
         found, name = (run.texts(), run.steps, run.outcome), f"propagate {precision.name}"
     elif kind == "reference":
-        digits = rng.choice(DIGITS)
+        digits = rng.choice(DIGITS[:2] if top.centre == CENTRES[-1] else DIGITS)
         found, name = reference(top, start, times, digits), f"reference {digits} digits"
     else:
         drift = Drift(Problem.of(top, start, precision), holding(top, start), times)
