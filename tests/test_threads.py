@@ -1,5 +1,6 @@
 """Every call is right whatever other threads, observers and the user's own flint.ctx do at the same time."""
 
+import decimal
 import random
 import signal
 import sys
@@ -11,10 +12,11 @@ from functools import partial
 from itertools import chain
 from typing import Any
 
+import numpy
 import pytest
 from flint import arb, ctx
 
-from heavytop.exact.balls import midpoint, radius, to_bits, working_precision
+from heavytop.exact.balls import ball_from, ball_text, midpoint, radius, to_bits, working_precision
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.euler import Euler
 from heavytop.exact.flint_context import ContextChanged, whole_evaluation
@@ -29,6 +31,7 @@ from heavytop.measure.drift import Drift
 from heavytop.measure.reference import reference
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, real
 from heavytop.suite.cases import CASES
+from heavytop.suite.measurements.shared import time_text
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import holding
@@ -347,3 +350,33 @@ def test_ctrl_c_at_any_moment_leaves_the_context_free_and_as_it_was() -> None:
     assert stopped == 150
     assert (ctx.prec, ctx.cap) == (61, 7)
     assert in_threads([partial(referred, 1, 30)]) == [referred(1, 30)]
+
+
+def test_what_numpy_and_decimal_were_set_to_changes_nothing() -> None:
+    def everything() -> Any:
+        return [
+            f()
+            for f in (carried, *(partial(part, 1, QUAD) for part in (propagated, drifted)), partial(referred, 2, 40))
+        ]
+
+    def run_texts() -> list[Any]:
+        return [run.texts() for run in propagate_ensemble([Problem.of(*some_top(1), DOUBLE)] * 9, TIMES)]
+
+    expected = everything(), run_texts(), time_text(F(10**18 + 1, 10**6))
+    default = decimal.DefaultContext
+    before = default.prec, default.rounding, default.capitals
+    strict = decimal.Context(2, decimal.ROUND_UP, capitals=0, traps=[decimal.Inexact, decimal.Rounded])
+    try:
+        default.prec, default.rounding, default.capitals = 2, decimal.ROUND_UP, 0
+        with numpy.errstate(all="raise"), decimal.localcontext(strict):
+            assert (everything(), run_texts(), time_text(F(10**18 + 1, 10**6))) == expected
+    finally:
+        default.prec, default.rounding, default.capitals = before
+
+
+def test_a_ball_of_any_size_becomes_text_and_a_ball_again() -> None:
+    for bits in (64, 20064):
+        with working_precision(bits):
+            value = arb(2).sqrt()
+        back = ball_from(ball_text(value))
+        assert (midpoint(back), radius(back)) == (midpoint(value), radius(value))
