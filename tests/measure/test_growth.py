@@ -5,8 +5,9 @@ import collections
 import numpy
 import pytest
 
-from heavytop.measure.growth import FEWEST_STARTS, Ensemble, band, finite_time_rates, law, median_interval
+from heavytop.measure.growth import FEWEST_STARTS, Ensemble, band, law
 from synthetic_ensembles import EPS, EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic, walks
+
 
 @pytest.mark.parametrize("kind", NAMES)
 def test_every_power_is_recognised(kind: str) -> None:

@@ -5,6 +5,7 @@ Each rule holds for every row that a run writes.  A row that breaks one was edit
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
@@ -102,8 +103,13 @@ def _against_metrics(name: str, series: Series, row: Row | BriefRow) -> Iterator
     largest, last = (row.metrics.get(f"{name}{part}") for part in ("_max", "_final"))
     if largest is not None and sizes and max(sizes) > _bound(largest) + CLOSE:
         yield f"{name}: the series is larger than {name}_max"
-    if last is not None and series.times and exact(series.times[-1]) == exact(row.time_reached):
+    if last is not None and _ended(series, row):
         yield from _last(f"{name}_final", series.values[-1], last)
+
+
+def _ended(series: Series, row: Row | BriefRow) -> bool:
+    times = series.times[-1:]
+    return times == [row.time_reached] or (bool(times) and exact(times[0]) == exact(row.time_reached))
 
 
 def _last(name: str, value: str, metric: Metric) -> Iterator[str]:
@@ -121,8 +127,16 @@ def _size(value: str) -> float | None:
     """log10 of a value of a series, -1e9 for 0; None for a word."""
     if value in (*_NO_NUMBER, UNRESOLVED, "never"):
         return None
-    found = log10(exact(value))
-    return _floor(found)
+    return log_size(value)
+
+
+def log_size(text: str) -> float:
+    """log10 |number|, -1e9 for 0; told without the cost of an exact one where a float holds it."""
+    try:
+        size = abs(float(text))
+    except ValueError:
+        size = 0.0
+    return math.log10(size) if 1e-300 < size < 1e300 else _floor(log10(exact(text)))
 
 
 def _bound(metric: Metric) -> float:
@@ -146,7 +160,7 @@ def _work(row: Row | BriefRow) -> Iterator[str]:
     if largest.log10 is not None and last is not None and last.log10 is not None and last.log10 > largest.log10 + CLOSE:
         yield "error_final: larger than the largest"
     ends = [_size(series.values[-1]) for series in both if series.values]
-    ended = all(series.times and exact(series.times[-1]) == exact(row.time_reached) for series in both)
+    ended = all(_ended(series, row) for series in both)
     known = [size for size in ends if size is not None]
     if last is None or last.log10 is None or not ended or len(known) < len(both):
         return

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from fractions import Fraction
 from statistics import median
 
 from heavytop.measure.scalar import UNRESOLVED
-from heavytop.precision import exact, log10
+from heavytop.precision import exact
 from heavytop.records import Series
+from heavytop.report.consistency import log_size
 from heavytop.report.policy import BITS
 from heavytop.report.verdicts import SAME, Judged, Verdict
 
@@ -31,17 +31,13 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
     lost = sum(b == UNRESOLVED != a for a, b in pairs)
     if lost > 2 + len(pairs) / _LOST_SHARE:
         return Verdict.INCOMPARABLE, f"{lost} values are no longer resolved"
-    numbers = [(exact(a), exact(b)) for a, b in pairs if not {a, b} & {*_NO_NUMBER, UNRESOLVED}]
+    numbers = [pair for pair in pairs if not {*pair} & {*_NO_NUMBER, UNRESOLVED}]
     if not numbers:
         return SAME
     if exactly:
-        most = Fraction(allowed) * max(abs(a) for a, _ in numbers)
-        off = any(abs(b - a) > most for a, b in numbers)
+        values = [(exact(a), exact(b)) for a, b in numbers]
+        most = Fraction(allowed) * max(abs(a) for a, _ in values)
+        off = any(abs(b - a) > most for a, b in values)
         return (Verdict.WORSE, "a value that must agree does not") if off else SAME
-    grown = median(_size(b, floor) - _size(a, floor) for a, b in numbers)
+    grown = median(max(log_size(b), floor) - max(log_size(a), floor) for a, b in numbers)
     return (Verdict.WORSE, f"{grown / BITS:.1f} bits lost at half of the samples") if grown > allowed else SAME
-
-
-def _size(value: Fraction, floor: float) -> float:
-    found = log10(value)
-    return max(-1e9 if found is None else found, floor if math.isfinite(floor) else -1e9)
