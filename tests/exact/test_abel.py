@@ -65,7 +65,7 @@ def test_the_fourier_error_is_bounded_and_the_bound_is_not_idle(other):
     # few terms beside many: the difference is below the bound, and not far below it
     with working_precision(1000):
         others = [(other, 1)] if other.imag.is_zero() else [(other, 1), (other.conjugate(), 1)]
-        true, few, errors, bounds = Gap(arb(-1), arb(1), Roots.of(arb(1), others)), 64, [], []
+        true, few, errors, bounds = Gap(arb(-1), arb(1), Roots.of(arb(1), others)), 256, [], []
         rows = fourier_rows(true.middle, true.reach, true.rest, few, 2)
         bound = FourierBound(true.middle, true.reach, true.rest)
         sums = SineSums([[2 * c / n for n, c in enumerate(row[1:], 1)] for row in rows])

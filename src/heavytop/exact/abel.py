@@ -47,6 +47,18 @@ class Variable(Protocol):
         """dF_0 by dphase, > 0."""
         ...
 
+    def ends(self, phase: Any) -> tuple[Any, Any]:
+        """√(v − lo) and √(hi − v), each with a sign that makes it analytic."""
+        ...
+
+    def bend(self, phase: Any) -> Any:
+        """−dv/dphase over the product of :meth:`ends`."""
+        ...
+
+    def phase(self, v: arb, slope: arb) -> arb:
+        """The phase where the variable is v and dv/dphase is ``slope``."""
+        ...
+
     def integrals(self, phase: arb) -> list[arb]:
         """F_j at the phase."""
         ...

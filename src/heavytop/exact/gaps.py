@@ -124,6 +124,23 @@ class Gap:
         """See :class:`heavytop.exact.abel.Variable`."""
         return self.middle + self.reach * phase.cos()
 
+    def ends(self, phase: Any) -> tuple[Any, Any]:
+        """√(v − lo) and √(hi − v), each with a sign that makes it analytic: √(2d) cos(θ/2), √(2d) sin(θ/2)."""
+        sine, cosine = (phase / 2).sin_cos()
+        root = (2 * self.reach).sqrt()
+        return root * cosine, root * sine
+
+    def bend(self, phase: Any) -> Any:
+        """−dv/dθ over the product of :meth:`ends`."""
+        return phase * 0 + 1
+
+    def phase(self, v: arb, slope: arb) -> arb:
+        """θ in (−π/2, 3π/2) from v and dv/dθ."""
+        cosine, sine = v - self.middle, -slope
+        if cosine > 0:
+            return arb.atan2(sine, cosine)
+        return arb.pi() + arb.atan2(-sine, -cosine)
+
     def integrals(self, phase: arb) -> list[arb]:
         """See :class:`heavytop.exact.abel.Variable`."""
         sums = self.sums.at(phase)
@@ -181,19 +198,36 @@ def _cosh(z: acb) -> arb:
 
 
 def fourier_rows(middle: arb, reach: arb, rest: Roots, terms: int, count: int) -> list[list[arb]]:
-    """c_n, n < N/2, of v^j/√g, j < count, from ``terms`` = N values: without the error of aliasing."""
+    """c_n, n < N/2, of v^j/√g, j < count, from ``terms`` = N values, 4 | N: without the error of aliasing."""
     half = terms // 2
-    places = [middle + reach * arb.cos_pi_fmpq(fmpq(i, half)) for i in range(half + 1)]
+    cosines = [arb.cos_pi_fmpq(fmpq(i, half)) for i in range(half + 1)]
+    places = [middle + reach * cosine for cosine in cosines]
     even = [rest.density(v) for v in places]
     rows: list[list[arb]] = []
     while len(rows) < count:
         odd = [v * value for v, value in zip(places, even, strict=True)]
-        # the coefficients of even functions are real, so two functions fit into one transform
-        values = [acb(a, b) for a, b in zip(even, odd, strict=True)]
-        found = acb.dft(values + values[-2:0:-1])[:half]
+        # all coefficients are real, so two functions fit into one transform
+        found = _cosine_sums([acb(a, b) for a, b in zip(even, odd, strict=True)], cosines)
         rows += [[c.real / terms for c in found], [c.imag / terms for c in found]]
         even = [v * value for v, value in zip(places, odd, strict=True)]
     return rows[:count]
+
+
+def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
+    """C_k = Σ_j x_j cos(2πjk/N), j < N, k < N/2, of an even x by a transform of half the length.
+
+    values: x_0 .. x_(N/2).  cosines: of 2πj/N.  With M = N/2, E_k and O_k the sums over even and odd j, C_k = E_k + O_k
+    and C_(M−k) = E_k − O_k; x_2i + i (x_(2i+1) − x_(2i−1)) has the transform E_k − 2 sin(2πk/N) O_k.
+    """
+    half = len(values) - 1
+    full = values + values[-2:0:-1]
+    found = acb.dft([full[2 * i] + acb(0, 1) * (full[2 * i + 1] - full[2 * i - 1]) for i in range(half)])
+    sums = [acb(0)] * (half + 1)
+    for k in range(half // 2 + 1):
+        mean, apart = (found[k] + found[-k]) / 2, (found[-k] - found[k]) / 2
+        odd = apart / (2 * cosines[half // 2 - k]) if k else sum(full[1::2], acb(0))
+        sums[k], sums[half - k] = mean + odd, mean - odd
+    return sums[:half]
 
 
 def _significant(rows: NDArray[np.float64]) -> NDArray[np.float64]:
