@@ -19,6 +19,7 @@ from heavytop.claims.ershkov import Branch, PartialCase
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.validated import Validated
 from heavytop.precision import decimal_text, shown
@@ -59,6 +60,7 @@ class Parting:
         return Fraction(decimal_text((self.before + self.after) / 2, DIGITS))
 
 
+@whole_evaluation
 def parting(case: PartialCase, horizon: Fraction, branch: Branch) -> Parting | None:
     """When the claim parts from the truth on the way from 0 to ``horizon`` ≠ 0; None if it provably does not.
 
