@@ -100,3 +100,20 @@ def test_the_row_does_not_depend_on_the_grid(tmp_path) -> None:
         rows = [measure(task) for task in expand(load(str(tmp_path / "p.toml"))[0])]
         values.append({row.integrator: row.metrics["claim_parts_by_1_percent_at"].value for row in rows})
     assert values == [{"claim:smooth": "0.201444", "claim:printed": "0.0100002"}] * 2
+
+
+def test_the_bounds_of_a_motion_are_those_of_its_energy_and_its_step() -> None:
+    given = case(6)
+    motion = module._Motion(true_solution(given), given)
+    (i1, i2, i3), (_, n, _) = given.solves.top.inertia, given.solves.top.moment
+    # the kinetic energy is at most C1 + |P b|: γ2 >= −1
+    most = 2 * float(given.c1 + n)
+    w1, w2, w3 = ((most / float(moment)) ** 0.5 for moment in (i1, i2, i3))
+    first = (float(i2 - i3) * w2 * w3 + float(n)) / float(i1)
+    expected = [first, float(i1 - i3) * w1 * w3 / float(i2), float(n / i3), w2 + w3, w1 + w3, w1 + w2]
+    assert [float(rate) for rate in motion.fastest] == pytest.approx(expected)
+    # over a step no component moves by more than that rate times the step
+    motion.field = lambda _, box: tuple(box)
+    time, step = Fraction(1, 50), Fraction(1, 200)
+    for box, value, rate in zip(motion.rates(time, step), motion.state(time), motion.fastest, strict=True):
+        assert float((box - value.mid()).abs_upper()) == pytest.approx(float(rate) * float(step), rel=1e-6)
