@@ -295,7 +295,8 @@ def finite_time_rates(times: Array, errors: Array) -> Array:
     centred = times - (weights * times).sum(axis=1, keepdims=True) / total
     spread = (weights * centred**2).sum(axis=1)
     moment = (weights * centred * logs).sum(axis=1)
-    return numpy.divide(moment, spread, out=numpy.zeros_like(moment), where=spread > 0)
+    rates: Array = numpy.divide(moment, spread, out=numpy.zeros_like(moment), where=spread > 0)
+    return rates
 
 
 def median_interval(values: Array) -> tuple[float, float]:
