@@ -98,6 +98,10 @@ def test_a_time_moves_within_the_noise_of_the_baseline(kind: str, name: str, own
         assert judged(old, at(near, band))[0] == "same"
         assert judged(old, at(far, band))[0] == "worse"
     assert judged(old, at(own[0], 0.05), noise=0)[0] == "worse"
+    if kind == "duration":  # 50 · 10^(2 · 0.05 √2), and with the noise of both 50 · 10^(2 · √(0.05² + 0.1²))
+        for band, near, far in ((0.05, "69.2", "69.3"), (0.1, "83.6", "83.8")):
+            assert judged(old, at(near, band))[0] == "same"
+            assert judged(old, at(far, band))[0] == "better"
 
 
 @pytest.mark.parametrize(
