@@ -267,7 +267,7 @@ def _law_said(label: str, law: Law) -> str:
     growth, exponent, _ = _law_words(law)
     if not exponent:
         return f"{label}: law {growth}."
-    return f"{label}: {growth}, {'rate' if growth == 'exponential' else 'exponent'} {exponent}."
+    return f"{label}: {growth}, {'median rate of the starts' if growth == 'exponential' else 'exponent'} {exponent}."
 
 
 def _law_words(law: Law | None) -> list[str]:

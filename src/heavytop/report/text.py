@@ -357,9 +357,11 @@ def _growth(rows: Sequence[Row]) -> list[RenderableType]:
         "detects",
         "lost at |t|",
     ]
+    chaotic = any(law.growth == "exponential" for row in rows for law in row.laws.values())
     return [
         title("Growth laws: root mean square over random starts, drift of the first integrals and distance from truth"),
         Text("  Detects: the smallest relative fault a step that these starts would have told from the healthy law."),
+        *([Text("  Rate: the median over the starts of their finite-time rates.")] if chaotic else []),
         table(columns, lines),
     ]
 
