@@ -25,11 +25,12 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import arb, ctx
+from flint import arb
 
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.balls import working_precision
 from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.kovalevskaya_abel import AbelMotion, Interval, intervals, pole
 from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
@@ -80,7 +81,7 @@ class Kovalevskaya(ClosedForm):
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         try:
-            return _motion(self, ctx.prec).at(time, ctx.cap)
+            return _motion(self, current_precision()).at(time, current_length())
         except Undecided:
             return [arb("nan")] * 6
 
@@ -97,6 +98,7 @@ def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion | ThetaMotion:
     return ThetaMotion.of(level)
 
 
+@whole_evaluation
 def _require_done(level: Level) -> None:
     """Raises NotInClass on the levels that are not done here."""
     cubic, double = level.cubic(), level.double()

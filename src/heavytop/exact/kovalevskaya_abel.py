@@ -34,13 +34,14 @@ from fractions import Fraction
 from itertools import combinations, pairwise
 from typing import Any
 
-from flint import acb, acb_series, arb, arb_series, ctx
+from flint import acb, acb_series, arb, arb_series
 
 from heavytop.exact.abel import Inversion, Variable
 from heavytop.exact.balls import ball, midpoint
 from heavytop.exact.closed_form import series_length
+from heavytop.exact.flint_context import coefficient, current_length
 from heavytop.exact.gaps import Gap, Roots
-from heavytop.exact.kovalevskaya_level import ORDERS, Level, Root, Start, linear, roots, start_of
+from heavytop.exact.kovalevskaya_level import ORDERS, Level, Root, Start, linear, real_part, roots, start_of
 from heavytop.exact.reduced import Undecided
 
 _UNITS = (acb(1), acb(0, 1), acb(-1), acb(0, -1))
@@ -164,8 +165,8 @@ class AbelMotion:
 
     def _moving(self, phases: Sequence[arb]) -> list[Any]:
         """The phases as power series in t, from their differential equations."""
-        moving = [arb_series([phase], prec=ctx.cap) for phase in phases]
-        for _ in range(ctx.cap - 1):
+        moving = [arb_series([phase], prec=current_length()) for phase in phases]
+        for _ in range(current_length() - 1):
             v1, v2 = (g.position(x) for g, x in zip(self.inversion.variables, moving, strict=True))
             first, second = (g.density(v) for g, v in zip(self.inversion.variables, (v1, v2), strict=True))
             rates = v2 / ((v1 - v2) * first), -v1 / ((v1 - v2) * second)
@@ -202,7 +203,7 @@ class AbelMotion:
         above, below = (sum((a * h for a, h in zip(row, products, strict=True)), acb_series([0])) for row in self.rows)
         half = 1 / (2 * below)
         p, q = above * half, first[0] * second[0] * half * acb(0, -1)
-        return _real_part(p), _real_part(q), _real_part(self._spin(phases, first, second) * half * acb(0, 4))
+        return real_part(p), real_part(q), real_part(self._spin(phases, first, second) * half * acb(0, 4))
 
     def _spin(self, phases: Sequence[Any], first: Sequence[Any], second: Sequence[Any]) -> Any:
         """(N'D − ND')/(h_10 h_20)."""
@@ -260,7 +261,8 @@ class AbelMotion:
 
 def _fourth_root(left: Any, right: Any) -> acb:
     """The one f in {1, i, −1, −i} with left = f right; raises Undecided where more than one can be."""
-    possible = [f for f in _UNITS if all((left[n] - f * right[n]).contains(0) for n in range(ORDERS))]
+    sides = [(coefficient(left, n), coefficient(right, n)) for n in range(ORDERS)]
+    possible = [f for f in _UNITS if all((one - f * other).contains(0) for one, other in sides)]
     if len(possible) != 1:
         raise Undecided
     return possible[0]
@@ -269,10 +271,6 @@ def _fourth_root(left: Any, right: Any) -> acb:
 def _real(value: acb, like: acb) -> acb:
     """``value`` without the imaginary part that rounding gave it, where ``like`` is real."""
     return acb(value.real) if like.imag.is_zero() else value
-
-
-def _real_part(series: Any) -> Any:
-    return arb_series([series[n].real for n in range(ctx.cap)], prec=ctx.cap)
 
 
 def start_phases(start: Start, mu: arb, variables: Sequence[Variable]) -> list[arb]:

@@ -21,10 +21,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from flint import acb, acb_mat, arb, arb_series, ctx, fmpq_poly
+from flint import acb, acb_mat, arb, arb_series, fmpq_poly
 
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import series_length
+from heavytop.exact.flint_context import coefficient, current_length
 from heavytop.exact.reduced import Reduced, Undecided, polynomial
 from heavytop.top.equations import Parameters, heavy_top
 
@@ -163,8 +164,8 @@ def start_of(level: Level) -> Start:
 def _flow(c: arb, start: list[arb]) -> tuple[Any, ...]:
     """The power series of the motion from the start, by Picard's iteration on the field itself."""
     parameters = Parameters((2, 2, 1), (c, arb(0), arb(0)), arb(0))
-    motion = [arb_series([value], prec=ctx.cap) for value in start]
-    for _ in range(ctx.cap - 1):
+    motion = [arb_series([value], prec=current_length()) for value in start]
+    for _ in range(current_length() - 1):
         rates = heavy_top(parameters, motion)
         motion = [value + arb_series(rate).integral() for value, rate in zip(start, rates, strict=True)]
     return tuple(motion)
@@ -194,3 +195,9 @@ def linear(start: Start, values: Sequence[acb]) -> tuple[list[acb], list[acb], a
 def square_root(value: acb) -> acb:
     """A root, whose ball is finite off 0, the negative axis included."""
     return acb(0, 1) * (-value).sqrt() if value.real < 0 else value.sqrt()
+
+
+def real_part(series: Any) -> Any:
+    """The real part of a complex series."""
+    length = current_length()
+    return arb_series([coefficient(series, n).real for n in range(length)], prec=length)

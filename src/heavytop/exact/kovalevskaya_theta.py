@@ -28,15 +28,17 @@ from fractions import Fraction
 from itertools import combinations, product
 from typing import Any
 
-from flint import acb, acb_mat, acb_series, arb, arb_mat, arb_series, ctx
+from flint import acb, acb_mat, acb_series, arb, arb_mat
 
 from heavytop.exact.balls import ball, midpoint, whole
 from heavytop.exact.closed_form import series_length
+from heavytop.exact.flint_context import coefficient, current_length
 from heavytop.exact.kovalevskaya_level import (
     ORDERS,
     Level,
     Start,
     linear,
+    real_part,
     roots,
     square_root,
     start_of,
@@ -230,7 +232,7 @@ class ThetaMotion:
             )
             half = 1 / (2 * below)
             parts = above * half, thetas[_number(_DELTA)] * half * -_I, spin * half * (4 * _I)
-            velocity = [arb_series([part[n].real for n in range(ctx.cap)], prec=ctx.cap) for part in parts]
+            velocity = [real_part(part) for part in parts]
         return self.level.restored(self.start.state(velocity, length), length)
 
     def reduced(self, z: acb_mat) -> acb_mat:
@@ -243,7 +245,7 @@ class ThetaMotion:
 
     def _thetas(self, z: acb_mat) -> list[Any]:
         """All 16 as series along v."""
-        order = ctx.cap - 1
+        order = current_length() - 1
         jets, (one, two) = acb_mat.theta_jets(self.curve.tau, z, order), self.rate.entries()
         weights = [(n, one ** (n - i) * two**i) for n in range(order + 1) for i in range(n + 1)]
         found = []
@@ -251,7 +253,7 @@ class ThetaMotion:
             row = [acb(0)] * (order + 1)
             for column, (n, weight) in enumerate(weights):
                 row[n] += jets[number, column] * weight
-            found.append(acb_series(row, prec=ctx.cap))
+            found.append(acb_series(row, prec=current_length()))
         return found
 
     def _rows(self, values: Sequence[acb], places: Sequence[int]) -> tuple[tuple[tuple[int, acb], ...], ...]:
@@ -298,7 +300,7 @@ def points(start: Start) -> list[tuple[arb, arb]]:
 
 def _ratio(left: Any, right: Any) -> acb:
     """left/right of two proportional series, from the largest coefficient."""
-    best = max(range(ORDERS), key=lambda n: abs(right[n]).lower())
+    best = max(range(ORDERS), key=lambda n: abs(coefficient(right, n)).lower())
     if right[best].contains(0):
         raise Undecided
     return acb(left[best] / right[best])
