@@ -8,7 +8,7 @@ import msgspec
 import pytest
 from flint import arb
 
-from heavytop.errors import Contradiction, InputError
+from heavytop.errors import Contradiction, InputError, OutOfReach
 from heavytop.exact.balls import midpoint, radius, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
@@ -110,6 +110,29 @@ def test_reference_serves_the_gyrostat():
     record = reference(known.top, known.start, ["-1/2"], 40, GYROSTAT)
     for ball, value in zip(record.states[0], known.state(Fraction(-1, 2), 160), strict=True):
         assert abs(Fraction(ball.value) - midpoint(value)) <= Fraction(ball.radius) + radius(value)
+
+
+class Wide:
+    """A solution that gives fewer digits than it was asked for: balls of ``radius`` around (1, 0, ...)."""
+
+    method, system = "too wide", KNOWN[0].system
+
+    def __init__(self, middle, radius):
+        self.middle, self.radius = middle, radius
+
+    def state(self, time, bits):
+        with working_precision(200):
+            return [arb(self.middle, self.radius), *[arb(0)] * 5]
+
+
+@pytest.mark.parametrize(("middle", "wide", "narrow"), [("100", "1e-28", "0.9e-28"), ("0", "1.01e-30", "0.99e-30")])
+def test_a_radius_beyond_the_digits_promised_is_not_printed(middle, wide, narrow):
+    def asked(radius):
+        return reference(KNOWN[0].top, KNOWN[0].start, ["1"], 30, finder=lambda *_: Wide(middle, radius))
+
+    assert Fraction(asked(narrow).states[0][0].radius) >= Fraction(narrow)
+    with pytest.raises(OutOfReach, match="not to 30 digits, by too wide"):
+        asked(wide)
 
 
 @pytest.mark.parametrize("digits", [0, -1, 20001])

@@ -5,6 +5,7 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import Contradiction
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.known import Known, certified, known_motion
@@ -81,3 +82,13 @@ def test_a_reference_with_fewer_digits_than_the_format_scores_nothing() -> None:
     known = known_motion(problem("euler"), Fraction(3))
     assert isinstance(known, Known)
     assert certified(Blurred(known.solution), Fraction(3), 117) is None
+
+
+@pytest.mark.parametrize("axes", ALL)
+def test_no_naming_of_the_axes_costs_a_motion_its_reference(axes) -> None:
+    case = CASES["delone"]
+    given = Problem.of(renamed_top(case.top, axes), renamed_state(case.start, axes), QUAD, case.system)
+    known = known_motion(given, Fraction(10**4))
+    assert isinstance(known, Known)
+    assert "closed form" in known.solution.method
+    assert known.certificate.agreed_digits >= 37

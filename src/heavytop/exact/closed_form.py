@@ -9,15 +9,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from math import isqrt
 from typing import TYPE_CHECKING, Any
 
 from flint import acb, acb_series, arb, arb_series, ctx
 
+from heavytop.errors import InputError
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
-from heavytop.exact.motion import initial_xi
-from heavytop.top.angles import attitude_from_angles
+from heavytop.top.angles import attitude_from_angles, perpendicular
 from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
 Carry = Callable[[Sequence[Any]], list[Any]]
 """Takes the body components at t = 0 of a vector fixed in space to those at the time in question."""
@@ -75,6 +76,18 @@ def turned(vector: Sequence[Any], omega: Sequence[arb], rate: arb, time: Any) ->
     along = dot(axis, vector)
     across = cross(vector, axis)
     return [along * n + cosine * (v - along * n) + sine * w for n, v, w in zip(axis, vector, across, strict=True)]
+
+
+def initial_xi(gamma: Vector) -> list[arb]:
+    """ξ at t = 0 where nobody gave it: :func:`perpendicular` of γ/|γ|; raises InputError for γ = 0."""
+    square = dot(gamma, gamma)
+    if square == 0:
+        raise InputError("gamma is the zero vector: no attitude stands on it.", "Give the direction of the weight.")
+    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
+    if root * root == square:
+        return [ball(x) for x in perpendicular((gamma[0] / root, gamma[1] / root, gamma[2] / root))]
+    size: Any = ball(square).sqrt()
+    return list(perpendicular((ball(gamma[0]) / size, ball(gamma[1]) / size, ball(gamma[2]) / size)))  # type: ignore[arg-type]
 
 
 def tanh_sech(argument: Any) -> tuple[Any, Any]:
@@ -141,7 +154,7 @@ class WithAttitude(ClosedForm):
     def attitude(self, time: Fraction, bits: int, initial: Sequence[Fraction] | None = None) -> list[arb]:
         """ξ, a unit vector fixed in space and ⟂ γ, in body components.
 
-        ``initial``: ξ at t = 0; :func:`heavytop.exact.motion.initial_xi` of γ if not given.
+        ``initial``: ξ at t = 0; :func:`heavytop.exact.closed_form.initial_xi` of γ if not given.
         """
 
         def evaluate(_working: int) -> list[arb]:

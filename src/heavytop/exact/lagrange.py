@@ -31,7 +31,8 @@ from flint import acb, arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
+from heavytop.exact.closed_form import initial_xi, series_length
+from heavytop.exact.motion import kept, rotate, series_at, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.second_kind import Winding
 from heavytop.exact.weierstrass import imag, real
@@ -75,7 +76,8 @@ class Lagrange:
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
+        with series_length(1):
+            return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
@@ -149,7 +151,8 @@ class Lagrange:
             cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
             return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
 
-        return to_bits(evaluate, bits, time)
+        with series_length(2):
+            return to_bits(evaluate, bits, time)
 
     def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[arb]:
         """A vector ⟂ γ, fixed in space, at ``time``.

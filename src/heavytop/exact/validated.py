@@ -22,6 +22,7 @@ from flint import arb, arb_series
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, relative_bits, working_precision
+from heavytop.exact.closed_form import series_length
 from heavytop.exact.enclosure import Node, Step, coefficient_bound, start_node, step
 from heavytop.exact.quadratic import Quadratic, quadratic
 from heavytop.top.angles import perpendicular
@@ -183,7 +184,8 @@ class Validated:
                     total = sum((c * sums[pair] for c, pair in row.products), arb(0))
                     total += sum((c * last[j] for c, j in row.linear), arb(0))
                     component.append(total / (row.denominator * (n + 1)))
-            return [arb_series(component, prec=length) for component in y]
+            with series_length(length):
+                return [arb_series(component, prec=length) for component in y]
 
     def _field(self, direction: int, dimension: int) -> Quadratic:
         """The field of y, or of y and ξ; backwards in time with its sign changed."""

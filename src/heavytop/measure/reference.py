@@ -8,12 +8,12 @@ from typing import Any
 
 import msgspec
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.balls import value_text
 from heavytop.exact.catalogue import find
 from heavytop.exact.solution import ExactSolution
 from heavytop.measure.certify import bits_of
-from heavytop.precision import exact
+from heavytop.precision import exact, shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -50,7 +50,7 @@ def reference(
     system: System = HEAVY_TOP,
     finder: Finder = find,
 ) -> Reference:
-    """The states at ``times`` to ``digits`` digits (relative above 1, absolute below).
+    """The states at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1 and absolute below.
 
     times: exact numbers in any order.  digits: 1 to 20,000.
     Raises InputError for other digits, for a time that is not a finite rational, and where the system does not admit
@@ -70,5 +70,18 @@ def reference(
 
 
 def ball_texts(solution: ExactSolution, time: Fraction, digits: int) -> list[Ball]:
-    """The six balls at ``time`` as text with ``digits`` significant digits."""
-    return [Ball(*value_text(value, digits)) for value in solution.state(time, bits_of(digits))]
+    """The six balls at ``time`` as text.
+
+    One significant digit more than ``digits`` is printed: rounded to ``digits`` of them, a value such as 1.04 may be
+    wrong by five units of the digit that was promised.  Raises OutOfReach where a printed radius exceeds 10^-digits,
+    relative to a value above 1.
+    """
+    found = [Ball(*value_text(value, digits + 1)) for value in solution.state(time, bits_of(digits))]
+    for component, ball in enumerate(found, 1):
+        if Fraction(ball.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(Fraction(ball.value))):
+            raise OutOfReach(
+                f"Component {component} at t = {shown(time)} is known within {ball.radius} only, not to {digits} "
+                f"digits, by {solution.method}.",
+                "Ask for fewer digits.",
+            )
+    return found
