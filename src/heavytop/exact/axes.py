@@ -22,7 +22,8 @@ from flint import arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.closed_form import initial_xi, series_length
+from heavytop.exact.closed_form import series_length
+from heavytop.exact.motion import initial_xi
 from heavytop.exact.solution import ExactSolution
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
@@ -100,7 +101,7 @@ class Renamed:
             return self._renamed(self.solution.series(time, length, bits))
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, starting where :func:`heavytop.exact.closed_form.initial_xi` says in the new names.
+        """ξ, starting where :func:`heavytop.exact.motion.initial_xi` says in the new names.
 
         Raises NotInClass where the solution has no attitude.
         """

@@ -1,6 +1,7 @@
 """Balls (python-flint's arb): exact numbers in, enclosures out.
 
-The working precision of FLINT is global, so every evaluation stands inside :func:`working_precision`.
+The working precision of FLINT is one for the whole process, so every evaluation stands inside
+:class:`heavytop.exact.flint_context.working_precision`, which is to be had from here too.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ from decimal import MAX_EMAX, MIN_EMIN, ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from types import SimpleNamespace
 
-from flint import arb, ctx, fmpq
+from flint import arb, fmpq
 
 from heavytop.errors import OutOfReach
+from heavytop.exact.flint_context import whole_evaluation
+from heavytop.exact.flint_context import working_precision as working_precision
 from heavytop.precision import decimal_text
 
 FUNCTIONS = SimpleNamespace(
@@ -31,22 +34,6 @@ _MAX_BITS = 1 << 22
 _HALF = arb(0.5)
 _GUARD, _STEP = 16, 64
 _RADIUS_BITS = 30
-
-
-class working_precision:  # noqa: N801 - reads as a verb
-    """FLINT's working precision set to ``bits`` within the block."""
-
-    __slots__ = ("before", "bits")
-
-    def __init__(self, bits: int) -> None:
-        self.bits = bits
-
-    def __enter__(self) -> None:
-        self.before = ctx.prec
-        ctx.prec = self.bits
-
-    def __exit__(self, *_: object) -> None:
-        ctx.prec = self.before
 
 
 def ball(value: Fraction | int) -> arb:
@@ -80,6 +67,7 @@ def ball_text(value: arb) -> str:
     return " ".join(str(int(part)) for part in (*value.mid().man_exp(), *value.rad().man_exp()))
 
 
+@whole_evaluation
 def ball_from(text: str) -> arb:
     """The ball of :func:`ball_text`.  Raises ValueError for other text."""
     if text == "nan":
@@ -103,6 +91,7 @@ def value_text(value: arb, digits: int) -> tuple[str, str]:
     return text, radius_text(radius(value) + abs(Fraction(text) - midpoint(value)))
 
 
+@whole_evaluation
 def whole(value: arb) -> int:
     """The whole number nearest to the middle of a ball; 0 if it is not finite."""
     found = (value + _HALF).mid().floor().unique_fmpz()
@@ -130,18 +119,22 @@ def _graspable(value: arb, smallest: int) -> arb:
     return arb(0, arb(2) ** (smallest + 1))
 
 
-def to_bits(evaluate: Callable[[int], list[arb]], bits: int, time: Fraction | None = None) -> list[arb]:
+@whole_evaluation
+def to_bits(
+    evaluate: Callable[[int], list[arb]], bits: int, time: Fraction | None = None, length: int = 1
+) -> list[arb]:
     """``evaluate(working bits)`` repeated at growing working precision until every ball has ``bits`` bits.
 
     Bits count relative to a value above 1 and absolutely below it.  time: what it is evaluated at; it costs its own
-    bits, and the precision then comes in steps, so that lattices are made once.  Raises OutOfReach where even a
+    bits, and the precision then comes in steps, so that lattices are made once.  length: of power series meanwhile.
+    Raises OutOfReach where even a
     precision of 16 times the asked bits plus 4096 does not give them.
     """
     extra = -1 if time is None else _GUARD + (abs(time.numerator) // time.denominator).bit_length()
     working, smallest = bits + 32, -16 * bits - 4096
     while working <= -smallest:
         inside = working if extra < 0 else -(-(working + extra) // _STEP) * _STEP
-        with working_precision(inside):
+        with working_precision(inside, length):
             values = evaluate(inside)
         right = [value.rel_one_accuracy_bits() for value in values]
         if min(right) >= bits:

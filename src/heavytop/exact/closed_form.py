@@ -9,35 +9,20 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from math import isqrt
 from typing import TYPE_CHECKING, Any
 
 from flint import acb, acb_series, arb, arb_series, ctx
 
-from heavytop.errors import InputError
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
-from heavytop.top.angles import attitude_from_angles, perpendicular
+from heavytop.exact.flint_context import coefficient
+from heavytop.exact.flint_context import series_length as series_length
+from heavytop.exact.motion import initial_xi
+from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
+from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
 Carry = Callable[[Sequence[Any]], list[Any]]
 """Takes the body components at t = 0 of a vector fixed in space to those at the time in question."""
-
-
-class series_length:  # noqa: N801 - reads as a verb
-    """FLINT's cap on the length of power series set to ``length`` within the block."""
-
-    __slots__ = ("before", "length")
-
-    def __init__(self, length: int) -> None:
-        self.length = length
-
-    def __enter__(self) -> None:
-        self.before = ctx.cap
-        ctx.cap = self.length
-
-    def __exit__(self, *_: object) -> None:
-        ctx.cap = self.before
 
 
 def instant(time: Fraction) -> Any:
@@ -78,18 +63,6 @@ def turned(vector: Sequence[Any], omega: Sequence[arb], rate: arb, time: Any) ->
     return [along * n + cosine * (v - along * n) + sine * w for n, v, w in zip(axis, vector, across, strict=True)]
 
 
-def initial_xi(gamma: Vector) -> list[arb]:
-    """ξ at t = 0 where nobody gave it: :func:`perpendicular` of γ/|γ|; raises InputError for γ = 0."""
-    square = dot(gamma, gamma)
-    if square == 0:
-        raise InputError("gamma is the zero vector: no attitude stands on it.", "Give the direction of the weight.")
-    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
-    if root * root == square:
-        return [ball(x) for x in perpendicular((gamma[0] / root, gamma[1] / root, gamma[2] / root))]
-    size: Any = ball(square).sqrt()
-    return list(perpendicular((ball(gamma[0]) / size, ball(gamma[1]) / size, ball(gamma[2]) / size)))  # type: ignore[arg-type]
-
-
 def tanh_sech(argument: Any) -> tuple[Any, Any]:
     """(tanh, sech) of a number or series; nothing grows, whatever its sign and size."""
     side = -1 if constant(argument) < 0 else 1
@@ -121,19 +94,17 @@ class ClosedForm(ABC):
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        with series_length(1):
-            return to_bits(lambda _working: self.evaluate(time), bits, time)
+        return to_bits(lambda _working: self.evaluate(time), bits, time)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         found: list[arb_series] = []
 
         def evaluate(_working: int) -> list[arb]:
-            found[:] = [arb_series(part, prec=length) for part in self.evaluate(time)]
+            found[:] = [whole_series(part, length) for part in self.evaluate(time)]
             return [part[0] for part in found]
 
-        with series_length(length):
-            to_bits(evaluate, bits, time)
+        to_bits(evaluate, bits, time, length)
         return found
 
 
@@ -154,15 +125,14 @@ class WithAttitude(ClosedForm):
     def attitude(self, time: Fraction, bits: int, initial: Sequence[Fraction] | None = None) -> list[arb]:
         """ξ, a unit vector fixed in space and ⟂ γ, in body components.
 
-        ``initial``: ξ at t = 0; :func:`heavytop.exact.closed_form.initial_xi` of γ if not given.
+        ``initial``: ξ at t = 0; :func:`heavytop.exact.motion.initial_xi` of γ if not given.
         """
 
         def evaluate(_working: int) -> list[arb]:
             xi = initial_xi(self.start.gamma) if initial is None else balls(initial)
             return self.motion(instant(time))[1](xi)
 
-        with series_length(1):
-            return to_bits(evaluate, bits, time)
+        return to_bits(evaluate, bits, time)
 
 
 class WithAngles(ClosedForm):
@@ -182,6 +152,13 @@ class WithAngles(ClosedForm):
             return list(attitude_from_angles(phi, theta, psi, FUNCTIONS))
 
         return to_bits(evaluate, bits)
+
+
+def whole_series(value: Any, length: int) -> arb_series:
+    """A number or a series as the series of ``length`` coefficients; raises ContextChanged where it was cut off."""
+    if isinstance(value, arb_series):
+        coefficient(value, length - 1)
+    return arb_series(value, prec=length)
 
 
 def constant(value: Any) -> arb:

@@ -29,8 +29,8 @@ from typing import Any
 from flint import arb, arb_series
 
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.closed_form import initial_xi, series_length
-from heavytop.exact.motion import kept, rotate, series_at, taylor, turned
+from heavytop.exact.flint_context import require_undisturbed
+from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.second_kind import Winding
 from heavytop.exact.weierstrass import Point, imag, real
@@ -80,8 +80,7 @@ class Gyrostat:
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        with series_length(1):
-            return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
+        return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
@@ -97,8 +96,7 @@ class Gyrostat:
             start = initial_xi(self.start.gamma)
             return [dot(start, [image[axis] for image in images]) for axis in range(3)]
 
-        with series_length(1):
-            return to_bits(evaluate, bits, time)
+        return to_bits(evaluate, bits, time)
 
     def _evaluate(self, time: Fraction, length: int, bits: int) -> list[Any]:
         prepared = _prepared(self, bits)
@@ -202,7 +200,9 @@ def _prepared(motion: Gyrostat, bits: int) -> _Prepared:
 
 @lru_cache(maxsize=64)
 def _held(motion: Gyrostat, vector: Vector, bits: int) -> _Fixed:
-    return _fixed(motion, _prepared(motion, bits).motion, vector)
+    made = _fixed(motion, _prepared(motion, bits).motion, vector)
+    require_undisturbed()
+    return made
 
 
 def _fixed(motion: Gyrostat, prepared: PreparedMotion, vector: Vector) -> _Fixed:

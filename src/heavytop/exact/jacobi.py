@@ -23,6 +23,7 @@ from flint import acb, acb_poly, acb_series, arb, arb_poly, arb_series, ctx
 
 from heavytop.exact.balls import whole
 from heavytop.exact.closed_form import constant, series_length
+from heavytop.exact.flint_context import coefficient
 from heavytop.exact.theta import Theta
 from heavytop.exact.weierstrass import real
 
@@ -135,7 +136,7 @@ class Wave:
         """The derivative of its argument at u = 0."""
         with series_length(2):
             value = self.at(arb_series([0, 1], prec=2))[0]
-            return arb((value[1] / value[0]).imag)
+            return arb((coefficient(value, 1) / value[0]).imag)
 
 
 def wave(functions: Jacobi, shift: arb) -> Wave:

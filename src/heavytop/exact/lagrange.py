@@ -31,8 +31,8 @@ from flint import acb, arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.closed_form import initial_xi, series_length
-from heavytop.exact.motion import kept, rotate, series_at, taylor, turned
+from heavytop.exact.flint_context import coefficient, require_undisturbed
+from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.second_kind import Winding
 from heavytop.exact.weierstrass import imag, real
@@ -76,8 +76,7 @@ class Lagrange:
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        with series_length(1):
-            return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
+        return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
@@ -151,8 +150,7 @@ class Lagrange:
             cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
             return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
 
-        with series_length(2):
-            return to_bits(evaluate, bits, time)
+        return to_bits(evaluate, bits, time, 2)
 
     def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[arb]:
         """A vector ⟂ γ, fixed in space, at ``time``.
@@ -168,7 +166,7 @@ class Lagrange:
         inverse = 1 / prepared.motion.denominator(point)
         (h,), (g, w) = (c.at(point, inverse) for c in (axis, prepared.horizontal))
         x, size = prepared.motion.position(point, inverse)[0], ball(self.constants[4]).sqrt()
-        plus, minus = _sides(h[0], h[1], g[0], w[0], x, size)
+        plus, minus = _sides(h[0], coefficient(h, 1), g[0], w[0], x, size)
         return [((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real, h[0].real]
 
 
@@ -212,7 +210,9 @@ def _axis(motion: Lagrange, vector: Vector, bits: int) -> Companions:
     # s Z = s ξ + i γ × ξ, so Z = ξ + i s (γ × ξ/s²)
     normal = tuple(c / square for c in cross(motion.start.gamma, vector))
     first, second = (_derivatives(motion, fixed) for fixed in (vector, normal))
-    return _prepared(motion, bits).motion.companions(winding, turned(first, second, winding))
+    made = _prepared(motion, bits).motion.companions(winding, turned(first, second, winding))
+    require_undisturbed()
+    return made
 
 
 def _derivatives(motion: Lagrange, fixed: tuple[Fraction, ...]) -> list[Fraction]:

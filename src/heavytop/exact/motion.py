@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import wraps
-from math import factorial
+from math import factorial, isqrt
 from typing import Any, TypeVar
 
 from flint import arb, arb_series, fmpq, fmpq_series
 
+from heavytop.errors import InputError
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.closed_form import series_length
+from heavytop.exact.flint_context import coefficient, require_undisturbed, series_length
 from heavytop.exact.quartic import Pair
 from heavytop.exact.second_kind import Winding
+from heavytop.top.angles import perpendicular
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import Vector, dot
 
@@ -29,9 +31,13 @@ def kept(make: Callable[[Any, int], Made]) -> Callable[[Any, int], Made]:
     @wraps(make)
     def look_up(motion: Any, bits: int) -> Made:
         made: dict[Any, Made] = motion.made
-        if (make, bits) not in made:
-            made[make, bits] = make(motion, bits)
-        return made[make, bits]
+        try:
+            return made[make, bits]
+        except KeyError:
+            found = make(motion, bits)
+            require_undisturbed()
+            made[make, bits] = found
+            return found
 
     return look_up
 
@@ -46,8 +52,7 @@ def series_at(
         found.append(evaluate(working, length))
         return [component[0] for component in found[-1]]
 
-    with series_length(length):
-        to_bits(leading, bits, time)
+    to_bits(leading, bits, time, length)
     return found[-1]
 
 
@@ -62,7 +67,7 @@ def taylor(
         for order in range(1, length):
             y = [fmpq_series(row, prec=length) for row in rows]
             for row, slope in zip(rows, field(exact, y), strict=True):
-                row.append(fmpq_series(slope)[order - 1] / order)
+                row.append(coefficient(fmpq_series(slope), order - 1) / order)
     return [[Fraction(int(c.p), int(c.q)) * factorial(n) for n, c in enumerate(row)] for row in rows]
 
 
@@ -105,3 +110,15 @@ def rotate(vector: Vector, omega: Vector, time: Any) -> list[Any]:
         cosine * ball(v - share * w) + sine * (ball(c) / size) + ball(share * w)
         for v, w, c in zip(vector, omega, crossed, strict=True)
     ]
+
+
+def initial_xi(gamma: Vector) -> list[arb]:
+    """ξ at t = 0 where nobody gave it: :func:`perpendicular` of γ/|γ|; raises InputError for γ = 0."""
+    square = dot(gamma, gamma)
+    if square == 0:
+        raise InputError("gamma is the zero vector: no attitude stands on it.", "Give the direction of the weight.")
+    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
+    if root * root == square:
+        return [ball(x) for x in perpendicular((gamma[0] / root, gamma[1] / root, gamma[2] / root))]
+    size: Any = ball(square).sqrt()
+    return list(perpendicular((ball(gamma[0]) / size, ball(gamma[1]) / size, ball(gamma[2]) / size)))  # type: ignore[arg-type]
