@@ -5,6 +5,7 @@ With Ω = s ω, τ = s t and P r = s² n the equations of ω, γ and n in τ are
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fractions import Fraction
 
 from heavytop.errors import OutOfReach
@@ -16,13 +17,13 @@ _LONGEST = 1 << 15
 _ORDINARY = 16
 
 
-def require_handy(top: HeavyTop, start: State) -> None:
+def require_handy(top: HeavyTop, start: State, times: Iterable[Fraction] = ()) -> None:
     """Raises OutOfReach for numbers whose exact arithmetic would take longer than anyone waits."""
-    for value in (*top.inertia, *top.moment, *start.flat):
+    for value in (*top.inertia, *top.moment, *start.flat, *times):
         length = max(value.numerator.bit_length(), value.denominator.bit_length())
         if length > _LONGEST:
             raise OutOfReach(
-                f"A number of the top or start is a fraction of {length} bits.",
+                f"A number of the top, the start or a time is a fraction of {length} bits.",
                 f"References are proven for fractions of up to {_LONGEST} bits, 1e-9000 to 1e9000: choose other units.",
             )
 
@@ -32,10 +33,20 @@ def unit_of_time(parameters: Parameters, start: tuple[Fraction, ...]) -> int:
 
     The rates are |Ω|, |λ| and the root of |P r||γ|/I, whichever is largest.
     """
+    largest = _exponent_of_rate(parameters, start, min(parameters.inertia))
+    return 0 if largest is None or -_ORDINARY <= largest <= _ORDINARY else largest
+
+
+def least_rate(parameters: Parameters, start: tuple[Fraction, ...]) -> Fraction:
+    """A rate that the motion has, but for a factor: of :func:`unit_of_time`, with the largest moment I; 0 at rest."""
+    largest = _exponent_of_rate(parameters, start, max(parameters.inertia))
+    return Fraction(0) if largest is None else Fraction(2) ** largest
+
+
+def _exponent_of_rate(parameters: Parameters, start: tuple[Fraction, ...], inertia: Fraction) -> int | None:
     turning = max(*map(abs, start[:3]), abs(Fraction(parameters.rotor)))
-    weight = max(map(abs, parameters.moment)) * max(map(abs, start[3:6])) / min(parameters.inertia)
-    largest = max([exponent(turning)] * (turning > 0) + [exponent(weight) // 2] * (weight > 0), default=0)
-    return 0 if -_ORDINARY <= largest <= _ORDINARY else largest
+    weight = max(map(abs, parameters.moment)) * max(map(abs, start[3:6])) / inertia
+    return max([exponent(turning)] * (turning > 0) + [exponent(weight) // 2] * (weight > 0), default=None)
 
 
 def exponent(value: Fraction) -> int:

@@ -11,9 +11,10 @@ import msgspec
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.balls import value_text
 from heavytop.exact.catalogue import find
+from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
 from heavytop.measure.certify import bits_of
-from heavytop.precision import exact, shown
+from heavytop.precision import exact, exact_text, shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -54,16 +55,17 @@ def reference(
 
     times: exact numbers in any order.  digits: 1 to 20,000.
     Raises InputError for other digits, for a time that is not a finite rational, and where the system does not admit
-    the start; OutOfReach where the digits cannot be proven.
+    the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
     if digits not in DIGITS:
         raise InputError(f"{digits} digits are not available.", "References have 1 to 20000 digits.")
     instants = [exact(time) for time in times]
+    require_handy(top, start, instants)
     solution = finder(top, start, system)
     return Reference(
         method=solution.method,
         digits=digits,
-        times=[str(time) for time in instants],
+        times=[exact_text(time) for time in instants],
         states=[ball_texts(solution, time, digits) for time in instants],
         system=system.name,
     )
