@@ -76,7 +76,11 @@ def mixed(rng):
 
     first, second, third = (abs(number()) for _ in range(3))
     weight, unit = number(), rng.choice(UNITS)
-    yield HeavyTop((first, first, second), weight, (0, 0, number())), State([number() for _ in range(3)], unit), HEAVY_TOP
+    yield (
+        HeavyTop((first, first, second), weight, (0, 0, number())),
+        State([number() for _ in range(3)], unit),
+        HEAVY_TOP,
+    )
     yield HeavyTop((first, second, third), 0, (0, 0, 1)), State([number() for _ in range(3)], unit), HEAVY_TOP
     level = (0, Fraction(3, 5), Fraction(4, 5))
     yield HeavyTop((first, second, third), weight, (0, number(), number())), State((number(), 0, 0), level), HEAVY_TOP

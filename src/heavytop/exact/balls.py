@@ -16,7 +16,7 @@ from flint import arb, fmpq
 from heavytop.errors import OutOfReach
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.flint_context import working_precision as working_precision
-from heavytop.precision import decimal_text
+from heavytop.precision import decimal_text, exact
 
 FUNCTIONS = SimpleNamespace(
     sqrt=arb.sqrt,
@@ -92,7 +92,7 @@ def ball_from(text: str) -> arb:
 def value_text(value: arb, digits: int) -> tuple[str, str]:
     """(value, radius) as decimal text: the radius encloses the ball and the rounding of the printed value."""
     text = decimal_text(midpoint(value), digits)
-    return text, radius_text(radius(value) + abs(Fraction(text) - midpoint(value)))
+    return text, radius_text(radius(value) + abs(exact(text) - midpoint(value)))
 
 
 @whole_evaluation

@@ -223,9 +223,7 @@ class Validated:
         """The field of y, or of y and ξ; backwards in time with its sign changed."""
         if (direction, dimension) not in self._fields:
             given, factor = self.parameters, Fraction(2) ** -self.unit
-            p = Parameters(
-                given.inertia, [factor * factor * n for n in given.moment], factor * Fraction(given.rotor)
-            )
+            p = Parameters(given.inertia, [factor * factor * n for n in given.moment], factor * Fraction(given.rotor))
 
             def rates(y: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
                 found = self.system.field(p, y[:6])

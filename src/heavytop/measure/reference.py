@@ -80,7 +80,7 @@ def ball_texts(solution: ExactSolution, time: Fraction, digits: int) -> list[Bal
     """
     found = [Ball(*value_text(value, digits + 1)) for value in solution.state(time, bits_of(digits))]
     for component, ball in enumerate(found, 1):
-        if Fraction(ball.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(Fraction(ball.value))):
+        if exact(ball.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(ball.value))):
             raise OutOfReach(
                 f"Component {component} at t = {shown(time)} is known within {ball.radius} only, not to {digits} "
                 f"digits, by {solution.method}.",
