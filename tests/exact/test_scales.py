@@ -56,19 +56,24 @@ def test_other_units_give_the_same_motion(name, top, start, system):
 def test_any_time_is_answered_or_refused_in_words(name, top, start, system):
     for decades in (-100, -30, 30, 100):
         begun = process_time()
-        try:
-            record = reference(top, start, [Fraction(10) ** decades], DIGITS, system)
-        except OutOfReach as refused:
-            assert name == "generic"
-            assert decades > 0
-            assert "out of reach" in refused.cause
+        if name == "generic" and decades > 0:
+            with pytest.raises(OutOfReach, match="out of reach"):
+                reference(top, start, [Fraction(10) ** decades], DIGITS, system)
         else:
-            assert record.digits == DIGITS
+            assert narrow(reference(top, start, [Fraction(10) ** decades], DIGITS, system))
         assert process_time() - begun < SECONDS
 
 
+def narrow(record):
+    return all(
+        Fraction(ball.radius) <= Fraction(1, 10**record.digits) * max(Fraction(1), abs(Fraction(ball.value)))
+        for state in record.states
+        for ball in state
+    )
+
+
 def mixed(rng):
-    """Tops whose moments, weight and rates differ by up to a thousand decades, one of each class that leaves them free."""
+    """Tops whose moments, weight and rates differ by thousands of decades, one of each class that leaves them free."""
 
     def number():
         size = Fraction(10) ** rng.choice((0, 0, 0, *DECADES))
@@ -105,21 +110,11 @@ def times(a, b):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_numbers_of_very_different_size_are_answered_or_refused_in_words(seed):
+def test_numbers_of_very_different_size_are_answered(seed):
     for top, start, system in mixed(random.Random(seed)):
         begun = process_time()
-        solution = find(top, start, system)
-        assert not isinstance(solution, Validated)
-        try:
-            record = reference(top, start, [TIME, Fraction(-1, 10**30)], DIGITS, system)
-        except OutOfReach as refused:
-            assert refused.remedy
-        else:
-            assert all(
-                Fraction(b.radius) <= Fraction(1, 10**DIGITS) * max(Fraction(1), abs(Fraction(b.value)))
-                for state in record.states
-                for b in state
-            )
+        assert not isinstance(find(top, start, system), Validated)
+        assert narrow(reference(top, start, [TIME, Fraction(-1, 10**30)], DIGITS, system))
         assert process_time() - begun < SECONDS
 
 
