@@ -16,20 +16,24 @@ from heavytop.exact.balls import midpoint, radius, working_precision
 from heavytop.exact.enclosure import CAP, Errors, Node, start_node, step
 from heavytop.exact.quadratic import quadratic
 from heavytop.exact.validated import Validated
-from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 START = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
 PARAMETERS = HEAVY_TOP.parameters(TOP, START)
 FIELD = quadratic(lambda y: HEAVY_TOP.field(PARAMETERS, y), 6)
+# a rotor so fast that the linear part counts most
+ROTOR = PARAMETERS._replace(rotor=Fraction(40))
+WITH_ROTOR = quadratic(lambda y: GYROSTAT.field(ROTOR, y), 6)
+FIELDS = {"heavy top": FIELD, "gyrostat": WITH_ROTOR}
 SIX = range(6)
 
 
-def node_with(precision, size, seed=0):
+def node_with(precision, size, seed=0, field=FIELD):
     """The start with a set of errors of about ``size`` ulps in a turned frame."""
     rng = np.random.default_rng(seed)
-    node = start_node(FIELD, START.flat, precision)
+    node = start_node(field, START.flat, precision)
     frame = np.linalg.qr(rng.standard_normal((6, 6)))[0]
     return Node(node.time, node.centre, Errors(frame, size * (0.5 + rng.random(6)), 0), node.halvings)
 
@@ -37,10 +41,15 @@ def node_with(precision, size, seed=0):
 STEPS = [(precision, size) for precision in (64, 128, 400) for size in (0.5, 1e4, 2.0 ** (precision - 30))]
 
 
+@pytest.fixture(params=FIELDS)
+def field(request):
+    return FIELDS[request.param]
+
+
 @pytest.fixture(params=STEPS, ids=lambda case: f"{case[0]} bits, errors {case[1]:.1g}")
-def made(request):
+def made(request, field):
     precision, size = request.param
-    found = step(FIELD, node_with(precision, size), precision)
+    found = step(field, node_with(precision, size, field=field), precision)
     assert found is not None
     return found
 
@@ -76,9 +85,9 @@ def set_size(errors):
     )
 
 
-def theorem(found):
+def theorem(found, field):
     """(D, W, the bound of |v|) of the module's theorem, exactly but for e^Λ from below; as numbers."""
-    h, q, slope, beta = found.length, FIELD.q, FIELD.l, betas(found)
+    h, q, slope, beta = found.length, field.q, field.l, betas(found)
     order = found.order
     defect = Fraction(order, 2) * ulp(found)
     for n in range(order, 2 * order + 1):
@@ -89,16 +98,16 @@ def theorem(found):
     return defect, widest, growth * (defect + h * q * widest**2)
 
 
-def test_the_defect_is_what_the_coefficients_leave(made):
-    defect, _, _ = theorem(made)
+def test_the_defect_is_what_the_coefficients_leave(made, field):
+    defect, _, _ = theorem(made, field)
     h = float(made.length)
-    bound = enclosure._defect(made.coefficients, made.precision, h * float(FIELD.q), h * float(FIELD.l))
+    bound = enclosure._defect(made.coefficients, made.precision, h * float(field.q), h * float(field.l))
     # β is bounded by a power of two: up to 4 times too large in a product
     assert defect <= Fraction(bound) * ulp(made) <= 16 * defect
 
 
-def test_local_and_widest_errors_are_those_of_the_theorem(made):
-    defect, widest, local = theorem(made)
+def test_local_and_widest_errors_are_those_of_the_theorem(made, field):
+    defect, widest, local = theorem(made, field)
     scale = Fraction(2) ** made.node.errors.exponent * ulp(made)
     assert widest <= Fraction(made.widest) <= 2 * widest + 32 * defect
     assert local <= Fraction(made.local) * scale <= 4 * local + 64 * defect
@@ -167,6 +176,24 @@ def test_the_variation_is_known_within_its_error(precision):
         gap = norm([[a - b for a, b in zip(x, y, strict=True)] for x, y in zip(true[n], exact(matrix), strict=True)])
         assert gap <= Fraction(found.variation_error)
         assert norm(exact(matrix)) <= Fraction(found._powers)
+
+
+@pytest.mark.parametrize("h", [0.25, 2.0, 16.0])
+def test_the_error_of_the_variation_holds_its_defect(h, field):
+    """At a state that stays, J is constant: V̂' − J V̂ is what the rounding of V̂ and its last power leave, exactly."""
+    node = start_node(field, START.flat, 64)
+    series = [[value] for value in node.centre]
+    slopes = h * 2 * float(field.q) * np.array([float(max(map(abs, node.centre))) / 2.0**64])
+    given, error = enclosure._variation(field, series, 64, h, slopes)
+    state = [Fraction(int(value), 2**64) for value in node.centre]
+    slope = [[Fraction(h) * (sum(Fraction(float(field.jacobian[i, j, k])) * state[k] for k in SIX)
+                             + Fraction(float(field.slope[i, j]))) for j in SIX] for i in SIX]  # fmt: skip
+    powers = [*map(exact, given), [[Fraction(0)] * 6] * 6]
+    defect = Fraction(0)
+    for n in range(len(powers) - 1):
+        left = [[(n + 1) * value for value in row] for row in powers[n + 1]]
+        defect += norm(minus(left, product(slope, powers[n]))) / (n + 1)
+    assert defect <= Fraction(error)
 
 
 def inverse_of(matrix):

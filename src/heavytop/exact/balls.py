@@ -135,7 +135,8 @@ def to_bits(
     """
     extra = -1 if time is None else _GUARD + (abs(time.numerator) // time.denominator).bit_length()
     working, smallest = bits + 32, -16 * bits - 4096
-    while working <= max(-smallest, _ENOUGH):
+    most = max(-smallest, _ENOUGH)
+    while True:
         inside = working if extra < 0 else -(-(working + extra) // _STEP) * _STEP
         with working_precision(inside, length):
             try:
@@ -152,8 +153,9 @@ def to_bits(
             if all(value.is_finite() for value in values):
                 return [v if r < -smallest else _graspable(v, smallest) for v, r in zip(values, right, strict=True)]
         reached = min(map(relative_bits, values))
-        working += max(bits - reached, working // 2) if reached >= 0 else working
-    raise OutOfReach(
-        f"Only {max(reached, 0)} of {bits} bits could be proven at a working precision of {inside} bits.",
-        "Ask for fewer digits or an earlier time; moments, weights and rates of very different size cost the most.",
-    )
+        if working >= most:
+            raise OutOfReach(
+                f"Only {max(reached, 0)} of {bits} bits could be proven at a working precision of {inside} bits.",
+                "Ask for fewer digits or an earlier time; moments, weights and rates of very different size cost most.",
+            )
+        working = min(most, working + (max(bits - reached, working // 2) if reached >= 0 else working))
