@@ -6,8 +6,9 @@ The working precision of FLINT is one for the whole process, so every evaluation
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from decimal import MAX_EMAX, MIN_EMIN, ROUND_CEILING, Context, Decimal
+from decimal import ROUND_CEILING, Decimal
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -16,7 +17,7 @@ from flint import arb, fmpq
 from heavytop.errors import OutOfReach
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.flint_context import working_precision as working_precision
-from heavytop.precision import decimal_text, exact
+from heavytop.precision import decimal_text, exact, quotient_text
 
 FUNCTIONS = SimpleNamespace(
     sqrt=arb.sqrt,
@@ -32,6 +33,7 @@ FUNCTIONS = SimpleNamespace(
 )
 _MAX_BITS = 1 << 22
 _HALF = arb(0.5)
+_INTEGER = re.compile(r"-?[0-9]+")
 _GUARD, _STEP = 16, 64
 _RADIUS_BITS = 30
 _ENOUGH = 1 << 15
@@ -59,16 +61,15 @@ def radius(value: arb) -> Fraction:
 
 def radius_text(value: Fraction) -> str:
     """A radius as decimal text of three digits, rounded up: it stays an upper bound."""
-    context = Context(prec=3, rounding=ROUND_CEILING, Emax=MAX_EMAX, Emin=MIN_EMIN)
-    quotient = context.divide(Decimal(value.numerator), Decimal(value.denominator))
-    return str(quotient) if quotient else "0"
+    return quotient_text(value, 3, ROUND_CEILING)
 
 
 def ball_text(value: arb) -> str:
     """A ball as text that :func:`ball_from` makes the very same ball of: ``m e r s`` for m 2^e ± r 2^s, or ``nan``."""
     if not value.is_finite():
         return "nan"
-    return " ".join(str(int(part)) for part in (*value.mid().man_exp(), *value.rad().man_exp()))
+    # Decimal, as Python refuses to write or read an int of more than 4300 digits, or of what the process set
+    return " ".join(str(Decimal(int(part))) for part in (*value.mid().man_exp(), *value.rad().man_exp()))
 
 
 @whole_evaluation
@@ -76,7 +77,7 @@ def ball_from(text: str) -> arb:
     """The ball of :func:`ball_text`.  Raises ValueError for other text."""
     if text == "nan":
         return arb("nan")
-    m, e, r, s = (int(part) for part in text.split())
+    m, e, r, s = (_integer(part) for part in text.split())
     if not r:
         return arb((m, e))
     with working_precision(m.bit_length() + 64):
@@ -87,6 +88,12 @@ def ball_from(text: str) -> arb:
     if ball_text(value) != text:
         raise ValueError(f"no ball is {text[:60]!r}")
     return value
+
+
+def _integer(text: str) -> int:
+    if not _INTEGER.fullmatch(text):
+        raise ValueError(f"no integer is {text[:60]!r}")
+    return int(Decimal(text))
 
 
 def value_text(value: arb, digits: int) -> tuple[str, str]:

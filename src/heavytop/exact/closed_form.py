@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from flint import acb, acb_series, arb, arb_series, ctx
+from flint import acb, acb_series, arb, arb_series
 
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
-from heavytop.exact.flint_context import coefficient
+from heavytop.exact.flint_context import coefficient, current_length
 from heavytop.exact.flint_context import series_length as series_length
 from heavytop.exact.motion import initial_xi
 from heavytop.top.angles import attitude_from_angles
@@ -27,7 +27,7 @@ Carry = Callable[[Sequence[Any]], list[Any]]
 
 def instant(time: Fraction) -> Any:
     """The power series t + ε, of the length set by :func:`series_length`; the number t for length 1."""
-    return ball(time) if ctx.cap == 1 else arb_series([ball(time), 1], prec=ctx.cap)
+    return ball(time) if current_length() == 1 else arb_series([ball(time), 1], prec=current_length())
 
 
 def unit(angle: Any) -> Any:
@@ -35,7 +35,7 @@ def unit(angle: Any) -> Any:
     sine, cosine = angle.sin_cos()
     if isinstance(angle, arb):
         return acb(cosine, sine)
-    return acb_series(cosine, prec=ctx.cap) + acb(0, 1) * acb_series(sine, prec=ctx.cap)
+    return acb_series(cosine, prec=current_length()) + acb(0, 1) * acb_series(sine, prec=current_length())
 
 
 def balls(vector: Sequence[Fraction]) -> list[arb]:

@@ -75,6 +75,16 @@ def _note() -> None:
     ctx.prec, ctx.cap = wanted
 
 
+def current_precision() -> int:
+    """The precision of the block that this stands in, whatever another thread has made of ``flint.ctx`` meanwhile."""
+    return _held.context[0]
+
+
+def current_length() -> int:
+    """The length of power series of the block that this stands in, as :func:`current_precision`."""
+    return _held.context[1]
+
+
 def require_undisturbed() -> None:
     """Raise ContextChanged if the context was changed since the evaluation began: before something is kept."""
     if (ctx.prec, ctx.cap) != _held.context:

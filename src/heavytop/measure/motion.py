@@ -12,6 +12,7 @@ from flint import arb
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import FUNCTIONS, working_precision
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.scales import least_rate
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -157,6 +158,7 @@ def _dense(problem: Problem, times: Sequence[Fraction]) -> list[Fraction]:
     return sorted(between | set(times), key=abs)
 
 
+@whole_evaluation
 def _angles(state: Any, followed: Sequence[float], precision: Precision) -> list[str]:
     """(φ, θ, ψ) of one state, shifted by the whole turns that were followed; ``nan`` at a pole."""
     with working_precision(precision.bits + GUARD_BITS):
