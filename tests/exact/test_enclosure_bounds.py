@@ -3,6 +3,7 @@
 What binary64 gives must be at least what the theorem asks for, and the room left for rounding must be there.
 """
 
+from dataclasses import replace
 from fractions import Fraction
 from math import factorial
 from random import Random
@@ -227,6 +228,33 @@ def test_a_new_frame_pays_for_all_that_it_is_not(uncertain):
                      for p, q in zip(carried, product(moved, exact(errors.frame)), strict=True)]  # fmt: skip
             assert norm(minus(product(back, whole), exact(turned))) <= bound
         assert bound <= Fraction(1, 10**11) + 20 * Fraction(uncertain)
+
+
+def test_the_value_of_the_polynomial_is_within_its_rounding():
+    """With all errors but that of Horner's scheme taken away: half an ulp a power is left, and some of it is used."""
+    found = step(FIELD, node_with(128, 0.5), 128)
+    still = Errors(found.node.errors.frame, np.zeros(6), 0)
+    bare = replace(found, node=replace(found.node, errors=still), local=0.0, variation_error=0.0)
+    used = Fraction(0)
+    for tau in (Fraction(n, 97) for n in range(0, 98, 4)):
+        with working_precision(300):
+            balls = bare.at(tau)
+        for ball, component in zip(balls, found.coefficients, strict=True):
+            true = sum((int(c) * tau**n for n, c in enumerate(component)), Fraction(0)) * ulp(found)
+            off = abs(midpoint(ball) - true)
+            assert off <= radius(ball) <= Fraction(found.order + 1, 2) * ulp(found)
+            used = max(used, off / ulp(found))
+    assert used > Fraction(1, 2)
+
+
+def test_what_a_step_adds_is_carried_into_every_direction_of_the_new_frame():
+    """|v| ≤ local in the maximum norm: component i of Q'^-1 v may come to local times the sum of row i."""
+    found = step(FIELD, node_with(128, 1e4), 128)
+    still = Errors(found.node.errors.frame, np.zeros(6), 0)
+    following = replace(found, node=replace(found.node, errors=still), local=1e6).end()
+    for row, r in zip(inverse_of(exact(following.errors.frame)), following.errors.radii, strict=True):
+        needed = sum(map(abs, row)) * 10**6
+        assert needed <= Fraction(float(r)) <= needed * (1 + Fraction(1, 10**6))
 
 
 def true_motion(displaced, time, bits=300):
