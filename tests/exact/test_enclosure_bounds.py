@@ -210,12 +210,17 @@ def minus(a, b):
     return [[x - y for x, y in zip(p, q, strict=True)] for p, q in zip(a, b, strict=True)]
 
 
-@pytest.mark.parametrize("uncertain", [0.0, 1e-14, 1e-6])
-def test_a_new_frame_pays_for_all_that_it_is_not(uncertain):
-    rng = np.random.default_rng(8)
+@pytest.mark.parametrize(
+    ("uncertain", "size", "skew"), [(0.0, 1, 0.0), (1e-14, 1, 0.0), (1e-6, 1, 0.0), (0.0, 1e-4, 1e-9), (0.0, 1, 1e-9)]
+)
+def test_a_new_frame_pays_for_all_that_it_is_not(uncertain, size, skew, monkeypatch):
+    """size: of the variation.  skew: how far the factorisation is from orthogonal, which binary64 alone would hide."""
+    rng, factorised = np.random.default_rng(8), np.linalg.qr
     for _ in range(6):
-        variation = np.eye(6) + 0.7 * rng.standard_normal((6, 6))
-        errors = Errors(np.linalg.qr(rng.standard_normal((6, 6)))[0], rng.random(6), 0)
+        variation = size * (np.eye(6) + 0.7 * rng.standard_normal((6, 6)))
+        errors = Errors(factorised(rng.standard_normal((6, 6)))[0], rng.random(6), 0)
+        noise = skew * rng.standard_normal((6, 6))
+        monkeypatch.setattr(np.linalg, "qr", lambda matrix, noise=noise: (factorised(matrix)[0] + noise, None))
         frame, turned, slack = enclosure._new_frame(variation, uncertain, errors)
         back, bound = inverse_of(exact(frame)), Fraction(slack)
         assert norm(minus(back, exact(frame.T))) <= bound
@@ -227,7 +232,7 @@ def test_a_new_frame_pays_for_all_that_it_is_not(uncertain):
             whole = [[a + b for a, b in zip(p, q, strict=True)]
                      for p, q in zip(carried, product(moved, exact(errors.frame)), strict=True)]  # fmt: skip
             assert norm(minus(product(back, whole), exact(turned))) <= bound
-        assert bound <= Fraction(1, 10**11) + 20 * Fraction(uncertain)
+        assert bound <= Fraction(1, 10**11) + 20 * Fraction(uncertain) + 10**4 * Fraction(skew)
 
 
 def test_the_value_of_the_polynomial_is_within_its_rounding():
@@ -245,6 +250,21 @@ def test_the_value_of_the_polynomial_is_within_its_rounding():
             assert off <= radius(ball) <= Fraction(found.order + 1, 2) * ulp(found)
             used = max(used, off / ulp(found))
     assert used > Fraction(1, 2)
+
+
+@pytest.mark.parametrize("uncertain", [0.0, 1e-9, 1e-3])
+def test_what_is_not_known_of_the_variation_widens_the_state(uncertain):
+    found = replace(step(FIELD, node_with(128, 1e6), 128), local=0.0, variation_error=uncertain)
+    errors, unit = found.node.errors, ulp(found)
+    with working_precision(300):
+        balls = found.at(Fraction(1))
+    moved = product(exact(found.variation.sum(axis=0)), exact(errors.frame))
+    for ball, row in zip(balls, moved, strict=True):
+        linear = sum(abs(a) * Fraction(float(r)) for a, r in zip(row, errors.radii, strict=True))
+        assert radius(ball) >= (linear + Fraction(uncertain) * set_size(errors)) * unit
+    with_it, without = found.end().errors, replace(found, variation_error=0.0).end().errors
+    assert all(with_it.radii >= without.radii)
+    assert with_it.radii.max() >= without.radii.max() + uncertain * float(errors.radii.max()) / 3
 
 
 def test_what_a_step_adds_is_carried_into_every_direction_of_the_new_frame():
