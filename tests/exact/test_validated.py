@@ -270,3 +270,11 @@ def test_a_motion_that_changes_far_faster_than_it_turns_is_refused():
         top = HeavyTop((1, 1 / Fraction(size), 3), 1, (0, 1, 1))
         with pytest.raises(OutOfReach, match="times as fast as it turns"):
             Validated(top, State((1, 1, 0), (0, 0, 1)))
+
+
+def test_bits_are_given_though_the_forecast_was_too_low(monkeypatch):
+    """The ladder of precisions is met at every offset: the last bit asked for counts."""
+    monkeypatch.setattr(Validated, "_forecast", lambda *_: (-8.0, 20.0))
+    solution = motion(VECTORS[0])
+    for bits in range(96, 130):
+        assert min(map(relative_bits, solution.state(Fraction(3), bits))) >= bits
