@@ -92,7 +92,7 @@ def reference(
     from heavytop.top.equations import system as system_named
     from heavytop.top.times import check_times
 
-    top, start = _motion(inertia, weight, centre, omega, gamma, normalize)
+    top, start = _motion(inertia, weight, centre, omega, gamma, normalize, of_any_size=True)
     found = proven(top, start, check_times(numbers(times)), digits, system_named(system))
     if json:
         print_json(found)
@@ -103,13 +103,19 @@ def reference(
     return 0
 
 
-def _motion(inertia: str, weight: str, centre: str, omega: str, gamma: str, normalize: bool) -> Any:
-    """The exact top and start of the options; what no rigid body has is a warning."""
+def _motion(
+    inertia: str, weight: str, centre: str, omega: str, gamma: str, normalize: bool, of_any_size: bool = False
+) -> Any:
+    """The exact top and start of the options; what no rigid body has is a warning.
+
+    of_any_size: for what computes with exact numbers alone, which no format bounds.
+    """
     from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
     top = HeavyTop(numbers(inertia), weight, numbers(centre))
     start = State(numbers(omega), numbers(gamma))
-    require_physical(top, start)
+    if not of_any_size:
+        require_physical(top, start)
     start = (start.normalized() if normalize else start).require_unit_gamma()
     for warning in top.warnings():
         print(f"heavytop: warning: {warning}", file=sys.stderr)
