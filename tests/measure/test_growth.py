@@ -1,50 +1,13 @@
 """Laws of growth on synthetic ensembles whose law is known: what is recognised, how sure it is, what is refused."""
 
 import collections
+import math
 
 import numpy
 import pytest
 
-from heavytop.measure.growth import FEWEST_STARTS, Ensemble, band, law
-
-STEP = 0.5
-EPS = 2.0**-52
-TIMES = 10 ** (numpy.arange(8 * 5 + 1) / 8)
-NAMES = {"walk": "t^0.5", "linear": "t", "integrated": "t^1.5", "quadratic": "t^2", "bounded": "bounded"}
-EXPONENT = {"walk": 0.5, "linear": 1, "integrated": 1.5, "quadratic": 2, "bounded": 0}
-
-
-def walks(rng, starts: int, times=TIMES):
-    """A random walk of EPS a step and its sum, exactly at the times: shape (2, starts, samples)."""
-    walk, total, done = numpy.zeros(starts), numpy.zeros(starts), 0
-    found = []
-    for steps in numpy.round(times / STEP):
-        n = steps - done
-        rise, bridge = rng.normal(size=(2, starts))
-        # n steps at once: the sum of a walk given its end has mean n/2 of it and variance n³/12
-        total = total + n * walk + n**1.5 * (rise / 2 + bridge / 12**0.5)
-        walk, done = walk + rise * n**0.5, steps
-        found.append((walk, total))
-    return EPS * numpy.moveaxis(numpy.array(found), 0, 2)
-
-
-def synthetic(kind: str, rng, starts: int = 64, times=TIMES):
-    """|error|, shape (starts, samples), with amplitudes that scatter over the starts by a factor 2."""
-    amplitude = numpy.exp(0.7 * rng.normal(size=(starts, 1)))
-    phase = rng.uniform(0, 6.28, size=(starts, 1))
-    if kind in ("walk", "integrated"):
-        values = walks(rng, starts, times)[int(kind == "integrated")] * amplitude
-    elif kind == "bounded":
-        values = 1e-12 * amplitude * numpy.sin(1.3 * times + phase)
-    else:
-        values = EPS * amplitude * (times / STEP) ** EXPONENT[kind] * (1 + 0.3 * numpy.sin(1.7 * times + phase))
-    # the sample is rounded to a number of the format
-    return numpy.abs(numpy.round(values / EPS) * EPS)
-
-
-def chaotic(rng, starts: int, rate: float = 0.15, times=TIMES):
-    grown = EPS * numpy.abs(rng.normal(size=(starts, 1))) * numpy.exp(numpy.minimum(rate * times, 60))
-    return numpy.where(grown < 1, grown, 1) * numpy.exp(0.5 * rng.normal(size=(starts, len(times))))
+from heavytop.measure.growth import FEWEST_STARTS, Ensemble, band, finite_time_rates, law, median_interval
+from synthetic_ensembles import EPS, EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic, walks
 
 
 @pytest.mark.parametrize("kind", NAMES)
@@ -215,3 +178,42 @@ def test_the_band_holds_the_rms_of_other_starts() -> None:
 def test_the_same_starts_give_the_same_bits() -> None:
     errors = synthetic("walk", numpy.random.default_rng(9))
     assert law(Ensemble(TIMES, errors, STEP)) == law(Ensemble(TIMES, errors.copy(), STEP))
+
+
+@pytest.mark.parametrize("starts", [16, 64])
+@pytest.mark.parametrize("spread", [0.05, 0.12])
+def test_the_interval_of_a_rate_holds_the_median_of_rates_that_scatter(starts: int, spread: float) -> None:
+    rng, times = numpy.random.default_rng(31), 10 ** (numpy.arange(32 * 4 + 1) / 32)
+    laws = [law(Ensemble(times, chaotic(rng, starts, 0.15, times, spread), STEP)) for _ in range(50)]
+    assert all(each.growth == "exponential" for each in laws)
+    assert sum(each.low <= 0.15 <= each.high for each in laws) >= 46
+    assert all(each.low <= each.exponent <= each.high for each in laws)
+
+
+@pytest.mark.parametrize(("count", "last", "outside"), [(8, 0, 2), (16, 3, 1394), (64, 23, None)])
+def test_the_interval_of_a_median_is_the_narrowest_that_is_exact(count: int, last: int, outside: int | None) -> None:
+    values = numpy.arange(count)[::-1].astype(float)
+    assert median_interval(values) == (last, count - 1 - last)
+    below = sum(math.comb(count, k) for k in range(last + 1))
+    assert 2 * below <= 0.05 * 2**count < 2 * (below + math.comb(count, last + 1))
+    assert outside in (None, 2 * below)
+
+
+def test_a_rate_is_that_of_each_start_and_zeros_count_for_nothing() -> None:
+    times = numpy.array([1.0, 2, 4, 8, 16])
+    errors = numpy.exp(numpy.array([[0.1], [0.5], [2.0]]) * times)
+    assert finite_time_rates(times, errors) == pytest.approx([0.1, 0.5, 2.0], rel=1e-12)
+    errors[1, 2] = 0
+    errors[2, 1:] = 0
+    assert finite_time_rates(times, errors) == pytest.approx([0.1, 0.5, 0.0], rel=1e-12)
+
+
+def test_what_all_starts_share_widens_the_interval_of_a_power() -> None:
+    rng = numpy.random.default_rng(12)
+    errors = synthetic("linear", rng)
+    wiggly = errors * numpy.exp(0.3 * numpy.sin(3 * numpy.arange(len(TIMES))))
+    plain, shared = (law(Ensemble(TIMES, each, STEP)) for each in (errors, wiggly))
+    x = numpy.log(TIMES[TIMES >= 100 * 0.999])
+    expected = 2 * 0.3 / 2**0.5 / ((x - x.mean()) ** 2).sum() ** 0.5
+    assert (shared.high - shared.low) / 2 == pytest.approx(expected, rel=0.25)
+    assert (plain.high - plain.low) / 2 < expected / 2

@@ -11,6 +11,7 @@ from flint import arb
 
 from heavytop.claims.signs import Unprovable
 from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.flint_context import whole_evaluation
 
 _FUNCTIONS: dict[str, Callable[..., arb]] = {
     "exp": arb.exp,
@@ -36,6 +37,7 @@ _FUNCTIONS: dict[str, Callable[..., arb]] = {
 }
 
 
+@whole_evaluation
 def evaluate(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: int) -> arb:
     """The ball of ``expression`` where each symbol has its exact value; not finite where it is undefined there."""
     known: dict[sympy.Expr, arb] = {}

@@ -1,6 +1,7 @@
 """Which closed form a motion has: exact rational tests on the exact data, up to a renaming of the axes.
 
-Constants first, then elementary functions, then elliptic ones; the validated enclosure for every other motion.
+Constants first, then elementary functions, then elliptic and hyperelliptic ones; the validated enclosure for
+every other motion.
 Each case class makes its own test: its constructor raises NotInClass, saying which equality failed and by how much.
 """
 
@@ -14,10 +15,13 @@ from heavytop.exact.bobylev_steklov import BobylevSteklov
 from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
 from heavytop.exact.grioli import Grioli
 from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.lagrange import Lagrange
 from heavytop.exact.pendulum import Pendulum
+from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.staude import Staude
 from heavytop.exact.validated import Validated
@@ -63,6 +67,8 @@ _HEAVY_TOP: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (Lagrange, CYCLIC),
     (BobylevSteklov, ALL),
     (Delone, CYCLIC),
+    (Kovalevskaya, CYCLIC),
+    (GoryachevChaplygin, CYCLIC),
 )
 _GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (_permanent_gyrostat, _KEEP),
@@ -74,8 +80,9 @@ _GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
 def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator[ExactSolution]:
     """Every closed form of this motion, the simplest first; none for a motion that has none here.
 
-    Raises InputError where the system does not admit the top and start.
+    Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
+    require_handy(top, start)
     system.parameters(top, start)
     for case, namings in _GYROSTAT if system is GYROSTAT else _HEAVY_TOP:
         for axes in namings:
@@ -90,6 +97,6 @@ def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator
 def find(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> ExactSolution:
     """The simplest closed form of this motion, or its validated enclosure.
 
-    Raises InputError where the system does not admit the top and start.
+    Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
     return next(matches(top, start, system), None) or Validated(top, start, system)

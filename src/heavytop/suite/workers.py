@@ -1,6 +1,7 @@
 """Where tasks run: in this process, in local processes, or on a Dask cluster.  The rows are the same.
 
-At most four tasks a worker are under way at a time, so that a plan of any length takes no more memory than that.
+At most four tasks a worker are under way at a time, so that a plan of any length takes no more memory than that.  A
+worker is a process, whatever the number of its threads.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from functools import cache
 from importlib import metadata
 from multiprocessing import get_context, parent_process
 from operator import itemgetter
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any
 
 from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
@@ -29,6 +30,9 @@ _PATIENCE = 30
 """Seconds without any worker after which a cluster is given up."""
 _RESUME = "Finished rows are kept: run again with --resume"
 _SAME = "Install the same versions on every machine."
+_one_task = Lock()
+"""A Dask worker with several threads measures one task at a time all the same: another beside it would spoil the
+timings, and another package's integrator need not bear threads.  Ensembles bring their own threads."""
 _PACKAGES = ("heavytop", "heyoka", "numpy", "mpmath", "gmpy2", "python-flint", "msgspec")
 
 Versions = dict[str, str]
@@ -54,7 +58,8 @@ def rows(
     saved: for the index of a task, where its row keeps its place; None where it keeps none, as on a cluster, which may
     have no disk in common with this machine.
 
-    A task whose worker died is run again, three times in all.
+    A task whose worker died is run again, three times in all; an integrator of another package that it ran is then a
+    row that failed.
     Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
     InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
     """
@@ -101,6 +106,11 @@ def _in_processes(
             queue.extendleft(reversed(lost))
             worst, times = max(deaths.items(), key=itemgetter(1), default=(0, 0))
             if times > 2:
+                if (ended := _ended_by_peer(tasks[worst], times)) is not None:
+                    queue.remove(worst)
+                    del deaths[worst]
+                    yield worst, ended
+                    continue
                 raise HeavyTopError(
                     f"A worker process died {times} times during {tasks[worst].label}.",
                     f"{_RESUME}, perhaps with fewer --workers.",
@@ -119,14 +129,16 @@ def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Ite
             return future
 
         def at_once() -> int:
-            workers: int = sum(client.nthreads().values())
-            return _AHEAD * workers
+            return _AHEAD * len(client.nthreads())
 
         try:
             for index, future in _windowed(queue, {}, submit, at_once):
                 try:
                     row = future.result()
                 except KilledWorker as error:
+                    if (ended := _ended_by_peer(tasks[index], error.allowed_failures + 1)) is not None:
+                        yield index, ended
+                        continue
                     raise HeavyTopError(
                         f"{error.allowed_failures + 1} workers died during {tasks[index].label}.", f"{_RESUME}."
                     ) from None
@@ -171,13 +183,25 @@ def _measure(task: Task, saved: Saved) -> Row:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
+def _ended_by_peer(task: Task, times: int) -> Row | None:
+    """The failed row of a task that ended its process, where an integrator of another package ran in it; else None."""
+    from heavytop.integrate.peers import BUILT_IN
+    from heavytop.suite.measurements.shared import peer_failure
+
+    name = task.form.partition(" ")[0]
+    if task.kind != "work_precision" or name in BUILT_IN:
+        return None
+    return peer_failure(task, f"{name} ended its process {times} times")
+
+
 def _measure_as(expected: Versions, task: Task) -> Row:
     """The row of ``task``; raises InputError unless the versions here are those expected."""
     here = versions()
     other = [f"{name} {here[name]} instead of {expected[name]}" for name in expected if here[name] != expected[name]]
     if other:
         raise InputError(f"A worker has {', '.join(other)}.", _SAME)
-    return _measure(task, Saved())
+    with _one_task:
+        return _measure(task, Saved())
 
 
 def _leave_interrupts_to_the_parent() -> None:

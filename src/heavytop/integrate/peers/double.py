@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache
+from functools import cache, wraps
+from threading import RLock
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, exact, number
 from heavytop.top import heavy_top
@@ -71,7 +72,10 @@ def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") ->
     def integrate(problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Trajectory:
         given = _given(name, knob, problem, times, setting)
         began = perf_counter()
-        solved = solve(given)
+        # the times are judged by as they were, whatever is done to those that are given
+        solved = solve(replace(given, times=given.times.copy()))
+        if not isinstance(solved, Solved):
+            raise PeerFailed(f"{name} returned a {type(solved).__name__} instead of Solved")
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
         flags = {knob: repr(given.setting), "field": field_kind()}
         return _judged(problem, name, order, given.times, solved, seconds, flags)
@@ -126,7 +130,7 @@ def _judged(
     """What was solved, up to the first state that is not finite."""
     import numpy
 
-    states = numpy.asarray(solved.states, dtype=float).reshape(-1, 6)[: len(times)]
+    states = _states(name, solved.states, len(times))
     finite = numpy.isfinite(states).all(axis=1)
     count = len(states) if finite.all() else int(finite.argmin())
     reached = times[-1] if count == len(times) else solved.reached
@@ -146,7 +150,36 @@ def _judged(
     )
 
 
-@cache
+def _states(name: str, given: Any, count: int) -> Any:
+    """The states as an array of doubles, shape (m, 6) with m <= count; raises PeerFailed for anything else."""
+    import numpy
+
+    states = numpy.asarray(given)
+    if not states.size:
+        return numpy.zeros((0, 6))
+    if states.dtype.kind not in "fiu":
+        raise PeerFailed(f"{name} returned states of {states.dtype}, not numbers of double")
+    if states.ndim != 2 or states.shape[1] != 6 or len(states) > count:
+        raise PeerFailed(f"{name} returned states of the shape {states.shape} for {count} times")
+    return states.astype(float)
+
+
+Made = TypeVar("Made")
+
+
+def compiled_once(make: Callable[..., Made]) -> Callable[..., Made]:
+    """``make``, called once for the same arguments: what one thread compiles, the others wait for."""
+    known, compiling = cache(make), RLock()
+
+    @wraps(make)
+    def look_up(*arguments: Any) -> Made:
+        with compiling:
+            return known(*arguments)
+
+    return look_up
+
+
+@compiled_once
 def compiler() -> Callable[[Any], Any]:
     """numba's ``njit``, taught the vector product of this program; the identity where numba is not installed."""
     try:
@@ -164,7 +197,7 @@ def field_kind() -> str:
     return "python" if compiler().__module__ == __name__ else "numba"
 
 
-@cache
+@compiled_once
 def fill(system: System) -> Callable[..., None]:
     """(rates, t, y, numbers): writes the field at y into ``rates``.
 
@@ -181,7 +214,7 @@ def fill(system: System) -> Callable[..., None]:
     return write
 
 
-@cache
+@compiled_once
 def rates(system: System) -> Callable[..., Any]:
     """(t, y, numbers) -> the field at y as a new array; machine code where numba is installed."""
     import numpy
