@@ -14,7 +14,7 @@ Inertia = Annotated[str, typer.Option(help="Principal moments A,B,C at the fixed
 Weight = Annotated[str, typer.Option(help="Weight P.")]
 Centre = Annotated[str, typer.Option(help="Centre of mass a,b,c.")]
 Omega = Annotated[str, typer.Option(help="Angular velocity x,y,z at t = 0.")]
-Gamma = Annotated[str, typer.Option(help="Unit vector of weight x,y,z at t = 0.")]
+Gamma = Annotated[str, typer.Option(help="x,y,z at t = 0: unit vector pointing vertically up, in body axes.")]
 Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly away from 0.")]
 SystemName = Annotated[str, typer.Option(help="heavy_top or gyrostat.")]
 Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]
@@ -38,7 +38,10 @@ def propagate(
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
     json: Json = False,
 ) -> int:
-    """Integrate one motion and print its states.  Numbers are exact: 3, 0.25, 1e-3, -2/5."""
+    """Integrate one motion of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ and print its states.
+
+    γ points up: the energy is ½ Ω·M + P r·γ.  Numbers are exact: 3, 0.25, 1e-3, -2/5.
+    """
     from heavytop import precision as formats
     from heavytop.top.equations import system as system_named
     from heavytop.top.times import check_times
@@ -81,7 +84,10 @@ def reference(
     normalize: Normalize = False,
     json: Json = False,
 ) -> int:
-    """Print proven states: a closed form where there is one, else a validated enclosure."""
+    """Print proven states: a closed form where there is one, else a validated enclosure.
+
+    The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
+    """
     from heavytop.measure.reference import reference as proven
     from heavytop.top.equations import system as system_named
     from heavytop.top.times import check_times
