@@ -19,11 +19,12 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import arb, ctx
+from flint import arb
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import working_precision
 from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.flint_context import current_length, current_precision
 from heavytop.exact.kovalevskaya_abel import AbelMotion, intervals
 from heavytop.exact.kovalevskaya_level import Level, roots, start_of
 from heavytop.exact.motion import kept
@@ -69,7 +70,7 @@ class Kovalevskaya(ClosedForm):
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         try:
-            return _motion(self, ctx.prec).at(time, ctx.cap)
+            return _motion(self, current_precision()).at(time, current_length())
         except Undecided:
             return [arb("nan")] * 6
 

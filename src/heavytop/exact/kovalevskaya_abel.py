@@ -34,11 +34,12 @@ from fractions import Fraction
 from itertools import combinations, pairwise
 from typing import Any
 
-from flint import acb, acb_mat, acb_series, arb, arb_series, ctx
+from flint import acb, acb_mat, acb_series, arb, arb_series
 
 from heavytop.exact.abel import Inversion, Variable
 from heavytop.exact.balls import ball, midpoint
 from heavytop.exact.closed_form import series_length
+from heavytop.exact.flint_context import current_length
 from heavytop.exact.gaps import Gap, Roots
 from heavytop.exact.kovalevskaya_level import ORDERS, Level, Root, Start, roots, start_of
 from heavytop.exact.reduced import Undecided
@@ -168,8 +169,8 @@ class AbelMotion:
 
     def _moving(self, phases: Sequence[arb]) -> list[Any]:
         """The phases as power series in t, from their differential equations."""
-        moving = [arb_series([phase], prec=ctx.cap) for phase in phases]
-        for _ in range(ctx.cap - 1):
+        moving = [arb_series([phase], prec=current_length()) for phase in phases]
+        for _ in range(current_length() - 1):
             v1, v2 = (g.position(x) for g, x in zip(self.inversion.variables, moving, strict=True))
             first, second = (g.density(v) for g, v in zip(self.inversion.variables, (v1, v2), strict=True))
             rates = v2 / ((v1 - v2) * first), -v1 / ((v1 - v2) * second)
@@ -296,7 +297,7 @@ def _real(value: acb, like: acb) -> acb:
 
 
 def _real_part(series: Any) -> Any:
-    return arb_series([series[n].real for n in range(ctx.cap)], prec=ctx.cap)
+    return arb_series([series[n].real for n in range(current_length())], prec=current_length())
 
 
 def start_phases(start: Start, mu: arb, variables: Sequence[Variable]) -> list[arb]:

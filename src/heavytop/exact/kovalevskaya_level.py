@@ -20,10 +20,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from flint import acb, arb, arb_series, ctx, fmpq_poly
+from flint import acb, arb, arb_series, fmpq_poly
 
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import series_length
+from heavytop.exact.flint_context import current_length
 from heavytop.exact.reduced import Reduced, polynomial
 from heavytop.top.equations import Parameters, heavy_top
 
@@ -152,8 +153,8 @@ def start_of(level: Level) -> Start:
 def _flow(c: arb, start: list[arb]) -> tuple[Any, ...]:
     """The power series of the motion from the start, by Picard's iteration on the field itself."""
     parameters = Parameters((2, 2, 1), (c, arb(0), arb(0)), arb(0))
-    motion = [arb_series([value], prec=ctx.cap) for value in start]
-    for _ in range(ctx.cap - 1):
+    motion = [arb_series([value], prec=current_length()) for value in start]
+    for _ in range(current_length() - 1):
         rates = heavy_top(parameters, motion)
         motion = [value + arb_series(rate).integral() for value, rate in zip(start, rates, strict=True)]
     return tuple(motion)

@@ -25,7 +25,7 @@ from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, relative_bits, working_precision
 from heavytop.exact.enclosure import Node, Step, coefficient_bound, start_node, step
 from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.quadratic import Quadratic, quadratic
+from heavytop.exact.quadratic import Matrix, Quadratic, quadratic
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector
@@ -239,7 +239,7 @@ class Validated:
             run = self._run(direction, precision, start)
             found = run.at(span)
             if found is not None:
-                values = _evaluated(*found, precision + 64)
+                values = _evaluated(*found, found[0].radii(found[1]), precision + 64)
                 reached = min(map(relative_bits, values))
                 if reached >= bits:
                     return values
@@ -278,6 +278,7 @@ def _rounded(start: tuple[Fraction, ...], bits: int) -> list[arb]:
 
 
 @whole_evaluation
-def _evaluated(found: Step, tau: Fraction, bits: int) -> list[arb]:
+def _evaluated(found: Step, tau: Fraction, radii: Matrix, bits: int) -> list[arb]:
+    # numpy would let other threads in amid the balls: the radii are there already
     with working_precision(bits):
-        return found.at(tau)
+        return found.around(tau, radii)
