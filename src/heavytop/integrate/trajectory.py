@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from heavytop.precision import Precision, exact, native, native_text, number, rounded
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 class Outcome(Enum):
@@ -120,12 +124,13 @@ class Place:
         return cls(content["samples"], state, (high, low), content["steps"], content["seconds"], content["flags"])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
     """A computed motion at the times that were reached.
 
     times: exact values of the rounded times, shape (n,).
-    states: native numbers, shape (n, 6), order Ω1 Ω2 Ω3 γ1 γ2 γ3; or (n, 9) with the attitude vector ξ behind.
+    states: native numbers, an array of shape (n, 6), order Ω1 Ω2 Ω3 γ1 γ2 γ3; or (n, 9) with the attitude vector ξ
+    behind.  It may be given as rows; it has no row where an observer took the states.
     time_reached: exact time of the last finite step end, or the last time asked for.
     seconds: ``compile`` and ``run`` apart.
     flags: everything that can change bits, as text.
@@ -135,7 +140,7 @@ class Trajectory:
     problem: Problem
     integrator: str
     times: tuple[Fraction, ...]
-    states: tuple[Any, ...]
+    states: Any
     outcome: Outcome
     time_reached: Fraction
     steps: int
@@ -144,9 +149,22 @@ class Trajectory:
     flags: dict[str, str] = field(default_factory=dict)
     evaluations: int | None = None
 
+    def __post_init__(self) -> None:
+        import numpy
+
+        width = 6 if self.problem.xi is None else 9
+        states = numpy.array(self.states) if len(self.states) else numpy.empty((0, width))
+        object.__setattr__(self, "states", states)
+
     def texts(self) -> list[list[str]]:
-        """The states as full-precision decimal strings."""
+        """The states as full-precision decimal strings, ``nan`` and ``inf`` where they are."""
         return [[native_text(value, self.problem.precision) for value in state] for state in self.states]
+
+    def to_numpy(self) -> NDArray[np.float64]:
+        """The states rounded to double, shape (n, 6), or (n, 9) with the attitude vector."""
+        import numpy
+
+        return numpy.array([[float(value) for value in state] for state in self.states]).reshape(self.states.shape)
 
 
 @dataclass(frozen=True, slots=True)

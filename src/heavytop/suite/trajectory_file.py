@@ -17,6 +17,7 @@ from typing import Any
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, parse, real, round_to, shown
+from heavytop.suite.files import without_repeats
 from heavytop.top.equations import VARIABLES, System, system
 from heavytop.top.heavy_top import HeavyTop, State, dot, require_physical
 from heavytop.top.times import check_times
@@ -103,7 +104,9 @@ def read(path: Path) -> Given:
 def _json(text: str) -> dict[str, Any]:
     """The document, every number as the text it is written as."""
     try:
-        document = json.loads(text, parse_float=str, parse_int=str, parse_constant=str)
+        document = json.loads(
+            text, parse_float=str, parse_int=str, parse_constant=str, object_pairs_hook=without_repeats
+        )
     except (ValueError, RecursionError) as error:
         raise InputError(f"This is not JSON: {error}.", _REMEDY) from None
     if not isinstance(document, dict):
@@ -134,6 +137,8 @@ def _csv(text: str) -> dict[str, Any]:
             # other comments may say what they like
             if value and key not in _KEYS and _nearest(key):
                 raise _unknown(key)
+            if key in _KEYS and key in document:
+                raise InputError(f"The key {key} stands twice.", "Give each key once.")
             document[key] = [part.strip() for part in value.split(",")] if key in _VECTORS else value
     body = [line for line in lines if line.strip() and not line.startswith("#")]
     try:

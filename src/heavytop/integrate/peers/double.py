@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from time import perf_counter
@@ -71,7 +71,7 @@ def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") ->
     def integrate(problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Trajectory:
         given = _given(name, knob, problem, times, setting)
         began = perf_counter()
-        solved = solve(given)
+        solved = _from_start(given, solve)
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
         flags = {knob: repr(given.setting), "field": field_kind()}
         return _judged(problem, name, order, given.times, solved, seconds, flags)
@@ -112,6 +112,17 @@ def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], se
     p = problem.parameters
     numbers = numpy.array(problem.native([*p.inertia, *p.moment, p.rotor]), dtype=float)
     return Given(problem.system, numpy.array(problem.native(problem.start.flat)), grid, numbers, float(setting))
+
+
+def _from_start(given: Given, solve: Solve) -> Solved:
+    """What ``solve`` gives for the times after 0, which most libraries refuse, behind the start itself."""
+    import numpy
+
+    if given.times[0] != 0:
+        return solve(given)
+    later = replace(given, times=given.times[1:])
+    solved = solve(later) if len(later.times) else Solved(numpy.empty((0, 6)), 0.0, 0, 0)
+    return replace(solved, states=[given.start, *solved.states])
 
 
 def _judged(
