@@ -106,6 +106,17 @@ def require(precision: Precision) -> Precision:
     return precision
 
 
+def usable_tolerance(value: Any, precision: Precision) -> Fraction:
+    """An exact tolerance; raises InputError unless it goes from the eps of the format to 1."""
+    tolerance = exact(value)
+    if not precision.eps <= tolerance <= 1:
+        raise InputError(
+            f"The tolerance {shown(tolerance)} cannot be kept in {precision.name}.",
+            f"Give one from its eps, {decimal_text(precision.eps, 3)}, to 1; without one it is eps.",
+        )
+    return tolerance
+
+
 def exact(value: Any) -> Fraction:
     """The exact value of an int, Fraction, Decimal, decimal or fraction string, or binary float of any format.
 
@@ -143,12 +154,12 @@ def exact(value: Any) -> Fraction:
 
 def _from_mantissa(value: Any) -> Fraction:
     """The exact value of mpmath's mpf."""
-    sign, mantissa, exponent, bits = value._mpf_
+    sign, mantissa, exponent, _ = value._mpf_
     if not mantissa and exponent:
         raise InputError(f"{quoted(value)} is not a finite number.", _REMEDY)
     if abs(exponent) > 4 * _MAX_TEXT:
         raise _too_large(value)
-    return (-1) ** sign * int(mantissa) * Fraction(2) ** exponent
+    return Fraction(-int(mantissa) if sign else int(mantissa)) * Fraction(2) ** int(exponent)
 
 
 def _too_large(value: object) -> InputError:
