@@ -74,16 +74,18 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    if name == "__version__":
-        from importlib.metadata import version
+if not TYPE_CHECKING:  # it would tell a type checker that every name is there
 
-        return version("heavytop")
-    if name not in _ROOM:
-        raise AttributeError(f"module 'heavytop' has no attribute {name!r}")
-    found = getattr(import_module(f"heavytop.{_ROOM[name]}"), name)
-    globals()[name] = found
-    return found
+    def __getattr__(name: str) -> object:
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version("heavytop")
+        if name not in _ROOM:
+            raise AttributeError(f"module 'heavytop' has no attribute {name!r}")
+        found = getattr(import_module(f"heavytop.{_ROOM[name]}"), name)
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:

@@ -75,9 +75,9 @@ def parse(name: str) -> Precision:
 def whole(value: Any, what: str) -> int:
     """``value`` as an integer; raises InputError for a bool, for a float even if it is whole, and for anything else."""
     try:
-        if not isinstance(value, bool) and type(value).__name__ != "bool":
+        if type(value).__name__ != "bool":  # Python's or numpy's
             return index(value)
-    except TypeError:
+    except Exception:  # no integer, or a foreign __index__ that raises
         pass
     raise InputError(f"{what}: {quoted(value)} is not an integer.", "Give an integer such as 53.")
 
@@ -141,7 +141,7 @@ def exact(value: Any) -> Fraction:
             if hasattr(value, "as_integer_ratio"):
                 return Fraction(*value.as_integer_ratio())
             return Fraction(index(value))
-        except (TypeError, ValueError, OverflowError, ZeroDivisionError):
+        except Exception:  # NaN, infinities, and whatever a foreign number does
             pass
     if kind == "mpf":
         return _from_mantissa(value)

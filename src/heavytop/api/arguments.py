@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterable, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import SupportsIndex, TypeAlias, TypeVar
+from typing import Any, SupportsIndex, TypeAlias, TypeVar
 
 from heavytop.errors import InputError, quoted
-from heavytop.precision import DOUBLE, Precision, exact, parse, physical, require, usable_tolerance, whole
+from heavytop.precision import DOUBLE, Precision, exact, parse, physical, require, shown, usable_tolerance, whole
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.equations import system as system_named
 from heavytop.top.heavy_top import HeavyTop, State, dot, ordered, require_physical, vector
@@ -18,11 +18,13 @@ from heavytop.top.times import check_times
 
 Number: TypeAlias = int | float | str | Fraction | Decimal | SupportsIndex
 """A number: an integer, a float of any format (the exact binary number it is), or exact text such as "-2/5"."""
-Numbers: TypeAlias = Iterable[Number]
-"""A list, a tuple or an array of numbers."""
+Numbers: TypeAlias = Iterable[Any]
+"""A list, a tuple or an array of :data:`Number`; type checkers take lists of several kinds for lists of anything."""
 
 SLACK_BITS = 8
 """|γ|² and |ξ|² may be off 1, and ξ·γ off 0, by so many bits of the rounding of what was given as floats."""
+_MOST = 10**18
+"""A count beyond it is no limit."""
 _TYPES = "Give heavytop.HeavyTop(inertia, weight, centre) and heavytop.State(omega, gamma)."
 _Kind = TypeVar("_Kind", HeavyTop, State)
 
@@ -53,7 +55,11 @@ def slack_of(precision: Precision) -> Fraction:
 
 def system(value: System | str) -> System:
     """The system, or the one of that name."""
-    return value if value in (HEAVY_TOP, GYROSTAT) and isinstance(value, System) else system_named(value)  # type: ignore[arg-type]
+    if isinstance(value, System) and (value is HEAVY_TOP or value is GYROSTAT):
+        return value
+    if not isinstance(value, str):
+        raise InputError(f"system = {quoted(value)} is none.", 'Give "heavy_top" or "gyrostat".')
+    return system_named(value)
 
 
 def precision(value: Precision | str) -> Precision:
@@ -106,7 +112,15 @@ def count(value: int | None, what: str) -> int | None:
     found = whole(value, what)
     if found < 1:
         raise InputError(f"{what} = {quoted(found)} allows nothing.", "Give 1 or more, or None for no limit.")
-    return found
+    return min(found, _MOST)
+
+
+def limit(value: Number | None, what: str) -> str | None:
+    """A number of a policy as text, or None."""
+    if value is None:
+        return None
+    found = physical(exact(value), what)
+    return shown(found) if found == 0 or abs(found) > Fraction(1, 10**150) else "0"
 
 
 def flag(value: bool | None, what: str) -> bool | None:
@@ -130,9 +144,10 @@ def path(value: str | os.PathLike[str], what: str) -> Path:
     """A path."""
     try:
         found = Path(value)
+        found.exists()
         if "\0" in str(found):
             raise ValueError
-    except (TypeError, ValueError):
+    except (OSError, TypeError, ValueError):  # no path, or one that no file can have
         raise InputError(f"{what} = {quoted(value)} is not a path.", "Give text or a pathlib.Path.") from None
     return found
 

@@ -12,7 +12,7 @@ from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.display import Table
 from heavytop.errors import InputError, quoted
-from heavytop.precision import exact, whole
+from heavytop.precision import whole
 from heavytop.report import compare as comparing
 from heavytop.report import policy as policies
 from heavytop.report import store
@@ -176,8 +176,8 @@ def compare(
         InputError: for what is no report or policy, and where there is nothing to compare.
     """
     rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
-    limits = policies.adjusted(rules, *(None if limit is None else str(exact(limit)) for limit in (floor, loss)))
-    found = comparing.compare(_report(baseline, "baseline"), _report(candidate, "candidate"), limits)
+    rules = policies.adjusted(rules, arguments.limit(floor, "floor"), arguments.limit(loss, "loss"))
+    found = comparing.compare(_report(baseline, "baseline"), _report(candidate, "candidate"), rules)
     return Comparison(**{each.name: getattr(found, each.name) for each in fields(found) if each.init})
 
 

@@ -19,6 +19,7 @@ from heavytop.suite.files import replace, without_repeats
 
 FILE = "report.json"
 DIGEST = "report.json.sha256"
+_NAME = 200
 _CHUNK = 100
 """Rows of a brief report that are checked at once: few, so that they are still in the cache when compared."""
 
@@ -145,11 +146,12 @@ def read_brief(path: Path) -> Brief:
 
 
 def _read(path: Path, kind: type[_Kind]) -> tuple[Path, _Kind]:
-    file = path / FILE if path.is_dir() else path
+    file = path
     try:
+        file = path / FILE if path.is_dir() else path
         content = file.read_bytes()
     except OSError as error:
-        raise InputError(f"There is no report at {file}: {error.strerror}.", REMEDY) from None
+        raise InputError(f"There is no report at {str(file)[:_NAME]}: {error.strerror}.", REMEDY) from None
     with ThreadPoolExecutor(1) as beside:
         digest = beside.submit(_has_its_digest, file, content)
         try:

@@ -15,6 +15,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy
+
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, parse, real, round_to, shown
@@ -226,7 +228,7 @@ def _component(value: Any) -> Fraction | None:
     try:
         return exact(value)
     except InputError:
-        if _NOT_FINITE.fullmatch(str(value)):
+        if isinstance(value, float | Decimal | numpy.floating) or type(value).__name__ in ("real", "real128", "mpf"):
             return None
         raise
 
