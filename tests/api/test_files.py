@@ -37,12 +37,8 @@ def test_a_comment_of_a_table_that_stands_twice_is_refused(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("place", ['"schema":', '"case":', '"value":'])
 def test_a_report_with_a_key_twice_is_refused(place: str, tmp_path: Path) -> None:
-    score = ht.score(
-        [1], [[0, 0, 1, 0, 0, 1]], top=ht.HeavyTop((2, 2, 1), 1, (0, 0, 1)), start=ht.State((0, 0, 1), (0, 0, 1))
-    )
-    from heavytop.records import SCHEMA, Report
-    from heavytop.report import store
-
+    top, start = ht.HeavyTop((2, 2, 1), 1, (0, 0, 1)), ht.State((0, 0, 1), (0, 0, 1))
+    score = ht.score([1], [start.flat], top=top, start=start)
     written = store.write(Report(SCHEMA, {"name": "score"}, {}, [score.row]), tmp_path)
     assert ht.read_report(tmp_path).rows[0].case == "given"
     text = written.read_text()
