@@ -106,35 +106,11 @@ def compiled(
     if constants is not None and precision != DOUBLE:
         raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")
     key = (system.name, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
-<<<<<<< HEAD
-    if key not in _compiled:
-        one, zero = number(Fraction(1), precision), number(Fraction(0), precision)
-        size = 9 if attitude else 6
-        options: dict[str, Any] = {"compact_mode": compact, "high_accuracy": high_accuracy}
-        if tolerance is not None:
-            options["tol"] = number(usable_tolerance(tolerance, precision), precision)
-        if precision.family == "real":
-            options["prec"] = precision.bits
-        build, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))
-        if constants is None:
-            options["pars"] = numpy.full((4 if system is GYROSTAT else 6, *shape), one)
-        before = perf_counter()
-        engine = build(
-            expressions(system, attitude, constants and _doubles(constants)),
-            numpy.full((size, *shape), zero),
-            fp_type=type(one),
-            **options,
-        )
-        seconds = perf_counter() - before
-        check(engine, system, precision, constants)
-        _compiled[key] = Compiled(engine, seconds, _flags(engine))
-=======
     with _compiling.setdefault(key, RLock()):
         if key not in _compiled:
             engine, seconds = _built(system, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
             check(engine, system, precision, constants)
             _compiled[key] = Compiled(engine, seconds, _flags(engine))
->>>>>>> main
     return _compiled[key]
 
 
@@ -153,7 +129,7 @@ def _built(
     size = 9 if attitude else 6
     options: dict[str, Any] = {"compact_mode": compact, "high_accuracy": high_accuracy}
     if tolerance is not None:
-        options["tol"] = number(tolerance, precision)
+        options["tol"] = number(usable_tolerance(tolerance, precision), precision)
     if precision.family == "real":
         options["prec"] = precision.bits
     build, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))
