@@ -38,6 +38,9 @@ def test_the_code_of_the_documentation_runs(page: str, tmp_path: Path, monkeypat
     for block in blocks(page):
         exec(compile(block, page, "exec"), names)
     assert capsys.readouterr().out
+    tables = [each._repr_html_() for each in names.values() if hasattr(each, "_repr_html_")]
+    assert len(tables) >= 2
+    assert all(html.count("<table>") == html.count("</table>") == 1 for html in tables)
 
 
 def test_importing_loads_nothing_heavy_and_every_name_is_there() -> None:
@@ -153,7 +156,6 @@ def test_everything_prints_as_a_small_table() -> None:
         run,
         ht.reference(TOP, START, TIMES, digits=20),
         ht.score(TIMES, ht.propagate(TOP, START, TIMES).states, top=TOP, start=START),
-        ht.audit("ershkov-partial"),
         ht.read_report(ROOT / "results" / "default"),
     ]
     for each in shown:
@@ -166,27 +168,24 @@ def test_everything_prints_as_a_small_table() -> None:
     assert "<script>" not in ht.score(TIMES, run.states[1:3], top=TOP, start=START, name="<script>")._repr_html_()
 
 
-SCRIPT = """import sys
-import threading
+SCRIPT = """import threading
 import heavytop as ht
 
 print("began", flush=True)
-report = ht.run("tiny.toml", out="out", workers=2)
 found = []
-thread = threading.Thread(target=lambda: found.append(ht.run("tiny.toml", out="other", workers=1)))
+thread = threading.Thread(target=lambda: found.append(ht.run("tiny.toml", out="out", workers=2)))
 thread.start()
 thread.join()
-print(report.verdict, ht.compare(report, found[0]).verdict, ht.compare("out", ht.read_report("other")).verdict)
+print(found[0].verdict, ht.compare("out", found[0]).verdict)
 """
 
 
-@pytest.mark.parametrize("how", ["script", "standard input"])
-def test_a_plain_script_needs_no_main_guard(how: str, tmp_path: Path) -> None:
+def test_a_plain_script_needs_no_main_guard(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(PLAN)
     (tmp_path / "script.py").write_text(SCRIPT)
-    command = [sys.executable, *(["script.py"] if how == "script" else ["-"])]
-    done = subprocess.run(command, cwd=tmp_path, input=SCRIPT, capture_output=True, text=True, timeout=120, check=False)
-    assert (done.stdout, done.stderr) == ("began\ncomplete same same\n", "")
+    command = [sys.executable, "script.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.stdout, done.stderr) == ("began\ncomplete same\n", "")
 
 
 def test_children_of_others_still_know_the_script(tmp_path: Path) -> None:
