@@ -182,3 +182,21 @@ def test_moments_that_no_body_has_are_told(tmp_path: Path) -> None:
     file.write_text(OWN.replace('"2", "1"]\nweight', '"2", "7"]\nweight').replace('["1", "1", "0"]', '["0", "0", "1"]'))
     (warning,) = warnings(load(str(file))[0])
     assert warning == "top odd: I3 = 7 exceeds the sum 5 of the other two: no rigid body has such moments."
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "integrator", "refused"),
+    [("1e-20", "heyoka", True), ("1e-15", "heyoka", False), ("1e-16", "sundials:CVODE", False), ("0", "heyoka", True)],
+)
+def test_a_tolerance_below_eps_is_refused_before_anything_runs(
+    tolerance: str, integrator: str, refused: bool, tmp_path: Path
+) -> None:
+    pytest.importorskip("sksundae")
+    file = tmp_path / "work.toml"
+    ladder = ONE.replace("'heyoka'", f"'{integrator}'").replace("1e-3", tolerance)
+    file.write_text(f'name = "work"\n{ladder}')
+    if refused:
+        with pytest.raises(InputError, match="olerance"):
+            read(str(file))
+    else:
+        assert len(read(str(file))[2]) == 1
