@@ -5,6 +5,7 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import Contradiction
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.known import Known, certified, known_motion
@@ -99,3 +100,24 @@ def test_values_that_are_exact_are_said_to_agree_exactly(top: HeavyTop, start: S
     assert isinstance(later, Known)
     assert f"certified at t = 7 to {later.certificate.agreed_digits} digits by " in later.text
     assert later.certificate.agreed_digits < 100
+
+
+@pytest.mark.parametrize("axes", ALL)
+def test_no_naming_of_the_axes_costs_a_motion_its_reference(axes) -> None:
+    case = CASES["delone"]
+    given = Problem.of(renamed_top(case.top, axes), renamed_state(case.start, axes), QUAD, case.system)
+    known = known_motion(given, Fraction(10**4))
+    assert isinstance(known, Known)
+    assert "closed form" in known.solution.method
+    assert known.certificate.agreed_digits >= 37
+
+
+@pytest.mark.parametrize("power", [-90, -30, 30, 90])
+def test_no_unit_of_time_costs_a_motion_its_reference(power) -> None:
+    case, rate = CASES["delone"], Fraction(2) ** power
+    top = HeavyTop(case.top.inertia, case.top.weight * rate**2, case.top.centre)
+    start = State([rate * w for w in case.start.omega], case.start.gamma)
+    known = known_motion(Problem.of(top, start, QUAD, case.system), 10**4 / rate)
+    assert isinstance(known, Known)
+    assert known.certificate.kind == "proven at both ends"
+    assert known.certificate.agreed_digits >= 37

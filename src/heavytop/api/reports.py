@@ -12,6 +12,7 @@ from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.display import Table
 from heavytop.errors import InputError, quoted
+from heavytop.measure.digits import digits_kept
 from heavytop.precision import whole
 from heavytop.report import compare as comparing
 from heavytop.report import policy as policies
@@ -21,7 +22,6 @@ from heavytop.report.parquet import COLUMNS, lines
 from heavytop.report.printable import printable
 from heavytop.report.run_folder import prepare
 from heavytop.report.text import failed, short
-from heavytop.suite.score import digits_kept
 
 if TYPE_CHECKING:
     import pandas

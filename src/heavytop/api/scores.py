@@ -10,10 +10,10 @@ from heavytop.api.arguments import Numbers
 from heavytop.display import Table
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Trajectory
+from heavytop.measure.digits import digits_kept
 from heavytop.measure.drift import Drift
 from heavytop.precision import Precision
 from heavytop.records import Metric, Row
-from heavytop.suite.score import digits_kept
 from heavytop.suite.score import score as scored
 from heavytop.suite.trajectory_file import of_arrays
 from heavytop.top.equations import HEAVY_TOP, System
@@ -43,7 +43,7 @@ class Score:
     drift: |I(t) − I(0)| by the name of the first integral, in its units.
     distance: from the known motion, by ``omega`` (1/time unit), ``gamma``, ``along`` the flow (phase) and ``across``
     it; empty without a reference.
-    digits_kept: decimal places of Ω and γ that are right at every sample; None without a reference.
+    digits_kept: −log10 of the largest |error|/max(1, |value|) of Ω and γ over the samples; None without a reference.
     against: what it was compared with, and how well that is known.  row: the same as `heavytop score --json`.
     """
 
@@ -155,7 +155,7 @@ def _rows(states: Any) -> list[list[Any]]:
 
 def _summaries(metrics: dict[str, Metric], prefix: str) -> dict[str, Summary]:
     """The metrics ``PREFIXNAME_max``, ``_rms`` and ``_final`` by NAME."""
-    names = [key[len(prefix) : -4] for key in metrics if key.startswith(prefix) and key.endswith("_max")]
+    names = [key[len(prefix) : -4] for key in metrics if key.startswith(prefix) and key.endswith("_rms")]
     return {name: Summary(*(metrics[f"{prefix}{name}_{statistic}"] for statistic in Summary._fields)) for name in names}
 
 
