@@ -33,7 +33,8 @@ INTEGRATORS = {
 def propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:
     """What propagates one motion with the integrator of that name; raises InputError for an unknown name or option."""
     if isinstance(name, str) and name not in INTEGRATORS and name in peers.known():
-        return _with(peers.peer(name), name, options)
+        _with(peers.peer(name), name, options)
+        return _with(peers.ready(name), name, options)
     return _with(_load(_find(name).propagate), name, options)
 
 
