@@ -190,4 +190,4 @@ def _digits(gap: Fraction) -> int:
     digits = max(0, int((gap.denominator.bit_length() - gap.numerator.bit_length() - 1) / _BITS_A_DIGIT) - 1)
     while gap * 10 ** (digits + 1) <= 1:
         digits += 1
-    return digits if gap * 10**digits <= 1 else 0
+    return digits
