@@ -9,6 +9,7 @@ from proofs import assert_narrow, assert_solves, positive, rational
 from heavytop.errors import NotInClass
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
 from heavytop.exact.validated import Validated
+from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
 
 F = Fraction
@@ -83,6 +84,20 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
         motion_from((F(1), F(0)), ("3/4", "1/2", "1/7"), UP)
     with pytest.raises(NotInClass, match="gamma = 0"):
         motion_from((F(1), F(0)), ("3/4", "1/2", "1/7"), (0, 0, 0))
+
+
+@pytest.mark.parametrize("power", [11, 20, 40, 120])
+def test_levels_too_near_to_one_that_is_not_done_are_left_to_the_enclosure(power):
+    step, top = F(1, 10**power), HeavyTop((4, 4, 1), 1, (1, 0, 0))
+    # beside G = 0 with u = 0 between the gaps, and beside an asymptotic motion
+    beside = State((F(4, 15), F(-1, 5), -step), (F(3, 5), F(4, 5), 0))
+    asymptotic = State((step, F(1, 4), -3 * step), (F(3, 5), 0, F(4, 5)))
+    for start in (beside, asymptotic):
+        with pytest.raises(
+            NotInClass, match=r"too near to a degenerate one: cosh beta - 1 = \d|too near to a double root"
+        ):
+            GoryachevChaplygin(top, start)
+        assert reference(top, start, [1, -3], 20).method.startswith("validated")
 
 
 def test_levels_that_are_not_done_are_named():

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, isqrt, log, pi
+from math import ceil, isfinite, isqrt, log, pi
 from typing import Any
 
 import numpy as np
@@ -70,6 +70,18 @@ class Roots:
     def all(self) -> list[tuple[acb, int]]:
         """Every b; of a pair the one above the real axis, with twice its multiplicity."""
         return [(acb(b), many) for b, many in self.real] + [(acb(x, y), 2 * many) for x, y, many in self.pairs]
+
+
+def distance(points: Sequence[acb], interval: tuple[int, int]) -> float:
+    """cosh β − 1 of the nearest point beside the gap between two real ones; 0 for no gap.
+
+    The Fourier series of that gap need terms in proportion to 1/β.
+    """
+    low, high = (points[i].real for i in interval)
+    if not low < high:
+        return 0.0
+    scaled = [(2 * b - low - high) / (high - low) for i, b in enumerate(points) if i not in interval]
+    return min(float((abs(z + 1) + abs(z - 1)) / 2 - 1) for z in scaled)
 
 
 class SineSums:
@@ -173,8 +185,9 @@ class FourierBound:
     def terms(self, most: int) -> int:
         """N, 2^k or 3·2^k, with an error of the sums below the working precision."""
         if not self.wanted <= most:
+            many = f"{self.wanted:.3g}" if isfinite(self.wanted) else "countless"
             raise OutOfReach(
-                f"Abel's integrals need {self.wanted:.3g} Fourier terms, more than {most}: two roots all but coincide.",
+                f"Abel's integrals need {many} Fourier terms, more than {most}: two roots all but coincide.",
                 "Ask for fewer digits, or take a start farther from the degenerate motion.",
             )
         power = max(32, 1 << ceil(self.wanted).bit_length())

@@ -19,7 +19,8 @@ whole motion
 
 so that turning points are points like any other.  σ is found by exclusion at the start.
 Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other;
-motions asymptotic to it, or with a variable at rest on it, are not done here.
+motions asymptotic to it, or with a variable at rest on it, are not done here.  Near them the Fourier series grow like
+the root of the distance; where 50 digits need more terms than they may have, the motion is left to the enclosure.
 Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); signs and recovery derived here from the integrals.
 """
 
@@ -38,7 +39,7 @@ from heavytop.exact.abel import Inversion
 from heavytop.exact.balls import ball, midpoint, working_precision
 from heavytop.exact.closed_form import ClosedForm, series_length
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
-from heavytop.exact.gaps import Gap, Roots
+from heavytop.exact.gaps import Gap, Roots, distance
 from heavytop.exact.motion import kept
 from heavytop.exact.reduced import Reduced, Undecided, polynomial
 from heavytop.precision import shown
@@ -47,6 +48,8 @@ from heavytop.top.heavy_top import HeavyTop, State, dot
 
 _REMEDY = "The validated enclosure holds for every motion."
 _DECISIONS = (64, 256, 1024, 4096)
+_DISTANCE = 4e-6
+"""cosh β − 1 of :func:`heavytop.exact.gaps.distance` where 50 digits take the most terms that a series may have."""
 _MINUS, _PLUS = 0, 1
 """The factors au − X and au + X of f."""
 
@@ -307,21 +310,23 @@ def _gap(curve: Sequence[Root], ends: tuple[int, int]) -> Gap:
 
 @whole_evaluation
 def _require_done(level: Level) -> None:
-    """Raises NotInClass on the levels that are not done here."""
+    """Raises NotInClass on the levels that are not done here, and too near to them."""
     sextic = level.sextic()
     multiple = sextic.gcd(sextic.derivative())
-    if multiple.degree() == 0:
-        return
-    if level.separated().gcd(multiple).degree() > 0:
+    if multiple.degree() > 0 and level.separated().gcd(multiple).degree() > 0:
         raise NotInClass("The level is degenerate: a separated variable rests at a double root.", _REMEDY)
     for bits in _DECISIONS:
         with working_precision(bits):
             try:
                 curve = roots(level)
                 ends = gap_ends(curve, separated_start(level))
+                near = min(distance([root.value for root in curve], pair) for pair in ends)
             except Undecided:
                 continue
         if any(curve[number].multiplicity > 1 for pair in ends for number in pair):
             raise NotInClass("The level is degenerate: the motion is asymptotic to a double root.", _REMEDY)
+        if near < _DISTANCE:
+            reason = f"cosh beta - 1 = {near:.2g} of the root that is nearest to a gap, and {_DISTANCE:g} is the least"
+            raise NotInClass(f"The level is too near to a degenerate one: {reason}.", _REMEDY)
         return
-    raise NotInClass("The level is degenerate, and the start too near to a double root to tell.", _REMEDY)
+    raise NotInClass("The start is too near to a double root to tell on which side of it the motion is.", _REMEDY)

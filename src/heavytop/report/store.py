@@ -67,6 +67,7 @@ class BriefRow(msgspec.Struct, gc=False):
     starts: Starts = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, Seconds] = {}
+    evaluations: Count | None = None
 
     @property
     def key(self) -> tuple[str, ...]:
