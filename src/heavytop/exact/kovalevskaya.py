@@ -11,7 +11,8 @@ Levels where the quintic has a multiple root, found exactly (Appelrot, Trudy otd
 
     k = 0                            Delone's class, elliptic: :mod:`heavytop.exact.delone`
     double root outside both gaps    as any other level, at any distance from it
-    double root at an end of a gap   asymptotic motions: refused
+    double root at an end of a gap   asymptotic motions (:mod:`heavytop.exact.asymptotic`)
+    common end of both gaps          both variables tend to it: refused
     a variable at rest on it         Appelrot's especially remarkable motions: refused
     double root of the cubic         refused
 
@@ -125,8 +126,9 @@ def _require_done(level: Level) -> None:
 
 def _require_apart(curve: Sequence[Root], ends: Sequence[Interval], name: str) -> None:
     """Raises NotInClass where neither of the two forms evaluates the motion."""
-    if any(curve[number - 1].multiplicity > 1 for interval in ends for number in interval if number):
-        raise NotInClass(f"{name}, and the motion is asymptotic to it.", _REMEDY)
+    limits = [number for interval in ends for number in interval if number and curve[number - 1].multiplicity > 1]
+    if len(limits) > 1:
+        raise NotInClass(f"{name}, and both separated variables tend to e.", _REMEDY)
     nearest = separation([root.value for root in curve])
     if nearest < SEPARATION and pole(curve, ends)[1] < _DISTANCE:
         raise NotInClass(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", _REMEDY)

@@ -37,6 +37,7 @@ from typing import Any
 from flint import acb, acb_series, arb, arb_series
 
 from heavytop.exact.abel import Inversion, Variable
+from heavytop.exact.asymptotic import Approach
 from heavytop.exact.balls import ball, midpoint
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.flint_context import coefficient, current_length
@@ -286,10 +287,12 @@ def start_phases(start: Start, mu: arb, variables: Sequence[Variable]) -> list[a
 
 
 def _variable(branch: Sequence[acb], curve: Sequence[Root], interval: Interval, lead: arb, most: int) -> Variable:
-    """The gap between two simple branch points."""
+    """The gap between two simple branch points, or the way from a simple one to a double one and back."""
     low, high = (branch[number].real for number in interval)
     if not low < high:
         raise Undecided
     many = [1, *(root.multiplicity for root in curve)]
-    others = [(b, many[i]) for i, b in enumerate(branch) if i not in interval]
-    return Gap(low, high, Roots.of(lead, others), most=most)
+    rest = Roots.of(lead, [(b, many[i]) for i, b in enumerate(branch) if i not in interval])
+    if many[interval[0]] > 1:
+        return Approach(high, low, rest, most=most)
+    return Approach(low, high, rest, most=most) if many[interval[1]] > 1 else Gap(low, high, rest, most=most)
