@@ -5,14 +5,17 @@ Numbers that measure something are decimal text with their log10 beside them, so
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import math
+from typing import Annotated, Any, Literal, SupportsFloat
 
 import msgspec
 
 SCHEMA = "heavytop-report/1"
 
-UNMEASURED = OUT_OF_REACH, CONTRADICTION = "out_of_reach", "contradiction"
-"""Outcomes of a row that came to nothing: it has no metrics, and says why in the place of a reference."""
+UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED = "out_of_reach", "contradiction", "failed"
+"""Outcomes of a row that came to nothing: it has no metrics, and says why in the place of a reference.
+
+failed: an integrator of others raised an error, or gave back what is no motion."""
 
 Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Starts = Annotated[int, msgspec.Meta(ge=1)]
@@ -36,6 +39,25 @@ class Metric(msgspec.Struct, gc=False):
     kind: Kind = "error"
     bound: str | None = None
     band: Annotated[float, msgspec.Meta(ge=0, le=100)] | None = None
+
+    def __float__(self) -> float:
+        """The nearest double, 0 where that is too small; the bound of what is unresolved, nan for the other words."""
+        try:
+            return float(self.bound if self.bound is not None else self.value)
+        except ValueError:
+            return math.inf if self.value == "never" else math.nan
+
+    def __lt__(self, other: SupportsFloat) -> bool:
+        return float(self) < float(other)
+
+    def __le__(self, other: SupportsFloat) -> bool:
+        return float(self) <= float(other)
+
+    def __gt__(self, other: SupportsFloat) -> bool:
+        return float(self) > float(other)
+
+    def __ge__(self, other: SupportsFloat) -> bool:
+        return float(self) >= float(other)
 
 
 class Series(msgspec.Struct):
@@ -75,6 +97,7 @@ class Row(msgspec.Struct):
     measured: what is held (known, claimed or computed); against: what it is held against, with method and radius.
     outcome, time_reached, steps, finite travel with every number.  seconds: timings, not compared.
     evaluations: of the field, where the integrator counts them.
+    samples: how many times the largest values are over; 0 where that is not said.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     """
 
@@ -96,6 +119,7 @@ class Row(msgspec.Struct):
     flags: dict[str, str] = {}
     input_rounding: str | None = None
     series: dict[str, Series] = {}
+    samples: Count = 0
     starts: Starts = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, Seconds] = {}

@@ -39,7 +39,7 @@ class Known:
         """Method, radius and certificate, for the row."""
         c = self.certificate
         limit = radius_text(Fraction(1, 2**self.bits))
-        by = f"certified at t = {shown(self.time)} to {c.agreed_digits} digits by {c.second_source} ({c.kind})"
+        by = f"certified at t = {shown(self.time)} {c.agreement} by {c.second_source} ({c.kind})"
         return f"known: {c.method}, radius below {limit}; {by}"
 
 
@@ -70,10 +70,10 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
     source excludes it: then something is wrong with this program.
     """
     bits = problem.precision.bits + GUARD_BITS
-    found = closed_form(problem)
-    if found is None and abs(horizon) > _VALIDATED_HORIZON:
-        return f"no closed form, and no enclosure beyond |t| = {_VALIDATED_HORIZON}"
     try:
+        found = closed_form(problem)
+        if found is None and abs(horizon) > _VALIDATED_HORIZON:
+            return f"no closed form, and no enclosure beyond |t| = {_VALIDATED_HORIZON}"
         known = certified(found or Validated(problem.top, problem.start, problem.system), horizon, bits)
     except OutOfReach as error:
         return error.cause

@@ -11,7 +11,7 @@ import msgspec
 
 from heavytop.errors import InputError
 from heavytop.integrate import peers
-from heavytop.precision import exact, parse, physical
+from heavytop.precision import exact, parse, physical, usable_tolerance
 from heavytop.suite.cases import Case
 from heavytop.suite.starts import GrowthRun, growth_task
 from heavytop.suite.task import Task
@@ -192,18 +192,22 @@ class WorkPrecision(Strict, tag="work_precision"):
     samples: int = 100
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row; raises InputError also for an integrator that is not there."""
+        """One a row; raises InputError also for an integrator that is unknown, or built in and not installed."""
         (horizon,) = _positive([self.horizon], "horizon")
         count = _samples(self.samples)
         times = tuple(horizon * i / count for i in range(1, count + 1))
         keep = tuple(times[i - 1] for i in log_spaced(count))
         for ladder in self.ladders:
-            peers.peer(ladder.integrator)
+            peers.require(ladder.integrator)
             if not ladder.tolerances and not ladder.steps:
                 raise InputError(f"The ladder of {ladder.integrator} is empty.", "Give it tolerances, or steps.")
             for text in ladder.tolerances + ladder.steps:
                 if text != "eps" and not 0 < exact(text) <= 1:
                     raise InputError(f"A tolerance or step of {text[:60]!r}.", "Give numbers above 0, up to 1.")
+            if ladder.integrator.partition(":")[0] == "heyoka":
+                for text in ladder.tolerances:
+                    if text != "eps":
+                        usable_tolerance(text, parse(ladder.precision))
         return [
             Task(
                 "work_precision",

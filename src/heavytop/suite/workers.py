@@ -15,12 +15,13 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import cache
 from importlib import metadata
-from multiprocessing import get_context, parent_process
+from multiprocessing import parent_process
 from operator import itemgetter
 from threading import Lock, Thread
 from typing import Any
 
 from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
+from heavytop.processes import ChildContext
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.task import Task
@@ -58,7 +59,8 @@ def rows(
     saved: for the index of a task, where its row keeps its place; None where it keeps none, as on a cluster, which may
     have no disk in common with this machine.
 
-    A task whose worker died is run again, three times in all.
+    A task whose worker died is run again, three times in all; an integrator of another package that it ran is then a
+    row that failed.
     Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
     InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
     """
@@ -105,6 +107,11 @@ def _in_processes(
             queue.extendleft(reversed(lost))
             worst, times = max(deaths.items(), key=itemgetter(1), default=(0, 0))
             if times > 2:
+                if (ended := _ended_by_peer(tasks[worst], times)) is not None:
+                    queue.remove(worst)
+                    del deaths[worst]
+                    yield worst, ended
+                    continue
                 raise HeavyTopError(
                     f"A worker process died {times} times during {tasks[worst].label}.",
                     f"{_RESUME}, perhaps with fewer --workers.",
@@ -130,6 +137,9 @@ def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Ite
                 try:
                     row = future.result()
                 except KilledWorker as error:
+                    if (ended := _ended_by_peer(tasks[index], error.allowed_failures + 1)) is not None:
+                        yield index, ended
+                        continue
                     raise HeavyTopError(
                         f"{error.allowed_failures + 1} workers died during {tasks[index].label}.", f"{_RESUME}."
                     ) from None
@@ -174,6 +184,17 @@ def _measure(task: Task, saved: Saved) -> Row:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
+def _ended_by_peer(task: Task, times: int) -> Row | None:
+    """The failed row of a task that ended its process, where an integrator of another package ran in it; else None."""
+    from heavytop.integrate.peers import BUILT_IN
+    from heavytop.suite.measurements.shared import peer_failure
+
+    name = task.form.partition(" ")[0]
+    if task.kind != "work_precision" or name in BUILT_IN:
+        return None
+    return peer_failure(task, f"{name} ended its process {times} times")
+
+
 def _measure_as(expected: Versions, task: Task) -> Row:
     """The row of ``task``; raises InputError unless the versions here are those expected."""
     here = versions()
@@ -198,9 +219,7 @@ def _end_with_the_parent() -> None:
 
 @contextmanager
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    # spawned, not forked: a forked child would share the state of heyoka's compiler and threads
-    context = get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts_to_the_parent) as pool:
+    with ProcessPoolExecutor(workers, mp_context=ChildContext(), initializer=_leave_interrupts_to_the_parent) as pool:
         try:
             yield pool
         except BrokenProcessPool:
