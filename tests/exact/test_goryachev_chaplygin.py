@@ -90,3 +90,18 @@ def test_levels_that_are_not_done_are_named():
         motion_from((F(1), F(1, 3)), (0, 0, 0), (F(3, 5), 0, F(4, 5)))
     with pytest.raises(NotInClass, match="both separated variables"):
         motion_from((F(1), F(0)), (0, F(1, 4), 0), (F(3, 5), 0, F(4, 5)))
+
+
+@pytest.mark.parametrize("exponent", [1, 2, 3])
+def test_near_a_degenerate_level_every_digit_comes_out(exponent):
+    spin = F(1, 10**exponent)
+    motion = motion_from((F(1), F(0)), (0, F(1, 4), spin), (F(3, 5), -spin * F(4, 5), F(4, 5)))
+    assert_solves(motion, F(7, 3))
+    assert_narrow(motion, F(10**6))
+
+
+def test_nearer_the_motion_is_refused_with_the_distance():
+    for exponent in (12, 100):
+        spin = F(1, 10**exponent)
+        with pytest.raises(NotInClass, match=r"degenerate but for .*, the distance|too near"):
+            motion_from((F(1), F(0)), (0, F(1, 4), spin), (F(3, 5), -spin * F(4, 5), F(4, 5)))
