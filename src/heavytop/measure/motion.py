@@ -11,7 +11,7 @@ from typing import Any
 from flint import arb
 
 from heavytop.exact.balls import FUNCTIONS, working_precision
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.integrators import named
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
 from heavytop.measure.scalar import GUARD_BITS, text, to_ball
@@ -101,17 +101,20 @@ def compute(
     system: System,
     attitude: bool = False,
     step_limit: int | None = None,
+    integrator: str = "heyoka",
 ) -> Motion:
     """The motion at ``times`` (exact, checked), with the drift of every integral that holds.
 
     attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
+    integrator: ``heyoka`` or ``words``; raises InputError for any other.
     """
     xi = perpendicular(start.gamma) if attitude else None
     problem = Problem.of(top, start, precision, system, xi)
     wanted = frozenset(exact(number(time, precision)) for time in times)
     watcher = _Watcher(problem, holding(top, start, system), wanted)
     samples = _dense(problem, times) if attitude else times
+    propagate = named(integrator)
     run = propagate(top, start, samples, precision, system=system, xi=xi, step_limit=step_limit, observer=watcher)
     run = replace(
         run, times=tuple(time for time, *_ in watcher.kept), states=tuple(state for _, state, _ in watcher.kept)
