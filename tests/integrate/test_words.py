@@ -16,7 +16,7 @@ from heavytop.integrate import words_engines
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
 from heavytop.integrate.words import propagate_words
-from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, Precision, exact, number, real
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, exact, number, real
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State, dot
@@ -30,7 +30,7 @@ EULER = HeavyTop((3, 2, 1), 0, (0, 0, 0))
 LAGRANGE = HeavyTop((1, 1, "1/2"), 1, (0, 0, 1))
 PAPER = HeavyTop((3, 5, 7), "1/3", (0, "1/7", 0))
 PAPER_START = State([Fraction(2, 7) * 11 / 3, Fraction(3, 7) * 11 / 5, Fraction(6, 7) * 11 / 7], ("2/7", "3/7", "6/7"))
-FORMATS = [DOUBLE, EXTENDED, DOUBLE_DOUBLE]
+FORMATS = [DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD, real(237)]
 
 
 def bits(run: Trajectory) -> list[list[Fraction]]:
@@ -62,7 +62,7 @@ def _middle(ball) -> Fraction:
 
 @pytest.mark.parametrize(
     ("precision", "limit"),
-    [(DOUBLE, "1e-14"), (EXTENDED, "1e-17"), (DOUBLE_DOUBLE, "1e-29")],
+    [(DOUBLE, "1e-14"), (EXTENDED, "1e-17"), (DOUBLE_DOUBLE, "1e-29"), (QUAD, "1e-31"), (real(237), "1e-58")],
     ids=lambda value: getattr(value, "name", value),
 )
 @pytest.mark.parametrize("given", VECTORS, ids=lambda given: given["name"])
@@ -75,8 +75,8 @@ def test_every_reference_state_is_met_in_every_format(given, precision: Precisio
 
 @pytest.mark.parametrize(
     ("precision", "horizon", "limit"),
-    [(DOUBLE, 2000, 1), (EXTENDED, 1000, 1), (DOUBLE_DOUBLE, 20, 400)],
-    ids=["double", "extended", "double-double"],
+    [(DOUBLE, 2000, 1), (EXTENDED, 1000, 1), (DOUBLE_DOUBLE, 20, 400), (QUAD, 500, 1), (real(500), 10, 1)],
+    ids=lambda value: getattr(value, "name", value),
 )
 @pytest.mark.parametrize(
     ("top", "start", "system"),
@@ -99,7 +99,7 @@ def test_what_is_returned_is_the_true_motion_rounded(precision, horizon, limit, 
 @pytest.mark.parametrize("sign", [1, -1], ids=["forwards", "backwards"])
 def test_motions_without_a_closed_form_lie_in_their_enclosure(top: HeavyTop, horizon: int, sign: int) -> None:
     times = [sign * Fraction(horizon * i, 3) for i in range(1, 4)]
-    for precision, limit in ((DOUBLE, 1), (EXTENDED, 1), (DOUBLE_DOUBLE, 40)):
+    for precision, limit in ((DOUBLE, 1), (EXTENDED, 1), (DOUBLE_DOUBLE, 40), (QUAD, 1), (real(237), 1)):
         assert worst(propagate_words(top, START, times, precision)) <= limit
 
 
@@ -135,15 +135,15 @@ def test_the_attitude_rides_along_and_stays_orthonormal(system) -> None:
 
 
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
-@pytest.mark.parametrize("exponent", [-30, -3, 6, 30])
+@pytest.mark.parametrize("exponent", [-30, 6, 60])
 def test_units_of_time_and_weight_change_nothing_but_the_units(precision, exponent: int) -> None:
     """The same motion with Ω in other units: the same error relative to Ω, a step less or more at the end."""
     unit = Fraction(10) ** exponent
     start = State([w * unit for w in START.omega], START.gamma)
     top = HeavyTop(GENERIC.inertia, unit**2, GENERIC.centre)
     run = propagate_words(top, start, [5 / unit], precision)
-    same = Problem.of(HeavyTop(run.problem.top.inertia, 1, run.problem.top.moment), run.problem.start, real(160))
-    wide = propagate(same.top, same.start, run.times, real(160))
+    same = Problem.of(HeavyTop(run.problem.top.inertia, 1, run.problem.top.moment), run.problem.start, real(300))
+    wide = propagate(same.top, same.start, run.times, real(300))
     for low, size in ((0, unit), (3, 1)):
         off = max(abs(a - exact(b)) for a, b in zip(bits(run)[0][low : low + 3], wide.states[0][low:], strict=False))
         assert off <= 60 * size * precision.eps
@@ -286,7 +286,7 @@ def test_heyoka_refuses_double_double() -> None:
 def test_wrong_machine_code_is_caught_by_the_step_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wrong sign in one lane, in one of the two recurrences or in both."""
     monkeypatch.setattr(floating, "_machines", {})
-    monkeypatch.setattr(words_engines, "_tools", {})
+    monkeypatch.setattr(words_engines, "_made", {})
     damaged = [list(part) for part in recurrence.GATHERED]
     damaged[2][4] = (6, -1)
     monkeypatch.setattr(recurrence, "GATHERED", tuple(map(tuple, damaged)))

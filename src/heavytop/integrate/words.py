@@ -10,7 +10,7 @@ from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
-from heavytop.integrate.words_engines import Setting, Tool, tool
+from heavytop.integrate.words_engines import choose, compiled
 from heavytop.precision import Precision, exact, number, require
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -72,13 +72,12 @@ def follow(
 
     between: called between chunks of a quarter of a second; it may raise to give the run up.
     """
-    scaled = Scaled.of(problem.system, problem.parameters, (*problem.start.flat, *(problem.xi or ())))
-    setting = Setting.of(scaled, problem.precision, tolerance)
-    used = tool(problem.system, problem.xi is not None, setting)
-    flags = setting.flags
+    arithmetic, scaled = choose(problem, tolerance)
+    compiling = compiled(arithmetic, problem.system, problem.xi is not None)
+    flags = arithmetic.flags
     forwards = bool(targets[-1] >= 0)
     began = perf_counter()
-    pace = _Pace(setting.run(scaled, forwards), scaled, step_limit, between)
+    pace = _Pace(arithmetic.begin(scaled, forwards), scaled, step_limit, between)
     kept_times: list[Fraction] = []
     kept_states: list[Any] = []
     outcome, done = Outcome.SUCCESS, 0
@@ -91,9 +90,10 @@ def follow(
         outcome = pace.reach(target)
         if outcome is not Outcome.SUCCESS:
             break
-        state = native_state(pace.sample(target), problem.precision)
+        sample = pace.sample(target)
+        state = None if sample is None else native_state(sample, problem.precision)
         if state is None:
-            outcome = Outcome.NON_FINITE
+            outcome = Outcome.CAPACITY if sample is None else Outcome.NON_FINITE
             break
         done += 1
         kept_times.append(target)
@@ -103,18 +103,18 @@ def follow(
             observer(target, state)
         if mark is not None and target != 0:
             mark(pace.place(done, perf_counter() - began, flags))
-    return _trajectory(problem, pace, used, flags, kept_times, kept_states, outcome, perf_counter() - began)
+    seconds = {"compile": compiling, "run": perf_counter() - began}
+    return _trajectory(problem, pace, flags, kept_times, kept_states, outcome, seconds)
 
 
 def _trajectory(
     problem: Problem,
     pace: _Pace,
-    used: Tool,
     flags: dict[str, str],
     times: list[Fraction],
     states: list[Any],
     outcome: Outcome,
-    seconds: float,
+    seconds: dict[str, float],
 ) -> Trajectory:
     reached = times[-1] if outcome is Outcome.SUCCESS and times else pace.time
     return Trajectory(
@@ -126,7 +126,7 @@ def _trajectory(
         reached,
         pace.run.steps,
         pace.run.order,
-        {"compile": used.seconds, "run": seconds},
+        seconds,
         flags,
     )
 
@@ -183,11 +183,11 @@ class _Pace:
             self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
         return Outcome.SUCCESS
 
-    def sample(self, target: Fraction) -> tuple[Fraction, ...]:
-        """The state at ``target``, inside the last step."""
+    def sample(self, target: Fraction) -> tuple[Fraction, ...] | None:
+        """The state at ``target``, inside the last step; None where the numbers outgrow their words there."""
         at_start = self.scaled.rest or target == 0
         state = self.scaled.state if at_start else self.run.sample(abs(target) * self.scaled.rate)
-        return self.scaled.back(state)
+        return None if state is None else self.scaled.back(state)
 
     def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
         """Where the last step began; at rest, the beginning."""

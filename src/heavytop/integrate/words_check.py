@@ -17,16 +17,16 @@ _GUARD_BITS = 8
 _LATER = Fraction(7, 11)
 
 
-def check(system: System, attitude: bool, begin: Callable[[Scaled], Run], bits: int) -> None:
+def check(system: System, attitude: bool, begin: Callable[[Scaled], Run], bits: int, bounded: bool = False) -> None:
     """One step against the exact series of a known motion: coefficients, the new state, and a sample inside the step.
 
-    begin: a run of a problem at its start.  bits: of its arithmetic.
+    begin: a run of a problem at its start.  bits: of its arithmetic.  bounded: the units it wants.
     Raises Contradiction.
     """
     moments, weights = (tuple(map(Fraction, part)) for part in (PARAMETERS.inertia, PARAMETERS.moment))
     given = Parameters(moments, weights, Fraction(PARAMETERS.rotor))
     start = tuple(map(Fraction, (*OMEGA, *GAMMA, *(XI if attitude else ()))))
-    scaled = Scaled.of(system, given, start)
+    scaled = Scaled.of(system, given, start, bounded)
     run = begin(scaled)
     _require(run.advance(Fraction(1, 2**40), 1) is Status.FINE, "the outcome of a step", bits)
     exact = list(derivatives(system, attitude, min(run.order, _MOST_ORDERS) + 1, given))
@@ -45,7 +45,8 @@ def check(system: System, attitude: bool, begin: Callable[[Scaled], Run], bits: 
         (run.sample(later), _LATER, "a state inside the step"),
     ):
         sums = [sum(row[i] * part**n for n, row in enumerate(terms)) for i in range(len(start))]
-        _require(max(abs(a - b) for a, b in zip(found, sums, strict=True)) <= tail, what, bits)
+        fine = found is not None and max(abs(a - b) for a, b in zip(found, sums, strict=True)) <= tail
+        _require(fine, what, bits)
 
 
 def _require(fine: bool, what: str, bits: int) -> None:

@@ -45,8 +45,8 @@ class Run(ABC):
         """Take steps, at most so many, until the last covers ``target``."""
 
     @abstractmethod
-    def sample(self, time: Fraction) -> tuple[Fraction, ...]:
-        """The state at a time inside the last step; changes nothing."""
+    def sample(self, time: Fraction) -> tuple[Fraction, ...] | None:
+        """The state at a time inside the last step; changes nothing.  None where the numbers outgrow their words."""
 
     @abstractmethod
     def coefficients(self, n: int) -> tuple[Fraction, ...]:

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from math import isqrt
 
 from heavytop.top.equations import GYROSTAT, Parameters, System
 from heavytop.words.lanes import Coefficients, coefficients
+
+_ROOT_BITS = 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +30,17 @@ class Scaled:
     rest: bool
 
     @classmethod
-    def of(cls, system: System, p: Parameters, y: tuple[Fraction, ...]) -> Scaled:
-        """The problem with parameters ``p`` that starts at ``y``, six or nine exact numbers."""
+    def of(cls, system: System, p: Parameters, y: tuple[Fraction, ...], bounded: bool = False) -> Scaled:
+        """The problem with parameters ``p`` that starts at ``y``, six or nine exact numbers.
+
+        bounded: with |ω| <= 4 at all times, by the first integrals, in place of |ω| near 1 at the start.
+        """
         rates = list(system.field(p, y[:6]))
         if len(y) == 9:
             rates += system.attitude(p, y[:6], y[6:])
         given = coefficients(system, p, False)
         gamma = _power_above(max(map(abs, y[3:6])))
-        rate = _rate(system, given, p, y, gamma)
+        rate = _bound(system, p, y) / 4 if bounded else _rate(system, given, p, y, gamma)
         sizes = [rate] * 3 + [gamma] * 3 + ([_power_above(max(map(abs, y[6:])))] * 3 if len(y) == 9 else [])
         scaled = coefficients(system, _in_units(system, p, rate, gamma), len(y) == 9)
         state = tuple(value / size for value, size in zip(y, sizes, strict=True))
@@ -59,6 +65,24 @@ def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction,
     if system is GYROSTAT:
         return _power_above(max(speed, abs(p.rotor), linear))
     return max((_power_above(speed) if speed else Fraction(0), _root_above(linear * gamma))) or Fraction(1)
+
+
+def _bound(system: System, p: Parameters, y: tuple[Fraction, ...]) -> Fraction:
+    """A power of two not less than |Ω_i| at any time: from the energy, or from |M| and the rotor of the gyrostat."""
+    omega, gamma = y[:3], y[3:6]
+    least = min(p.inertia)
+    if system is GYROSTAT:
+        square = sum((i * w) ** 2 for i, w in zip(p.inertia, omega, strict=True)) / least**2
+        return _root_above(max(square, Fraction(p.rotor) ** 2)) or Fraction(1)
+    kinetic = sum(i * w * w for i, w in zip(p.inertia, omega, strict=True)) / 2
+    torque = _root(sum(n * n for n in p.moment) * sum(g * g for g in gamma))
+    return _root_above(2 * (kinetic + 2 * torque) / least) or Fraction(1)
+
+
+def _root(value: Fraction) -> Fraction:
+    """Not less than √value, and at most a millionth larger."""
+    unit = Fraction(2) ** _ROOT_BITS / (_root_above(value) or 1)
+    return Fraction(isqrt(int(value * unit**2)) + 1) / unit
 
 
 def _power_above(value: Fraction) -> Fraction:
