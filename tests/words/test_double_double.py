@@ -6,37 +6,17 @@ from fractions import Fraction
 
 import numpy
 import pytest
-from llvmlite import binding, ir
+from llvmlite import ir
+from words_helpers import LEVELS, problem
 
-from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.words import double_double as dd
 from heavytop.words.floating import Floating, Ladder
 from heavytop.words.machine import Processor, compiled
 from heavytop.words.pairs import log2, power_of_two, split
 from heavytop.words.run import Status
-from heavytop.words.scaled import Scaled
 from heavytop.words.vector import DOUBLE, function
 
 LADDER = Ladder.of(Fraction(1, 2**105))
-
-
-def problem(spin: int = 1, attitude: bool = False) -> Scaled:
-    p = Parameters(
-        (Fraction(3), Fraction(2), Fraction(1)), (Fraction(1, 2), Fraction(1, 3), Fraction(1, 5)), Fraction(0)
-    )
-    y = tuple(Fraction(text) * spin for text in ("1/10", "1/5", "9/10"))
-    return Scaled.of(HEAVY_TOP, p, (*y, *map(Fraction, ("3/5", "0", "4/5", *(("0", "1", "0") if attitude else ())))))
-
-
-def here(feature: str) -> bool:
-    return bool(binding.get_host_cpu_features().get(feature))
-
-
-LEVELS = [
-    pytest.param(Processor("x86-64"), marks=pytest.mark.skipif(not here("sse2"), reason="no such processor"), id="1"),
-    pytest.param(Processor("x86-64-v3"), marks=pytest.mark.skipif(not here("fma"), reason="no FMA"), id="3"),
-    pytest.param(Processor("x86-64-v4"), marks=pytest.mark.skipif(not here("avx512f"), reason="no AVX-512"), id="4"),
-]
 
 
 @pytest.mark.parametrize("processor", LEVELS)
