@@ -37,9 +37,9 @@ def machine(grid: Grid, system: System, attitude: bool, processor: Processor | N
 
 
 def excess(problem: Scaled) -> int:
-    """e, so that the coefficients over 2^e are at most 4: as many bits are lost in products with them."""
+    """e, so that the coefficients over 2^e are at most 1: as many bits are lost in products with them."""
     largest, found = problem.coefficients.largest, 0
-    while largest > 4 * 2**found:
+    while largest > 2**found:
         found += 1
     return found
 
@@ -68,7 +68,8 @@ class Fixed(Run):
         self.rows, self.sums, self.seen = doubles(row * (orders + 2)), doubles(8 * grid.words), doubles(8)
         self.places = numpy.zeros(grid.words + 2, numpy.int64)
         self.clock, self.counts = doubles(steps.CLOCK), numpy.zeros(steps.COUNTS, numpy.int64)
-        self.clock[steps.SIGN] = (1 if forwards else -1) * 2.0**self.excess
+        self.clock[steps.SIGN] = 1.0 if forwards else -1.0
+        self.counts[steps.EXCESS] = self.excess
         self.counts[[steps.HALVINGS, steps.FEWEST, steps.MOST]] = _FIRST_HALVINGS, _FEWEST_HALVINGS, _MOST_HALVINGS
         self.constants = self._constants(Fraction(1))
         self._row = row
@@ -129,8 +130,9 @@ class Fixed(Run):
         """The words after a time ``span``: one series; where a sum leaves its range, two of half the length."""
         found, rows = doubles(len(words)), doubles(len(self.rows))
         arrays = [words, *self._scratch(self._constants(span), rows)]
-        factor = float(self.clock[steps.SIGN])
-        orders = self.machine.functions["series"](*[pointer(array) for array in arrays], factor, pointer(found))
+        factor, raises = steps.raises_of(self.excess)
+        call = [*[pointer(array) for array in arrays], factor * float(self.clock[steps.SIGN]), raises, pointer(found)]
+        orders = self.machine.functions["series"](*call)
         if orders >= 0:
             return found
         half = None if halvings == 0 else self._moved(words, span / 2, halvings - 1)

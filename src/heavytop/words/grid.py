@@ -19,9 +19,10 @@ from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compil
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, POINTER, Code, Index, function
 
 TIME, TARGET, BEGAN, SIGN, CLOCK = range(5)
-"""Places of the clock, doubles: |time|, its target, the beginning of the last step; ± the unit of the factor."""
-HALVINGS, FEWEST, MOST, STATUS, ORDERS, REDONE, COUNTS = range(7)
-"""Places of the counts: −log2 h of the next step and its bounds, how the last one ended, its orders, steps redone."""
+"""Places of the clock, doubles: |time|, its target, the beginning of the last step; the direction."""
+HALVINGS, FEWEST, MOST, STATUS, ORDERS, REDONE, EXCESS, COUNTS = range(8)
+"""Places of the counts: −log2 h of the next step and its bounds, how the last one ended, its orders, steps redone;
+log2 of what the constants were divided by."""
 FINE, TOO_SMALL, CAPACITY = 0, 2, 3
 _MANY_ORDERS, _FEW_ORDERS = 0.53, 0.34
 
@@ -41,7 +42,7 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
     machine = compiled(
         module,
         {
-            "series": (integer, [*pointers, ctypes.c_double, DOUBLES]),
+            "series": (integer, [*pointers, ctypes.c_double, integer, DOUBLES]),
             "advance": (integer, [*pointers, DOUBLES, DOUBLES, INTEGERS, integer]),
         },
         processor,
@@ -92,7 +93,12 @@ class _Advance:
         code, b = self.code, self.code.builder
         halvings = self._count(HALVINGS)
         length = _power(code, halvings)
-        orders = b.call(self.series, [*self.scratch, b.fmul(self._time(SIGN), length), self.result])
+        exponent = b.sub(self._count(EXCESS), halvings)
+        raises = b.ashr(b.add(exponent, code.integer(3)), code.integer(2))
+        raises = b.select(b.icmp_signed(">", raises, code.integer(0)), raises, code.integer(0))
+        rest = b.sub(b.shl(raises, code.integer(2)), exponent)
+        factor = b.fmul(self._time(SIGN), _power(code, rest))
+        orders = b.call(self.series, [*self.scratch, factor, raises, self.result])
         good = b.icmp_signed(">=", orders, code.integer(0))
         time = self._time(TIME)
         after = b.fadd(time, length)
@@ -125,6 +131,12 @@ class _Advance:
         shorter = b.or_(b.not_(good), b.icmp_signed(">", orders, many))
         following = b.select(shorter, b.add(halvings, one), halvings)
         self._set_count(b.select(longer, b.sub(halvings, one), following), HALVINGS)
+
+
+def raises_of(exponent: int) -> tuple[float, int]:
+    """(factor, raises) with factor 16^raises = 2^exponent and factor at most 1, as ``advance`` takes them."""
+    raises = max(0, (exponent + 3) >> 2)
+    return 2.0 ** (exponent - 4 * raises), raises
 
 
 def _power(code: Code, halvings: Any) -> Any:

@@ -29,11 +29,11 @@ def most_orders(grid: Grid) -> int:
 
 @dataclass(slots=True)
 class Series:
-    """Writes ``series(state, constants, inverses, rows, sums, places, seen, factor, result)``.
+    """Writes ``series(state, constants, inverses, rows, sums, places, seen, factor, raises, result)``.
 
     state, result: K words of each vector.  constants: K words of A and each B, for each vector.  inverses: 1/(n + 1).
-    rows: R, then L of each vector, K words each, an order a row.  sums, seen, places: scratch.  factor: what every
-    coefficient is multiplied by from one order to the next, ± a power of two.
+    rows: R, then L of each vector, K words each, an order a row.  sums, seen, places: scratch.  factor, raises: from
+    one order to the next coefficients are multiplied by factor 16^raises; factor is ± a power of two, at most 1.
     """
 
     module: ir.Module
@@ -52,9 +52,9 @@ class Series:
     def write(self) -> Any:
         """The function."""
         self.kernels = write_kernels(self.module, self.grid, self.row)
-        arguments = [POINTER] * 5 + [INT_POINTER, POINTER, DOUBLE, POINTER]
+        arguments = [POINTER] * 5 + [INT_POINTER, POINTER, DOUBLE, INT, POINTER]
         self.made, self.code = function(self.module, "series", INT, arguments)
-        state, _, _, _, _, places, seen, _, result = self.made.args
+        state, _, _, _, _, places, seen, _, _, result = self.made.args
         code, b = self.code, self.code.builder
         words = self.grid.words
         y = [code.load(state, 8 * k) for k in range(words * self.vectors)]
@@ -142,8 +142,9 @@ class Series:
         found: list[Any] = []
         for v in range(self.vectors):
             products = self._products(n, zeros, v)
-            scaled = self._rates(v, products, y[words * v : words * (v + 1)])
-            quotient, wide = self._divided(n, scaled, wide)
+            rates = self._rates(v, products, y[words * v : words * (v + 1)])
+            raised, wide = self._raised(rates, wide)
+            quotient, wide = self._divided(n, self._times(raised), wide)
             found += quotient
         zeros_after = self._leading_zeros(found, zeros)
         b, places = code.builder, self.made.args[5]
@@ -158,7 +159,7 @@ class Series:
     def _products(self, n: Any, zeros: Any, vector: int) -> list[Any]:
         """S_n: for each number u of leading zero words on the left and w on the right, where orders have those."""
         code, b, words = self.code, self.code.builder, self.grid.words
-        _, _, _, rows, sums, places, seen, _, _ = self.made.args
+        rows, sums, places, seen = self.made.args[3:7]
         for k, centre in enumerate(centred(code, self.grid, words)):
             code.store(centre, sums, 8 * k)
         one, zero = code.integer(1), code.integer(0)
@@ -211,9 +212,9 @@ class Series:
         b.position_at_end(end)
 
     def _rates(self, vector: int, sums: list[Any], y: list[Any]) -> list[Any]:
-        """A ∘ gathered S + Σ B ∘ permuted y, times the factor."""
+        """A ∘ gathered S + Σ B ∘ permuted y."""
         code, b, grid = self.code, self.code.builder, self.grid
-        _, constants, _, _, _, _, seen, factor, _ = self.made.args
+        constants, seen = self.made.args[1], self.made.args[6]
         words, linear = grid.words, turned(self.system)
         gathered_bits = b.bitcast(code.load(seen, 0), INT_VECTOR)
         watched = Accumulator(code, grid, 0, sums, gathered_bits)
@@ -229,10 +230,8 @@ class Series:
             result.add_product([code.load(constants, place + 8 * i) for i in range(words)], source)
         result.look_at_all()
         code.store(b.bitcast(result.seen, VECTOR), seen, 0)
-        rate = carried(
-            code, grid, [code.subtract(s, c) for s, c in zip(result.sums, centred(code, grid, words), strict=True)]
-        )
-        return self._times(rate, code.spread(factor))
+        parts = zip(result.sums, centred(code, grid, words), strict=True)
+        return carried(code, grid, [code.subtract(total, centre) for total, centre in parts])
 
     def _gathered(self, total: list[Any]) -> list[Any]:
         code = self.code
@@ -246,9 +245,24 @@ class Series:
             found.append(code.add(code.add(parts[0], parts[1]), code.add(parts[2], parts[3])))
         return found
 
-    def _times(self, words: list[Any], factor: Any) -> list[Any]:
-        """Each word rounded to its grid after the multiplication; what is left goes to the next, exactly."""
+    def _raised(self, words: list[Any], wide: Any) -> tuple[list[Any], Any]:
+        """Multiplied by 16 as often as is asked; seldom at all."""
+        code, sixteen = self.code, self.code.constant(16.0)
+
+        def once(_: Any, values: list[Any]) -> list[Any]:
+            products = [code.multiply(word, sixteen) for word in values[:-1]]
+            widest = values[-1]
+            for k, word in enumerate(products):
+                widest = self._watch(widest, word, k)
+            return [*carried(code, self.grid, products), widest]
+
+        values = code.loop(0, self.made.args[8], once, [*words, wide])
+        return values[:-1], values[-1]
+
+    def _times(self, words: list[Any]) -> list[Any]:
+        """Each word times the factor, rounded to its grid; what is left goes to the next, exactly."""
         code, found, left = self.code, [], None
+        factor = code.spread(self.made.args[7])
         for k, word in enumerate(words):
             big = code.constant(self.grid.centre(k))
             high = code.subtract(code.fma(word, factor, big), big)
