@@ -22,7 +22,7 @@ _LEAST_LOW_ORDER = 2
 _ROUNDING_BITS = 12
 _LEAST_ROOM = -58.0
 _QUOTIENT_BITS = 140
-_LARGEST = Fraction(2) ** 1000
+LARGEST_TIME = Fraction(2) ** 1000
 
 _machines: dict[tuple[str, bool, Processor | None], tuple[Machine, Layout]] = {}
 _making = Lock()
@@ -100,7 +100,7 @@ class Floating(Run):
         return _exact_state(self.words, len(self.problem.state))
 
     def advance(self, target: Fraction, steps: int) -> Status:
-        self.clock[dd.TARGET : dd.TARGET_LOW + 1] = split(min(target, _LARGEST))
+        self.clock[dd.TARGET : dd.TARGET_LOW + 1] = split(min(target, LARGEST_TIME))
         arrays = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
         taken = self.machine.functions["advance"](*arrays, steps)
         self.steps += taken

@@ -11,7 +11,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from heavytop.words.vector import DOUBLE, INT, Code, Pair
+from heavytop.words.vector import DOUBLE, INT, INT_VECTOR, LANES, VECTOR, Code, Pair
 
 _FRACTION_BITS = 52
 _BIAS = 1023
@@ -46,36 +46,52 @@ def split(value: Fraction) -> tuple[float, float]:
 
 
 def log2(code: Code, value: Any) -> Any:
-    """log2 of a double that is not negative, to 1e-3; about -1023 for 0."""
-    b = code.builder
-    bits = b.bitcast(value, INT)
-    exponent = b.sub(b.lshr(bits, code.integer(_FRACTION_BITS)), code.integer(_BIAS))
-    one = code.integer(_BIAS << _FRACTION_BITS)
-    significand = b.or_(b.and_(bits, code.integer((1 << _FRACTION_BITS) - 1)), one)
-    fraction = b.fsub(b.bitcast(significand, DOUBLE), ir.Constant(DOUBLE, 1.0))
-    return b.fadd(b.sitofp(exponent, DOUBLE), _bent(code, fraction, _LOG))
+    """log2 of a double that is not negative, to 1e-3, or of each of eight; about -1023 for 0."""
+    b, of = code.builder, _Like(value)
+    bits = b.bitcast(value, of.integers)
+    exponent = b.sub(b.lshr(bits, of.integer(_FRACTION_BITS)), of.integer(_BIAS))
+    one = of.integer(_BIAS << _FRACTION_BITS)
+    significand = b.or_(b.and_(bits, of.integer((1 << _FRACTION_BITS) - 1)), one)
+    fraction = b.fsub(b.bitcast(significand, value.type), of.double(1.0))
+    return b.fadd(b.sitofp(exponent, value.type), _bent(code, fraction, _LOG))
 
 
 def power_of_two(code: Code, exponent: Any, most: int, bits: int) -> Any:
-    """2^exponent to 1e-3, at most 2^most, its significand cut to that many bits."""
-    b = code.builder
-    low, high = ir.Constant(DOUBLE, _LEAST_EXPONENT), ir.Constant(DOUBLE, float(most))
+    """2^exponent to 1e-3, at most 2^most, its significand cut to that many bits; of a double, or of each of eight."""
+    b, of = code.builder, _Like(exponent)
+    low, high = of.double(_LEAST_EXPONENT), of.double(float(most))
     bounded = b.select(b.fcmp_ordered("<", exponent, high), exponent, high)
     bounded = b.select(b.fcmp_ordered(">", bounded, low), bounded, low)
-    whole = b.fptosi(b.fsub(bounded, low), INT)
-    fraction = b.fsub(b.fsub(bounded, low), b.sitofp(whole, DOUBLE))
-    significand = b.bitcast(b.fadd(ir.Constant(DOUBLE, 1.0), _bent(code, fraction, _POWER)), INT)
+    whole = b.fptosi(b.fsub(bounded, low), of.integers)
+    fraction = b.fsub(b.fsub(bounded, low), b.sitofp(whole, exponent.type))
+    significand = b.bitcast(b.fadd(of.double(1.0), _bent(code, fraction, _POWER)), of.integers)
     kept = ((1 << _FRACTION_BITS) - 1) ^ ((1 << (_FRACTION_BITS + 1 - bits)) - 1)
-    biased = b.add(whole, code.integer(_BIAS + int(_LEAST_EXPONENT)))
-    shifted = b.shl(biased, code.integer(_FRACTION_BITS))
-    return b.bitcast(b.add(b.and_(significand, code.integer(kept)), shifted), DOUBLE)
+    biased = b.add(whole, of.integer(_BIAS + int(_LEAST_EXPONENT)))
+    shifted = b.shl(biased, of.integer(_FRACTION_BITS))
+    return b.bitcast(b.add(b.and_(significand, of.integer(kept)), shifted), exponent.type)
 
 
 def _bent(code: Code, fraction: Any, bend: tuple[float, ...]) -> Any:
     """f + f (1 - f) times a polynomial in f."""
-    b = code.builder
-    total = ir.Constant(DOUBLE, bend[-1])
+    b, of = code.builder, _Like(fraction)
+    total = of.double(bend[-1])
     for coefficient in reversed(bend[:-1]):
-        total = b.fadd(b.fmul(total, fraction), ir.Constant(DOUBLE, coefficient))
-    one = ir.Constant(DOUBLE, 1.0)
-    return b.fadd(fraction, b.fmul(b.fmul(fraction, b.fsub(one, fraction)), total))
+        total = b.fadd(b.fmul(total, fraction), of.double(coefficient))
+    return b.fadd(fraction, b.fmul(b.fmul(fraction, b.fsub(of.double(1.0), fraction)), total))
+
+
+class _Like:
+    """Constants of the shape of a value: one, or eight."""
+
+    def __init__(self, value: Any) -> None:
+        self.eight = value.type == VECTOR
+        self.integers = INT_VECTOR if self.eight else INT
+        self.doubles = value.type
+
+    def integer(self, value: int) -> Any:
+        one = ir.Constant(INT, value)
+        return ir.Constant(INT_VECTOR, [one] * LANES) if self.eight else one
+
+    def double(self, value: float) -> Any:
+        one = ir.Constant(DOUBLE, value)
+        return ir.Constant(VECTOR, [one] * LANES) if self.eight else one
