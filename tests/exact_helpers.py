@@ -6,7 +6,7 @@ from fractions import Fraction
 from math import ceil, log2
 from random import Random
 
-from flint import arb, ctx
+from flint import arb
 
 from heavytop.exact.balls import ball, working_precision
 
@@ -18,13 +18,9 @@ def residual(solution, time: Fraction, digits: int = 60) -> list[arb]:
     parameters = getattr(solution, "parameters", None)
     if parameters is None:
         parameters = solution.system.parameters(solution.top, solution.start)
-    before, ctx.cap = ctx.cap, 2
-    try:
-        with working_precision(bits + 64):
-            rates = solution.system.field(in_balls(parameters), series)
-            return [y[1] - rate[0] for y, rate in zip(series, rates, strict=True)]
-    finally:
-        ctx.cap = before
+    with working_precision(bits + 64, 2):
+        rates = solution.system.field(in_balls(parameters), series)
+        return [y[1] - rate[0] for y, rate in zip(series, rates, strict=True)]
 
 
 def in_balls(parameters):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal
+from decimal import MAX_EMAX, MIN_EMIN, ROUND_HALF_EVEN, Context, Decimal, Overflow
 from fractions import Fraction
 from typing import Any
 
@@ -231,9 +231,15 @@ def rounded(value: Fraction, precision: Precision) -> Fraction:
 
 def decimal_text(value: Fraction, digits: int) -> str:
     """``value`` as decimal text with ``digits`` significant digits, rounded to nearest."""
-    context = Context(prec=digits, Emax=MAX_EMAX, Emin=MIN_EMIN)
+    return quotient_text(value, digits, ROUND_HALF_EVEN)
+
+
+def quotient_text(value: Fraction, digits: int, rounding: str) -> str:
+    """``value`` as decimal text with ``digits`` significant digits, rounded as asked, a constant of ``decimal``."""
+    # nothing is left to decimal.DefaultContext, which is one for the whole process
+    context = Context(digits, rounding, Emin=MIN_EMIN, Emax=MAX_EMAX, capitals=1, clamp=0, flags=[], traps=[Overflow])
     quotient = context.divide(Decimal(value.numerator), Decimal(value.denominator))
-    return str(quotient) if quotient else "0"
+    return context.to_sci_string(quotient) if quotient else "0"
 
 
 def log10(value: Fraction) -> float | None:

@@ -12,8 +12,10 @@ from heavytop.exact.catalogue import find, matches
 from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
 from heavytop.exact.grioli import Grioli, grioli_motion
 from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.lagrange import Lagrange
 from heavytop.exact.pendulum import Pendulum
 from heavytop.exact.staude import Staude, staude_motion
@@ -32,6 +34,12 @@ SAMPLES = {
     Pendulum: Pendulum(HeavyTop((3, 2, 1), 1, (0, 1, "1/2")), State(("1/2", 0, 0), (0, "3/5", "4/5"))),
     Lagrange: Lagrange(HeavyTop(("3/2", "3/2", 1), 2, (0, 0, "3/4")), State(("1/5", "-1/3", 2), ("3/5", 0, "4/5"))),
     BobylevSteklov: bobylev_steklov_motion((F(5, 2), F(1)), F(1), F(1, 2), F(1, 3), F(2)),
+    Kovalevskaya: Kovalevskaya(
+        HeavyTop((2, 2, 1), "1/2", ("6/5", "2/3", 0)), State(("1/3", "4/5", "-7/10"), ("2/7", "3/7", "6/7"))
+    ),
+    GoryachevChaplygin: GoryachevChaplygin(
+        HeavyTop((4, 4, 1), "1/2", ("6/5", "2/3", 0)), State(("3/4", "1/2", -2), ("2/3", 0, 1))
+    ),
     Delone: Delone(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((1, "1/2", "1/3"), ("3/4", 1, "1/5"))),
 }
 

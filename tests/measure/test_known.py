@@ -24,7 +24,7 @@ def problem(name: str, precision=DOUBLE) -> Problem:
         ("lagrange", "Lagrange"),
         ("pendulum", "pendulum"),
         ("gyrostat", "gyrostat"),
-        ("kovalevskaya", "validated"),
+        ("kovalevskaya", "Kovalevskaya"),
     ],
 )
 def test_every_case_finds_its_reference_from_the_rounded_data(name: str, method: str) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Protocol
 
 from heavytop.claims.guard import in_time
-from heavytop.claims.judge import AuditReport, Finding, Setting, Statement, judge
+from heavytop.claims.judge import AuditReport, Finding, judge
+from heavytop.claims.statement import Setting, Statement
 from heavytop.errors import InputError
 from heavytop.top.equations import HEAVY_TOP, System, system
 
@@ -22,6 +23,9 @@ class Auditable(Protocol):
 
     @property
     def source(self) -> str: ...
+
+    @property
+    def kind(self) -> str: ...
 
     @property
     def setting(self) -> Setting: ...
@@ -67,7 +71,7 @@ def audit_claim(claim: Auditable, about: System) -> AuditReport:
     rows = judge(claim.statements(about), claim.setting)
     why, solves = claim.explain()
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
-    return AuditReport(claim.name, about.name, claim.source, rows, tuple(why), solves, constants)
+    return AuditReport(claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind)
 
 
 def only_branch(report: AuditReport, branch: str) -> AuditReport:

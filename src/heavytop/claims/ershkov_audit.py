@@ -15,10 +15,12 @@ from typing import Any
 import sympy
 
 from heavytop.claims import ershkov, ershkov_general
+from heavytop.claims.conditions import conditions_of
 from heavytop.claims.ershkov_general import GeneralConstants
 from heavytop.claims.explain import explain
-from heavytop.claims.judge import AFTER, ALL, BEFORE, Domain, Finding, Setting, Statement
-from heavytop.claims.statements import SYMBOLIC, Motion, motion_statements
+from heavytop.claims.judge import Finding
+from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Formulas, Setting, Statement
+from heavytop.claims.statements import SYMBOLIC, Motion, attitude, motion_statements
 from heavytop.top.angles import gamma_from_angles
 from heavytop.top.equations import VARIABLES, Parameters, System
 from heavytop.top.integrals import energy, momentum_squared
@@ -39,6 +41,7 @@ class PartialClaim:
     theta: Formula = ershkov.theta
     psi: Formula = ershkov.psi
     name: str = "ershkov-partial"
+    kind: str = "motion"
     source: str = f"{SOURCE}, (4.1)-(4.6), (6.1)-(6.2)"
 
     @property
@@ -88,15 +91,20 @@ class PartialClaim:
             phi, theta = ershkov.angles_smooth(c, u, SYMBOLIC)
         omega = (first, omega2, self.omega3(c, omega2, SYMBOLIC))
         psi = self.psi(_I1, _I3, c.alpha, u, _T, SYMBOLIC)
+        gamma = ershkov.gamma(c, omega)
         return Motion(
             branch,
             domain,
             omega,
-            ershkov.gamma(c, omega),
+            gamma,
             _rate,
             phi,
             (_rate(phi), _rate(theta), _rate(psi)),
             (sympy.Integer(1), c.c0, c.c1),
+            conditions_of((*omega, *gamma)),
+            attitude(phi, theta, psi),
+            conditions_of((phi, theta, psi)),
+            _POLE,
         )
 
     def _steps(self) -> Iterator[Statement]:
@@ -142,11 +150,14 @@ class PartialClaim:
             turned = gamma_from_angles(phi, theta, SYMBOLIC)
             for component, (ours, theirs) in enumerate(zip(turned, smooth.gamma, strict=True), 1):
                 text = "(4.5) in (3.2): gamma of the angles is gamma of the smooth branch"
-                yield Statement("4.5", component, branch, domain, ours - theirs, text)
+                formulas = _turned_formulas((*turned, *smooth.gamma), (phi, theta))
+                yield Statement("4.5", component, branch, domain, ours - theirs, text, formulas)
         final = (ershkov.phi_of_6_1(c.alpha, root, SYMBOLIC), ershkov.theta_of_6_1(c.alpha, root, SYMBOLIC))
+        turned = gamma_from_angles(*printed, SYMBOLIC)
+        formulas = _turned_formulas((*turned, *smooth.gamma), (*printed, *final))
         for domain in (BEFORE, AFTER):
             for component, (ours, theirs) in enumerate(zip(printed, final, strict=True), 1):
-                yield Statement("6.1", component, "printed", domain, ours - theirs, "(6.1) is (4.5)")
+                yield Statement("6.1", component, "printed", domain, ours - theirs, "(6.1) is (4.5)", formulas)
         a = ershkov.a_of_6_2(_I1, _I3, c.alpha, SYMBOLIC)
         yield Statement("6.2", 1, "smooth", ALL, a - c.a, "A of (6.2) is A of (4.1)")
 
@@ -160,13 +171,14 @@ class PartialClaim:
                 u = sympy.sqrt(u * u)
             psi = self.psi(_I1, _I3, c.alpha, u, _T, SYMBOLIC)
             text = f"(4.6) with {readings[branch]} is the line alpha*t*(I1 + I3)/(2*I3)"
-            yield Statement("4.6", 1, branch, domain, psi - line, text)
             motion = self._motion(branch, domain)
+            yield Statement("4.6", 1, branch, domain, psi - line, text, motion.angle_formulas)
             assert motion.rates is not None
             rate = ershkov_general.psi_rate(
                 GeneralConstants((_I1, _I1, _I3), _P, 0, c.c0, c.c1), motion.omega[2], motion.rates[0]
             )
-            yield Statement("4.6", 2, branch, domain, motion.rates[2] - rate, f"(4.6) with {readings[branch]} in (3.4)")
+            text = f"(4.6) with {readings[branch]} in (3.4)"
+            yield Statement("4.6", 2, branch, domain, motion.rates[2] - rate, text, motion.angle_formulas)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +191,7 @@ class GeneralClaim:
     f1: Formula = ershkov_general.f1
     f2: Formula = ershkov_general.f2
     name: str = "ershkov-general"
+    kind: str = "motion"
     source: str = f"{SOURCE}, (2.1)-(2.4), (3.3), (3.4)"
 
     @property
@@ -194,6 +207,7 @@ class GeneralClaim:
             samples=tuple(_sample(symbols, (*values, *pair)) for values in data for pair in signs),
             parts={name: _parts(self._motion(name, where)) for name, where in (("smooth", _ANY), ("printed", _RISING))},
             constants=(("P*b/C0", _P * _B / _C0),),
+            nonzero=(_S1, _S3),
         )
 
     @property
@@ -235,8 +249,21 @@ class GeneralClaim:
         phi = ershkov_general.phi(c, omega, SYMBOLIC) if branch == "printed" else sympy.atan2(gamma[0], gamma[1])
         theta = ershkov_general.theta(c, omega, SYMBOLIC)
         psi_rate = ershkov_general.psi_rate(c, third, rate(phi))
-        constants = (sympy.Integer(1), _C0, _C1)
-        return Motion(branch, domain, omega, gamma, rate, phi, (rate(phi), rate(theta), psi_rate), constants)
+        rates = (rate(phi), rate(theta), psi_rate)
+        return Motion(
+            branch,
+            domain,
+            omega,
+            gamma,
+            rate,
+            phi,
+            rates,
+            (sympy.Integer(1), _C0, _C1),
+            conditions_of((*omega, *gamma)),
+            gamma_from_angles(phi, theta, SYMBOLIC),
+            conditions_of((phi, theta)),
+            "sin(theta) ≠ 0 (pole of the angles)",
+        )
 
     def _steps(self) -> Iterator[Statement]:
         """(2.2)-(2.4) against the invariants: |M|² = C0² and (1.3) with (2.1), solved for Ω1², Ω3²."""
@@ -258,11 +285,17 @@ class GeneralClaim:
         turned = gamma_from_angles(printed.phi, ershkov_general.theta(c, printed.omega, SYMBOLIC), SYMBOLIC)
         for component, (ours, theirs) in enumerate(zip(turned, printed.gamma, strict=True), 1):
             text = "(3.3) in (3.2): gamma of the angles is gamma; arctan loses the quadrant where Omega2 < 0"
-            yield Statement("3.3", component, "printed", _ANY_ROOT, ours - theirs, text)
+            formulas = Formulas((ours, theirs), conditions_of((ours, theirs)))
+            yield Statement("3.3", component, "printed", _ANY_ROOT, ours - theirs, text, formulas)
 
 
 def _rate(value: sympy.Expr) -> sympy.Expr:
     return sympy.diff(value, _T)
+
+
+def _turned_formulas(gamma: tuple[sympy.Expr, ...], angles: tuple[sympy.Expr, ...]) -> Formulas:
+    """What an equation between angles rests on: that γ of the angles is continuous."""
+    return Formulas(gamma, frozenset(), (), conditions_of(angles), _POLE)
 
 
 def _partial_constants() -> ershkov.Constants:
@@ -286,10 +319,13 @@ _T, _W, _B, _C1, _S1, _S3 = sympy.symbols("t Omega2 b C1 s1 s3", real=True)
 _I1, _I2, _I3, _P, _C0, _ALPHA = sympy.symbols("I1 I2 I3 P C0 alpha", positive=True)
 _SIGN1, _SIGN3 = sympy.sign(_S1), sympy.sign(_S3)
 _GENERAL = GeneralConstants((_I1, _I2, _I3), _P, _B, _C0, _C1)
+_POLE = "t ≠ 0 (pole of the angles)"
 _PLACES = (("smooth", ALL), ("printed", BEFORE), ("printed", AFTER))
 _HERE = (Fraction(1, 5), Fraction(1, 3))
 _BOTH_HERE = (*_HERE, Fraction(-1, 5))
-_ANY = Domain("all", 0, _BOTH_HERE, "every Omega2 with f1, f2 > 0; sign(Omega1*Omega3) = -sign(Omega2')")
-_ANY_ROOT = Domain("all", 0, _BOTH_HERE, "positive roots, every Omega2 with f1, f2 > 0")
-_FALLING = Domain("t<=0", 1, _HERE, "positive roots, Omega2' < 0, Omega2 > 0: time is counted from a minimum of Omega2")
-_RISING = Domain("t>0", 1, _HERE, "positive roots, Omega2' > 0, Omega2 > 0: time is counted from a minimum of Omega2")
+_REAL = (ershkov_general.f1(_GENERAL, _W), ershkov_general.f2(_GENERAL, _W))
+_ANY = Domain("all", 0, _BOTH_HERE, "every Omega2 with f1, f2 > 0; sign(Omega1*Omega3) = -sign(Omega2')", _REAL)
+_ANY_ROOT = Domain("all", 0, _BOTH_HERE, "positive roots, every Omega2 with f1, f2 > 0", _REAL)
+_MINIMUM = "time is counted from a minimum of Omega2"
+_FALLING = Domain("t<=0", 1, _HERE, f"positive roots, Omega2' < 0, Omega2 > 0: {_MINIMUM}", _REAL)
+_RISING = Domain("t>0", 1, _HERE, f"positive roots, Omega2' > 0, Omega2 > 0: {_MINIMUM}", _REAL)

@@ -9,8 +9,9 @@ from typing import Any
 import sympy
 from flint import arb
 
-from heavytop.claims.rational import Unprovable
+from heavytop.claims.signs import Unprovable
 from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.flint_context import whole_evaluation
 
 _FUNCTIONS: dict[str, Callable[..., arb]] = {
     "exp": arb.exp,
@@ -36,6 +37,7 @@ _FUNCTIONS: dict[str, Callable[..., arb]] = {
 }
 
 
+@whole_evaluation
 def evaluate(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: int) -> arb:
     """The ball of ``expression`` where each symbol has its exact value; not finite where it is undefined there."""
     known: dict[sympy.Expr, arb] = {}
@@ -75,6 +77,18 @@ def evaluate(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bi
 def _power(base: arb, exponent: sympy.Expr) -> arb:
     if exponent.is_Rational and exponent.q in (1, 2):
         root = base if exponent.q == 1 else base.sqrt()
-        power = root ** abs(int(exponent.p))
+        power = _whole_power(root, abs(int(exponent.p)))
         return power if exponent.p > 0 else 1 / power
     raise Unprovable(f"The power {exponent} is no multiple of 1/2.")
+
+
+def _whole_power(base: arb, exponent: int) -> arb:
+    """By squaring: python-flint's power of a ball with midpoint 0 is nan."""
+    result, square = arb(1), base
+    while exponent:
+        if exponent & 1:
+            result *= square
+        exponent >>= 1
+        if exponent:
+            square *= square
+    return result

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from heavytop.claims.judge import Finding, Setting, judge, verdict_of
+from heavytop.claims.judge import Finding, judge, verdict_of
+from heavytop.claims.statement import Setting
 from heavytop.claims.statements import SYSTEMS, Motion, determinant, motion_statements, why_not_equivalent
 from heavytop.top.equations import GYROSTAT, Parameters, System
 

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import sympy
 
+from heavytop.claims.conditions import Need, condition
 from heavytop.errors import InputError
 from heavytop.precision import exact
 
@@ -44,10 +45,11 @@ class Size(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Formula:
-    """A parsed formula with the bounds on its size."""
+    """A parsed formula with the bounds on its size, and what it needs to be defined and real as it is written."""
 
     expression: sympy.Expr
     size: Size
+    needs: frozenset[Need] = frozenset()
 
 
 def symbol(expression: sympy.Expr) -> Formula:
@@ -126,6 +128,7 @@ class _Parser:
             total = self._checked(
                 total.expression + part.expression if sign == "+" else total.expression - part.expression,
                 _added(total.size, part.size),
+                total.needs | part.needs,
             )
         self._depth -= 1
         return total
@@ -137,10 +140,11 @@ class _Parser:
             if operator == "/":
                 if part.expression == 0:
                     raise self._error("a division by 0")
-                part = Formula(1 / part.expression, part.size)
+                needs = part.needs | condition("/", (part.expression,))
+                part = Formula(1 / part.expression, part.size, needs)
             size = _multiplied(total.size, part.size)
             self._check(size)
-            total = Formula(total.expression * part.expression, size)
+            total = Formula(total.expression * part.expression, size, total.needs | part.needs)
         return total
 
     def _factor(self) -> Formula:
@@ -148,7 +152,7 @@ class _Parser:
         while sign := self._take("+", "-"):
             negative ^= sign == "-"
         value = self._power()
-        return Formula(-value.expression, value.size) if negative else value
+        return Formula(-value.expression, value.size, value.needs) if negative else value
 
     def _power(self) -> Formula:
         base = self._atom()
@@ -157,7 +161,8 @@ class _Parser:
         self._depth += 1
         if self._depth > _MAX_DEPTH:
             raise self._error(f"powers nested deeper than {_MAX_DEPTH}")
-        exponent = self._factor().expression
+        power = self._factor()
+        exponent, needs = power.expression, base.needs | power.needs
         self._depth -= 1
         if not exponent.is_Rational or exponent.q > 2 or abs(exponent.p) > _MAX_DEGREE:
             raise self._error(f"the exponent is no integer or half-integer up to {_MAX_DEGREE}; write exp() for others")
@@ -167,7 +172,11 @@ class _Parser:
         n = base.size
         size = Size(n.nodes + 1, n.bits * whole, n.degree * whole, comb(min(n.terms, _MAX_TERMS) + whole - 1, whole))
         self._check(size)
-        return Formula(base.expression**exponent, size)
+        if exponent.q == 2:
+            needs |= condition("sqrt", (base.expression,))
+        if exponent < 0:
+            needs |= condition("/", (base.expression,))
+        return self._checked(base.expression**exponent, size, needs)
 
     def _atom(self) -> Formula:
         token = self._next()
@@ -209,13 +218,15 @@ class _Parser:
         for argument in arguments[1:]:
             size = _added(size, argument.size)
         size = size._replace(nodes=size.nodes + 1)
-        return self._checked(function(*(argument.expression for argument in arguments)), size)
+        inside = tuple(argument.expression for argument in arguments)
+        needs = condition(token, inside).union(*(argument.needs for argument in arguments))
+        return self._checked(function(*inside), size, needs)
 
-    def _checked(self, expression: sympy.Expr, size: Size) -> Formula:
+    def _checked(self, expression: sympy.Expr, size: Size, needs: frozenset[Need] = frozenset()) -> Formula:
         self._check(size)
         if expression.has(sympy.zoo, sympy.oo, -sympy.oo, sympy.nan, sympy.I):
             raise self._error(f"{expression} is no real number")
-        return Formula(expression, size)
+        return Formula(expression, size, needs)
 
     def _check(self, size: Size) -> None:
         limits = Size(_MAX_NODES, _MAX_BITS, _MAX_DEGREE, _MAX_TERMS)

@@ -103,7 +103,8 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable:
         raise InputError(f"{where}: kind {content.kind!r} needs the table [{wanted}], and no other claim.", _REMEDY)
     if content.domain not in ("all", "t<=0", "t>0"):
         raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
-    from heavytop.claims.user_claim import UserIntegral, UserMotion
+    from heavytop.claims.user_claim import UserMotion
+    from heavytop.claims.user_integral import UserIntegral
 
     return UserMotion(content) if content.kind == "motion" else UserIntegral(content)
 

@@ -1,23 +1,29 @@
 """A claim substituted into every equation: a verdict for each, with a proof or a witness.
 
-``holds`` is an identity proven by exact algebra; ``refuted`` is a witness: exact parameters and a time where a ball
-excludes 0; anything else is ``undecided`` with a bound at the sample points.  Balls alone never prove.
+``holds`` is an identity proven by exact algebra with every condition of the proof discharged; ``refuted`` is a
+witness: exact parameters and a time in the domain, on all relations, where every formula is defined and real and a
+ball excludes 0; anything else is ``undecided`` with a bound at the sample points.  Balls alone never prove.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 import sympy
 from flint import arb
 
-from heavytop.claims.algebra import Assumptions, Field
+from heavytop.claims.algebra import Field
+from heavytop.claims.conditions import conditions_of
 from heavytop.claims.evaluate import evaluate
-from heavytop.claims.rational import Quotient, Unprovable
+from heavytop.claims.proof import Condition
+from heavytop.claims.prover import Prover
+from heavytop.claims.rational import Quotient
+from heavytop.claims.signs import Unprovable
+from heavytop.claims.statement import Formulas, Setting, Statement
 from heavytop.exact.balls import radius as radius_of
 from heavytop.exact.balls import radius_text, value_text
 
@@ -26,69 +32,12 @@ _LONGEST = 160
 
 
 @dataclass(frozen=True, slots=True)
-class Domain:
-    """Where a statement is made.
-
-    label: ``all``, ``t<=0`` or ``t>0``.  sign: the sign of the variable there, 0 for both.
-    points: exact values of the variable at which balls are taken.  note: what the label means, if not time.
-    """
-
-    label: str
-    sign: int
-    points: tuple[Fraction, ...]
-    note: str = ""
-
-
-_BEFORE = (Fraction(-1, 2), Fraction(-7, 5), Fraction(-1, 9))
-_AFTER = (Fraction(1, 2), Fraction(7, 5), Fraction(1, 9))
-ALL = Domain("all", 0, (*_BEFORE[:2], *_AFTER[:2]))
-BEFORE = Domain("t<=0", -1, _BEFORE)
-AFTER = Domain("t>0", 1, _AFTER)
-
-
-@dataclass(frozen=True, slots=True)
-class Statement:
-    """One equation, component, branch and domain; it says that ``residual`` is 0.
-
-    text: the equation in words and signs.
-    """
-
-    equation: str
-    component: int
-    branch: str
-    domain: Domain
-    residual: sympy.Expr
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """What the statements of a claim are about.
-
-    variable: the symbol that moves (t, or Ω2 in the general case).
-    samples: exact parameter sets.  parts: names with expressions through which a residual may be written, such as γ3.
-    constants: the same for constant factors, such as k/2.  relations: what is 0 wherever the claim is made.
-    """
-
-    variable: sympy.Symbol
-    positive: tuple[sympy.Symbol, ...]
-    samples: tuple[Mapping[sympy.Symbol, Fraction], ...]
-    greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...] = ()
-    parts: Mapping[str, tuple[tuple[str, sympy.Expr], ...]] = field(default_factory=dict)
-    constants: tuple[tuple[str, sympy.Expr], ...] = ()
-    relations: tuple[sympy.Expr, ...] = ()
-
-    def assumptions(self, sign: int) -> Assumptions:
-        """What the algebra may use on a domain where the variable has this sign."""
-        return Assumptions(self.variable, self.positive, self.greater, sign, self.relations)
-
-
-@dataclass(frozen=True, slots=True)
 class Row:
     """The verdict on one statement.
 
     holds: True (proven), False (refuted by ``witness``), None (undecided).
     residual: "0", the closed form where found, else what the balls say.
+    conditions: what the proof rests on; the row is undecided if one is not discharged.
     """
 
     equation: str
@@ -100,6 +49,7 @@ class Row:
     statement: str
     witness: Mapping[str, Any] | None = None
     note: str = ""
+    conditions: tuple[Condition, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The row with the keys that scripts rely on."""
@@ -109,6 +59,9 @@ class Row:
             document["witness"] = dict(self.witness)
         if self.note:
             document["where"] = self.note
+        document["conditions"] = [
+            {"text": c.text, "discharged": c.discharged, "reason": c.reason} for c in self.conditions
+        ]
         return document
 
 
@@ -132,7 +85,8 @@ class AuditReport:
     """The audit of one claim about one system.
 
     why: what explains the verdict, each step checked.  solves: the systems whose equations of motion the claim
-    satisfies on its smooth branch.  constants: names in the residuals with what they stand for, such as k/2.
+    satisfies on its smooth branch, or that keep the integral or relation.  kind: motion, integral or relation.
+    constants: names in the residuals with what they stand for, such as k/2.
     """
 
     claim: str
@@ -142,6 +96,7 @@ class AuditReport:
     why: tuple[Finding, ...] = ()
     solves: tuple[str, ...] = ()
     constants: tuple[tuple[str, str], ...] = ()
+    kind: str = "motion"
 
     @property
     def verdict(self) -> str:
@@ -158,6 +113,7 @@ class AuditReport:
         return {
             "claim": self.claim,
             "system": self.system,
+            "kind": self.kind,
             "verdict": self.verdict,
             "source": self.source,
             "solves": list(self.solves),
@@ -169,82 +125,51 @@ class AuditReport:
 
 def judge(statements: Sequence[Statement], setting: Setting) -> tuple[Row, ...]:
     """The verdict on each statement, in their order."""
-    fields = _Fields(statements, setting)
-    return tuple(_judge_one(statement, setting, fields) for statement in statements)
+    statements = [s if s.formulas != Formulas() else _bare(s) for s in statements]
+    prover = Prover(statements, setting)
+    return tuple(_judge_one(statement, setting, prover) for statement in statements)
 
 
-class _Fields:
-    """One field for each (domain, branch): its expressions share their exponentials."""
-
-    def __init__(self, statements: Sequence[Statement], setting: Setting) -> None:
-        self._statements = statements
-        self._setting = setting
-        self._fields: dict[tuple[int, str, str], Field | None] = {}
-
-    def of(self, statement: Statement, sign: int) -> Field | None:
-        """The field for this statement with this sign of the variable; None where the algebra cannot carry it."""
-        key = (sign, statement.branch, statement.domain.label)
-        if key not in self._fields:
-            alike = [
-                other.residual
-                for other in self._statements
-                if (other.branch, other.domain.label) == (statement.branch, statement.domain.label)
-            ]
-            parts = [part for _, part in self._setting.parts.get(statement.branch, ())]
-            self._fields[key] = self._make(sign, [*alike, *parts])
-        found = self._fields[key]
-        return found if found is not None else self._make(sign, [statement.residual])
-
-    def _make(self, sign: int, expressions: list[sympy.Expr]) -> Field | None:
-        try:
-            return Field(self._setting.assumptions(sign), expressions)
-        except Unprovable:
-            return None
+def _bare(statement: Statement) -> Statement:
+    """An identity that says nothing of a motion rests on what stands in it."""
+    return replace(statement, formulas=Formulas(needs=conditions_of([statement.residual])))
 
 
-def _judge_one(statement: Statement, setting: Setting, fields: _Fields) -> Row:
-    witness = next(_witnesses(statement, setting), None)
+def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Row:
+    witness = next(_witnesses(statement, setting, prover), None)
+    proven, conditions = prover.prove(statement)
     if witness is not None:
-        found = fields.of(statement, statement.domain.sign)
+        found = prover.field(statement, statement.domain.sign, strict=bool(statement.domain.sign))
         closed = None if found is None else _closed_form(statement, setting, found)
-        return _row(statement, False, closed or f"{witness['value']} at the witness", witness)
-    if _proven(statement, fields):
-        return _row(statement, True, "0")
-    return _row(statement, None, f"|residual| < {_bound(statement, setting)} at the sample points")
+        return _row(statement, False, closed or f"{witness['value']} at the witness", conditions, witness)
+    if proven and all(condition.discharged for condition in conditions):
+        return _row(statement, True, "0", conditions)
+    residual = "0 where the conditions are met" if proven else _bound(statement, prover)
+    return _row(statement, None, residual, conditions)
 
 
-def _row(statement: Statement, holds: bool | None, residual: str, witness: Mapping[str, Any] | None = None) -> Row:
-    s = statement
-    return Row(s.equation, s.component, s.branch, s.domain.label, holds, residual, s.text, witness, s.domain.note)
+def _row(
+    s: Statement,
+    holds: bool | None,
+    residual: str,
+    conditions: tuple[Condition, ...],
+    witness: Mapping[str, Any] | None = None,
+) -> Row:
+    name, note = s.domain.label, s.domain.note
+    return Row(s.equation, s.component, s.branch, name, holds, residual, s.text, witness, note, conditions)
 
 
-def _proven(statement: Statement, fields: _Fields) -> bool:
-    """By one field, or for ``all`` by one for either sign of the variable: together they cover it by continuity."""
-    field_ = fields.of(statement, statement.domain.sign)
-    if field_ is not None and field_.is_zero(statement.residual):
-        return True
-    if statement.domain.sign or statement.domain.note:
-        return False
-    halves = [fields.of(statement, sign) for sign in (-1, 1)]
-    return all(half is not None and half.is_zero(statement.residual) for half in halves)
-
-
-def _places(statement: Statement, setting: Setting) -> Iterator[dict[sympy.Symbol, Fraction]]:
-    for sample in setting.samples:
-        for point in statement.domain.points:
-            yield {setting.variable: point, **sample}
-
-
-def _witnesses(statement: Statement, setting: Setting) -> Iterator[dict[str, Any]]:
-    """Exact parameters and times where a ball of the residual excludes 0."""
+def _witnesses(statement: Statement, setting: Setting, prover: Prover) -> Iterator[dict[str, Any]]:
+    """Exact parameters and times in the domain, on all relations, where a ball of the residual excludes 0."""
     for bits in _BITS:
-        for values in _places(statement, setting):
+        for values in prover.places(statement):
             ball = _ball(statement.residual, values, bits)
-            if ball is not None and not ball.contains(0):
+            if ball is not None and not ball.contains(0) and prover.is_defined(statement, values):
                 value, radius = value_text(ball, 20)
                 place = {str(symbol): str(number) for symbol, number in values.items()}
                 time = place.pop(str(setting.variable))
-                yield {"parameters": place, str(setting.variable): time, "value": value, "radius": radius}
+                moving = {} if statement.flow is not None else {str(setting.variable): time}
+                yield {"parameters": place, **moving, "value": value, "radius": radius}
 
 
 def _ball(residual: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: int) -> arb | None:
@@ -256,12 +181,13 @@ def _ball(residual: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: i
     return ball if ball.is_finite() else None
 
 
-def _bound(statement: Statement, setting: Setting) -> str:
-    balls = [_ball(statement.residual, values, _BITS[-1]) for values in _places(statement, setting)]
+def _bound(statement: Statement, prover: Prover) -> str:
+    places = [place for place in prover.places(statement) if prover.is_defined(statement, place)]
+    balls = [_ball(statement.residual, values, _BITS[-1]) for values in places]
     bounds = [abs(ball).upper() for ball in balls if ball is not None]
-    if len(bounds) < len(balls) or not bounds:
-        return "infinity (undefined at a sample point)"
-    return radius_text(max(radius_of(arb(0, bound)) for bound in bounds))
+    if not bounds:
+        return "undefined at every sample point"
+    return f"|residual| < {radius_text(max(radius_of(arb(0, bound)) for bound in bounds))} at the sample points"
 
 
 def _closed_form(statement: Statement, setting: Setting, field_: Field) -> str | None:

@@ -2,7 +2,7 @@
 
 A :class:`Tower` holds generators x0, x1, ...; some are free (parameters, time, an exponential), some are roots with
 a relation R² = q, q a polynomial in the generators before R.  Whatever reduces to 0 modulo the relations is 0
-wherever it is defined: that is the whole proof.  The converse needs the roots to be independent and is not claimed.
+wherever none of the tower's ``divisors`` is 0.  The converse needs the roots to be independent and is not claimed.
 """
 
 from __future__ import annotations
@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from math import isqrt, prod
+from math import isqrt
 from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpz
 
-from heavytop.errors import HeavyTopError
+from heavytop.claims.signs import NUMBER_BITS, Sign, Signs, Unprovable, used
+from heavytop.exact.balls import working_precision
 
 SLOTS = 64
 # terms of a product, and of numerator times denominator where a common factor is sought: the paper's claims need
@@ -23,19 +24,6 @@ SLOTS = 64
 _MAX_PRODUCT = 10_000
 _MAX_QUOTIENT = 1_500
 _FACTORED_BITS = 64
-
-
-class Unprovable(HeavyTopError):
-    """An expression that the exact algebra cannot carry: it leaves the verdict to the balls, and so undecided."""
-
-
-@dataclass(frozen=True, slots=True)
-class Generator:
-    """One generator: what it stands for, whether it is constant in time, its sign if that is known (else 0)."""
-
-    meaning: Any
-    constant: bool
-    sign: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +34,22 @@ class Quotient:
     denominator: Any
 
 
+@dataclass(frozen=True, slots=True)
+class Generator:
+    """One generator: what it stands for, whether it is constant in time, and what is known of its sign.
+
+    sign: 1 or -1 where it is so all over the domain, 0 allowed; else 0.  strict: it is never 0.
+    kind: ``symbol``, ``number``, ``root`` (√arguments[0]) or the name of a function of ``arguments``.
+    """
+
+    meaning: Any
+    constant: bool
+    sign: int
+    strict: bool = False
+    kind: str = "symbol"
+    arguments: tuple[Quotient, ...] = ()
+
+
 class Tower:
     """Generators with their relations and signs, and the arithmetic of quotients modulo them."""
 
@@ -54,37 +58,50 @@ class Tower:
         self.gens = self.context.gens()
         self.generators: list[Generator] = []
         self._radicands: dict[int, Any] = {}
-        self._positive_forms: dict[int, Any] = {}
-        self._below_one: set[int] = set()
         self._roots: dict[str, int] = {}
         self.one = self.context.constant(1)
+        self.signs = Signs(self)
+        # what has been divided by so far, by its text: nothing is proven where one of them is 0
+        self.divisors: dict[str, Any] = {}
 
     # --- generators -----------------------------------------------------------------------------------------------
 
-    def add(self, meaning: Any, *, constant: bool, sign: int = 0) -> int:
+    def add(
+        self,
+        meaning: Any,
+        *,
+        constant: bool,
+        sign: int = 0,
+        strict: bool = False,
+        kind: str = "symbol",
+        arguments: tuple[Quotient, ...] = (),
+    ) -> int:
         """The index of a new free generator."""
         if len(self.generators) == SLOTS:
             raise Unprovable(f"More than {SLOTS} independent quantities.", "Split the claim into smaller ones.")
-        self.generators.append(Generator(meaning, constant, sign))
+        self.generators.append(Generator(meaning, constant, sign, strict, kind, arguments))
         return len(self.generators) - 1
 
-    def add_root(self, meaning: Any, square: Any, *, sign: int) -> int:
+    def add_root(self, meaning: Any, square: Any, *, sign: int, kind: str = "root") -> int:
         """The index of a new generator R with R² = ``square``, a polynomial in the generators so far."""
-        index = self.add(meaning, constant=all(self.generators[i].constant for i in used(square)), sign=sign)
+        constant = all(self.generators[i].constant for i in used(square))
+        strict = kind == "root" and self.signs.of(square).strict
+        argument = Quotient(square, self.one)
+        index = self.add(meaning, constant=constant, sign=sign, strict=strict, kind=kind, arguments=(argument,))
         self._radicands[index] = square
+        number = self.signs.ball(square)
+        if number is not None and kind == "root":
+            with working_precision(NUMBER_BITS):
+                self.signs.numbers[index] = number.sqrt()
         return index
+
+    def radicand(self, index: int) -> Any | None:
+        """q of a root R² = q; None for a free generator."""
+        return self._radicands.get(index)
 
     def relations(self) -> list[Any]:
         """R² − q for every root R = √q."""
         return [self.gens[index] ** 2 - square for index, square in self._radicands.items()]
-
-    def declare_form(self, index: int, form: Any) -> None:
-        """In sign tests generator ``index`` is ``form``, a polynomial in generators of known sign."""
-        self._positive_forms[index] = form
-
-    def declare_below_one(self, index: int) -> None:
-        """Generator ``index`` lies in (0, 1)."""
-        self._below_one.add(index)
 
     # --- arithmetic -----------------------------------------------------------------------------------------------
 
@@ -106,21 +123,22 @@ class Tower:
         """``p`` with every root to a power below 2."""
         for index in sorted(self._radicands, reverse=True):
             if p.degrees()[index] > 1:
-                parts = self._by_power(p, index)
+                parts = self.by_power(p, index)
                 q, root = self._radicands[index], self.gens[index]
                 total = self.context.constant(0)
                 for power, part in parts.items():
-                    total += self.times(self._power(q, power // 2), part * root ** (power % 2))
+                    total += self.times(self.raised(q, power // 2), part * root ** (power % 2))
                 p = total
         return p
 
-    def _power(self, p: Any, exponent: int) -> Any:
+    def raised(self, p: Any, exponent: int) -> Any:
+        """A power of a polynomial; raises Unprovable where it would be too large to hold."""
         result = self.one
         for _ in range(exponent):
             result = self.times(result, p)
         return result
 
-    def _by_power(self, p: Any, index: int) -> dict[int, Any]:
+    def by_power(self, p: Any, index: int) -> dict[int, Any]:
         """The coefficients of the powers of one generator."""
         parts: dict[int, dict[Any, Any]] = {}
         for monomial, coefficient in p.to_dict().items():
@@ -133,7 +151,7 @@ class Tower:
         numerator, denominator = self.reduce(numerator), self.reduce(denominator)
         for index in sorted(self._radicands, reverse=True):
             if denominator.degrees()[index] == 1:
-                parts = self._by_power(denominator, index)
+                parts = self.by_power(denominator, index)
                 conjugate = parts.get(0, self.context.constant(0)) - parts[1] * self.gens[index]
                 rational = self.reduce(self.times(denominator, conjugate))
                 if rational:
@@ -143,10 +161,15 @@ class Tower:
             raise Unprovable("A denominator is identically 0.", "Check the formula, or the domain it is claimed on.")
         if len(denominator) > 1 and len(numerator) * len(denominator) > _MAX_QUOTIENT:
             raise Unprovable("A quotient of polynomials is too large.", "Split the claim into smaller ones.")
+        self._divided_by(denominator)
         common = numerator.gcd(denominator) if numerator else denominator
         numerator, denominator = numerator / common, denominator / common
         lead = denominator.leading_coefficient()
         return Quotient(numerator / lead, denominator / lead)
+
+    def _divided_by(self, p: Any) -> None:
+        if not p.is_constant():
+            self.divisors.setdefault(str(p), p)
 
     def sum(self, parts: Iterable[Quotient]) -> Quotient:
         """The sum of quotients."""
@@ -186,47 +209,12 @@ class Tower:
         """a / b."""
         return self.product((a, self.power(b, -1)))
 
-    # --- signs, absolute values, roots ------------------------------------------------------------------------------
+    # --- absolute values and roots ----------------------------------------------------------------------------------
 
-    def sign(self, value: Quotient) -> int:
-        """1 or -1 where the sign is the same all over the domain (0 allowed), else 0."""
-        return self.sign_of_polynomial(value.numerator) * self.sign_of_polynomial(value.denominator)
-
-    def sign_of_polynomial(self, p: Any) -> int:
-        """The product of the signs of its factors."""
-        constant, factors = p.factor()
-        signs = (self._sign_of_factor(factor) ** int(power) for factor, power in factors)
-        return int(prod(signs, start=1 if constant > 0 else -1))
-
-    def _sign_of_factor(self, p: Any) -> int:
-        """By coefficients of one sign, after each generator is written through positive ones."""
-        for index in self._below_one & used(p):
-            # p(X) has the sign of X^n p(1/Z) with Z = 1/X > 1
-            degree = int(p.degrees()[index])
-            terms = {
-                (*monomial[:index], degree - monomial[index], *monomial[index + 1 :]): coefficient
-                for monomial, coefficient in p.to_dict().items()
-            }
-            p = self.context.from_dict(terms)
-        while forms := self._positive_forms.keys() & used(p):
-            # the last first: a form uses only what was declared before it, and generators without a form
-            last = max(forms, key=list(self._positive_forms).index)
-            p = self._substitute(p, last, self._positive_forms[last])
-        found = {self._sign_of_term(monomial, coefficient) for monomial, coefficient in p.to_dict().items()}
-        return found.pop() if len(found) == 1 else 0
-
-    def _substitute(self, p: Any, index: int, form: Any) -> Any:
-        total = self.context.constant(0)
-        for power, part in self._by_power(p, index).items():
-            total += self.times(part, self._power(form, power))
-        return total
-
-    def _sign_of_term(self, monomial: Any, coefficient: Any) -> int:
-        sign = 1 if coefficient > 0 else -1
-        for index, power in enumerate(monomial):
-            if power % 2:
-                sign *= self.generators[index].sign
-        return sign
+    def sign(self, value: Quotient) -> Sign:
+        """The sign of a quotient where it is defined."""
+        above, below = self.signs.of(value.numerator), self.signs.of(value.denominator)
+        return Sign(above.value * below.value, above.strict)
 
     def absolute(self, value: Quotient) -> Quotient:
         """|value|, factor by factor; a factor of unknown sign becomes a root of its square."""
@@ -238,9 +226,9 @@ class Tower:
         constant, factors = p.factor()
         result = self.context.constant(abs(constant))
         for factor, power in factors:
-            sign = self._sign_of_factor(factor)
+            sign = self.signs.of(factor).value
             size = factor * sign if sign else self.gens[self._root_of(factor * factor)]
-            result = self.times(result, self._power(size, int(power)))
+            result = self.times(result, self.raised(size, int(power)))
         return result
 
     def root(self, value: Quotient) -> Quotient:
@@ -255,9 +243,9 @@ class Tower:
         constant, factors = p.factor()
         outside, rest, sign = self.one, self.one, 1 if constant > 0 else -1
         for factor, power in factors:
-            outside = self.times(outside, self._absolute(self._power(factor, int(power) // 2)))
+            outside = self.times(outside, self._absolute(self.raised(factor, int(power) // 2)))
             if power % 2:
-                known = self._sign_of_factor(factor)
+                known = self.signs.of(factor).value
                 if known:
                     outside = self.times(outside, self.gens[self._root_of(factor * known)])
                     sign *= known
@@ -291,8 +279,3 @@ class Tower:
         if key not in self._roots:
             self._roots[key] = self.add_root(("sqrt", square), square, sign=1)
         return self._roots[key]
-
-
-def used(p: Any) -> set[int]:
-    """The generators that occur in a polynomial."""
-    return {index for index, degree in enumerate(p.degrees()) if degree > 0}

@@ -6,13 +6,15 @@ The fields, integrals and angles are those of :mod:`heavytop.top`, over sympy.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import sympy
 
-from heavytop.claims.judge import Domain, Finding, Statement
-from heavytop.top.angles import omega_from_angles
+from heavytop.claims.conditions import Need
+from heavytop.claims.judge import Finding
+from heavytop.claims.statement import Domain, Formulas, Statement
+from heavytop.top.angles import gamma_from_angles, omega_from_angles
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import cross, dot
 from heavytop.top.integrals import area, energy, gamma_squared, gyrostat_energy, momentum, momentum_squared
@@ -40,6 +42,7 @@ class Motion:
 
     rate: the derivative in time.  angles: (φ, θ); rates: (φ', θ', ψ').
     constants: (|γ|², C0, C1) that (1.3) should have; without them (1.3) says that the three are constant.
+    needs: what Ω and γ need to be defined.  attitude, angle_needs, pole: as in Formulas.
     """
 
     branch: str
@@ -50,11 +53,37 @@ class Motion:
     phi: sympy.Expr | None = None
     rates: Triple | None = None
     constants: Triple | None = None
+    needs: frozenset[Need] = frozenset()
+    attitude: tuple[sympy.Expr, ...] = ()
+    angle_needs: frozenset[Need] = frozenset()
+    pole: str = ""
 
     @property
     def state(self) -> tuple[sympy.Expr, ...]:
         """The six variables in the order of the state."""
         return (*self.omega, *self.gamma)
+
+    @property
+    def formulas(self) -> Formulas:
+        """What the equations in Ω and γ rest on."""
+        return Formulas(self.state, self.needs)
+
+    @property
+    def angle_formulas(self) -> Formulas:
+        """What the equations in the angles rest on."""
+        return Formulas(self.state, self.needs, self.attitude, self.angle_needs, self.pole)
+
+
+def attitude(phi: sympy.Expr, theta: sympy.Expr, psi: sympy.Expr) -> tuple[sympy.Expr, ...]:
+    """γ and ξ of the angles: they are continuous where the attitude is, at the poles too."""
+    sine, cosine = sympy.sin(phi), sympy.cos(phi)
+    tilt = sympy.cos(theta)
+    xi = (
+        sympy.cos(psi) * cosine - tilt * sine * sympy.sin(psi),
+        -sympy.cos(psi) * sine - tilt * cosine * sympy.sin(psi),
+        sympy.sin(theta) * sympy.sin(psi),
+    )
+    return (*gamma_from_angles(phi, theta, SYMBOLIC), *xi)
 
 
 def motion_statements(motion: Motion, p: Parameters, system: System) -> Iterator[Statement]:
@@ -72,7 +101,9 @@ def motion_statements(motion: Motion, p: Parameters, system: System) -> Iterator
         turned = omega_from_angles(motion.gamma, motion.phi, motion.rates, SYMBOLIC)
         actual = system.angular_velocity(p, y)
         for component, (ours, theirs) in enumerate(zip(actual, turned, strict=True), 1):
-            yield _statement("3.1", component, motion, ours - theirs, f"{turning} = psi', theta', phi' of the angles")
+            text = f"{turning} = psi', theta', phi' of the angles"
+            statement = _statement("3.1", component, motion, ours - theirs, text)
+            yield replace(statement, formulas=motion.angle_formulas)
 
 
 def _integral_statements(motion: Motion, p: Parameters, system: System) -> Iterator[Statement]:
@@ -92,7 +123,7 @@ def _integral_statements(motion: Motion, p: Parameters, system: System) -> Itera
 
 
 def _statement(equation: str, component: int, motion: Motion, residual: sympy.Expr, text: str) -> Statement:
-    return Statement(equation, component, motion.branch, motion.domain, residual, text)
+    return Statement(equation, component, motion.branch, motion.domain, residual, text, motion.formulas)
 
 
 def why_not_equivalent() -> Sequence[Finding]:
@@ -136,7 +167,9 @@ def why_not_equivalent() -> Sequence[Finding]:
 def determinant(motion: Motion, p: Parameters) -> Statement:
     """det(γ, M, P r) = 0 along the claim."""
     value = dot(cross(motion.gamma, momentum(p, motion.state)), p.moment)
-    return Statement("det(gamma, M, r)", 1, motion.branch, motion.domain, value, "det(gamma, M, P*r) = 0")
+    return Statement(
+        "det(gamma, M, r)", 1, motion.branch, motion.domain, value, "det(gamma, M, P*r) = 0", motion.formulas
+    )
 
 
 SYSTEMS = (HEAVY_TOP, GYROSTAT)

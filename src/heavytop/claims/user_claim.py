@@ -1,8 +1,7 @@
-"""A claim from a file as statements: its formulas over sympy, its assumptions, its samples."""
+"""A motion claimed in a file as statements, and what every kind of claim in a file shares."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -10,21 +9,24 @@ from fractions import Fraction
 import sympy
 from flint import arb
 
+from heavytop.claims.assume import Assumed, assume, comparison
+from heavytop.claims.conditions import Need, condition, is_exactly_zero
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
-from heavytop.claims.from_file import ClaimFile, IntegralTable, MotionTable, sample_rows
-from heavytop.claims.judge import AFTER, ALL, BEFORE, Domain, Finding, Setting, Statement, judge, verdict_of
-from heavytop.claims.rational import Unprovable
-from heavytop.claims.statements import SYMBOLIC, SYSTEMS, Motion, Triple, motion_statements
+from heavytop.claims.from_file import ClaimFile, MotionTable, sample_rows
+from heavytop.claims.judge import Finding, judge, verdict_of
+from heavytop.claims.signs import Unprovable
+from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Setting, Statement
+from heavytop.claims.statements import SYMBOLIC, SYSTEMS, Motion, Triple, attitude, motion_statements
 from heavytop.errors import InputError
 from heavytop.precision import exact
 from heavytop.top.angles import gamma_from_angles, omega_from_angles
 from heavytop.top.equations import GYROSTAT, Parameters, System
 
-_TIME = sympy.Symbol("t", real=True)
-_STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
-_RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in _STATE)}
+TIME = sympy.Symbol("t", real=True)
+STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
+_RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
 _DOMAINS = {"all": ALL, "t<=0": BEFORE, "t>0": AFTER}
 _SAMPLE_BITS = 512
 
@@ -35,12 +37,13 @@ class Ground:
 
     names: dict[str, Formula]
     symbols: dict[str, sympy.Symbol]
-    positive: tuple[sympy.Symbol, ...]
-    greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...]
+    assumed: Assumed
     samples: tuple[dict[sympy.Symbol, Fraction], ...]
     relations: tuple[sympy.Expr, ...]
     top: Parameters
     rotor: sympy.Expr | None
+    needs: frozenset[Need]
+    rotor_needs: frozenset[Need]
 
     def parameters(self, system: System) -> Parameters:
         """Parameters of the field; raises InputError where `gyrostat` is asked for and the file gives no rotor."""
@@ -54,69 +57,65 @@ def lay_ground(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Ground:
     for name in (*content.parameters, *content.definitions):
         if name in _RESERVED or (name in content.parameters and name in content.definitions):
             raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(_RESERVED))}.")
-    above = [_comparison(text) for text in content.assume]
-    positive_names = {left for left, right in above if right == "0"}
+    above = [comparison(text) for text in content.assume]
+    # the principal moments of a top are positive, said or not
+    positive = {left for left, right in above if right == "0"} | {text.strip() for text in content.top.inertia}
     symbols = {
-        name: sympy.Symbol(name, positive=True) if name in positive_names else sympy.Symbol(name, real=True)
+        name: sympy.Symbol(name, positive=True) if name in positive else sympy.Symbol(name, real=True)
         for name in content.parameters
     }
     names = {name: symbol(value) for name, value in symbols.items()}
     names |= {"pi": symbol(sympy.pi), **{str(variable): symbol(variable) for variable in variables}}
     for name, text in content.definitions.items():
         names[name] = parse(text, names, f"definition of {name}")
-    unknown = [left for left, _ in above if left not in symbols]
-    if unknown:
-        raise InputError(f"An assumption is about {unknown[0][:40]!r}, no parameter.", "Write: parameter > formula.")
-    greater = tuple((symbols[left], _formula(right, names, "assume")) for left, right in above if right != "0")
-    samples = tuple(
-        {symbols[name]: exact(value) for name, value in row.items()} for row in sample_rows(content.parameters)
-    )
+    bounds = [
+        (parse(left, names, "assume").expression, parse(right, names, "assume").expression) for left, right in above
+    ]
     top = content.top
-    moments, centre = (
-        _three(part, names, f"top.{what}") for part, what in ((top.inertia, "inertia"), (top.centre, "centre"))
-    )
-    weight = _formula(top.weight, names, "top.weight")
-    moment = tuple(weight * part for part in centre)
+    moments = _three(top.inertia, names, "top.inertia")
+    arm = [*_three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
+    rotor = None if top.rotor is None else parse(top.rotor, names, "top.rotor")
+    relations = [parse(text, names, "relations") for text in content.relations]
+    weight = arm.pop()
+    inertia, centre = (tuple(part.expression for part in parts) for parts in (moments, arm))
     ground = Ground(
         names,
         symbols,
-        tuple(symbols[name] for name in symbols if name in positive_names),
-        greater,
-        samples,
-        tuple(_formula(text, names, "relations") for text in content.relations),
-        Parameters(moments, moment, sympy.Integer(0)),
-        None if top.rotor is None else _formula(top.rotor, names, "top.rotor"),
+        assume(bounds, inertia, symbols.values()),
+        tuple({symbols[name]: exact(value) for name, value in row.items()} for row in sample_rows(content.parameters)),
+        tuple(relation.expression for relation in relations),
+        Parameters(inertia, tuple(weight.expression * part for part in centre), sympy.Integer(0)),
+        None if rotor is None else rotor.expression,
+        needs_of([*moments, *arm, weight, *relations]).union(*(condition("/", (part,)) for part in inertia)),
+        frozenset() if rotor is None else rotor.needs,
     )
-    _check_samples(ground)
+    _check_samples(ground, bounds)
     return ground
 
 
-def _comparison(text: str) -> tuple[str, str]:
-    left, found, right = text.partition(">")
-    if not found or ">" in right or "=" in right or not re.fullmatch(r"\w+", left.strip()):
-        raise InputError(f"assume: {text[:60]!r} is not understood.", "Write: parameter > formula.")
-    return left.strip(), right.strip()
+def needs_of(formulas: Iterable[Formula]) -> frozenset[Need]:
+    """What all of them need."""
+    return frozenset().union(*(formula.needs for formula in formulas))
 
 
-def _formula(text: str, names: dict[str, Formula], where: str) -> sympy.Expr:
-    return parse(text, names, where).expression
-
-
-def _three(texts: Iterable[str], names: dict[str, Formula], where: str) -> Triple:
-    first, second, third = (_formula(text, names, f"{where}[{index}]") for index, text in enumerate(texts))
+def _three(texts: Iterable[str], names: dict[str, Formula], where: str) -> tuple[Formula, Formula, Formula]:
+    first, second, third = (parse(text, names, f"{where}[{index}]") for index, text in enumerate(texts))
     return first, second, third
 
 
-def _check_samples(ground: Ground) -> None:
+def _expressions(formulas: tuple[Formula, Formula, Formula]) -> Triple:
+    return formulas[0].expression, formulas[1].expression, formulas[2].expression
+
+
+def _check_samples(ground: Ground, bounds: list[tuple[sympy.Expr, sympy.Expr]]) -> None:
     """Samples that break the claim's own assumptions would be false witnesses: raises InputError."""
     for sample in ground.samples:
         shown = ", ".join(f"{name} = {value}" for name, value in sample.items())
-        above = [(value, sympy.Integer(0)) for value in ground.positive] + list(ground.greater)
-        for left, right in above:
+        for left, right in bounds:
             if not _at(left - right, sample) > 0:
                 raise InputError(f"The sample {shown} breaks the assumption {left} > {right}.", "Change the sample.")
         for relation in ground.relations:
-            if not _at(relation, sample).contains(0):
+            if is_exactly_zero(relation, sample) is False:
                 raise InputError(f"The sample {shown} breaks the relation {relation} = 0.", "Change the sample.")
         for index, moment in enumerate(ground.top.inertia, 1):
             if not _at(moment, sample) > 0:
@@ -132,8 +131,12 @@ def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
         ) from None
 
 
-def _setting(ground: Ground, variable: sympy.Symbol) -> Setting:
-    return Setting(variable, ground.positive, ground.samples, ground.greater, relations=ground.relations)
+def setting_of(ground: Ground, variable: sympy.Symbol) -> Setting:
+    """The setting of a claim on this ground."""
+    a = ground.assumed
+    return Setting(
+        variable, a.positive, ground.samples, a.greater, relations=ground.relations, facts=a.facts, ranges=a.ranges
+    )
 
 
 @dataclass(frozen=True)
@@ -145,7 +148,7 @@ class UserMotion:
     motion: Motion = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ground", lay_ground(self.content, [_TIME]))
+        object.__setattr__(self, "ground", lay_ground(self.content, [TIME]))
         assert self.content.motion is not None
         object.__setattr__(self, "motion", _read_motion(self.content, self.content.motion, self.ground))
 
@@ -160,31 +163,39 @@ class UserMotion:
         return self.content.source
 
     @property
+    def kind(self) -> str:
+        """motion."""
+        return self.content.kind
+
+    @property
     def setting(self) -> Setting:
         """The file's assumptions and samples; γ as the part through which residuals are written."""
         parts = tuple((f"gamma{index}", part) for index, part in enumerate(self.motion.gamma, 1))
-        return replace(_setting(self.ground, _TIME), parts={"smooth": parts})
+        return replace(setting_of(self.ground, TIME), parts={"smooth": parts})
 
     def statements(self, system: System) -> list[Statement]:
         """(1.1)-(1.3), (3.1) where angles are claimed, and (3.2) where γ is claimed beside them."""
-        return [*motion_statements(self.motion, self.ground.parameters(system), system), *self._angles_give_gamma()]
+        motion = self.motion
+        if system is GYROSTAT:
+            motion = replace(motion, needs=motion.needs | self.ground.rotor_needs)
+        return [*motion_statements(motion, self.ground.parameters(system), system), *self._angles_give_gamma()]
 
     def _angles_give_gamma(self) -> Iterator[Statement]:
         table = self.content.motion
         if table is not None and table.angles is not None and table.gamma is not None:
-            phi, theta, _ = _three(table.angles, self.ground.names, "motion.angles")
+            phi, theta, _ = _expressions(_three(table.angles, self.ground.names, "motion.angles"))
             turned = gamma_from_angles(phi, theta, SYMBOLIC)
             for component, (ours, theirs) in enumerate(zip(turned, self.motion.gamma, strict=True), 1):
                 text = "(3.2): gamma of the angles is gamma"
-                yield Statement("3.2", component, "smooth", self.motion.domain, ours - theirs, text)
+                formulas = self.motion.angle_formulas
+                yield Statement("3.2", component, "smooth", self.motion.domain, ours - theirs, text, formulas)
 
     def explain(self) -> tuple[list[Finding], tuple[str, ...]]:
         """No steps; the systems whose (1.1), (1.2) are proven."""
         solves = []
         for system in SYSTEMS:
             if system is not GYROSTAT or self.ground.rotor is not None:
-                statements = list(motion_statements(self.motion, self.ground.parameters(system), system))
-                rows = judge([s for s in statements if s.equation in ("1.1", "1.2")], self.setting)
+                rows = judge([s for s in self.statements(system) if s.equation in ("1.1", "1.2")], self.setting)
                 if verdict_of(rows) == "holds":
                     solves.append(system.name)
         return [], tuple(solves)
@@ -192,22 +203,34 @@ class UserMotion:
 
 def _read_motion(content: ClaimFile, table: MotionTable, ground: Ground) -> Motion:
     def rate(value: sympy.Expr) -> sympy.Expr:
-        return sympy.diff(value, _TIME)
+        return sympy.diff(value, TIME)
 
-    angles = None if table.angles is None else _three(table.angles, ground.names, "motion.angles")
-    if angles is None and (table.omega is None or table.gamma is None):
+    names, needs = ground.names, ground.needs
+    if table.angles is None and (table.omega is None or table.gamma is None):
         raise InputError("[motion] has neither angles nor both omega and gamma.", "Give omega and gamma, or angles.")
-    rates = None if angles is None else (rate(angles[0]), rate(angles[1]), rate(angles[2]))
-    gamma = None if table.gamma is None else _three(table.gamma, ground.names, "motion.gamma")
-    if gamma is None:
-        assert angles is not None
-        gamma = gamma_from_angles(angles[0], angles[1], SYMBOLIC)
-    omega = None if table.omega is None else _three(table.omega, ground.names, "motion.omega")
-    if omega is None:
-        assert angles is not None
-        omega = omega_from_angles(gamma, angles[0], rates, SYMBOLIC)
+    phi = rates = None
+    turned: tuple[sympy.Expr, ...] = ()
+    angle_needs: frozenset[Need] = frozenset()
+    if table.angles is not None:
+        formulas = _three(table.angles, names, "motion.angles")
+        phi, theta, psi = _expressions(formulas)
+        rates, turned = (rate(phi), rate(theta), rate(psi)), attitude(phi, theta, psi)
+        angle_needs = needs_of(formulas)
+    gamma: Triple
+    if table.gamma is not None:
+        formulas = _three(table.gamma, names, "motion.gamma")
+        gamma, needs = _expressions(formulas), needs | needs_of(formulas)
+    else:
+        gamma, needs = turned[:3], needs | angle_needs
+    if table.omega is not None:
+        formulas = _three(table.omega, names, "motion.omega")
+        omega, needs = _expressions(formulas), needs | needs_of(formulas)
+    else:
+        omega, needs = omega_from_angles(gamma, phi, rates, SYMBOLIC), needs | angle_needs
     domain = _domain(content)
-    return Motion("smooth", domain, omega, gamma, rate, None if angles is None else angles[0], rates)
+    return Motion(
+        "smooth", domain, omega, gamma, rate, phi, rates, needs=needs, attitude=turned, angle_needs=angle_needs
+    )
 
 
 def _domain(content: ClaimFile) -> Domain:
@@ -215,68 +238,8 @@ def _domain(content: ClaimFile) -> Domain:
     if content.times is None:
         return domain
     times = tuple(exact(time) for time in content.times)
-    if any(time * domain.sign < 0 for time in times):
+    if any(time * domain.sign < 0 or (domain is AFTER and time == 0) for time in times):
         raise InputError(
             f"A time of {', '.join(content.times)} lies outside {domain.label}.", "Change times or domain."
         )
-    return replace(domain, points=times)
-
-
-@dataclass(frozen=True)
-class UserIntegral:
-    """A first integral or an invariant relation claimed in a file."""
-
-    content: ClaimFile
-    ground: Ground = field(init=False)
-    value: sympy.Expr = field(init=False)
-    where: tuple[sympy.Expr, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        ground = lay_ground(self.content, _STATE)
-        table = self._table
-        object.__setattr__(self, "ground", ground)
-        object.__setattr__(self, "value", _formula(table.value, ground.names, "integral.value"))
-        where = [_formula(text, ground.names, "integral.where") for text in table.where]
-        if self.content.kind == "relation":
-            where.append(self.value)
-        object.__setattr__(self, "where", tuple(where))
-
-    @property
-    def _table(self) -> IntegralTable:
-        assert self.content.integral is not None
-        return self.content.integral
-
-    @property
-    def name(self) -> str:
-        """As the file has it."""
-        return self.content.name
-
-    @property
-    def source(self) -> str:
-        """As the file has it."""
-        return self.content.source
-
-    @property
-    def setting(self) -> Setting:
-        """The file's assumptions; the samples are its parameters at those of its states that lie on the conditions."""
-        base = _setting(self.ground, _TIME)
-        states = [dict(zip(_STATE, map(exact, values), strict=True)) for values in self._table.states]
-        samples = [{**sample, **state} for sample in self.ground.samples for state in states]
-        on = tuple(place for place in samples if all(_at(condition, place).contains(0) for condition in self.where))
-        if not on:
-            raise InputError("No state of the file lies on its conditions.", "Give states with `where` equal to 0.")
-        return replace(base, samples=on, relations=(*self.ground.relations, *self.where))
-
-    def statements(self, system: System) -> list[Statement]:
-        """dF/dt = 0 along the field of ``system``, on the conditions."""
-        rates = system.field(self.ground.parameters(system), _STATE)
-        rate = sum((sympy.diff(self.value, x) * dx for x, dx in zip(_STATE, rates, strict=True)), sympy.Integer(0))
-        text = "dF/dt = 0 along the motion" + (", where the conditions hold" if self.where else "")
-        domain = replace(ALL, points=(Fraction(0),))
-        return [Statement("dF/dt", 1, "smooth", domain, rate, text)]
-
-    def explain(self) -> tuple[list[Finding], tuple[str, ...]]:
-        """No steps; the systems that conserve it, by proof."""
-        systems = [system for system in SYSTEMS if system is not GYROSTAT or self.ground.rotor is not None]
-        proven = [s.name for s in systems if verdict_of(judge(self.statements(s), self.setting)) == "holds"]
-        return [], tuple(proven)
+    return replace(domain, points=(*times, *(point for point in domain.points if point not in times)))

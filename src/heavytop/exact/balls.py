@@ -1,19 +1,23 @@
 """Balls (python-flint's arb): exact numbers in, enclosures out.
 
-The working precision of FLINT is global, so every evaluation stands inside :func:`working_precision`.
+The working precision of FLINT is one for the whole process, so every evaluation stands inside
+:class:`heavytop.exact.flint_context.working_precision`, which is to be had from here too.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from decimal import MAX_EMAX, MIN_EMIN, ROUND_CEILING, Context, Decimal
+from decimal import ROUND_CEILING, Decimal
 from fractions import Fraction
 from types import SimpleNamespace
 
-from flint import arb, ctx, fmpq
+from flint import arb, fmpq
 
 from heavytop.errors import OutOfReach
-from heavytop.precision import decimal_text
+from heavytop.exact.flint_context import whole_evaluation
+from heavytop.exact.flint_context import working_precision as working_precision
+from heavytop.precision import decimal_text, quotient_text
 
 FUNCTIONS = SimpleNamespace(
     sqrt=arb.sqrt,
@@ -29,24 +33,9 @@ FUNCTIONS = SimpleNamespace(
 )
 _MAX_BITS = 1 << 22
 _HALF = arb(0.5)
+_INTEGER = re.compile(r"-?[0-9]+")
 _GUARD, _STEP = 16, 64
 _RADIUS_BITS = 30
-
-
-class working_precision:  # noqa: N801 - reads as a verb
-    """FLINT's working precision set to ``bits`` within the block."""
-
-    __slots__ = ("before", "bits")
-
-    def __init__(self, bits: int) -> None:
-        self.bits = bits
-
-    def __enter__(self) -> None:
-        self.before = ctx.prec
-        ctx.prec = self.bits
-
-    def __exit__(self, *_: object) -> None:
-        ctx.prec = self.before
 
 
 def ball(value: Fraction | int) -> arb:
@@ -68,23 +57,23 @@ def radius(value: arb) -> Fraction:
 
 def radius_text(value: Fraction) -> str:
     """A radius as decimal text of three digits, rounded up: it stays an upper bound."""
-    context = Context(prec=3, rounding=ROUND_CEILING, Emax=MAX_EMAX, Emin=MIN_EMIN)
-    quotient = context.divide(Decimal(value.numerator), Decimal(value.denominator))
-    return str(quotient) if quotient else "0"
+    return quotient_text(value, 3, ROUND_CEILING)
 
 
 def ball_text(value: arb) -> str:
     """A ball as text that :func:`ball_from` makes the very same ball of: ``m e r s`` for m 2^e ± r 2^s, or ``nan``."""
     if not value.is_finite():
         return "nan"
-    return " ".join(str(int(part)) for part in (*value.mid().man_exp(), *value.rad().man_exp()))
+    # Decimal, as Python refuses to write or read an int of more than 4300 digits, or of what the process set
+    return " ".join(str(Decimal(int(part))) for part in (*value.mid().man_exp(), *value.rad().man_exp()))
 
 
+@whole_evaluation
 def ball_from(text: str) -> arb:
     """The ball of :func:`ball_text`.  Raises ValueError for other text."""
     if text == "nan":
         return arb("nan")
-    m, e, r, s = (int(part) for part in text.split())
+    m, e, r, s = (_integer(part) for part in text.split())
     if not r:
         return arb((m, e))
     with working_precision(m.bit_length() + 64):
@@ -97,12 +86,19 @@ def ball_from(text: str) -> arb:
     return value
 
 
+def _integer(text: str) -> int:
+    if not _INTEGER.fullmatch(text):
+        raise ValueError(f"no integer is {text[:60]!r}")
+    return int(Decimal(text))
+
+
 def value_text(value: arb, digits: int) -> tuple[str, str]:
     """(value, radius) as decimal text: the radius encloses the ball and the rounding of the printed value."""
     text = decimal_text(midpoint(value), digits)
     return text, radius_text(radius(value) + abs(Fraction(text) - midpoint(value)))
 
 
+@whole_evaluation
 def whole(value: arb) -> int:
     """The whole number nearest to the middle of a ball; 0 if it is not finite."""
     found = (value + _HALF).mid().floor().unique_fmpz()
@@ -130,18 +126,22 @@ def _graspable(value: arb, smallest: int) -> arb:
     return arb(0, arb(2) ** (smallest + 1))
 
 
-def to_bits(evaluate: Callable[[int], list[arb]], bits: int, time: Fraction | None = None) -> list[arb]:
+@whole_evaluation
+def to_bits(
+    evaluate: Callable[[int], list[arb]], bits: int, time: Fraction | None = None, length: int = 1
+) -> list[arb]:
     """``evaluate(working bits)`` repeated at growing working precision until every ball has ``bits`` bits.
 
     Bits count relative to a value above 1 and absolutely below it.  time: what it is evaluated at; it costs its own
-    bits, and the precision then comes in steps, so that lattices are made once.  Raises OutOfReach where even a
+    bits, and the precision then comes in steps, so that lattices are made once.  length: of power series meanwhile.
+    Raises OutOfReach where even a
     precision of 16 times the asked bits plus 4096 does not give them.
     """
     extra = -1 if time is None else _GUARD + (abs(time.numerator) // time.denominator).bit_length()
     working, smallest = bits + 32, -16 * bits - 4096
     while working <= -smallest:
         inside = working if extra < 0 else -(-(working + extra) // _STEP) * _STEP
-        with working_precision(inside):
+        with working_precision(inside, length):
             values = evaluate(inside)
         right = [value.rel_one_accuracy_bits() for value in values]
         if min(right) >= bits:

@@ -19,11 +19,12 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import arb, ctx
+from flint import arb
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm, balls, half_angle, instant, sign
+from heavytop.exact.flint_context import current_precision
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.motion import kept
 from heavytop.precision import shown
@@ -59,7 +60,7 @@ class BobylevSteklov(ClosedForm):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self, ctx.prec)
+        lattice = _lattice(self, current_precision())
         if lattice is None:
             return balls(self.start.flat)
         x, slope = lattice.motion(instant(time))

@@ -1,6 +1,7 @@
 """Which closed form a motion has: exact rational tests on the exact data, up to a renaming of the axes.
 
-Constants first, then elementary functions, then elliptic ones; the validated enclosure for every other motion.
+Constants first, then elementary functions, then elliptic and hyperelliptic ones; the validated enclosure for
+every other motion.
 Each case class makes its own test: its constructor raises NotInClass, saying which equality failed and by how much.
 """
 
@@ -14,8 +15,10 @@ from heavytop.exact.bobylev_steklov import BobylevSteklov
 from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
 from heavytop.exact.grioli import Grioli
 from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.lagrange import Lagrange
 from heavytop.exact.pendulum import Pendulum
 from heavytop.exact.solution import ExactSolution
@@ -63,6 +66,8 @@ _HEAVY_TOP: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (Lagrange, CYCLIC),
     (BobylevSteklov, ALL),
     (Delone, CYCLIC),
+    (Kovalevskaya, CYCLIC),
+    (GoryachevChaplygin, CYCLIC),
 )
 _GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (_permanent_gyrostat, _KEEP),

@@ -11,9 +11,11 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from flint import acb, acb_series, arb, arb_series, ctx
+from flint import acb, acb_series, arb, arb_series
 
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
+from heavytop.exact.flint_context import coefficient, current_length
+from heavytop.exact.flint_context import series_length as series_length
 from heavytop.exact.motion import initial_xi
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, System
@@ -23,25 +25,9 @@ Carry = Callable[[Sequence[Any]], list[Any]]
 """Takes the body components at t = 0 of a vector fixed in space to those at the time in question."""
 
 
-class series_length:  # noqa: N801 - reads as a verb
-    """FLINT's cap on the length of power series set to ``length`` within the block."""
-
-    __slots__ = ("before", "length")
-
-    def __init__(self, length: int) -> None:
-        self.length = length
-
-    def __enter__(self) -> None:
-        self.before = ctx.cap
-        ctx.cap = self.length
-
-    def __exit__(self, *_: object) -> None:
-        ctx.cap = self.before
-
-
 def instant(time: Fraction) -> Any:
     """The power series t + ε, of the length set by :func:`series_length`; the number t for length 1."""
-    return ball(time) if ctx.cap == 1 else arb_series([ball(time), 1], prec=ctx.cap)
+    return ball(time) if current_length() == 1 else arb_series([ball(time), 1], prec=current_length())
 
 
 def unit(angle: Any) -> Any:
@@ -49,7 +35,7 @@ def unit(angle: Any) -> Any:
     sine, cosine = angle.sin_cos()
     if isinstance(angle, arb):
         return acb(cosine, sine)
-    return acb_series(cosine, prec=ctx.cap) + acb(0, 1) * acb_series(sine, prec=ctx.cap)
+    return acb_series(cosine, prec=current_length()) + acb(0, 1) * acb_series(sine, prec=current_length())
 
 
 def balls(vector: Sequence[Fraction]) -> list[arb]:
@@ -108,19 +94,17 @@ class ClosedForm(ABC):
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        with series_length(1):
-            return to_bits(lambda _working: self.evaluate(time), bits, time)
+        return to_bits(lambda _working: self.evaluate(time), bits, time)
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         found: list[arb_series] = []
 
         def evaluate(_working: int) -> list[arb]:
-            found[:] = [arb_series(part, prec=length) for part in self.evaluate(time)]
+            found[:] = [whole_series(part, length) for part in self.evaluate(time)]
             return [part[0] for part in found]
 
-        with series_length(length):
-            to_bits(evaluate, bits, time)
+        to_bits(evaluate, bits, time, length)
         return found
 
 
@@ -148,8 +132,7 @@ class WithAttitude(ClosedForm):
             xi = initial_xi(self.start.gamma) if initial is None else balls(initial)
             return self.motion(instant(time))[1](xi)
 
-        with series_length(1):
-            return to_bits(evaluate, bits, time)
+        return to_bits(evaluate, bits, time)
 
 
 class WithAngles(ClosedForm):
@@ -169,6 +152,13 @@ class WithAngles(ClosedForm):
             return list(attitude_from_angles(phi, theta, psi, FUNCTIONS))
 
         return to_bits(evaluate, bits)
+
+
+def whole_series(value: Any, length: int) -> arb_series:
+    """A number or a series as the series of ``length`` coefficients; raises ContextChanged where it was cut off."""
+    if isinstance(value, arb_series):
+        coefficient(value, length - 1)
+    return arb_series(value, prec=length)
 
 
 def constant(value: Any) -> arb:

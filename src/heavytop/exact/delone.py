@@ -32,11 +32,12 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import arb, ctx
+from flint import arb
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, WithAngles, balls, constant, instant, series_length, tanh_sech
+from heavytop.exact.flint_context import current_length, current_precision
 from heavytop.exact.motion import kept
 from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.precision import shown
@@ -74,7 +75,7 @@ class Delone(ClosedForm):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        length = ctx.cap
+        length = current_length()
         with series_length(length + 1):
             cosine, sine = self._turn(time)
             square, along, _, weight = (ball(value) for value in _constants(self))
@@ -97,8 +98,8 @@ class Delone(ClosedForm):
 
     def _turn(self, time: Fraction) -> tuple[Any, Any]:
         """cos b and sin b/|n|."""
-        motion = _prepared(self, ctx.prec)
-        point = motion.lattice.point(time, ctx.cap)
+        motion = _prepared(self, current_precision())
+        point = motion.lattice.point(time, current_length())
         below, above = motion.denominator(point), motion.numerator(point)
         square = ball(_constants(self)[0])
         total = below * below + square * (above * above)

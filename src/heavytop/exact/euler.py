@@ -28,11 +28,12 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
-from flint import acb, arb, ctx
+from flint import acb, arb
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign, turned, unit
+from heavytop.exact.flint_context import current_precision
 from heavytop.exact.jacobi import Jacobi, Wave, jacobi, legendre_f, wave
 from heavytop.exact.motion import kept
 from heavytop.exact.weierstrass import imag, real
@@ -68,7 +69,7 @@ class Euler(WithAttitude):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self, ctx.prec)
+        lattice = _lattice(self, current_precision())
         if lattice is None:
             return WithAttitude.evaluate(self, time)
         omega, place = lattice.motion(instant(time))
@@ -76,7 +77,7 @@ class Euler(WithAttitude):
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self, ctx.prec)
+        lattice = _lattice(self, current_precision())
         if lattice is not None:
             omega, place = lattice.motion(time)
             return omega, lambda vector: place(lattice.held(vector))

@@ -29,6 +29,7 @@ from typing import Any
 from flint import arb, arb_series
 
 from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.flint_context import require_undisturbed
 from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.second_kind import Winding
@@ -199,7 +200,9 @@ def _prepared(motion: Gyrostat, bits: int) -> _Prepared:
 
 @lru_cache(maxsize=64)
 def _held(motion: Gyrostat, vector: Vector, bits: int) -> _Fixed:
-    return _fixed(motion, _prepared(motion, bits).motion, vector)
+    made = _fixed(motion, _prepared(motion, bits).motion, vector)
+    require_undisturbed()
+    return made
 
 
 def _fixed(motion: Gyrostat, prepared: PreparedMotion, vector: Vector) -> _Fixed:

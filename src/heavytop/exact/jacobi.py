@@ -19,10 +19,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from flint import acb, acb_poly, acb_series, arb, arb_poly, arb_series, ctx
+from flint import acb, acb_poly, acb_series, arb, arb_poly, arb_series
 
 from heavytop.exact.balls import whole
 from heavytop.exact.closed_form import constant, series_length
+from heavytop.exact.flint_context import coefficient, current_length
 from heavytop.exact.theta import Theta
 from heavytop.exact.weierstrass import real
 
@@ -65,7 +66,7 @@ class Jacobi:
 
     def thetas(self, u: Any) -> tuple[acb_series, ...]:
         """θ1, θ2, θ3, θ4 at z = scale · u, for a real or complex series u."""
-        return _thetas(self.scale * acb_series(u, prec=ctx.cap), self.tau)
+        return _thetas(self.scale * acb_series(u, prec=current_length()), self.tau)
 
     def functions(self, u: Any) -> tuple[Any, Any, Any]:
         """(sn, cn, dn) at the number or series u."""
@@ -125,7 +126,7 @@ class Wave:
 
     def _series(self, u: arb_series) -> Any:
         functions = self.functions
-        above = functions.thetas(acb_series(u, prec=ctx.cap) + _I * self.shift)[0]
+        above = functions.thetas(acb_series(u, prec=current_length()) + _I * self.shift)[0]
         _, second, _, fourth = functions.thetas(u)
         if functions.theta.hyperbolic:
             return -above / second
@@ -135,7 +136,7 @@ class Wave:
         """The derivative of its argument at u = 0."""
         with series_length(2):
             value = self.at(arb_series([0, 1], prec=2))[0]
-            return arb((value[1] / value[0]).imag)
+            return arb((coefficient(value, 1) / value[0]).imag)
 
 
 def wave(functions: Jacobi, shift: arb) -> Wave:
@@ -205,5 +206,5 @@ def _thetas(z: acb_series, tau: acb | None) -> tuple[acb_series, ...]:
     if tau is not None:
         return tuple(acb_series.modular_theta(z, tau))
     sine, cosine = acb_series.sin_cos_pi(z)
-    one = acb_series([1], prec=ctx.cap)
+    one = acb_series([1], prec=current_length())
     return sine, cosine, one, one

@@ -31,6 +31,7 @@ from flint import acb, arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.flint_context import coefficient, require_undisturbed
 from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.second_kind import Winding
@@ -149,7 +150,7 @@ class Lagrange:
             cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
             return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
 
-        return to_bits(evaluate, bits, time)
+        return to_bits(evaluate, bits, time, 2)
 
     def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[arb]:
         """A vector ⟂ γ, fixed in space, at ``time``.
@@ -165,7 +166,7 @@ class Lagrange:
         inverse = 1 / prepared.motion.denominator(point)
         (h,), (g, w) = (c.at(point, inverse) for c in (axis, prepared.horizontal))
         x, size = prepared.motion.position(point, inverse)[0], ball(self.constants[4]).sqrt()
-        plus, minus = _sides(h[0], h[1], g[0], w[0], x, size)
+        plus, minus = _sides(h[0], coefficient(h, 1), g[0], w[0], x, size)
         return [((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real, h[0].real]
 
 
@@ -209,7 +210,9 @@ def _axis(motion: Lagrange, vector: Vector, bits: int) -> Companions:
     # s Z = s ξ + i γ × ξ, so Z = ξ + i s (γ × ξ/s²)
     normal = tuple(c / square for c in cross(motion.start.gamma, vector))
     first, second = (_derivatives(motion, fixed) for fixed in (vector, normal))
-    return _prepared(motion, bits).motion.companions(winding, turned(first, second, winding))
+    made = _prepared(motion, bits).motion.companions(winding, turned(first, second, winding))
+    require_undisturbed()
+    return made
 
 
 def _derivatives(motion: Lagrange, fixed: tuple[Fraction, ...]) -> list[Fraction]:

@@ -8,10 +8,11 @@ from functools import wraps
 from math import factorial, isqrt
 from typing import Any, TypeVar
 
-from flint import arb, arb_series, ctx, fmpq, fmpq_series
+from flint import arb, arb_series, fmpq, fmpq_series
 
 from heavytop.errors import InputError
 from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.flint_context import coefficient, require_undisturbed, series_length
 from heavytop.exact.quartic import Pair
 from heavytop.exact.second_kind import Winding
 from heavytop.top.angles import perpendicular
@@ -30,9 +31,13 @@ def kept(make: Callable[[Any, int], Made]) -> Callable[[Any, int], Made]:
     @wraps(make)
     def look_up(motion: Any, bits: int) -> Made:
         made: dict[Any, Made] = motion.made
-        if (make, bits) not in made:
-            made[make, bits] = make(motion, bits)
-        return made[make, bits]
+        try:
+            return made[make, bits]
+        except KeyError:
+            found = make(motion, bits)
+            require_undisturbed()
+            made[make, bits] = found
+            return found
 
     return look_up
 
@@ -42,17 +47,12 @@ def series_at(
 ) -> list[arb_series]:
     """``evaluate(working bits, length)`` with the ε^0 coefficients certain to ``bits`` bits (:func:`to_bits`)."""
     found: list[list[arb_series]] = []
-    before = ctx.cap
-    ctx.cap = max(length, before)
 
     def leading(working: int) -> list[arb]:
         found.append(evaluate(working, length))
         return [component[0] for component in found[-1]]
 
-    try:
-        to_bits(leading, bits, time)
-    finally:
-        ctx.cap = before
+    to_bits(leading, bits, time, length)
     return found[-1]
 
 
@@ -63,10 +63,11 @@ def taylor(
     inertia, moment, rotor = parameters
     exact = Parameters([_rational(i) for i in inertia], [_rational(n) for n in moment], _rational(rotor))
     rows = [[_rational(value)] for value in start]
-    for order in range(1, length):
-        y = [fmpq_series(row, prec=length) for row in rows]
-        for row, slope in zip(rows, field(exact, y), strict=True):
-            row.append(fmpq_series(slope)[order - 1] / order)
+    with series_length(length):
+        for order in range(1, length):
+            y = [fmpq_series(row, prec=length) for row in rows]
+            for row, slope in zip(rows, field(exact, y), strict=True):
+                row.append(coefficient(fmpq_series(slope), order - 1) / order)
     return [[Fraction(int(c.p), int(c.q)) * factorial(n) for n, c in enumerate(row)] for row in rows]
 
 

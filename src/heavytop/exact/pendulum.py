@@ -20,11 +20,12 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import arb, ctx
+from flint import arb
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign
+from heavytop.exact.flint_context import current_precision
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.motion import kept
 from heavytop.precision import shown
@@ -79,7 +80,7 @@ class Pendulum(WithAttitude):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self, ctx.prec)
+        lattice = _lattice(self, current_precision())
         if lattice is None:
             return WithAttitude.evaluate(self, time)
         omega, carry = lattice.motion(instant(time))
@@ -87,7 +88,7 @@ class Pendulum(WithAttitude):
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self, ctx.prec)
+        lattice = _lattice(self, current_precision())
         return ([arb(0)] * 3, list) if lattice is None else lattice.motion(time)
 
 

@@ -20,9 +20,10 @@ from dataclasses import dataclass
 from itertools import chain, cycle, repeat
 from typing import Any
 
-from flint import acb, acb_poly, arb, arb_poly, ctx, fmpz_poly
+from flint import acb, acb_poly, arb, arb_poly, fmpz_poly
 
 from heavytop.exact.balls import working_precision
+from heavytop.exact.flint_context import current_precision
 
 _MOST = 2000
 
@@ -84,7 +85,7 @@ class Theta:
 
     def _enough(self, wide: Any) -> tuple[int, arb]:
         """N, and the ball around 0 with the sum of all terms from n = N on; not finite where nothing is known."""
-        smallest = arb(2) ** (-ctx.prec - 8)
+        smallest = arb(2) ** (-current_precision() - 8)
         with working_precision(64):
             nome, growth = abs(self.square).sqrt(), self.growth * wide
             for n in range(1, _MOST):

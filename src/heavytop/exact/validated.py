@@ -17,12 +17,14 @@ from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import ceil, log2, log10
+from typing import NamedTuple
 
 from flint import arb, arb_series
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, relative_bits, working_precision
 from heavytop.exact.enclosure import Node, Step, coefficient_bound, start_node, step
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.quadratic import Quadratic, quadratic
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
@@ -37,52 +39,56 @@ _ATTEMPTS = 6
 
 @dataclass(slots=True)
 class Run:
-    """Nodes of one motion at one working precision, from time 0 on as far as they were asked for."""
+    """Nodes of one motion at one working precision, from time 0 on as far as they were asked for.
+
+    Any thread may ask: a node depends on its time alone, and what is remembered is replaced, never changed in place.
+    """
 
     motion: Quadratic
     precision: int
-    nodes: list[Node]
+    nodes: tuple[Node, ...]
     stride: int = 1
     lost_at: Fraction | None = None
     _last: Step | None = None
     _skipped: int = 0
 
-    def at(self, time: Fraction) -> list[arb] | None:
-        """The state at ``time`` ≥ 0; None if the errors grew too large before it."""
-        node = self._nearest(time)
+    def at(self, time: Fraction) -> tuple[Step, Fraction] | None:
+        """The step that covers ``time`` ≥ 0, and τ in it; None if the errors grew too large before it."""
+        found, node = self._nearest(time)
         while True:
             if self.lost_at is not None and node.time >= self.lost_at:
                 return None
-            found = self._last if self._last is not None and self._last.node is node else self._step(node)
+            if found is None:
+                found = self._last = step(self.motion, node, self.precision)
             if found is None:
                 self.lost_at = node.time
                 return None
             if node.time + found.length >= time:
-                return found.at((time - node.time) / found.length)
-            node = found.end()
+                return found, (time - node.time) / found.length
+            node, found = found.end(), None
             self._keep(node)
 
-    def _step(self, node: Node) -> Step | None:
-        self._last = step(self.motion, node, self.precision)
-        return self._last
-
-    def _nearest(self, time: Fraction) -> Node:
-        known = [self.nodes[bisect_right(self.nodes, time, key=lambda node: node.time) - 1]]
-        if self._last is not None and self._last.node.time <= time:
-            known.append(self._last.node)
-        return max(known, key=lambda node: node.time)
+    def _nearest(self, time: Fraction) -> tuple[Step | None, Node]:
+        """The last node known before ``time``, and the step from it where that is known too."""
+        last, nodes = self._last, self.nodes
+        node = nodes[bisect_right(nodes, time, key=lambda node: node.time) - 1]
+        if last is not None and node.time <= last.node.time <= time:
+            return last, last.node
+        return None, node
 
     def _keep(self, node: Node) -> None:
         """Remember every ``stride``-th node: constant memory at any horizon."""
-        if node.time <= self.nodes[-1].time:
+        nodes = self.nodes
+        if node.time <= nodes[-1].time:
             return
         self._skipped += 1
         if self._skipped >= self.stride:
             self._skipped = 0
-            self.nodes.append(node)
-        if len(self.nodes) > _KEPT_NODES:
-            self.nodes = self.nodes[::2]
+            nodes = (*nodes, node)
+        if len(nodes) > _KEPT_NODES:
+            nodes = nodes[::2]
             self.stride *= 2
+        self.nodes = nodes
 
 
 def _ladder(bits: float) -> int:
@@ -97,29 +103,42 @@ def _seconds_a_step(precision: int) -> float:
     return 1e-3 + 6e-8 * precision**2
 
 
+class _Ahead(NamedTuple):
+    """How far a pilot came: the node at its end, and the time and the bits lost after each of its steps."""
+
+    node: Node
+    times: tuple[Fraction, ...] = ()
+    losses: tuple[float, ...] = ()
+
+
 @dataclass(slots=True)
 class Pilot:
-    """A cheap run that tells how many bits the motion loses and how many steps it takes, by time."""
+    """A cheap run that tells how many bits the motion loses and how many steps it takes, by time.
+
+    Any thread may ask: ``ahead`` is replaced as a whole, and does not depend on who came how far.
+    """
 
     motion: Quadratic
-    node: Node
-    times: list[Fraction] = field(default_factory=list)
-    losses: list[float] = field(default_factory=list)
+    ahead: _Ahead
 
     def forecast(self, span: Fraction) -> tuple[float, float]:
         """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go."""
-        while (not self.times or self.times[-1] < span) and len(self.times) < _PILOT_STEPS:
-            found = step(self.motion, self.node, _PILOT_BITS)
+        node, known, bits = self.ahead
+        times, losses = list(known), list(bits)
+        while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
+            found = step(self.motion, node, _PILOT_BITS)
             if found is None:
                 break
-            self.node = found.end()
-            self.times.append(self.node.time)
-            self.losses.append(self.node.errors.exponent + log2(float(self.node.errors.sizes().max()) + 1))
-        if not self.times:
+            node = found.end()
+            times.append(node.time)
+            losses.append(node.errors.exponent + log2(float(node.errors.sizes().max()) + 1))
+        if len(times) > len(known):
+            self.ahead = _Ahead(node, tuple(times), tuple(losses))
+        if not times:
             return float(_PILOT_BITS), 64 * float(span)
-        index = min(bisect_left(self.times, span), len(self.times) - 1)
-        more = max(1.0, float(span / self.times[index]))
-        return 16 + self.losses[index] * more, (index + 1) * more
+        index = min(bisect_left(times, span), len(times) - 1)
+        more = max(1.0, float(span / times[index]))
+        return 16 + losses[index] * more, (index + 1) * more
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,9 +191,12 @@ class Validated:
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`: the recurrence of Taylor's series on the enclosure."""
-        values = self.state(time, bits + 4 * length)
+        return self._extended(self.state(time, bits + 4 * length), length, bits)
+
+    @whole_evaluation
+    def _extended(self, values: list[arb], length: int, bits: int) -> list[arb_series]:
         motion = self._field(1, 6)
-        with working_precision(bits + 4 * length + 32):
+        with working_precision(bits + 4 * length + 32, length):
             y = [[value] for value in values]
             for n in range(length - 1):
                 sums = [sum((y[j][m] * y[k][n - m] for m in range(n + 1)), arb(0)) for j, k in motion.pairs]
@@ -203,22 +225,21 @@ class Validated:
         key = (direction, precision, len(start))
         if key not in self._runs:
             motion = self._field(direction, len(start))
-            self._runs[key] = Run(motion, precision, [start_node(motion, start, precision)])
+            self._runs[key] = Run(motion, precision, (start_node(motion, start, precision),))
         return self._runs[key]
 
     def _enclosure(self, time: Fraction, bits: int, start: tuple[Fraction, ...]) -> list[arb]:
         if time == 0:
-            with working_precision(bits + 8):
-                return [ball(value) for value in start]
+            return _rounded(start, bits + 8)
         direction, span = (1 if time > 0 else -1), abs(time)
         loss, steps = self._forecast(direction, span, start)
         for _ in range(_ATTEMPTS):
             precision = _ladder(bits + loss + 8)
             self._require_reach(time, bits, loss, steps, precision)
             run = self._run(direction, precision, start)
-            with working_precision(precision + 64):
-                values = run.at(span)
-            if values is not None:
+            found = run.at(span)
+            if found is not None:
+                values = _evaluated(*found, precision + 64)
                 reached = min(map(relative_bits, values))
                 if reached >= bits:
                     return values
@@ -232,7 +253,7 @@ class Validated:
         key = (direction, len(start))
         if key not in self._pilots:
             motion = self._field(*key)
-            self._pilots[key] = Pilot(motion, start_node(motion, start, _PILOT_BITS))
+            self._pilots[key] = Pilot(motion, _Ahead(start_node(motion, start, _PILOT_BITS)))
         return self._pilots[key].forecast(span)
 
     def _require_reach(self, time: Fraction, bits: int, loss: float, steps: float, precision: int) -> None:
@@ -248,3 +269,15 @@ class Validated:
             f"{bits * log10(2):.0f} digits at t = {float(time):.6g} are out of reach of a validated integration.",
             f"About {int(reachable * log10(2))} digits could be proven there: ask for fewer, or for an earlier time.",
         )
+
+
+@whole_evaluation
+def _rounded(start: tuple[Fraction, ...], bits: int) -> list[arb]:
+    with working_precision(bits):
+        return [ball(value) for value in start]
+
+
+@whole_evaluation
+def _evaluated(found: Step, tau: Fraction, bits: int) -> list[arb]:
+    with working_precision(bits):
+        return found.at(tau)

@@ -20,10 +20,11 @@ from functools import lru_cache
 from math import lcm
 from typing import Any
 
-from flint import acb, acb_series, arb, arb_poly, arb_series, ctx, fmpz_poly
+from flint import acb, acb_series, arb, arb_poly, arb_series, fmpz_poly
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.flint_context import current_precision
 from heavytop.exact.theta import Theta
 
 Exact = Fraction | int
@@ -229,7 +230,7 @@ def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
     they do not decide it.
     """
     if not isinstance(g2, arb) and not isinstance(g3, arb):
-        return exact_lattice(Fraction(g2), Fraction(g3), ctx.prec)
+        return exact_lattice(Fraction(g2), Fraction(g3), current_precision())
     g2, g3 = as_ball(g2), as_ball(g3)
     discriminant = g2**3 - 27 * g3**2
     if not (discriminant > 0 or discriminant < 0):
@@ -262,7 +263,7 @@ def _enclose(near: acb, g2: arb, g3: arb) -> acb:
     """The ball around ``near`` that holds a root of 4x³ − g2 x − g3: a contracting interval Newton step."""
     middle = near.mid() if not near.imag.contains(0) else acb(near.real.mid())
     value = 4 * middle**3 - g2 * middle - g3
-    spread = abs(value / (12 * middle**2 - g2)).upper() * 2 + arb(2) ** (-ctx.prec)
+    spread = abs(value / (12 * middle**2 - g2)).upper() * 2 + arb(2) ** (-current_precision())
     wide = middle + (acb(arb(0, spread)) if middle.imag == 0 else acb(arb(0, spread), arb(0, spread)))
     narrow = middle - value / (12 * wide**2 - g2)
     if not wide.contains(narrow):

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, field
 from fractions import Fraction
+from threading import Lock, RLock
 from time import perf_counter
 from typing import Any
 
@@ -29,21 +30,26 @@ _XI = ("xi1", "xi2", "xi3")
 class Compiled:
     """A compiled integrator of one system and format, used again for every top.
 
-    spare: copies for threads, which must not share an engine.
+    engine: never run, only copied, so that a copy can be made while others run.  spare: copies that nobody uses now.
     """
 
     engine: Any
     seconds: float
     flags: dict[str, str]
     spare: list[Any] = field(default_factory=list)
+    copying: Lock = field(default_factory=Lock)
 
     @contextmanager
     def lent(self) -> Iterator[Any]:
-        """A copy of the engine for one thread, given back at the end."""
+        """A copy of the engine for one run, given back at the end, also of a run that raises.
+
+        Whoever runs meanwhile, another thread or an observer of this very run, has another copy.
+        """
         try:
             engine = self.spare.pop()
         except IndexError:
-            engine = deepcopy(self.engine)
+            with self.copying:
+                engine = deepcopy(self.engine)
         try:
             yield engine
         finally:
@@ -51,6 +57,8 @@ class Compiled:
 
 
 _compiled: dict[tuple[Any, ...], Compiled] = {}
+_compiling: dict[tuple[Any, ...], RLock] = {}
+"""One lock a key: what one thread compiles, another that needs the same waits for."""
 
 
 def expressions(system: System, attitude: bool, constants: Parameters | None = None) -> list[tuple[Any, Any]]:
@@ -100,28 +108,43 @@ def compiled(
     if constants is not None and precision != DOUBLE:
         raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")
     key = (system.name, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
-    if key not in _compiled:
-        one, zero = number(Fraction(1), precision), number(Fraction(0), precision)
-        size = 9 if attitude else 6
-        options: dict[str, Any] = {"compact_mode": compact, "high_accuracy": high_accuracy}
-        if tolerance is not None:
-            options["tol"] = number(tolerance, precision)
-        if precision.family == "real":
-            options["prec"] = precision.bits
-        build, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))
-        if constants is None:
-            options["pars"] = numpy.full((4 if system is GYROSTAT else 6, *shape), one)
-        before = perf_counter()
-        engine = build(
-            expressions(system, attitude, constants and _doubles(constants)),
-            numpy.full((size, *shape), zero),
-            fp_type=type(one),
-            **options,
-        )
-        seconds = perf_counter() - before
-        check(engine, system, precision, constants)
-        _compiled[key] = Compiled(engine, seconds, _flags(engine))
+    with _compiling.setdefault(key, RLock()):
+        if key not in _compiled:
+            engine, seconds = _built(system, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
+            check(engine, system, precision, constants)
+            _compiled[key] = Compiled(engine, seconds, _flags(engine))
     return _compiled[key]
+
+
+def _built(
+    system: System,
+    precision: Precision,
+    attitude: bool,
+    tolerance: Fraction | None,
+    high_accuracy: bool,
+    compact: bool,
+    lanes: int | None,
+    constants: Parameters | None,
+) -> tuple[Any, float]:
+    """A new engine, and the seconds that compiling it took."""
+    one, zero = number(Fraction(1), precision), number(Fraction(0), precision)
+    size = 9 if attitude else 6
+    options: dict[str, Any] = {"compact_mode": compact, "high_accuracy": high_accuracy}
+    if tolerance is not None:
+        options["tol"] = number(tolerance, precision)
+    if precision.family == "real":
+        options["prec"] = precision.bits
+    build, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))
+    if constants is None:
+        options["pars"] = numpy.full((4 if system is GYROSTAT else 6, *shape), one)
+    before = perf_counter()
+    engine = build(
+        expressions(system, attitude, constants and _doubles(constants)),
+        numpy.full((size, *shape), zero),
+        fp_type=type(one),
+        **options,
+    )
+    return engine, perf_counter() - before
 
 
 def _doubles(p: Parameters) -> Parameters:

@@ -52,7 +52,8 @@ def propagate(
     problem = Problem.of(top, start, precision, system, xi)
     targets = [number(time, precision) for time in check_times(times)]
     tool = compiled(system, precision, attitude=xi is not None, **options)
-    return follow(tool, tool.engine, problem, targets, step_limit, observer, stepping=stepping, place=place, mark=mark)
+    with tool.lent() as engine:
+        return follow(tool, engine, problem, targets, step_limit, observer, stepping=stepping, place=place, mark=mark)
 
 
 def follow(
@@ -127,20 +128,21 @@ def first_steps(
     """
     problem = Problem.of(top, start, precision, system)
     tool = compiled(system, precision, **options)
-    load(tool.engine, problem)
-    stepper = stepping(tool.engine, True, None, None)
     times: list[Fraction] = []
     steps: list[TaylorStep] = []
     outcome = Outcome.SUCCESS
     began = perf_counter()
     end = number(until, precision)
-    while stepper.time < end and outcome is Outcome.SUCCESS and stepper.rest is None:
-        before = tool.engine.state.copy()
-        outcome = stepper.single()
-        if outcome is Outcome.SUCCESS and stepper.rest is None:
-            after = tool.engine.state.copy()
-            steps.append(TaylorStep(before, tool.engine.last_h, stepper.polynomial(), after))
-            times.append(exact(tool.engine.time))
+    with tool.lent() as engine:
+        load(engine, problem)
+        stepper = stepping(engine, True, None, None)
+        while stepper.time < end and outcome is Outcome.SUCCESS and stepper.rest is None:
+            before = engine.state.copy()
+            outcome = stepper.single()
+            if outcome is Outcome.SUCCESS and stepper.rest is None:
+                steps.append(TaylorStep(before, engine.last_h, stepper.polynomial(), engine.state.copy()))
+                times.append(exact(engine.time))
+        order = engine.order
     return Trajectory(
         problem,
         "heyoka",
@@ -149,7 +151,7 @@ def first_steps(
         outcome,
         times[-1] if times else Fraction(0),
         len(steps),
-        tool.engine.order,
+        order,
         {"compile": tool.seconds, "run": perf_counter() - began},
         tool.flags,
     ), steps

@@ -19,6 +19,7 @@ from flint import arb
 
 from heavytop.errors import Contradiction, OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.validated import Validated
 from heavytop.top.equations import Parameters
@@ -102,13 +103,16 @@ def certified_state(
     values = solution.state(time, bits_of(digits))
     if certificate.agreed_digits >= digits:
         return values, certificate
-    slack = Fraction(1, 10) ** certificate.agreed_digits
-    with working_precision(bits_of(digits) + 64):
-        widened = [
+    return _widened(values, Fraction(1, 10) ** certificate.agreed_digits, bits_of(digits) + 64), certificate
+
+
+@whole_evaluation
+def _widened(values: Sequence[arb], slack: Fraction, bits: int) -> list[arb]:
+    with working_precision(bits):
+        return [
             ball(midpoint(value)) + arb(0, (ball(slack * max(Fraction(1), abs(midpoint(value)))) + value.rad()).upper())
             for value in values
         ]
-    return widened, certificate
 
 
 def enclosure_of(solution: ExactSolution, start: State | None = None, effort: float = _EFFORT) -> Validated:
@@ -133,6 +137,7 @@ def _early_and_last(
     return Certificate(solution.method, source, agreed, "proven at both ends")
 
 
+@whole_evaluation
 def _integral_digits(solution: ExactSolution, values: Sequence[arb], bits: int) -> int:
     """The digits to which the first integrals at ``values`` are those of the exact start."""
     exact = _parameters(solution)

@@ -16,6 +16,7 @@ from flint import arb
 from heavytop.claims.ershkov import Branch, PartialCase, Values, partial_case
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits, working_precision
 from heavytop.exact.ershkov_partial import hyperbolic, hyperbolic_angles
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.measure.scalar import largest, to_ball
 from heavytop.precision import Precision, exact, number
 from heavytop.top.angles import attitude_from_angles, euler_angles, rotation_angle
@@ -72,6 +73,7 @@ def _on_balls(case: PartialCase, time: Fraction, branch: Branch) -> Values:
     return partial_case(ball(case.i1), ball(case.i3), ball(case.c1), ball(time), FUNCTIONS, branch)
 
 
+@whole_evaluation
 def claim_attitude(case: PartialCase, time: Fraction, branch: Branch) -> tuple[Any, Any, Any]:
     """The claimed attitude vector ξ at ``time``: on the smooth branch (4.5) continued through the pole at t = 0."""
     if branch == "smooth":
@@ -85,9 +87,11 @@ def claim_attitude(case: PartialCase, time: Fraction, branch: Branch) -> tuple[A
 
 def model_error(case: PartialCase, time: Fraction, truth: Truth, branch: Branch = "smooth") -> ModelError:
     """The claim, exactly evaluated, against the true heavy-top motion from its own data at t = 0."""
-    claim = exact_claim(case, time, branch)
-    state, xi = truth(time)
-    claimed_xi = claim_attitude(case, time, branch)
+    return _difference(exact_claim(case, time, branch), claim_attitude(case, time, branch), *truth(time))
+
+
+@whole_evaluation
+def _difference(claim: Values, claimed_xi: tuple[Any, Any, Any], state: Sequence[arb], xi: Sequence[arb]) -> ModelError:
     with working_precision(MODEL_BITS + 32):
         gamma = tuple(state[3:6])
         claimed = euler_angles(claim.gamma, claimed_xi, FUNCTIONS)
@@ -118,6 +122,7 @@ class EvaluationError:
     psi: arb
 
 
+@whole_evaluation
 def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, form: str) -> EvaluationError:
     """The formulas evaluated in ``precision`` against themselves evaluated exactly, from the same rounded data.
 

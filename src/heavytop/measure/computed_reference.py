@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import Any
 
 from flint import arb
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import exact, real
@@ -47,10 +49,8 @@ class ComputedReference:
                     f"A reference run with {run.problem.precision.bits} bits {run.outcome.message}.",
                     "Ask for an earlier time.",
                 )
-        self.balls: dict[Fraction, list[arb]] = {}
-        with working_precision(bits + 128):
-            for time, coarse, fine in zip(times, *(run.states for run in runs), strict=True):
-                self.balls[time] = [_around(exact(a), exact(b), bits) for a, b in zip(coarse, fine, strict=True)]
+        states = zip(times, *(run.states for run in runs), strict=True)
+        self.balls: dict[Fraction, list[arb]] = {time: _around(coarse, fine, bits) for time, coarse, fine in states}
         worst = max(float(value.rad()) for values in self.balls.values() for value in values)
         self.method = f"computed, not proven: heyoka at {bits} and {bits + 64} bits agree within {worst:.1e}"
 
@@ -59,7 +59,9 @@ class ComputedReference:
         return self.balls[time]
 
 
-def _around(coarse: Fraction, fine: Fraction, bits: int) -> arb:
-    """The finer value, with the difference (at least a rounding of the coarser) as its radius."""
-    spread = abs(fine - coarse) + Fraction(2) ** -bits
-    return ball(fine) + arb(0, ball(spread).abs_upper())
+@whole_evaluation
+def _around(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[arb]:
+    """The finer values, each with the difference (at least a rounding of the coarser) as its radius."""
+    pairs = [(exact(a), exact(b)) for a, b in zip(coarse, fine, strict=True)]
+    with working_precision(bits + 128):
+        return [ball(b) + arb(0, ball(abs(b - a) + Fraction(2) ** -bits).abs_upper()) for a, b in pairs]

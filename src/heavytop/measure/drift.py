@@ -9,12 +9,15 @@ from typing import Any
 from flint import arb
 
 from heavytop.exact.balls import ball, ball_from, ball_text, working_precision
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scalar import GUARD_BITS, metric, text, to_ball
 from heavytop.records import Metric, Series
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import dot
 from heavytop.top.integrals import Integral
+
+Sums = tuple[arb, arb, arb]
 
 
 class Running:
@@ -27,15 +30,17 @@ class Running:
         self.count = 0
         self.kept: dict[Fraction, arb] = {}
 
-    def add(self, time: Fraction, value: arb, keep: bool) -> None:
-        """Take in |value| at ``time``; remember it for the series if ``keep``."""
+    def following(self, value: arb) -> Sums:
+        """Maximum, sum of squares and last with |value| too; evaluated at the working precision, nothing taken in."""
         size = abs(value)
-        self.maximum = self.maximum.max(size)
-        self.squares += size * size
-        self.final = size
+        return self.maximum.max(size), self.squares + size * size, size
+
+    def take(self, time: Fraction, sums: Sums, keep: bool) -> None:
+        """Take in a value at ``time`` by its :meth:`following`; remember it for the series if ``keep``."""
+        self.maximum, self.squares, self.final = sums
         self.count += 1
         if keep:
-            self.kept[time] = size
+            self.kept[time] = self.final
 
     def metrics(self, name: str) -> dict[str, Metric]:
         """``name_max``, ``name_rms``, ``name_final``; ``missing`` without a sample."""
@@ -80,27 +85,35 @@ class Drift:
     def __init__(self, problem: Problem, integrals: Sequence[Integral], keep: Sequence[Fraction] = ()) -> None:
         self.bits = problem.precision.bits + GUARD_BITS
         self.keep = frozenset(keep)
-        with working_precision(self.bits):
-            exact = problem.parameters
-            self.parameters = Parameters(
-                [ball(value) for value in exact.inertia], [ball(value) for value in exact.moment], ball(exact.rotor)
-            )
-            self.functions: dict[str, Callable[[Parameters, Any], Any]] = {i.name: i.value for i in integrals}
-            start = [ball(value) for value in problem.start.flat]
-            if problem.xi is not None:
-                start += [ball(value) for value in problem.xi]
-                self.functions |= {"xi_squared": _xi_squared, "xi_dot_gamma": _xi_dot_gamma}
-            self.initial = {name: value(self.parameters, start) for name, value in self.functions.items()}
+        self.functions: dict[str, Callable[[Parameters, Any], Any]] = {i.name: i.value for i in integrals}
+        if problem.xi is not None:
+            self.functions |= {"xi_squared": _xi_squared, "xi_dot_gamma": _xi_dot_gamma}
+        self.parameters = parameter_balls(problem, self.bits)
+        self.initial = self._values((*problem.start.flat, *(problem.xi or ())))
         self.running = {name: Running() for name in self.functions}
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
         """Take in one native state."""
+        keep = time in self.keep
+        for running, sums in zip(self.running.values(), self._following(state), strict=True):
+            running.take(time, sums, keep)
+
+    @whole_evaluation
+    def _values(self, state: Sequence[Fraction]) -> dict[str, arb]:
+        with working_precision(self.bits):
+            y = [ball(value) for value in state]
+            return {name: value(self.parameters, y) for name, value in self.functions.items()}
+
+    @whole_evaluation
+    def _following(self, state: Sequence[Any]) -> list[Sums]:
         with working_precision(self.bits):
             y = [to_ball(value) for value in state]
-            keep = time in self.keep
-            for name, value in self.functions.items():
-                self.running[name].add(time, value(self.parameters, y) - self.initial[name], keep)
+            return [
+                self.running[name].following(value(self.parameters, y) - self.initial[name])
+                for name, value in self.functions.items()
+            ]
 
+    @whole_evaluation
     def metrics(self) -> dict[str, Metric]:
         """``drift_NAME_max``, ``_rms``, ``_final`` for every integral."""
         with working_precision(self.bits):
@@ -118,6 +131,16 @@ class Drift:
         """Go on from that :meth:`content`."""
         for name, run in self.running.items():
             run.restore(content[name])
+
+
+@whole_evaluation
+def parameter_balls(problem: Problem, bits: int) -> Parameters:
+    """I, P r and λ of a problem as balls of ``bits`` bits."""
+    exact = problem.parameters
+    with working_precision(bits):
+        return Parameters(
+            [ball(value) for value in exact.inertia], [ball(value) for value in exact.moment], ball(exact.rotor)
+        )
 
 
 def _xi_squared(_: Parameters, y: Any) -> Any:

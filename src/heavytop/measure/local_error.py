@@ -7,6 +7,7 @@ asking the step's polynomial beyond the step, at 2 h and 3 h, where its error is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from math import log
 from statistics import median
@@ -14,9 +15,10 @@ from statistics import median
 from flint import arb
 
 from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.validated import Validated
 from heavytop.integrate.trajectory import Problem, TaylorStep
-from heavytop.measure.drift import Running
+from heavytop.measure.drift import Running, Sums
 from heavytop.measure.scalar import GUARD_BITS, largest, metric, resolved, to_ball
 from heavytop.precision import exact
 from heavytop.records import Metric
@@ -43,27 +45,40 @@ class LocalError:
         begin = [exact(value) for value in step.start]
         truth = Validated(p.top, State(tuple(begin[:3]), tuple(begin[3:6])), p.system, p.parameters.rotor)
         length = exact(step.length)
+        truths = [truth.state(n * length, self.bits) for n in (1, _NEAR, _FAR)]
+        sums, order = self._following(step, truths, max(map(abs, begin)))
+        self.running.take(time, sums, keep=False)
+        self.orders += order
+
+    @whole_evaluation
+    def _following(
+        self, step: TaylorStep, truths: Sequence[Sequence[arb]], size: Fraction
+    ) -> tuple[Sums, tuple[float, ...]]:
+        """What the errors add up to with this step, and the order seen in it, if any."""
+        length = exact(step.length)
         with working_precision(self.bits):
-            scale = ball(p.precision.eps * max(map(abs, begin)))
-            self.running.add(
-                time, self._error([to_ball(value) for value in step.end], truth, length) / scale, keep=False
-            )
-            near, far = (self._error(_at(step, n * length), truth, n * length) for n in (_NEAR, _FAR))
+            scale = ball(self.problem.precision.eps * size)
+            computed = [to_ball(value) for value in step.end], *(_at(step, n * length) for n in (_NEAR, _FAR))
+            own, near, far = (_largest_gap(*pair) for pair in zip(computed, truths, strict=True))
+            order: tuple[float, ...] = ()
             if resolved(near) and resolved(far) and near > 0 and far > 0:
-                self.orders.append(float((far / near).log()) / log(_FAR / _NEAR) - 1)
+                order = (float((far / near).log()) / log(_FAR / _NEAR) - 1,)
+            return self.running.following(own / scale), order
 
-    def _error(self, state: list[arb], truth: Validated, time: Fraction) -> arb:
-        pairs = zip(state, truth.state(time, self.bits), strict=True)
-        return largest(value - true for value, true in pairs)
-
+    @whole_evaluation
     def metrics(self) -> dict[str, Metric]:
         """``local_error_ulp_max``, ``_rms`` and ``observed_order``, the median over the steps as a whole number."""
-        found = {name: m for name, m in self.running.metrics("local_error_ulp").items() if not name.endswith("final")}
         order = Metric("missing", None, "value")
-        if self.orders:
-            with working_precision(64):
+        with working_precision(self.bits):
+            found = self.running.metrics("local_error_ulp")
+            if self.orders:
                 order = metric(arb(round(median(self.orders))), "value")
+        found.pop("local_error_ulp_final")
         return found | {"observed_order": order}
+
+
+def _largest_gap(state: Sequence[arb], truth: Sequence[arb]) -> arb:
+    return largest(value - true for value, true in zip(state, truth, strict=True))
 
 
 def _at(step: TaylorStep, time: Fraction) -> list[arb]:

@@ -11,6 +11,7 @@ from typing import Any
 from flint import arb
 
 from heavytop.exact.balls import FUNCTIONS, working_precision
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.integrators import named
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
@@ -143,6 +144,7 @@ def _dense(problem: Problem, times: Sequence[Fraction]) -> list[Fraction]:
     return sorted(between | set(times), key=abs)
 
 
+@whole_evaluation
 def _angles(state: Any, followed: Sequence[float], precision: Precision) -> list[str]:
     """(φ, θ, ψ) of one state, shifted by the whole turns that were followed; ``nan`` at a pole."""
     with working_precision(precision.bits + GUARD_BITS):

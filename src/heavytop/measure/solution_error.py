@@ -9,12 +9,12 @@ from typing import Any
 from flint import arb
 
 from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.drift import Running
+from heavytop.measure.drift import Running, Sums, parameter_balls
 from heavytop.measure.scalar import GUARD_BITS, largest, resolved, to_ball
 from heavytop.records import Metric, Series
-from heavytop.top.equations import Parameters
 
 
 class SolutionError:
@@ -38,31 +38,29 @@ class SolutionError:
         self.break_away: Fraction | None = None
         self.running = {name: Running() for name in ("omega", "gamma", "along", "across")}
         self.system = problem.system
-        with working_precision(self.bits):
-            exact = problem.parameters
-            self.parameters = Parameters(
-                [ball(value) for value in exact.inertia], [ball(value) for value in exact.moment], ball(exact.rotor)
-            )
+        self.parameters = parameter_balls(problem, self.bits)
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
         """Take in one native state."""
-        truth = self.known.state(time, self.bits)
+        sums, left = self._following(state, self.known.state(time, self.bits))
+        keep = time in self.keep
+        for running, part in zip(self.running.values(), sums, strict=True):
+            running.take(time, part, keep)
+        if left and self.break_away is None:
+            self.break_away = time
+
+    @whole_evaluation
+    def _following(self, state: Sequence[Any], truth: Sequence[arb]) -> tuple[list[Sums], bool]:
+        """What the errors add up to with this state, and whether Ω is off by more than the threshold."""
         with working_precision(self.bits + GUARD_BITS):
             delta = [to_ball(value) - true for value, true in zip(state[:6], truth, strict=True)]
             flow = self.system.field(self.parameters, truth)
-            along, across = split(delta, flow)
-            keep = time in self.keep
             omega = largest(delta[:3])
-            for name, value in (
-                ("omega", omega),
-                ("gamma", largest(delta[3:])),
-                ("along", along),
-                ("across", across),
-            ):
-                self.running[name].add(time, value, keep)
-            if self.break_away is None and self.threshold is not None and omega > ball(self.threshold):
-                self.break_away = time
+            values = omega, largest(delta[3:]), *split(delta, flow)
+            sums = [running.following(value) for running, value in zip(self.running.values(), values, strict=True)]
+            return sums, self.threshold is not None and bool(omega > ball(self.threshold))
 
+    @whole_evaluation
     def metrics(self, prefix: str = "solution_error") -> dict[str, Metric]:
         """``PREFIX_omega_max``, ... for omega, gamma, along and across."""
         with working_precision(self.bits):

@@ -9,23 +9,29 @@ from rich.text import Text
 from heavytop.claims.judge import AuditReport, Row
 
 _WORDS = {True: "holds", False: "refuted", None: "undecided"}
+_KINDS = {"motion": "a motion", "integral": "a first integral", "relation": "an invariant relation"}
+_PROVEN = {
+    "motion": "Its equations of motion are proven for",
+    "integral": "It is proven to be constant along the motions of",
+    "relation": "It is proven to be kept by the motions of",
+}
 _STYLES = {True: "green", False: "bold red", None: "yellow"}
 
 
 def audit_text(report: AuditReport) -> RenderableType:
     """Verdict, a table of the equations, the witnesses of what is refuted, and why."""
-    head = Text(f"{report.claim} as a motion of {report.system}: ")
+    head = Text(f"{report.claim} as {_KINDS[report.kind]} of {report.system}: ")
     head.append(report.verdict, style=_STYLES[{"holds": True, "refuted": False}.get(report.verdict)])
     parts: list[RenderableType] = [head]
     if report.source:
         parts.append(Text(report.source))
     parts += [Text(f"{name} = {value}") for name, value in report.constants if name != value]
-    parts += [Text(), _table(report), Text(), *_witnesses(report)]
+    parts += [Text(), _table(report), Text(), *_witnesses(report), *_conditions(report)]
     if report.why:
         parts += [Text(), Text("Why, each step checked by the same algebra:")]
         parts += [Text(f"  [{_WORDS[finding.holds]}] {finding.statement}") for finding in report.why]
     solved = ", ".join(report.solves) or "none of the systems known here"
-    parts += [Text(), Text(f"Its equations of motion are proven for: {solved}")]
+    parts += [Text(), Text(f"{_PROVEN[report.kind]}: {solved}")]
     return Group(*parts)
 
 
@@ -57,4 +63,19 @@ def _witnesses(report: AuditReport) -> list[Text]:
     notes = {f"  {row.branch} {row.domain}: {row.note}" for row in report.rows if row.note}
     if notes:
         lines += [Text("The domains:"), *(Text(note) for note in sorted(notes))]
+    return lines
+
+
+def _conditions(report: AuditReport) -> list[Text]:
+    """What the proofs rest on, each condition once: first what is not discharged, with the rows that it leaves open."""
+    rows: dict[tuple[bool, str, str], list[str]] = {}
+    for row in report.rows:
+        if row.holds is not False:
+            for c in row.conditions:
+                rows.setdefault((c.discharged, c.text, c.reason), []).append(_label(row))
+    lines = [Text("Conditions of the proofs:")] if rows else []
+    for (discharged, text, reason), labels in sorted(rows.items()):
+        state = Text("discharged" if discharged else "not discharged", style=_STYLES[True if discharged else None])
+        where = "" if discharged else f" [{', '.join(dict.fromkeys(labels))}]"
+        lines.append(Text("  ").append(state).append(f": {text} ({reason}){where}"))
     return lines

@@ -15,6 +15,7 @@ from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
 from heavytop.records import UNMEASURED, Law, Metric, Row
+from heavytop.report.consistency import contradictions
 from heavytop.report.printable import printable
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def check_rows(file: Path, rows: Sequence[Row] | Sequence[BriefRow]) -> None:
                     _check_metric(f"{_where(file, row)}, {printable(name)[:60]}", metric, row.finite)
 
 
-def check_series(file: Path, rows: Iterable[Row]) -> None:
+def check_series(file: Path, rows: Iterable[Row | BriefRow]) -> None:
     """Raises InputError where a series has not one value for each time, or a number that is none."""
     for row in rows:
         for name, series in row.series.items():
@@ -66,6 +67,14 @@ def check_series(file: Path, rows: Iterable[Row]) -> None:
             for text in (*series.times, *series.values):
                 if text not in WORDS["value"] and not _plain(text):
                     _number(f"{_where(file, row)}, {printable(name)[:60]}", text)
+
+
+def check_consistency(file: Path, rows: Iterable[Row | BriefRow]) -> None:
+    """Raises InputError where the numbers of a row, each of which can be, contradict one another."""
+    for row in rows:
+        for problem in contradictions(row):
+            field, _, reason = problem.partition(": ")
+            raise InputError(f"{_where(file, row)}, {printable(field)[:60]}: {printable(reason)[:200]}.", REMEDY)
 
 
 def _plain(text: str) -> bool:
@@ -113,10 +122,6 @@ def _check_row(file: Path, row: Row | BriefRow) -> None:
 
 
 def _check_law(where: str, law: Law) -> None:
-    if (law.low is None) != (law.high is None) or (law.exponent is None and law.low is not None):
-        raise InputError(f"{where}: half an interval, or one without its exponent.", REMEDY)
-    if law.low is not None and law.high is not None and law.low > law.high:
-        raise InputError(f"{where}: an interval from {law.low:g} to {law.high:g}.", REMEDY)
     for name in ("first", "last", "detects", "lost_at"):
         text = getattr(law, name)
         if text is not None and _number(f"{where}, {name}", text) < 0:

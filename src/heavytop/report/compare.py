@@ -6,48 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-import msgspec
-
 from heavytop.errors import InputError
-from heavytop.measure.luck import accumulated, assumed, least
-from heavytop.precision import exact
-from heavytop.report.policy import BITS, Lookup, Policy
+from heavytop.report.policy import Policy
+from heavytop.report.row_comparison import Finding, RowComparison
 from heavytop.report.store import AnyReport, AnyRow
-from heavytop.report.verdicts import Judged, Verdict, judge, judge_law, judge_seconds, law_text
+from heavytop.report.verdicts import Verdict
+
+__all__ = ["Comparison", "Finding", "compare"]
 
 _MACHINE = ("system", "machine", "processor", "simd_width_double", "cpu_features")
 
 _FIRST = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Verdict.NEW)
-
-
-class Finding(msgspec.Struct, frozen=True, gc=False):
-    """One metric of one row: verdict, the two values as text, and why.
-
-    metric: "" for a whole row, ``growth NAME`` for the law of a series, ``seconds NAME`` for a timing.
-    """
-
-    key: tuple[str, ...]
-    metric: str
-    verdict: Verdict
-    baseline: str | None
-    candidate: str | None
-    reason: str = ""
-
-    def to_json(self) -> dict[str, Any]:
-        """The row of `compare --json`."""
-        measure, case, system, integrator, precision = self.key
-        return {
-            "case": case,
-            "metric": self.metric,
-            "verdict": self.verdict.value,
-            "baseline": self.baseline,
-            "candidate": self.candidate,
-            "reason": self.reason,
-            "measure": measure,
-            "system": system,
-            "integrator": integrator,
-            "precision": precision,
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +75,7 @@ def compare(baseline: AnyReport, candidate: AnyReport, policy: Policy, *, list_s
     Raises InputError where neither report has a row, or the policy leaves nothing to compare.
     """
     findings: list[Finding] = []
-    rows = _Rows(policy, _timed(policy, baseline.environment, candidate.environment), list_same)
+    rows = RowComparison(policy, _timed(policy, baseline.environment, candidate.environment), list_same)
     others = _Others(candidate.rows)
     for row in baseline.rows:
         key = row.key
@@ -150,106 +119,6 @@ class _Others:
             yield self._rows[number]
         for _, row in self._coming:
             yield row
-
-
-class _Rows:
-    def __init__(self, policy: Policy, timed: bool, list_same: bool) -> None:
-        self.policy = policy
-        self.list_same = list_same
-        self.same = 0
-        self.lookup = Lookup(policy)
-        self.timed = timed
-
-    def ignores(self, row: AnyRow) -> bool:
-        """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
-        return bool(self.policy.rule) and self.lookup.metric(self.lookup.row(row.measure, row.case), "").ignore
-
-    def compare(self, key: tuple[str, ...], old: AnyRow, new: AnyRow) -> list[Finding]:
-        reason = self._incomparable(old, new)
-        if reason:
-            return (
-                [] if self.ignores(old) else [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
-            )
-        rules = self.lookup.row(old.measure, old.case) if self.policy.rule else ()
-        loss = self.lookup.metric((), "").loss
-        found = []
-        for name, metric in old.metrics.items():
-            match = new.metrics.get(name)
-            if (
-                # most metrics of most reports: two numbers that differ by less than they may under every rule
-                not rules
-                and match is not None
-                and metric.log10 is not None
-                and match.log10 is not None
-                and metric.kind == match.kind == "error"
-                and -loss <= metric.log10 - match.log10 <= loss
-            ):
-                if self.list_same:
-                    found.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
-                else:
-                    self.same += 1
-            elif not (limits := self.lookup.metric(rules, name)).ignore:
-                if match is None:
-                    found.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
-                    continue
-                least_of = least(old.metrics, name), least(new.metrics, name)
-                eps = (1 - old.bits) * BITS + accumulated(old.measure, name, old.steps)
-                if metric.band is None and (luck := assumed(old.measure, old.integrator)):
-                    metric = msgspec.structs.replace(metric, band=luck)
-                verdict, why = judge(metric, match, limits, eps, self.policy.suspicious_digits, least_of)
-                found.append(Finding(key, name, verdict, metric.value, match.value, why))
-        if new.metrics.keys() != old.metrics.keys():
-            found += [
-                Finding(key, name, Verdict.NEW, None, metric.value)
-                for name, metric in new.metrics.items()
-                if name not in old.metrics and not self.lookup.metric(rules, name).ignore
-            ]
-        if old.laws or new.laws:
-            found += self._laws(key, rules, old, new)
-        if old.finite and not new.finite and not self.ignores(old):
-            found.append(Finding(key, "", Verdict.INCOMPARABLE, "finite", "not finite", "a value is no longer finite"))
-        if self.timed:
-            for name in sorted(old.seconds.keys() & new.seconds.keys()):
-                if not self.lookup.metric(rules, f"seconds {name}").ignore:
-                    verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
-                    before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
-                    found.append(Finding(key, f"seconds {name}", verdict, before, after, why))
-        return found
-
-    def _laws(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
-        for name in dict.fromkeys((*old.laws, *new.laws)):
-            metric = f"growth {name}"
-            if self.lookup.metric(rules, metric).ignore:
-                continue
-            a, b = old.laws.get(name), new.laws.get(name)
-            judged: Judged
-            if a is None or b is None:
-                judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
-            else:
-                judged = judge_law(a, b)
-            before, after = (None if law is None else law_text(law) for law in (a, b))
-            yield Finding(key, metric, judged[0], before, after, judged[1])
-
-    def _incomparable(self, old: AnyRow, new: AnyRow) -> str:
-        """Why two rows cannot be compared; empty where they can."""
-        for row, which in ((old, "baseline"), (new, "candidate")):
-            if row.outcome != "success":
-                return f"the {which} ended as {row.outcome} at t = {row.time_reached}"
-        if old.horizon != new.horizon and exact(old.horizon) != exact(new.horizon):
-            return f"horizon {old.horizon} against {new.horizon}"
-        if old.bits != new.bits:
-            return f"{old.bits} bits against {new.bits}"
-        if (old.starts == 1) != (new.starts == 1):
-            return f"{old.starts} starts against {new.starts}"
-        if old.flags != new.flags and self.policy.flags != "ignore":
-            names = [n for n in sorted({*old.flags, *new.flags}) if old.flags.get(n) != new.flags.get(n)]
-            return "flags differ: " + ", ".join(f"{n} {old.flags.get(n)} -> {new.flags.get(n)}" for n in names)
-        if old.against != new.against:
-            # known is known, whichever closed form or enclosure it was: a better certificate makes no difference
-            kinds = [row.against.partition(":")[0].partition(",")[0] for row in (old, new)]
-            if kinds[0] != kinds[1]:
-                return f"held against {kinds[0]!r} and {kinds[1]!r}"
-        return ""
 
 
 def _timed(policy: Policy, old: dict[str, Any], new: dict[str, Any]) -> bool:

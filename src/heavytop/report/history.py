@@ -14,13 +14,14 @@ from heavytop.errors import InputError
 from heavytop.precision import exact
 from heavytop.report.compare import compare
 from heavytop.report.comparison_text import row_name
+from heavytop.report.laws import law_text
 from heavytop.report.policy import Policy
 from heavytop.report.printable import printable
 from heavytop.report.section import clip
 from heavytop.report.store import AnyReport
 from heavytop.report.svg import document, quiet_style
 from heavytop.report.text import short
-from heavytop.report.verdicts import Verdict, law_text
+from heavytop.report.verdicts import Verdict
 
 _MARK = {
     Verdict.WORSE: "▲",

@@ -74,18 +74,8 @@ def trials(tasks: Sequence[Task], workers: int, progress: Callable[[Task], None]
     names = (CONTROL, *FAULTS)
     size = len(tasks) // (1 + len(names))
     healthy, *others = ([found[i] for i in range(at, at + size)] for at in range(0, len(tasks), size))
-    for other in others:
-        _lend_bands(healthy, other)
     compared = (compare(_report(healthy), _report(other), Policy()) for other in others)
     return [_trial(name, comparison) for name, comparison in zip(names, compared, strict=True)]
-
-
-def _lend_bands(healthy: Sequence[Row], others: Sequence[Row]) -> None:
-    """The luck of a motion is the healthy integrator's: what a broken one would measure as its own says nothing."""
-    for known, row in zip(healthy, others, strict=True):
-        for name, found in row.metrics.items():
-            if name in known.metrics:
-                found.band = known.metrics[name].band
 
 
 def _report(measured: Sequence[Row]) -> Report:

@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 import msgspec
 
 from heavytop.errors import InputError
-from heavytop.records import SCHEMA, Bits, Count, Law, Metric, Report, Row, Seconds, Starts
-from heavytop.report.checks import REMEDY, check_keys, check_rows, check_series
+from heavytop.records import SCHEMA, Bits, Count, Law, Metric, Report, Row, Seconds, Series, Starts
+from heavytop.report.checks import REMEDY, check_consistency, check_keys, check_rows, check_series
 from heavytop.suite.files import replace
 
 FILE = "report.json"
@@ -42,7 +42,7 @@ def _pieces(report: Report, rows: Iterable[Row]) -> Iterator[bytes]:
 
 
 class BriefRow(msgspec.Struct, gc=False):
-    """What a comparison needs of a :class:`heavytop.records.Row`: no series, no words about it."""
+    """What a comparison needs of a :class:`heavytop.records.Row`."""
 
     case: str
     system: str
@@ -56,8 +56,12 @@ class BriefRow(msgspec.Struct, gc=False):
     finite: bool
     metrics: dict[str, Metric]
     measure: str = ""
+    measured: str = ""
     against: str = ""
+    order: Count | None = None
     flags: dict[str, str] = {}
+    input_rounding: str | None = None
+    series: dict[str, Series] = {}
     starts: Starts = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, Seconds] = {}
@@ -111,6 +115,8 @@ class _Rows:
                 place = f"row {start + len(rows) + 1}: {error}"
                 raise InputError(f"{self._file} is not a whole report: {place}.", REMEDY) from None
             check_rows(self._file, rows)
+            check_series(self._file, rows)
+            check_consistency(self._file, rows)
             hashes = {hash(row.key) for row in rows}
             if len(hashes) < len(rows) or hashes & seen:
                 check_keys(self._file, (self._decode(row) for row in self._rows))
@@ -135,6 +141,7 @@ def read(path: Path) -> Report:
     check_keys(file, report.rows)
     check_rows(file, report.rows)
     check_series(file, report.rows)
+    check_consistency(file, report.rows)
     return report
 
 

@@ -7,14 +7,17 @@ from enum import Enum
 from fractions import Fraction
 
 from heavytop.errors import InputError
-from heavytop.measure.scalar import UNRESOLVED
+from heavytop.measure.scalar import RESOLVED_RADII, UNRESOLVED
 from heavytop.precision import exact, log10
-from heavytop.records import Law, Metric
+from heavytop.records import Metric
+from heavytop.report.noise import allowed_gain, allowed_loss
 from heavytop.report.policy import BITS, Limits, Timings
 
 _ROUNDED = 2e-6
 """Two logarithms of six decimals cannot tell a smaller difference."""
-_GROWTH = ("bounded", "t^0.5", "t", "t^1.5", "t^2", "exponential")
+_UNRESOLVED = math.log10(1 + RESOLVED_RADII)
+"""Decades by which the bound of an unresolved error may move with its reference as it was: it is |midpoint| + radius,
+from one radius to eleven."""
 
 
 class Verdict(Enum):
@@ -66,25 +69,21 @@ def size(metric: Metric) -> float:
     return -math.inf if found is None else found
 
 
-def band(old: Metric, new: Metric) -> float:
-    """Half-width in decades of the 95 % interval of the ratio: the bands of the two rows in quadrature."""
-    return math.hypot(old.band or 0.0, new.band or 0.0)
-
-
 def _errors(
     old: Metric, new: Metric, limits: Limits, floor: float, suspicious: float, least: tuple[float, float]
 ) -> Judged:
     """Smaller is better; below the floor all errors are the same.  What its reference does not resolve is at most its
-    bound: never better, and incomparable where the bound itself would be worse.
+    bound: never better, and incomparable where the bound itself would be worse, or where it has fallen so far that it
+    is another error or another reference.
     """
     a, b = max(size(old), floor, least[0]), max(size(new), floor, least[1])
     if limits.limit is not None and size(new) > limits.limit:
         known = new.value != UNRESOLVED
         return (Verdict.WORSE if known else Verdict.INCOMPARABLE), "above its limit" if known else "limit not resolved"
-    noise = limits.noise * band(old, new)
+    noise = limits.noise * (allowed_loss(old, new) if b > a else allowed_gain(old, new))
     allowed = max(limits.loss, noise) + _ROUNDED
     if new.value == UNRESOLVED:
-        return SAME if b <= a + allowed else (Verdict.INCOMPARABLE, f"unresolved below {new.bound}")
+        return _unresolved(old, new, b - a, allowed)
     if a == b or (old.value == UNRESOLVED and b <= a):
         return SAME
     if math.isinf(a) or math.isinf(b):
@@ -92,11 +91,22 @@ def _errors(
     lost = b - a
     if abs(lost) <= allowed:
         return SAME
-    luck = f", luck moves it by {noise / BITS:.1f} bits" if noise > limits.loss else ""
+    luck = f", noise moves it by {noise / BITS:.1f} bits" if noise > limits.loss else ""
     if lost > 0:
         return Verdict.WORSE, f"{lost / BITS:.1f} bits lost{luck}"
     odd = "; suspicious: look for a reason" if -lost > suspicious else ""
     return Verdict.BETTER, f"{-lost / BITS:.1f} bits gained{luck}{odd}"
+
+
+def _unresolved(old: Metric, new: Metric, lost: float, allowed: float) -> Judged:
+    """lost: decades from the error or bound of the baseline to the bound of the candidate, above the floor."""
+    if lost > allowed:
+        return Verdict.INCOMPARABLE, f"unresolved below {new.bound}"
+    # two bounds are those of a reference, and the floor is about errors
+    moved = size(new) - size(old) if old.value == UNRESOLVED else lost
+    if abs(moved) > allowed + _UNRESOLVED:
+        return Verdict.INCOMPARABLE, f"unresolved below {new.bound}, {abs(moved):.1f} decades away"
+    return SAME
 
 
 def _durations(old: Metric, new: Metric, limits: Limits) -> Judged:
@@ -112,10 +122,12 @@ def _durations(old: Metric, new: Metric, limits: Limits) -> Judged:
     if old.log10 is None:
         return Verdict.BETTER, f"now at {new.value}"
     ratio = 10 ** min(size(new) - old.log10, 300.0)
-    luck = 10 ** min(limits.noise * band(old, new), 300.0)
-    if ratio * luck < 1 and ratio < 1 - limits.duration:
+    shorter, longer = (
+        10 ** min(limits.noise * band, 300.0) for band in (allowed_loss(old, new), allowed_gain(old, new))
+    )
+    if ratio * shorter < 1 and ratio < 1 - limits.duration:
         return Verdict.WORSE, f"{1 - ratio:.0%} earlier"
-    if ratio > luck and ratio > 1 + limits.duration:
+    if ratio > longer and ratio > 1 + limits.duration:
         return Verdict.BETTER, f"{ratio - 1:.0%} later"
     return SAME
 
@@ -128,43 +140,8 @@ def _values(old: Metric, new: Metric, limits: Limits) -> Judged:
     if "never" in (old.value, new.value) or UNRESOLVED in (old.value, new.value):
         return differs
     a, b = exact(old.value), exact(new.value)
-    off = max(limits.value, 10 ** min(limits.noise * band(old, new), 300.0) - 1)
+    off = max(limits.value, 10 ** min(limits.noise * allowed_loss(old, new), 300.0) - 1)
     return SAME if abs(a - b) <= Fraction(off) * max(abs(a), abs(b)) else differs
-
-
-def law_text(law: Law) -> str:
-    """A growth law in a few words."""
-    if law.exponent is None:
-        return law.growth
-    span = "" if law.low is None or law.high is None else f" [{law.low:.3g}, {law.high:.3g}]"
-    return f"{law.growth}, exponent {law.exponent:.3g}{span}"
-
-
-def judge_law(old: Law, new: Law) -> Judged:
-    """A change of class is never noise; within a class, exponents whose intervals do not meet.
-
-    An exponent without an interval is the same as one that it equals or whose interval holds it; else nobody can tell.
-    """
-    if old.growth != new.growth:
-        if "unresolved" in (old.growth, new.growth):
-            return Verdict.INCOMPARABLE, "the growth is resolved in one report only"
-        worse = _GROWTH.index(new.growth) > _GROWTH.index(old.growth)
-        return (Verdict.WORSE if worse else Verdict.BETTER), f"grows like {new.growth}, not {old.growth}"
-    if old.exponent is None or new.exponent is None:
-        known = old.exponent is not None or new.exponent is not None
-        return (Verdict.INCOMPARABLE, "an exponent in one report only") if known else SAME
-    (low, high), (new_low, new_high) = _interval(old), _interval(new)
-    if new_low <= high and new_high >= low:
-        return SAME
-    if old.low is None or new.low is None:
-        return Verdict.INCOMPARABLE, "another exponent, and no interval to tell luck from it"
-    return (Verdict.WORSE, "a larger exponent") if new_low > high else (Verdict.BETTER, "a smaller exponent")
-
-
-def _interval(law: Law) -> tuple[float, float]:
-    """That of the exponent; where it has none, the exponent alone."""
-    assert law.exponent is not None
-    return (law.exponent, law.exponent) if law.low is None or law.high is None else (law.low, law.high)
 
 
 def judge_seconds(old: float, new: float, timings: Timings) -> Judged:

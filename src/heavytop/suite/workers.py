@@ -1,6 +1,7 @@
 """Where tasks run: in this process, in local processes, or on a Dask cluster.  The rows are the same.
 
-At most four tasks a worker are under way at a time, so that a plan of any length takes no more memory than that.
+At most four tasks a worker are under way at a time, so that a plan of any length takes no more memory than that.  A
+worker is a process, whatever the number of its threads.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from functools import cache
 from importlib import metadata
 from multiprocessing import get_context, parent_process
 from operator import itemgetter
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any
 
 from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
@@ -29,6 +30,9 @@ _PATIENCE = 30
 """Seconds without any worker after which a cluster is given up."""
 _RESUME = "Finished rows are kept: run again with --resume"
 _SAME = "Install the same versions on every machine."
+_one_task = Lock()
+"""A Dask worker with several threads measures one task at a time all the same: another beside it would spoil the
+timings, and another package's integrator need not bear threads.  Ensembles bring their own threads."""
 _PACKAGES = ("heavytop", "heyoka", "numpy", "mpmath", "gmpy2", "python-flint", "msgspec")
 
 Versions = dict[str, str]
@@ -119,8 +123,7 @@ def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Ite
             return future
 
         def at_once() -> int:
-            workers: int = sum(client.nthreads().values())
-            return _AHEAD * workers
+            return _AHEAD * len(client.nthreads())
 
         try:
             for index, future in _windowed(queue, {}, submit, at_once):
@@ -177,7 +180,8 @@ def _measure_as(expected: Versions, task: Task) -> Row:
     other = [f"{name} {here[name]} instead of {expected[name]}" for name in expected if here[name] != expected[name]]
     if other:
         raise InputError(f"A worker has {', '.join(other)}.", _SAME)
-    return _measure(task, Saved())
+    with _one_task:
+        return _measure(task, Saved())
 
 
 def _leave_interrupts_to_the_parent() -> None:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy
 from CyRK import cyjit, nbsolve2_ivp
 
-from heavytop.integrate.peers.double import Given, Solve, Solved, double_peer, fill, timed
+from heavytop.integrate.peers.double import Given, Solve, Solved, compiled_once, double_peer, fill, timed
 from heavytop.top.equations import System
 
 
-@cache
+@compiled_once
 def _machine_code(system: System) -> Any:
     return cyjit(fill(system))
 
 
-@cache
+@compiled_once
 def _warm(system: System, method: str) -> None:
     """Compiles what a first call would compile."""
     _call(Given(system, numpy.zeros(6), numpy.ones(1), numpy.ones(7), 1e-3), method).free()

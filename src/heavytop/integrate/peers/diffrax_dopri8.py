@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import diffrax
 import jax
 import jax.numpy as jnp
+import numpy
 
-from heavytop.integrate.peers.double import Given, Solved, double_peer, timed
+from heavytop.integrate.peers.double import Given, Solved, compiled_once, double_peer, timed
 from heavytop.integrate.trajectory import Outcome
 from heavytop.top.equations import Parameters, System
-
-jax.config.update("jax_enable_x64", True)
-jax.config.update("jax_platforms", "cpu")
 
 _MOST_STEPS = 2**24
 
 
-@cache
+@compiled_once
 def _compiled(system: System, count: int) -> Callable[..., Any]:
     """The integration to ``count`` times as machine code."""
 
@@ -47,9 +44,11 @@ def _compiled(system: System, count: int) -> Callable[..., Any]:
 
 
 def _solve(given: Given) -> Solved:
-    code, seconds = timed(_compiled, given.system, len(given.times))
-    run = code(given.start, given.times, given.numbers, given.setting)
-    states = jax.block_until_ready(run.ys)
+    # settings of this thread and this block alone: the user's jax stays what it is
+    with jax.enable_x64(True), jax.default_device(jax.devices("cpu")[0]):
+        code, seconds = timed(_compiled, given.system, len(given.times))
+        run = code(given.start, given.times, given.numbers, given.setting)
+        states = numpy.asarray(jax.block_until_ready(run.ys))
     # diffrax fills what it did not reach with infinities
     limit = bool(run.result == diffrax.RESULTS.max_steps_reached)
     outcome = Outcome.STEP_LIMIT if limit else Outcome.STEP_TOO_SMALL

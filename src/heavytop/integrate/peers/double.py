@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, wraps
+from threading import RLock
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -146,7 +147,22 @@ def _judged(
     )
 
 
-@cache
+Made = TypeVar("Made")
+
+
+def compiled_once(make: Callable[..., Made]) -> Callable[..., Made]:
+    """``make``, called once for the same arguments: what one thread compiles, the others wait for."""
+    known, compiling = cache(make), RLock()
+
+    @wraps(make)
+    def look_up(*arguments: Any) -> Made:
+        with compiling:
+            return known(*arguments)
+
+    return look_up
+
+
+@compiled_once
 def compiler() -> Callable[[Any], Any]:
     """numba's ``njit``, taught the vector product of this program; the identity where numba is not installed."""
     try:
@@ -164,7 +180,7 @@ def field_kind() -> str:
     return "python" if compiler().__module__ == __name__ else "numba"
 
 
-@cache
+@compiled_once
 def fill(system: System) -> Callable[..., None]:
     """(rates, t, y, numbers): writes the field at y into ``rates``.
 
@@ -181,7 +197,7 @@ def fill(system: System) -> Callable[..., None]:
     return write
 
 
-@cache
+@compiled_once
 def rates(system: System) -> Callable[..., Any]:
     """(t, y, numbers) -> the field at y as a new array; machine code where numba is installed."""
     import numpy

@@ -38,21 +38,23 @@ def odefun(
     problem = Problem.of(top, start, precision, system)
     evaluations = 0
     began = perf_counter()
-    with mpmath.workprec(precision.bits):
+    # a context of this run's own: that of the module is one for all threads
+    own = mpmath.ctx_mp.MPContext()
+    own.prec = precision.bits
 
-        def big(value: Fraction) -> Any:
-            return mpmath.mpf(value.numerator) / value.denominator
+    def big(value: Fraction) -> Any:
+        return own.mpf(value.numerator) / value.denominator
 
-        def rates(_time: Any, y: Any) -> list[Any]:
-            nonlocal evaluations
-            evaluations += 1
-            return list(system.field(p, y))
+    def rates(_time: Any, y: Any) -> list[Any]:
+        nonlocal evaluations
+        evaluations += 1
+        return list(system.field(p, y))
 
-        given = problem.parameters
-        p = Parameters([big(v) for v in given.inertia], [big(v) for v in given.moment], big(given.rotor))
-        wanted = None if tolerance is None else big(tolerance)
-        solve = mpmath.odefun(rates, 0, [big(v) for v in problem.start.flat], tol=wanted)
-        values = [[_exact(v) for v in solve(big(time))] for time in grid]
+    given = problem.parameters
+    p = Parameters([big(v) for v in given.inertia], [big(v) for v in given.moment], big(given.rotor))
+    wanted = None if tolerance is None else big(tolerance)
+    solve = own.odefun(rates, 0, [big(v) for v in problem.start.flat], tol=wanted)
+    values = [[_exact(v) for v in solve(big(time))] for time in grid]
     seconds = perf_counter() - began
     states = tuple(numpy.array([number(v, precision) for v in row]) for row in values)
     return Trajectory(

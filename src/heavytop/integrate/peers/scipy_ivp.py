@@ -6,10 +6,13 @@ A relative tolerance below 100 eps is raised to that, as SciPy would do with a w
 from __future__ import annotations
 
 import warnings
+from threading import Lock
 
 from heavytop.integrate.peers.double import Given, Solve, Solved, double_peer, rates, timed
 
 _FINEST = 100 * 2.0**-52
+_filters = Lock()
+"""The filters of warnings are one list for the whole process: two runs that change it would put it back wrongly."""
 
 
 def _solver(method: str) -> Solve:
@@ -18,7 +21,7 @@ def _solver(method: str) -> Solve:
 
         field, seconds = timed(rates, given.system)
         dense = len(given.times) > 1
-        with warnings.catch_warnings():
+        with _filters, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what they say is in the outcome
             run = solve_ivp(
                 field,

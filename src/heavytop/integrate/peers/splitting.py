@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
-from heavytop.integrate.peers.double import Given, Solve, Solved, compiler, double_peer, timed
+from heavytop.integrate.peers.double import Given, Solve, Solved, compiled_once, compiler, double_peer, timed
 from heavytop.top.equations import Parameters, System
 
 _SUZUKI = 1 / (4 - 4 ** (1 / 3))
@@ -34,7 +33,7 @@ STAGES = {
 }
 
 
-@cache
+@compiled_once
 def _stepper(system: System) -> Callable[..., None]:
     """(M and γ in one array, numbers, h, count, stages): ``count`` steps of size h."""
     import numpy

@@ -2,25 +2,57 @@
 
 from __future__ import annotations
 
-import io
-from contextlib import redirect_stdout
-from functools import cache
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Lock, get_ident
 from typing import Any
 
 import numpy
 from sksundae.cvode import CVODE
 
-from heavytop.integrate.peers.double import Given, Solved, compiler, double_peer, fill, timed
+from heavytop.integrate.peers.double import Given, Solved, compiled_once, compiler, double_peer, fill, timed
 from heavytop.top.equations import System
 
 _MOST_STEPS = 10**8
 
 
-@cache
+@compiled_once
 def _machine_code(system: System) -> Any:
     write = compiler()(fill(system))
     write(numpy.empty(6), 0.0, numpy.zeros(6), numpy.ones(7))
     return write
+
+
+class _Muted:
+    """Standard output without what one thread writes; anything else of it is as it was."""
+
+    def __init__(self, stream: Any, thread: int) -> None:
+        self.stream = stream
+        self.thread = thread
+
+    def write(self, text: str) -> int:
+        return len(text) if get_ident() == self.thread else self.stream.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
+
+
+_muting = Lock()
+"""Standard output is one for the whole process: two runs that replace it would put it back wrongly."""
+
+
+@contextmanager
+def _muted() -> Iterator[None]:
+    """Nothing that this thread prints is seen."""
+    with _muting:
+        before = sys.stdout
+        sys.stdout = muted = _Muted(before, get_ident())
+        try:
+            yield
+        finally:
+            if sys.stdout is muted:
+                sys.stdout = before
 
 
 def _solve(given: Given) -> Solved:
@@ -30,7 +62,7 @@ def _solve(given: Given) -> Solved:
         write(result, time, y, given.numbers)
 
     solver = CVODE(rates, method="Adams", rtol=given.setting, atol=given.setting, max_num_steps=_MOST_STEPS)
-    with redirect_stdout(io.StringIO()):  # CVODE prints why it gives up: the outcome says so
+    with _muted():  # CVODE prints why it gives up: the outcome says so
         run = solver.solve(numpy.concatenate([[0.0], given.times]), given.start)
     if len(given.times) == 1:
         # two times are a span: CVODE gives every step in between

@@ -128,13 +128,13 @@ def _shared(problems: tuple[Problem, ...], times: tuple[Fraction, ...]) -> dict[
 
 def _propagated(problems: list[Problem], times: list[Fraction], wider: Wider) -> list[Texts]:
     """The states of every problem at ``times``; those that are done are not computed again."""
-    done = _shared(tuple(problems), tuple(times))
-    done |= wider.done
-    wider.done = done
+    shared = _shared(tuple(problems), tuple(times))
+    # a copy: another thread may add to what is shared while this one saves its own
+    wider.done = done = shared.copy() | wider.done
     missing = [index for index in range(len(problems)) if index not in done]
 
     def finished(place: int, run: Trajectory) -> None:
-        done[missing[place]] = run.texts() if run.outcome is Outcome.SUCCESS else []
+        done[missing[place]] = shared[missing[place]] = run.texts() if run.outcome is Outcome.SUCCESS else []
         wider.changed()
 
     if missing:

@@ -16,6 +16,7 @@ import msgspec
 from flint import arb
 
 from heavytop.exact.balls import working_precision
+from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
@@ -54,9 +55,9 @@ class Remembered:
 
 
 def drift_bands(task: Task, run: Trajectory, metrics: Metrics) -> Metrics:
-    """``metrics`` of a drift row with their bands; as they are where the run failed or its integrator is broken."""
+    """``metrics`` of a drift row with their bands, from reruns of its integrator; as they are where it failed."""
     assert task.case is not None
-    if run.outcome is not Outcome.SUCCESS or task.integrator != "heyoka":
+    if run.outcome is not Outcome.SUCCESS:
         return metrics
     case, horizon = task.case, task.times[-1]
     end = horizon if run.steps <= _STEPS else horizon * _STEPS / run.steps
@@ -64,7 +65,7 @@ def drift_bands(task: Task, run: Trajectory, metrics: Metrics) -> Metrics:
     problem = _short(Problem.of(case.top, case.start, DOUBLE, case.system))
     integrals = holding(case.top, case.start, case.system)
     truth = _truth(problem, times) if any(name.startswith("solution_error") for name in metrics) else None
-    reruns = _reruns(problem, task.seed, times, lambda given: _Watched(given, integrals, truth))
+    reruns = _reruns(problem, task, times, lambda given: _Watched(given, integrals, truth))
     return _banded(task, metrics, reruns)
 
 
@@ -79,7 +80,7 @@ def homoclinic_bands(task: Task, run: Trajectory, metrics: Metrics, watch: Calla
     case = task.case
     end = (1.1 * DOUBLE.bits * math.log(2) + 4) / case.rate
     times = [time for time in task.times[3::4] if float(abs(time)) <= end]
-    reruns = _reruns(Problem.of(case.top, case.start, DOUBLE, case.system), task.seed, times, watch)
+    reruns = _reruns(Problem.of(case.top, case.start, DOUBLE, case.system), task, times, watch)
     banded = _banded(task, metrics, reruns)
     own = banded["break_away_time"]
     ends = [float(exact(rerun["break_away_time"].value)) for rerun in reruns if rerun["break_away_time"].log10]
@@ -89,16 +90,22 @@ def homoclinic_bands(task: Task, run: Trajectory, metrics: Metrics, watch: Calla
     return banded
 
 
-def _reruns(problem: Problem, seed: int, times: Sequence[Fraction], watch: Callable[[Problem], Watch]) -> list[Metrics]:
+def _reruns(
+    problem: Problem, task: Task, times: Sequence[Fraction], watch: Callable[[Problem], Watch]
+) -> list[Metrics]:
     """The same motion with other roundings; the metrics of each run."""
     p = problem.parameters
     problems = []
     for index in range(1, RERUNS + 1):
-        scale = factor(seed, index)
+        scale = factor(task.seed, index)
         inertia, moment = (tuple(scale * value for value in part) for part in (p.inertia, p.moment))
         problems.append(replace(problem, parameters=p._replace(inertia=inertia, moment=moment)))
     watches = [watch(given) for given in problems]
-    propagate_ensemble(problems, times, observer=lambda i, time, state: watches[i](time, state), threads=1)
+    if task.integrator == "heyoka":
+        propagate_ensemble(problems, times, observer=lambda i, time, state: watches[i](time, state), threads=1)
+    else:
+        for given, each in zip(problems, watches, strict=True):
+            FAULTS[task.integrator].propagate(given.top, given.start, times, DOUBLE, system=given.system, observer=each)
     return [watch.metrics() for watch in watches]
 
 

@@ -24,8 +24,11 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 def time_text(time: Fraction) -> str:
     """A time in reports: exact where 20 digits suffice, else 20 digits."""
-    value = Decimal(decimal_text(time, 20))
-    return format(value.normalize(), "f") if value and abs(time) < 10**15 else str(value)
+    text = decimal_text(time, 20)
+    if abs(time) >= 10**15:
+        return text
+    text = format(Decimal(text), "f")
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def time_metric(time: Fraction | None, kind: Kind) -> Metric:

@@ -1,0 +1,62 @@
+"""What a file assumes of its parameters: ``assume = ["alpha > 0", "I1 > I3", "k < 1"]``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import sympy
+
+from heavytop.errors import InputError
+
+Bound = tuple[sympy.Expr, sympy.Expr]
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """The fields of :class:`~heavytop.claims.statement.Setting` of the same names."""
+
+    positive: tuple[sympy.Symbol, ...]
+    greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...]
+    facts: tuple[sympy.Expr, ...]
+    ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...]
+
+
+def comparison(text: str) -> tuple[str, str]:
+    """(left, right) of ``left > right`` or ``right < left``; raises InputError for anything else."""
+    sign = ">" if ">" in text else "<"
+    left, found, right = (part.strip() for part in text.partition(sign))
+    if not found or not left or not right or {"<", ">", "="} & set(left + right):
+        raise InputError(f"assume: {text[:60]!r} is not understood.", "Write: formula > formula.")
+    return (left, right) if sign == ">" else (right, left)
+
+
+def assume(bounds: Sequence[Bound], moments: Iterable[sympy.Expr], symbols: Iterable[sympy.Symbol]) -> Assumed:
+    """What follows from left > right of each bound, and from positive principal moments."""
+    symbols = list(symbols)
+    positive = tuple(symbol for symbol in symbols if symbol.is_positive)
+    greater: list[tuple[sympy.Symbol, sympy.Expr]] = []
+    facts: list[sympy.Expr] = []
+    formed: set[sympy.Symbol] = set()
+    for left, right in bounds:
+        if left in positive and right == 0:
+            continue
+        # one bound below becomes a form of the symbol; it may not go round in a circle
+        free = left in symbols and left not in formed and not right.free_symbols & formed
+        if free and not any(left in other.free_symbols for _, other in greater) and left not in right.free_symbols:
+            greater.append((left, right))
+            formed.add(left)
+        else:
+            facts.append(left - right)
+    facts += [moment for moment in moments if not moment.is_positive]
+    return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges(bounds)))
+
+
+def _ranges(bounds: Sequence[Bound]) -> Iterable[tuple[sympy.Symbol, tuple[Fraction, Fraction]]]:
+    """Symbols between two fractions."""
+    lower = {left: right for left, right in bounds if left.is_Symbol and right.is_Rational}
+    upper = {right: left for left, right in bounds if right.is_Symbol and left.is_Rational}
+    for symbol in lower.keys() & upper.keys():
+        low, high = lower[symbol], upper[symbol]
+        yield symbol, (Fraction(int(low.p), int(low.q)), Fraction(int(high.p), int(high.q)))

@@ -1,0 +1,188 @@
+"""Statements of one claim, proven or not: their fields are shared, and every condition of a proof is listed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import sympy
+
+from heavytop.claims.algebra import Field
+from heavytop.claims.conditions import Kind, Need
+from heavytop.claims.evaluate import evaluate
+from heavytop.claims.proof import Condition, Region
+from heavytop.claims.signs import NUMBER_BITS, Unprovable
+from heavytop.claims.statement import Place, Setting, Statement
+
+_CONTINUOUS = "the formulas are real and continuous all over the domain"
+_ATTITUDE = "the attitude of the angles is continuous inside the domain"
+_SAMPLE = "every formula is defined and real at a sample in the domain"
+_DIVISORS = "the algebra divides by nothing that is 0"
+_ALGEBRA = "the algebra can carry the formulas"
+_REMOVABLE = "removable: the formulas are continuous across it"
+_AT_THE_END = "proven inside the domain, removable in gamma at its end"
+Key = tuple[int | bool | str, ...]
+
+
+class Prover:
+    """The statements of a claim with the fields in which they are proven."""
+
+    def __init__(self, statements: Sequence[Statement], setting: Setting) -> None:
+        self._statements = statements
+        self._setting = setting
+        self._fields: dict[Key, Field | None] = {}
+        self._regions: dict[int, Region] = {}
+        self._conditions: dict[object, tuple[Condition, ...]] = {}
+        self._places: dict[tuple[str, str], list[Place]] = {}
+
+    # --- fields -----------------------------------------------------------------------------------------------------
+
+    def field(self, statement: Statement, sign: int, *, strict: bool = False) -> Field | None:
+        """The field for this statement with this sign of the variable; None where the algebra cannot carry it."""
+        key: Key = (sign, strict, statement.branch, statement.domain.label + statement.domain.note)
+        if key not in self._fields:
+            alike = [
+                other
+                for other in self._statements
+                if (other.branch, other.domain) == (statement.branch, statement.domain)
+            ]
+            parts = [part for _, part in self._setting.parts.get(statement.branch, ())]
+            self._fields[key] = self._make(alike, sign, strict, parts)
+        if self._fields[key] is None:
+            alone: Key = (*key, str(statement.residual))
+            if alone not in self._fields:
+                self._fields[alone] = self._make([statement], sign, strict, [])
+            return self._fields[alone]
+        return self._fields[key]
+
+    def _make(
+        self, statements: Sequence[Statement], sign: int, strict: bool, parts: Iterable[sympy.Expr]
+    ) -> Field | None:
+        facts = (*statements[0].domain.facts, *self._kept_facts(statements[0]))
+        assumptions = self._setting.assumptions(sign, strict=strict, facts=facts)
+        expressions = dict.fromkeys([*(s.residual for s in statements), *parts])
+        for statement in statements:
+            f = statement.formulas
+            expressions |= dict.fromkeys((*f.values, *f.attitude))
+            expressions |= dict.fromkeys(need.expression for need in _sorted(f.needs | f.angle_needs))
+        try:
+            return Field(assumptions, expressions)
+        except Unprovable:
+            return None
+
+    def _kept_facts(self, statement: Statement) -> list[sympy.Expr]:
+        """Of a first integral: what has to be positive for it to be real, and stays so under the flow."""
+        if statement.flow is None:
+            return []
+        needs = [need for need in _sorted(statement.formulas.needs) if need.kind is not Kind.NONZERO]
+        try:
+            base = Field(self._setting.assumptions(0), [statement.residual, *(need.expression for need in needs)])
+        except Unprovable:
+            return []
+        region = Region(base, self._setting, statement, [])
+        kept = [need.expression for need in needs if region.is_kept(base.enter(need.expression).numerator)]
+        return [expression for expression in kept if not base.tower.sign(base.enter(expression)).value]
+
+    def _region(self, statement: Statement, sign: int, *, strict: bool) -> Region | None:
+        field = self.field(statement, sign, strict=strict)
+        if field is None:
+            return None
+        if id(field) not in self._regions:
+            self._regions[id(field)] = Region(field, self._setting, statement, self.places(statement))
+        return self._regions[id(field)]
+
+    def places(self, statement: Statement) -> list[Place]:
+        """Exact places in the domain, on all relations."""
+        key = (statement.domain.label + statement.domain.note, str(statement.domain.points))
+        if key not in self._places:
+            self._places[key] = list(self._setting.places(statement))
+        return self._places[key]
+
+    # --- proofs -----------------------------------------------------------------------------------------------------
+
+    def prove(self, statement: Statement) -> tuple[bool, tuple[Condition, ...]]:
+        """(whether the residual is proven to be 0, the conditions under which that proves the statement)."""
+        proven, divisors = self._identity(statement)
+        sample = self._sample(statement)
+        return proven, (*self._conditions_of(statement), *divisors, sample)
+
+    def _identity(self, statement: Statement) -> tuple[bool, list[Condition]]:
+        """By one field, or for ``all`` by one for either sign of the variable: together they are dense in it."""
+        domain = statement.domain
+        strict = bool(domain.sign)
+        divisors = self._zero_in(self._region(statement, domain.sign, strict=strict), statement)
+        if divisors is None and not domain.sign and not domain.note and statement.flow is None:
+            halves = [self._zero_in(self._region(statement, sign, strict=True), statement) for sign in (-1, 1)]
+            if halves[0] is not None and halves[1] is not None:
+                divisors = [*halves[0], *halves[1]]
+        if divisors is None:
+            return False, []
+        return True, [Condition(_DIVISORS, False, f"it divides by {text}") for text in divisors]
+
+    def _zero_in(self, region: Region | None, statement: Statement) -> list[str] | None:
+        """The divisors that stand against the proof; None where there is no proof."""
+        if region is None:
+            return None
+        if region.field.vanishes(statement.residual):
+            return list(region.divisors(forced=False))
+        radical = statement.flow is None or not statement.flow.is_relation
+        if region.field.is_forced(statement.residual, radical=radical):
+            return list(region.divisors(forced=True))
+        return None
+
+    def _sample(self, statement: Statement) -> Condition:
+        places = self.places(statement)
+        if not places:
+            return Condition(_SAMPLE, False, "no sample is proven to lie on the relations")
+        if any(self.is_defined(statement, place) for place in places):
+            return Condition(_SAMPLE, True, "checked in balls")
+        return Condition(_SAMPLE, False, "at no sample in the domain is every formula defined and real")
+
+    def is_defined(self, statement: Statement, place: Place) -> bool:
+        """Whether every formula and the residual is certainly defined and real at a place."""
+        formulas = statement.formulas
+        if not all(need.is_met(place) for need in formulas.needs | formulas.angle_needs):
+            return False
+        try:
+            return bool(evaluate(statement.residual, place, NUMBER_BITS).is_finite())
+        except Unprovable:
+            return False
+
+    def _conditions_of(self, statement: Statement) -> tuple[Condition, ...]:
+        key = (statement.branch, statement.domain, statement.formulas, id(statement.flow))
+        if key not in self._conditions:
+            self._conditions[key] = tuple(self._make_conditions(statement))
+        return self._conditions[key]
+
+    def _make_conditions(self, statement: Statement) -> list[Condition]:
+        domain, f = statement.domain, statement.formulas
+        ends = domain.holds_its_end
+        whole = self._region(statement, domain.sign, strict=bool(domain.sign) and not ends)
+        inner = self._region(statement, domain.sign, strict=True) if ends else whole
+        if whole is None or inner is None:
+            return [Condition(_ALGEBRA, False, "the formulas are too large, or hold what it does not know")]
+        against = whole.obstacle(f.values), inner.obstacle(f.attitude)
+        continuous = bool(f.values) and not any(against)
+        found = {need: whole.discharge(need) for need in _sorted(f.needs | f.angle_needs)}
+        for need, how in found.items():
+            if not how and need not in f.needs and inner.discharge(need) and continuous:
+                found[need] = _AT_THE_END
+            elif not how and continuous and inner.is_removable(need):
+                found[need] = _REMOVABLE
+        conditions = [Condition(need.text, bool(how), how or "not shown") for need, how in found.items()]
+        for text, values, obstacle in ((_CONTINUOUS, f.values, against[0]), (_ATTITUDE, f.attitude, against[1])):
+            if values:
+                conditions.append(Condition(text, not obstacle, obstacle or "by the rules of composition"))
+        if f.pole:
+            conditions.append(Condition(f.pole, continuous, "removable in gamma" if continuous else "not shown"))
+        return [*conditions, *self._kept(statement, whole)]
+
+    def _kept(self, statement: Statement, region: Region) -> Iterable[Condition]:
+        """The side conditions are invariant: their rates are combinations of them."""
+        for text, rate in statement.flow.kept if statement.flow is not None else ():
+            kept = region.field.vanishes(rate) or region.field.is_forced(rate, radical=False)
+            reason = "its rate is a combination of the conditions" if kept else "its rate is not shown to be 0 there"
+            yield Condition(f"{text} = 0 is kept by the flow", kept, reason)
+
+
+def _sorted(needs: Iterable[Need]) -> list[Need]:
+    return sorted(needs, key=lambda need: (need.kind.value, str(need.expression)))

@@ -1,0 +1,309 @@
+"""Exponentials, circular functions, logarithms and inverse functions as generators of a tower.
+
+Exponentials and circular functions of commensurable arguments become powers of one generator each; what is left
+(inverse functions, logarithms) becomes a free generator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import sympy
+from flint import fmpz
+
+from heavytop.claims.evaluate import evaluate
+from heavytop.claims.rational import Quotient
+from heavytop.claims.signs import NUMBER_BITS, Sign, Unprovable, used
+
+if TYPE_CHECKING:
+    from heavytop.claims.algebra import Field
+
+_MAX_MULTIPLE = 64
+_FACTORED_BITS = 64
+_INVERSE = ("asin", "acos", "atan", "atan2")
+# 22/7 is larger than pi
+_RANGES = {
+    "asin": (Fraction(-11, 7), Fraction(11, 7)),
+    "atan": (Fraction(-11, 7), Fraction(11, 7)),
+    "acos": (Fraction(0), Fraction(22, 7)),
+    "atan2": (Fraction(-22, 7), Fraction(22, 7)),
+}
+Circle = tuple[Quotient, Quotient]
+
+
+class Refine(Exception):
+    """A base of exponentials has to be divided: start again."""
+
+
+class Transcendental:
+    """The transcendental generators of ``field``.  ``divisors`` outlives it: what the bases have to be divided by."""
+
+    def __init__(self, field: Field, divisors: list[int]) -> None:
+        self._field = field
+        self._tower = field.tower
+        self._divisors = divisors
+        self._bases: list[tuple[str, Quotient, int]] = []
+        self._functions: dict[tuple[str, ...], int] = {}
+
+    # --- exponentials -----------------------------------------------------------------------------------------------
+
+    def exponential(self, argument: Quotient) -> Quotient:
+        """exp of an argument; whole and half multiples of logarithms in it come out as powers."""
+        argument, factor = self._without_logarithms(argument)
+        if not argument.numerator:
+            return factor
+
+        def make(base: Quotient, _divisor: int) -> int:
+            meaning = sympy.exp(self._field.expression(base))
+            index = self._new("exp", meaning, (base,), Sign(1, True))
+            self._declare_size(index, self._tower.sign(base).value)
+            return index
+
+        index, multiple = self._multiple("exp", argument, make)
+        return self._tower.product(
+            (factor, self._tower.power(self._tower.polynomial(self._tower.gens[index]), multiple))
+        )
+
+    def hyperbolic(self, name: str, argument: Quotient) -> Quotient:
+        """sinh, cosh, tanh and their reciprocals."""
+        t = self._tower
+        up = self.exponential(argument)
+        down = t.power(up, -1)
+        sine, cosine = t.sum((up, t.product((t.number(-1), down)))), t.sum((up, down))
+        two = t.number(2)
+        above, below = {
+            "sinh": (sine, two),
+            "cosh": (cosine, two),
+            "tanh": (sine, cosine),
+            "coth": (cosine, sine),
+            "sech": (two, cosine),
+            "csch": (two, sine),
+        }[name]
+        return t.divide(above, below)
+
+    def _without_logarithms(self, argument: Quotient) -> tuple[Quotient, Quotient]:
+        """(argument without multiples of logarithms, their exponentials)."""
+        t, factor, rest = self._tower, self._tower.number(1), {}
+        denominator = argument.denominator
+        if not denominator.is_constant():
+            return argument, factor
+        for monomial, coefficient in argument.numerator.to_dict().items():
+            twice = 2 * Fraction(int(coefficient.p), int(coefficient.q))
+            index = _single(monomial)
+            is_log = index is not None and t.generators[index].kind == "log"
+            if is_log and index is not None and twice.denominator == 1 and abs(twice) <= _MAX_MULTIPLE:
+                inside = t.generators[index].arguments[0]
+                base = inside if twice % 2 == 0 else t.root(inside)
+                power = int(twice) // 2 if twice % 2 == 0 else int(twice)
+                factor = t.product((factor, t.power(base, power)))
+            else:
+                rest[monomial] = coefficient
+        return t.polynomial(t.context.from_dict(rest)), factor
+
+    def _declare_size(self, index: int, sign: int) -> None:
+        """An exponential of known sign of the argument lies above or below 1."""
+        if sign:
+            excess = self._tower.add(f"excess over 1 of x{index}", constant=False, sign=1)
+            self._tower.signs.declare_form(index, self._tower.gens[excess] + 1)
+            if sign < 0:
+                self._tower.signs.declare_below_one(index)
+
+    def _multiple(self, kind: str, argument: Quotient, make: Callable[[Quotient, int], int]) -> tuple[int, int]:
+        """(generator, n): the argument is n times the generator's base.
+
+        make: adds the generator of a new base, which is the argument over as much as has turned out to be needed.
+        """
+        for position, (known_kind, base, index) in enumerate(self._bases):
+            if kind == known_kind:
+                ratio = self._tower.divide(argument, base)
+                if not used(ratio.numerator) and ratio.denominator == self._tower.one:
+                    value = ratio.numerator.leading_coefficient()
+                    if value.q > 1:
+                        self._divisors[position] *= int(value.q)
+                        raise Refine
+                    if abs(value.p) > _MAX_MULTIPLE:
+                        raise Unprovable(f"A multiple {value.p} of an argument.")
+                    return index, int(value.p)
+        if len(self._divisors) <= len(self._bases):
+            self._divisors.append(1)
+        divisor = self._divisors[len(self._bases)]
+        if divisor > _MAX_MULTIPLE:
+            raise Unprovable(f"A multiple {divisor} of an argument.")
+        base = self._tower.product((argument, self._tower.number(Fraction(1, divisor))))
+        position = len(self._bases)
+        self._bases.append((kind, base, -1))
+        self._bases[position] = (kind, base, make(base, divisor))
+        return self._bases[position][2], divisor
+
+    # --- the circle -------------------------------------------------------------------------------------------------
+
+    def circle(self, argument: Quotient) -> Circle:
+        """(sin, cos) of an argument: sums by the addition theorem, multiples by powers of cos + i sin."""
+        t = self._tower
+        total: Circle = (t.number(0), t.number(1))
+        if not argument.numerator:
+            return total
+        for part in _terms(argument, self._field):
+            total = self._turn(total, self._circle_of_term(part))
+        return total
+
+    def _circle_of_term(self, value: Quotient) -> Circle:
+        inverse = self._inverse_multiple(value)
+        if inverse is not None:
+            return self._turned(*inverse)
+
+        def make(base: Quotient, _divisor: int) -> int:
+            part = self._field.expression(base)
+            sine, cosine = sympy.sin(part, evaluate=False), sympy.cos(part, evaluate=False)
+            index = self._new("sin", sine, (base,), Sign(0, False))
+            square = 1 - self._tower.gens[index] ** 2
+            partner = self._tower.add_root(("cos", part), square, sign=0, kind="cos")
+            self._field.means(partner, cosine)
+            self._set_number(partner, cosine)
+            self._tower.signs.circles[index] = partner
+            unit = (Fraction(-1), Fraction(1))
+            self._tower.signs.ranges |= {index: unit, partner: unit}
+            return index
+
+        index, multiple = self._multiple("circle", value, make)
+        t = self._tower
+        cosine = self._tower.signs.circles[index]
+        return self._turned((t.polynomial(t.gens[index]), t.polynomial(t.gens[cosine])), multiple)
+
+    def _inverse_multiple(self, value: Quotient) -> tuple[Circle, int] | None:
+        """((sin, cos) of an inverse function, n) where the value is n times it."""
+        t = self._tower
+        terms = value.numerator.to_dict()
+        if len(terms) != 1 or not value.denominator.is_constant():
+            return None
+        ((monomial, coefficient),) = terms.items()
+        index = _single(monomial)
+        if index is None or coefficient.q != 1 or abs(coefficient.p) > _MAX_MULTIPLE:
+            return None
+        g = t.generators[index]
+        if g.kind not in _INVERSE:
+            return None
+        u, one = g.arguments[0], t.number(1)
+        square = t.product((u, u))
+        other = t.root(t.sum((one, t.product((t.number(1 if g.kind == "atan" else -1), square)))))
+        if g.kind == "atan2":
+            x = g.arguments[1]
+            radius = t.root(t.sum((square, t.product((x, x)))))
+            pair = t.divide(u, radius), t.divide(x, radius)
+        elif g.kind == "atan":
+            pair = t.divide(u, other), t.divide(one, other)
+        else:
+            pair = (u, other) if g.kind == "asin" else (other, u)
+        return pair, int(coefficient.p)
+
+    def _turned(self, pair: Circle, multiple: int) -> Circle:
+        """(sin, cos) of a multiple."""
+        sine, cosine = pair
+        if multiple < 0:
+            sine = self._tower.product((self._tower.number(-1), sine))
+        result = (self._tower.number(0), self._tower.number(1))
+        for _ in range(abs(multiple)):
+            result = self._turn(result, (sine, cosine))
+        return result
+
+    def _turn(self, a: Sequence[Quotient], b: Sequence[Quotient]) -> Circle:
+        """(sin, cos) of a sum."""
+        t = self._tower
+        minus = t.number(-1)
+        return (
+            t.sum((t.product((a[0], b[1])), t.product((a[1], b[0])))),
+            t.sum((t.product((a[1], b[1])), t.product((minus, a[0], b[0])))),
+        )
+
+    # --- logarithms and the rest ------------------------------------------------------------------------------------
+
+    def logarithm(self, inside: Quotient) -> Quotient:
+        """ln: exponentials come out as their arguments, positive factors and primes as logarithms of their own."""
+        t = self._tower
+        total, sign, number, left = t.number(0), 1, Fraction(1), [t.one, t.one]
+        for side, part in enumerate((inside.numerator, inside.denominator)):
+            constant, factors = part.factor()
+            sign *= 1 if constant > 0 else -1
+            number *= abs(Fraction(int(constant.p), int(constant.q))) ** (1 - 2 * side)
+            for factor, power in factors:
+                known = t.signs.of(factor)
+                if known.value and known.strict:
+                    sign *= known.value ** int(power)
+                    weight = t.number(int(power) * (1 - 2 * side))
+                    total = t.sum((total, t.product((weight, self._logarithm_of_factor(factor * known.value)))))
+                else:
+                    left[side] = t.times(left[side], t.raised(factor, int(power)))
+        total = t.sum((total, self._logarithm_of_number(number)))
+        if left == [t.one, t.one] and sign > 0:
+            return total
+        return t.sum((total, self.function("log", (t.quotient(left[0] * sign, left[1]),))))
+
+    def _logarithm_of_number(self, value: Fraction) -> Quotient:
+        """ln of a positive fraction, over its primes where they are small."""
+        t, total = self._tower, self._tower.number(0)
+        for whole, weight in ((value.numerator, 1), (value.denominator, -1)):
+            primes = fmpz(whole).factor() if whole.bit_length() <= _FACTORED_BITS else [(whole, 1)]
+            for prime, power in primes:
+                if prime != 1:
+                    one = self.function("log", (t.number(int(prime)),))
+                    total = t.sum((total, t.product((t.number(weight * int(power)), one))))
+        return total
+
+    def _logarithm_of_factor(self, factor: Any) -> Quotient:
+        """ln of an irreducible positive polynomial."""
+        t = self._tower
+        index = _single(next(iter(factor.to_dict()))) if len(factor) == 1 else None
+        if index is not None and factor == t.gens[index]:
+            g = t.generators[index]
+            if g.kind == "exp":
+                return g.arguments[0]
+            if g.kind == "root":
+                return t.product((t.number(Fraction(1, 2)), self.logarithm(g.arguments[0])))
+        return self.function("log", (t.polynomial(factor),))
+
+    def function(self, name: str, arguments: tuple[Quotient, ...]) -> Quotient:
+        """A free generator for a function of these arguments: the same arguments, the same generator."""
+        key = (name, *(str((a.numerator, a.denominator)) for a in arguments))
+        if key not in self._functions:
+            make = getattr(sympy, name)
+            meaning = make(*(self._field.expression(argument) for argument in arguments), evaluate=False)
+            sign = Sign(0, False)
+            if name in ("asin", "atan"):
+                sign = self._tower.sign(arguments[0])
+            elif name == "acos":
+                sign = Sign(1, False)
+            index = self._new(name, meaning, arguments, sign)
+            if name in _RANGES:
+                self._tower.signs.ranges[index] = _RANGES[name]
+            self._functions[key] = index
+        return self._tower.polynomial(self._tower.gens[self._functions[key]])
+
+    def _new(self, kind: str, meaning: sympy.Expr, arguments: tuple[Quotient, ...], sign: Sign) -> int:
+        constant = all(self._field.is_constant(argument) for argument in arguments)
+        index = self._tower.add(
+            meaning, constant=constant, sign=sign.value, strict=sign.strict, kind=kind, arguments=arguments
+        )
+        self._field.means(index, meaning)
+        self._set_number(index, meaning)
+        return index
+
+    def _set_number(self, index: int, meaning: sympy.Expr) -> None:
+        if not meaning.free_symbols:
+            self._tower.signs.numbers[index] = evaluate(meaning, {}, NUMBER_BITS)
+
+
+def _single(monomial: Any) -> int | None:
+    """The generator that a monomial is, or None."""
+    powers = [(index, int(power)) for index, power in enumerate(monomial) if power]
+    return powers[0][0] if len(powers) == 1 and powers[0][1] == 1 else None
+
+
+def _terms(argument: Quotient, field: Field) -> list[Quotient]:
+    """The summands of an argument; in one piece where it has a denominator."""
+    t = field.tower
+    return [
+        t.quotient(t.context.from_dict({monomial: coefficient}), argument.denominator)
+        for monomial, coefficient in argument.numerator.to_dict().items()
+    ]

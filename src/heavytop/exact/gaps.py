@@ -1,0 +1,237 @@
+"""A variable that swings between two simple real roots of a polynomial, and its Abel integrals with a proven error.
+
+    v = m + d cos θ,   m = (lo + hi)/2,   d = (hi − lo)/2,   f(v) = (v − lo)(hi − v) g(v),   g > 0 on [lo, hi]
+
+The phase θ of a motion in the gap is monotone and regular, turning points included.  Abel's integrals
+
+    F_j(θ) = ∫_0^θ v^j/√g dθ = c_0 θ + Σ (2c_n/n) sin nθ
+
+grow by a real period with every turn.  Their integrand h is even and 2π-periodic, and analytic on |Im θ| ≤ η as long as
+v, which runs through ellipses there, leaves every other root b outside: η < β = |Im arccos z|, z = (b − m)/d, and
+
+    |v − b| ≥ d (cosh β − cosh η),   cosh β = ½ (|z + 1| + |z − 1|),
+
+since cos θ − z is a product of two sines and |sin(x + iy)| ≥ sinh|y|.  That gives a bound W of |h|, and
+|c_n| ≤ W e^(−η|n|).  From N equidistant values come c_n, n < N/2, with an error of at most
+2W e^(−η(N − n))/(1 − e^(−ηN)) (aliasing); F, cut at n = N/2, is off by at most
+
+    (4/(1 − e^(−ηN)) + 2) W e^(−ηN/2)/(1 − e^(−η)),   the error of c_0 apart.
+
+Sums are products of matrices and vectors of cos jθ, sin jθ: Horner's rule at the ball e^(iθ) would lose a factor √2
+with every degree.  Source: Trefethen and Weideman, SIAM Review 56 (2014), theorem 3.1, for the error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, isqrt, log, pi
+from typing import Any
+
+import numpy as np
+from flint import acb, arb, arb_mat, ctx, fmpq
+from numpy.typing import NDArray
+
+from heavytop.errors import OutOfReach
+from heavytop.exact.balls import working_precision
+from heavytop.exact.closed_form import constant
+
+MOST_TERMS = 1 << 17
+_WIDTH, _FARTHEST, _BOUND_BITS = 0.9, 100, 64
+
+
+@dataclass(frozen=True, slots=True)
+class Roots:
+    """g(v) = lead Π |v − b|^multiplicity.
+
+    lead: > 0.  real: (b, multiplicity).  pairs: (Re b, |Im b|, multiplicity), once for b and its conjugate.
+    """
+
+    lead: arb
+    real: tuple[tuple[arb, int], ...]
+    pairs: tuple[tuple[arb, arb, int], ...]
+
+    @classmethod
+    def of(cls, lead: arb, roots: Sequence[tuple[acb, int]]) -> Roots:
+        """From all roots of a real polynomial; a root is real where its imaginary part is exactly 0."""
+        real = tuple((b.real, many) for b, many in roots if b.imag.is_zero())
+        return cls(lead, real, tuple((b.real, b.imag, many) for b, many in roots if b.imag > 0))
+
+    def density(self, v: Any) -> Any:
+        """1/√g at a number or series v; not finite where g may vanish."""
+        product = self.lead
+        for b, many in self.real:
+            product = product * (v - b) ** many
+        for x, y, many in self.pairs:
+            product = product * ((v - x) * (v - x) + y * y) ** many
+        return (-product if constant(product) < 0 else product).rsqrt()
+
+    def all(self) -> list[tuple[acb, int]]:
+        """Every b; of a pair the one above the real axis, with twice its multiplicity."""
+        return [(acb(b), many) for b, many in self.real] + [(acb(x, y), 2 * many) for x, y, many in self.pairs]
+
+
+class SineSums:
+    """Σ_n a_n sin nθ, n ≥ 1, for several rows of coefficients at once."""
+
+    def __init__(self, rows: Sequence[Sequence[arb]]) -> None:
+        length = len(rows[0]) + 1
+        self.small = max(1, isqrt(length))
+        self.large = -(-length // self.small)
+        size = self.small * self.large
+        padded = [[arb(0), *row, *[arb(0)] * (size - length)] for row in rows]
+        self.matrix = arb_mat([row[i : i + self.small] for row in padded for i in range(0, size, self.small)])
+
+    def at(self, angle: arb) -> list[arb]:
+        """Each sum at the angle: sin(l + j)θ = sin lθ cos jθ + cos lθ sin jθ."""
+        steps = [(angle * j).sin_cos() for j in range(self.small)]
+        inner = self.matrix * arb_mat([[cosine, sine] for sine, cosine in steps])
+        leaps = [(angle * (i * self.small)).sin_cos() for i in range(self.large)]
+        rows = arb_mat(inner.nrows() // self.large, 2 * self.large, inner.entries())
+        return (rows * arb_mat(2 * self.large, 1, [part for pair in leaps for part in pair])).entries()
+
+
+class Gap:
+    """A variable between two simple real roots ``lo`` < ``hi``.
+
+    rest: g.  count: how many integrals, j = 0 .. count − 1.  most: OutOfReach is raised where the Fourier series needs
+    more terms than this at the working precision.
+    """
+
+    turn = 2 * pi
+    periodic = True
+
+    def __init__(self, lo: arb, hi: arb, rest: Roots, count: int = 2, most: int = MOST_TERMS) -> None:
+        self.middle, self.reach, self.rest = (lo + hi) / 2, (hi - lo) / 2, rest
+        self.density = rest.density
+        bound = FourierBound(self.middle, self.reach, rest)
+        self.terms = bound.terms(most)
+        rows = fourier_rows(self.middle, self.reach, rest, self.terms, count)
+        self.means = [row[0] + bound.mean_error(self.terms, j) for j, row in enumerate(rows)]
+        self.errors = [bound.sum_error(self.terms, j) for j in range(count)]
+        sines = [[2 * c / n for n, c in enumerate(row[1:], 1)] for row in rows]
+        self.sums = SineSums(sines)
+        self._floats = _significant(np.array([[float(a) for a in row] for row in sines]))
+        self._mean_floats = np.array([float(mean) for mean in self.means])
+        self._orders = np.arange(1, self._floats.shape[1] + 1)
+
+    @property
+    def column(self) -> list[arb]:
+        """The real periods."""
+        return [2 * arb.pi() * mean for mean in self.means]
+
+    def position(self, phase: Any) -> Any:
+        """See :class:`heavytop.exact.abel.Variable`."""
+        return self.middle + self.reach * phase.cos()
+
+    def ends(self, phase: Any) -> tuple[Any, Any]:
+        """√(v − lo) and √(hi − v), each with a sign that makes it analytic: √(2d) cos(θ/2), √(2d) sin(θ/2)."""
+        sine, cosine = (phase / 2).sin_cos()
+        root = (2 * self.reach).sqrt()
+        return root * cosine, root * sine
+
+    def bend(self, phase: Any) -> Any:
+        """−dv/dθ over the product of :meth:`ends`."""
+        return phase * 0 + 1
+
+    def phase(self, v: arb, slope: arb) -> arb:
+        """θ in (−π/2, 3π/2) from v and dv/dθ."""
+        cosine, sine = v - self.middle, -slope
+        if cosine > 0:
+            return arb.atan2(sine, cosine)
+        return arb.pi() + arb.atan2(-sine, -cosine)
+
+    def integrals(self, phase: arb) -> list[arb]:
+        """See :class:`heavytop.exact.abel.Variable`."""
+        sums = self.sums.at(phase)
+        return [c * phase + total + e for c, total, e in zip(self.means, sums, self.errors, strict=True)]
+
+    def estimates(self, phase: float) -> NDArray[np.float64]:
+        """See :class:`heavytop.exact.abel.Variable`."""
+        found: NDArray[np.float64] = self._mean_floats * phase + self._floats @ np.sin(self._orders * phase)
+        return found
+
+
+class FourierBound:
+    """The error of the Fourier series of v^j/√g; see the head of this file."""
+
+    def __init__(self, middle: arb, reach: arb, rest: Roots) -> None:
+        self.bits = ctx.prec
+        with working_precision(_BOUND_BITS):
+            heights = [(_cosh((b - middle) / reach), many) for b, many in rest.all()]
+            nearest = min((height.lower() for height, _ in heights), default=arb(_FARTHEST))
+            self.width = (nearest.acosh() * _WIDTH).lower()
+            square = rest.lead
+            for height, many in heights:
+                square = square * (reach * (height - self.width.cosh())) ** many
+            self.largest = square.rsqrt()
+            self.farthest = abs(middle) + reach * self.width.cosh()
+            excess = 7 * self.largest / (rest.density(middle) * (1 - (-self.width).exp()))
+            self.wanted = 2 * (float(excess.log()) + self.bits * log(2)) / float(self.width)
+
+    def terms(self, most: int) -> int:
+        """N, 2^k or 3·2^k, with an error of the sums below the working precision."""
+        if not self.wanted <= most:
+            raise OutOfReach(
+                f"Abel's integrals need {self.wanted:.3g} Fourier terms, more than {most}: two roots all but coincide.",
+                "Ask for fewer digits, or take a start farther from the degenerate motion.",
+            )
+        power = max(32, 1 << ceil(self.wanted).bit_length())
+        return power // 4 * 3 if power // 4 * 3 >= self.wanted else power
+
+    def mean_error(self, terms: int, order: int) -> arb:
+        """The ball around 0 with the error of c_0."""
+        return self._ball(2 * (-self.width * terms).exp() / (1 - (-self.width * terms).exp()), order)
+
+    def sum_error(self, terms: int, order: int) -> arb:
+        """The ball around 0 with the error of F, c_0 apart."""
+        tail = (-self.width * terms / 2).exp() / (1 - (-self.width).exp())
+        return self._ball((4 / (1 - (-self.width * terms).exp()) + 2) * tail, order)
+
+    def _ball(self, factor: arb, order: int) -> arb:
+        return arb(0, (factor * self.largest * self.farthest**order).upper())
+
+
+def _cosh(z: acb) -> arb:
+    """cosh of |Im arccos z|, at least 1."""
+    return (abs(z + 1) + abs(z - 1)) / 2
+
+
+def fourier_rows(middle: arb, reach: arb, rest: Roots, terms: int, count: int) -> list[list[arb]]:
+    """c_n, n < N/2, of v^j/√g, j < count, from ``terms`` = N values, 4 | N: without the error of aliasing."""
+    half = terms // 2
+    cosines = [arb.cos_pi_fmpq(fmpq(i, half)) for i in range(half + 1)]
+    places = [middle + reach * cosine for cosine in cosines]
+    even = [rest.density(v) for v in places]
+    rows: list[list[arb]] = []
+    while len(rows) < count:
+        odd = [v * value for v, value in zip(places, even, strict=True)]
+        # all coefficients are real, so two functions fit into one transform
+        found = _cosine_sums([acb(a, b) for a, b in zip(even, odd, strict=True)], cosines)
+        rows += [[c.real / terms for c in found], [c.imag / terms for c in found]]
+        even = [v * value for v, value in zip(places, odd, strict=True)]
+    return rows[:count]
+
+
+def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
+    """C_k = Σ_j x_j cos(2πjk/N), j < N, k < N/2, of an even x by a transform of half the length.
+
+    values: x_0 .. x_(N/2).  cosines: of 2πj/N.  With M = N/2, E_k and O_k the sums over even and odd j, C_k = E_k + O_k
+    and C_(M−k) = E_k − O_k; x_2i + i (x_(2i+1) − x_(2i−1)) has the transform E_k − 2 sin(2πk/N) O_k.
+    """
+    half = len(values) - 1
+    full = values + values[-2:0:-1]
+    found = acb.dft([full[2 * i] + acb(0, 1) * (full[2 * i + 1] - full[2 * i - 1]) for i in range(half)])
+    sums = [acb(0)] * (half + 1)
+    for k in range(half // 2 + 1):
+        mean, apart = (found[k] + found[-k]) / 2, (found[-k] - found[k]) / 2
+        odd = apart / (2 * cosines[half // 2 - k]) if k else sum(full[1::2], acb(0))
+        sums[k], sums[half - k] = mean + odd, mean - odd
+    return sums[:half]
+
+
+def _significant(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The rows without the terms that no float sees."""
+    sizes = np.abs(rows) / np.abs(rows).max(axis=1, keepdims=True).clip(min=np.finfo(float).tiny)
+    kept = np.flatnonzero(sizes.max(axis=0) > np.finfo(float).eps / 64)
+    return rows[:, : kept[-1] + 1] if kept.size else rows[:, :1]

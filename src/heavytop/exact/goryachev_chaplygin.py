@@ -1,0 +1,325 @@
+"""Goryachev-Chaplygin: I1 = I2 = 4 I3, c = 0, M·γ = 0, by inversion of Abel's integrals.
+
+The centre of mass may lie anywhere in the plane of the equal moments, and |γ| be anything but 0.  With I = (4, 4, 1),
+n = (c, 0, 0) (:mod:`heavytop.exact.reduced`), s = p² + q² and a = c|γ|
+
+    h = 2s + r²/2 + cγ1,   G = r s − c p γ3,   u1,2 = ½ (r ± √(r² + 16 s)),   u1 ≥ 0 ≥ u2,   X(u) = ½ (u³ − 2h u − 4G)
+    x_k = X(u_k) = c (2pγ3 − γ1 u_k),   y_k = u_k' (u_k − u_other) = c (2qγ3 − γ2 u_k),   x_k² + y_k² = a² u_k²
+    f(u) = a² u² − X² = (au − X)(au + X),   y_k² = f(u_k),   Σ du/y = 0,   Σ u du/y = dt
+
+f has rational coefficients.  u_k = m + d cos θ_k, f = (u − lo)(hi − u) g (:mod:`heavytop.exact.gaps`),
+
+    θ1' = −√g1/(u1 − u2),   θ2' = −√g2/(u1 − u2),   G_0 constant,   G_1 → G_1 − t   (ε1 = 1, ε2 = −1)
+
+With α_k = √|au_k − X(u_k)|, β_k = √|au_k + X(u_k)|, analytic in θ_k, y1 = α1 β1, y2 = −α2 β2, and one sign σ for the
+whole motion
+
+    r = u1 + u2        p = σ (α1β2 + α2β1)/(4a)           q = −σ (β1β2 − α1α2)/(4a)
+    γ1 = −(X(u1) − X(u2))/(c (u1 − u2))     γ2 = −(α1β1 + α2β2)/(c (u1 − u2))     γ3 = −σ (α1β2 − α2β1)/(c (u1 − u2))
+
+so that turning points are points like any other.  σ is found by exclusion at the start.
+Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other;
+motions asymptotic to it, or with a variable at rest on it, are not done here.
+Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); signs and recovery derived here from the integrals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+from flint import acb, arb, arb_series, ctx, fmpq_poly
+
+from heavytop.errors import NotInClass
+from heavytop.exact.abel import Inversion
+from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.closed_form import ClosedForm, series_length
+from heavytop.exact.gaps import Gap, Roots
+from heavytop.exact.motion import kept
+from heavytop.exact.reduced import Reduced, Undecided, polynomial
+from heavytop.precision import shown
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State, dot
+
+_REMEDY = "The validated enclosure holds for every motion."
+_DECISIONS = (64, 256, 1024, 4096)
+_MINUS, _PLUS = 0, 1
+"""The factors au − X and au + X of f."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoryachevChaplygin(ClosedForm):
+    """A motion of the Goryachev-Chaplygin top with the small moment on axis 3.
+
+    Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0 and γ ≠ 0, and on the levels not done.
+    """
+
+    top: HeavyTop
+    start: State
+    method: str = "closed form: Goryachev-Chaplygin, inversion of Abel's integrals"
+    system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
+        if i1 != i2 or i1 != 4 * i3:
+            differences = f"I1 - I2 = {shown(i1 - i2)}, I1 - 4 I3 = {shown(i1 - 4 * i3)}"
+            raise NotInClass(f"Goryachev-Chaplygin needs I1 = I2 = 4 I3; {differences}.", "Rename the axes if need be.")
+        if n3 != 0 or n1 == n2 == 0:
+            raise NotInClass(
+                f"Goryachev-Chaplygin needs P c = 0 and P r != 0; P r = ({', '.join(map(shown, (n1, n2, n3)))}).",
+                "The centre of mass lies in the plane of the equal moments.",
+            )
+        area = dot(self.top.angular_momentum(self.start.omega), self.start.gamma)
+        if area != 0:
+            raise NotInClass(
+                f"Goryachev-Chaplygin needs M·gamma = 0, but M·gamma = {shown(area)}.",
+                "Only motions of zero area integral are solved: choose Omega3 so that it vanishes.",
+            )
+        if not any(self.start.gamma):
+            raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
+        _require_done(Level.of(self.top, self.start))
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        try:
+            return _motion(self, ctx.prec).at(time, ctx.cap)
+        except Undecided:
+            return [arb("nan")] * 6
+
+
+@kept
+def _motion(case: GoryachevChaplygin, _bits: int) -> Motion:
+    return Motion.of(Level.of(case.top, case.start))
+
+
+class Level(Reduced):
+    """The exact level of a start."""
+
+    __slots__ = ()
+
+    @property
+    def energy(self) -> Fraction:
+        """h."""
+        w1, w2, w3 = self.omega
+        return 2 * (w1 * w1 + w2 * w2) + w3 * w3 / 2 + self.along(self.gamma)
+
+    @property
+    def third(self) -> Fraction:
+        """G, Goryachev and Chaplygin's integral."""
+        w1, w2, w3 = self.omega
+        return w3 * (w1 * w1 + w2 * w2) - self.along(self.omega) * self.gamma[2]
+
+    def sextic(self) -> fmpq_poly:
+        """f."""
+        zero, square = Fraction(0), self.moment_square * self.gamma_square
+        cubic = polynomial(-4 * self.third, -2 * self.energy, zero, Fraction(1))
+        return polynomial(zero, zero, 4 * square) - cubic * cubic
+
+    def separated(self) -> fmpq_poly:
+        """u² − r u − 4s, with the roots u1, u2."""
+        w1, w2, w3 = self.omega
+        return polynomial(-4 * (w1 * w1 + w2 * w2), -w3, Fraction(1))
+
+
+@dataclass(frozen=True, slots=True)
+class Root:
+    """A root of f: how often it is one of au − X, and of au + X."""
+
+    value: acb
+    counts: tuple[int, int]
+
+    @property
+    def multiplicity(self) -> int:
+        """As a root of f."""
+        return sum(self.counts)
+
+
+def roots(level: Level) -> list[Root]:
+    """The roots of f at the working precision; raises Undecided where it does not tell their factor."""
+    h, constant, a = ball(level.energy), 4 * ball(level.third), _size(level)
+    found: list[Root] = []
+    pairs: Any = level.sextic().complex_roots()
+    for value, many in pairs:
+        if value.is_zero():
+            found.append(Root(acb(value), (many // 2, many - many // 2)))
+            continue
+        cubics = [value * (value * value - 2 * (h + side * a)) - constant for side in (1, -1)]
+        of = [cubic.contains(0) for cubic in cubics]
+        if sum(of) != 1:
+            raise Undecided
+        found.append(Root(acb(value), (many * of[0], many * of[1])))
+    return found
+
+
+def _size(level: Level) -> arb:
+    """a = c|γ|."""
+    return ball(level.moment_square * level.gamma_square).sqrt()
+
+
+def separated_start(level: Level) -> tuple[arb, arb]:
+    """u1, u2 at t = 0; of the two the one that cancels comes from the product."""
+    w1, w2, w3 = level.omega
+    square = w1 * w1 + w2 * w2
+    larger = (abs(ball(w3)) + ball(w3 * w3 + 16 * square).sqrt()) / 2
+    smaller = 4 * ball(square) / larger
+    return (larger, -smaller) if w3 >= 0 else (smaller, -larger)
+
+
+def gap_ends(curve: Sequence[Root], places: Sequence[arb]) -> list[tuple[int, int]]:
+    """Between which two real roots u1 and u2 move; raises Undecided where the balls do not tell."""
+    real = sorted((i for i, root in enumerate(curve) if root.value.imag.is_zero()), key=lambda i: _exact(curve[i]))
+    allowed, inside = [], False
+    for low, high in pairwise(real):
+        if curve[low].value.overlaps(curve[high].value):
+            raise Undecided
+        inside ^= curve[low].multiplicity % 2 == 1
+        if inside:
+            allowed.append((low, high))
+    found = []
+    for u in places:
+        possible = [ends for ends in allowed if not (u < curve[ends[0]].value.real or u > curve[ends[1]].value.real)]
+        if len(possible) != 1:
+            raise Undecided
+        found += possible
+    return found
+
+
+def _exact(root: Root) -> Fraction:
+    return midpoint(root.value.real)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """The motion of a level at one working precision.
+
+    moment, size: c and a.  ends: numbers of the roots at both ends of each gap.  origin: G at t = 0.  sign: σ.
+    """
+
+    level: Level
+    moment: arb
+    size: arb
+    curve: tuple[Root, ...]
+    ends: tuple[tuple[int, int], ...]
+    gaps: tuple[Gap, ...]
+    origin: tuple[arb, arb]
+    sign: int
+
+    @classmethod
+    def of(cls, level: Level) -> Motion:
+        """At the working precision.
+
+        Raises Undecided where it does not suffice, OutOfReach where the Fourier series need too many terms.
+        """
+        curve, places = roots(level), separated_start(level)
+        ends = gap_ends(curve, places)
+        gaps = tuple(_gap(curve, pair) for pair in ends)
+        c, a = ball(level.moment_square).sqrt(), _size(level)
+        turned = level.turned()
+        speeds = [c * (2 * turned[1] * turned[5] - turned[4] * u) for u in places]
+        # du/dθ is −y1/√g1 and y2/√g2
+        slopes = -speeds[0] * gaps[0].density(places[0]), speeds[1] * gaps[1].density(places[1])
+        phases = [gap.phase(u, slope) for gap, u, slope in zip(gaps, places, slopes, strict=True)]
+        first, second = Inversion(gaps, (1, -1)).values(phases)
+        with series_length(1):
+            possible = []
+            for sign in (1, -1):
+                motion = cls(level, c, a, tuple(curve), tuple(ends), gaps, (first, second), sign)
+                found = motion._state([arb_series([phase], prec=1) for phase in phases], [0, 0])
+                if all(one[0].overlaps(other) for one, other in zip(found, turned, strict=True)):
+                    possible.append(motion)
+        if len(possible) != 1:
+            raise Undecided
+        return possible[0]
+
+    def at(self, time: Fraction, length: int) -> list[Any]:
+        """The six components at ``time``, numbers, or series in t of that length.
+
+        Raises Undecided where the working precision does not prove the phases.
+        """
+        target = [self.origin[0], self.origin[1] - ball(time * self.level.rate)]
+        phases, turns = Inversion(self.gaps, (1, -1)).phases(target)
+        if not all(phase.is_finite() for phase in phases):
+            raise Undecided
+        with series_length(length):
+            return self.level.restored(self._state(self._moving(phases), turns), length)
+
+    def _moving(self, phases: Sequence[arb]) -> list[Any]:
+        """The phases as power series in t, from their differential equations."""
+        moving = [arb_series([phase], prec=ctx.cap) for phase in phases]
+        for _ in range(ctx.cap - 1):
+            u1, u2 = (gap.position(x) for gap, x in zip(self.gaps, moving, strict=True))
+            rates = [-1 / ((u1 - u2) * gap.density(u)) for gap, u in zip(self.gaps, (u1, u2), strict=True)]
+            moving = [phase + rate.integral() for phase, rate in zip(phases, rates, strict=True)]
+        return moving
+
+    def _state(self, phases: Sequence[Any], turns: Sequence[int]) -> list[Any]:
+        """The six components in the turned frame."""
+        (u1, a1, b1), (u2, a2, b2) = (self._halves(k, phases[k], turns[k]) for k in (0, 1))
+        h, apart = ball(self.level.energy), 1 / (self.moment * (u1 - u2))
+        quarter = self.sign / (4 * self.size)
+        # (X(u1) − X(u2))/(u1 − u2)
+        slope = (u1 * u1 + u1 * u2 + u2 * u2 - 2 * h) / 2
+        return [
+            quarter * (a1 * b2 + a2 * b1),
+            quarter * (a1 * a2 - b1 * b2),
+            u1 + u2,
+            -slope / self.moment,
+            -(a1 * b1 + a2 * b2) * apart,
+            -self.sign * (a1 * b2 - a2 * b1) * apart,
+        ]
+
+    def _halves(self, variable: int, phase: Any, turns: int) -> tuple[Any, Any, Any]:
+        """(u, α, β)."""
+        gap, (low, high) = self.gaps[variable], self.ends[variable]
+        u, side = gap.position(phase), -1 if turns % 2 else 1
+        at_end = dict(zip((low, high), gap.ends(phase), strict=True))
+        found = []
+        for factor in (_MINUS, _PLUS):
+            value, rest = phase * 0 + 1, phase * 0 + arb(1) / 2
+            for number, root in enumerate(self.curve):
+                if root.counts[factor] and number in at_end:
+                    value *= side * at_end[number]
+                elif root.counts[factor]:
+                    rest *= _distance(u, root.value, root.counts[factor], gap.middle)
+            found.append(value * rest.sqrt())
+        return u, found[0], found[1]
+
+
+def _distance(u: Any, root: acb, many: int, middle: arb) -> Any:
+    """|u − root|^many for a real root, its square for a pair once; 1 for the other of the pair."""
+    if root.imag.is_zero():
+        return (u - root.real if root.real < middle else root.real - u) ** many
+    if root.imag < 0:
+        return 1
+    return ((u - root.real) ** 2 + root.imag**2) ** many
+
+
+def _gap(curve: Sequence[Root], ends: tuple[int, int]) -> Gap:
+    low, high = (curve[number].value.real for number in ends)
+    others = [(root.value, root.multiplicity) for number, root in enumerate(curve) if number not in ends]
+    return Gap(low, high, Roots.of(arb(1) / 4, others))
+
+
+def _require_done(level: Level) -> None:
+    """Raises NotInClass on the levels that are not done here."""
+    sextic = level.sextic()
+    multiple = sextic.gcd(sextic.derivative())
+    if multiple.degree() == 0:
+        return
+    if level.separated().gcd(multiple).degree() > 0:
+        raise NotInClass("The level is degenerate: a separated variable rests at a double root.", _REMEDY)
+    for bits in _DECISIONS:
+        with working_precision(bits):
+            try:
+                curve = roots(level)
+                ends = gap_ends(curve, separated_start(level))
+            except Undecided:
+                continue
+        if any(curve[number].multiplicity > 1 for pair in ends for number in pair):
+            raise NotInClass("The level is degenerate: the motion is asymptotic to a double root.", _REMEDY)
+        return
+    raise NotInClass("The level is degenerate, and the start too near to a double root to tell.", _REMEDY)

@@ -1,0 +1,104 @@
+"""Kovalevskaya's top, I1 = I2 = 2 I3, c = 0: every start but those on four kinds of degenerate levels.
+
+The centre of mass may lie anywhere in the plane of the equal moments, and |γ| be anything but 0.  The two separated
+variables (:mod:`heavytop.exact.kovalevskaya_level`) move along a straight line in Abel's integrals, which are inverted
+in balls (:mod:`heavytop.exact.kovalevskaya_abel`): the cost does not depend on the time.
+
+Levels where the quintic has a multiple root, found exactly (Appelrot, Trudy otd. fiz. nauk 16 (1911)):
+
+    k = 0                            Delone's class, elliptic: :mod:`heavytop.exact.delone`
+    double root outside both gaps    as any other level
+    double root at an end of a gap, a variable at rest on it, a double root of the cubic: not done here
+
+Source: S. Kovalevskaya, Acta Math. 12 (1889) 177; recovery of Ω and γ without Kötter's formulas.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from flint import arb, ctx
+
+from heavytop.errors import NotInClass
+from heavytop.exact.balls import working_precision
+from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.kovalevskaya_abel import AbelMotion, intervals
+from heavytop.exact.kovalevskaya_level import Level, roots, start_of
+from heavytop.exact.motion import kept
+from heavytop.exact.reduced import Undecided
+from heavytop.precision import shown
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+MOST_TERMS = 1 << 14
+_REMEDY = "The validated enclosure holds for every motion."
+_DECISIONS = (64, 256, 1024, 4096)
+
+
+@dataclass(frozen=True, slots=True)
+class Kovalevskaya(ClosedForm):
+    """A motion of Kovalevskaya's top with the small moment on axis 3.
+
+    Raises NotInClass unless I1 = I2 = 2 I3, P c = 0, P r ≠ 0 and γ ≠ 0, and on the levels that are not done.
+    """
+
+    top: HeavyTop
+    start: State
+    method: str = "closed form: Kovalevskaya, inversion of Abel's integrals"
+    system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
+        if i1 != i2 or i1 != 2 * i3:
+            raise NotInClass(
+                f"Kovalevskaya needs I1 = I2 = 2 I3; I1 - I2 = {shown(i1 - i2)}, I1 - 2 I3 = {shown(i1 - 2 * i3)}.",
+                "Rename the axes if need be.",
+            )
+        if n3 != 0 or n1 == n2 == 0:
+            raise NotInClass(
+                f"Kovalevskaya needs P c = 0 and P r != 0, but P r = ({', '.join(map(shown, (n1, n2, n3)))}).",
+                "The centre of mass lies in the plane of the equal moments.",
+            )
+        if not any(self.start.gamma):
+            raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
+        _require_done(Level.of(self.top, self.start))
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        try:
+            return _motion(self, ctx.prec).at(time, ctx.cap)
+        except Undecided:
+            return [arb("nan")] * 6
+
+
+@kept
+def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion:
+    return AbelMotion.of(Level.of(case.top, case.start), MOST_TERMS)
+
+
+def _require_done(level: Level) -> None:
+    """Raises NotInClass on the levels that are not done here."""
+    cubic, double = level.cubic(), level.double()
+    if level.fourth == 0:
+        raise NotInClass("k = 0: the motion is in Delone's class.", "Use that class: its motions are elliptic.")
+    if cubic.gcd(cubic.derivative()).degree() > 0:
+        raise NotInClass("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", _REMEDY)
+    if double * double != level.fourth:
+        return
+    name = f"The level is degenerate: l^2 = 2 |gamma|^2 (h + e) with e = {shown(double)}, e^2 = k^2"
+    if level.separated(double) == 0:
+        raise NotInClass(f"{name}, and one separated variable rests at e.", _REMEDY)
+    for bits in _DECISIONS:
+        with working_precision(bits):
+            try:
+                curve = roots(level)
+                ends = intervals(level, curve, start_of(level))
+            except Undecided:
+                continue
+        if any(curve[number - 1].multiplicity > 1 for interval in ends for number in interval if number):
+            raise NotInClass(f"{name}, and the motion is asymptotic to it.", _REMEDY)
+        return
+    raise NotInClass(f"{name}, and the start is too near to it to tell on which side.", _REMEDY)

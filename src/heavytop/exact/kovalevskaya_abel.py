@@ -1,0 +1,321 @@
+"""Kovalevskaya's top by real Abel inversion: p, q, r from the phases of the two separated variables.
+
+w1 runs through infinity where q = 0, so v = 1/(w − μ) takes its place, μ a real number in neither gap.  With
+v_e = 1/(e − μ), c6 = −2 Π (μ − e) and Y² = c6 v Π (v − v_e) over the roots e of φ (:mod:`kovalevskaya_level`)
+
+    θ1' = √g1 v2/(v1 − v2),   θ2' = −√g2 v1/(v1 − v2),   G_0 → G_0 − t,   G_1 constant   (ε1 = ε2 = 1)
+
+Recovery.  For a root e_j of the cubic the form (w − w1)(w − w2)(x1 − x2)² is a square:
+
+    P_j = √((w1 − e_j)(w2 − e_j)) = α_j (X − e_j Z) + β_j Y,   X = x1x2/(x1 − x2),  Y = (x1 + x2)/(x1 − x2),
+    α_j² = 2(h + e_j),   β_j² = G + e_j²,   α_j β_j = −C,      Z = 1/(x1 − x2)
+
+three linear equations for X, Y, Z.  Let h_kb be a root of ±(v_k − b), analytic in θ_k: √(2d) sin(θ/2), √(2d) cos(θ/2)
+for the ends of the gap, √(v − b) or √|v − b| otherwise.  Then P_j = f_j (μ − e_j) h_1j h_2j/(h_10 h_20) with one
+f_j ∈ {1, i, −1, −i} for the whole motion, as both sides are meromorphic and have equal squares.  With
+κ_j = f_j (μ − e_j), (X, Y, Z) = 𝓜^−1 P, N = Σ Y_j κ_j h_1j h_2j, D = Σ Z_j κ_j h_1j h_2j
+
+    p = N/(2D),   q = h_10 h_20/(2i D)
+
+and r = 2p'/q, in which h_10 h_20 cancels term by term.  γ follows from q', r' and the energy:
+
+    γ3 = (2q' + pr)/c,   γ2 = −r'/c,   γ1 = (h − p² − q² − r²/2)/c
+
+f_j is found by exclusion: q P_j h_10 h_20 = q κ_j h_1j h_2j at the start, to the third order in t, where one of the
+coefficients differs from 0 (turning points and q = 0 included); the three other f_j are excluded by balls.
+Source: the squares are Kovalevskaya's and Kötter's; derived here, and checked by sympy for a generic level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations, pairwise
+from typing import Any
+
+from flint import acb, acb_mat, acb_series, arb, arb_series, ctx
+
+from heavytop.exact.abel import Inversion, Variable
+from heavytop.exact.balls import ball, midpoint
+from heavytop.exact.closed_form import series_length
+from heavytop.exact.gaps import Gap, Roots
+from heavytop.exact.kovalevskaya_level import ORDERS, Level, Root, Start, roots, start_of
+from heavytop.exact.reduced import Undecided
+
+_UNITS = (acb(1), acb(0, 1), acb(-1), acb(0, -1))
+_SHARES = (0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98)
+_BEYOND = (0.05, 0.3, 1.0, 3.0, 10.0)
+Interval = tuple[int, int]
+"""Numbers of the branch points at the lower and upper end in v; 0 is v = 0, j is root number j − 1."""
+
+
+def intervals(level: Level, curve: Sequence[Root], start: Start) -> tuple[Interval, Interval]:
+    """Where w1 and w2 move: pairs of numbers of branch points, (lower, upper) in v and so (upper, lower) in w.
+
+    Raises Undecided where the balls do not tell.
+    """
+    real = ordered(curve)
+    allowed, inside = [(real[0] + 1, 0)], True
+    for low, high in pairwise(real):
+        inside ^= curve[low].multiplicity % 2 == 1
+        if inside:
+            allowed.append((high + 1, low + 1))
+
+    def possible(variable: int, interval: Interval) -> bool:
+        upper, lower = interval
+        below = lower > 0 and start.above(variable, curve[lower - 1].value.real) < 0
+        return not below and not start.above(variable, curve[upper - 1].value.real) > 0
+
+    found = [[interval for interval in allowed if possible(k, interval)] for k in (0, 1)]
+    if any(len(choice) != 1 for choice in found):
+        raise Undecided
+    return found[0][0], found[1][0]
+
+
+def ordered(curve: Sequence[Root]) -> list[int]:
+    """The numbers of the real roots, rising; raises Undecided where two balls meet."""
+    real = [i for i, root in enumerate(curve) if root.value.imag.is_zero()]
+    real.sort(key=lambda i: midpoint(curve[i].value.real))
+    if any(curve[i].value.overlaps(curve[j].value) for i, j in pairwise(real)):
+        raise Undecided
+    return real
+
+
+def pole(curve: Sequence[Root], occupied: Sequence[Interval]) -> float:
+    """μ: outside both gaps, where the branch points in v come to lie as far from the gaps as possible."""
+    places = [complex(float(root.value.real), float(root.value.imag)) for root in curve]
+    real = [places[i].real for i in ordered(curve)]
+    taken = {(places[upper - 1].real, places[lower - 1].real if lower else None) for upper, lower in occupied}
+    candidates = [real[-1] + share * (real[-1] - real[0]) for share in _BEYOND]
+    for low, high in pairwise(real):
+        if (high, low) not in taken:
+            candidates += [low + share * (high - low) for share in _SHARES]
+
+    def distance(mu: float) -> float:
+        if mu in real:
+            return 0.0
+        points = [0j, *(1 / (place - mu) for place in places)]
+        return min(_distance(points, interval) for interval in occupied)
+
+    return max(candidates, key=distance)
+
+
+def _distance(points: Sequence[complex], interval: Interval) -> float:
+    """cosh β − 1 of the nearest other branch point (:mod:`heavytop.exact.gaps`); 0 for no gap."""
+    low, high = (points[i].real for i in interval)
+    if not low < high:
+        return 0.0
+    scaled = [(2 * b - low - high) / (high - low) for i, b in enumerate(points) if i not in interval]
+    return min((abs(z + 1) + abs(z - 1)) / 2 for z in scaled) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class AbelMotion:
+    """The motion of a level at one working precision.
+
+    branch: the branch points in v, number 0 is 0.  cubic: the numbers of the three e_j, and μ − e_j.  ends: of the
+    gaps.  rows: the rows of 𝓜^−1 for Y and Z, times κ_j.  origin: G at t = 0.
+    """
+
+    level: Level
+    start: Start
+    branch: tuple[acb, ...]
+    ends: tuple[Interval, Interval]
+    inversion: Inversion
+    origin: tuple[arb, arb]
+    cubic: tuple[int, ...]
+    rows: tuple[tuple[acb, ...], tuple[acb, ...]]
+
+    @classmethod
+    def of(cls, level: Level, most: int) -> AbelMotion:
+        """At the working precision.
+
+        Raises Undecided where it does not suffice, OutOfReach for Fourier series of more than ``most`` terms.
+        """
+        start, curve = start_of(level), roots(level)
+        ends = intervals(level, curve, start)
+        mu = arb(pole(curve, ends))
+        branch = (acb(0), *(_real(1 / (root.value - mu), root.value) for root in curve))
+        lead = arb(2)
+        for root in curve:
+            lead *= abs(mu - root.value) ** root.multiplicity
+        gaps = tuple(_variable(branch, curve, interval, lead, most) for interval in ends)
+        phases = start_phases(start, mu, gaps)
+        inversion = Inversion(gaps, (1, 1))
+        first, second = inversion.values(phases)
+        cubic = tuple(i for i, root in enumerate(curve, 1) if root.cubic)
+        plain = cls(level, start, branch, ends, inversion, (first, second), cubic, ((), ()))
+        return plain._with_factors(curve, mu, phases)
+
+    def at(self, time: Fraction, length: int) -> list[Any]:
+        """The six components at ``time``, numbers, or series in t of that length.
+
+        Raises Undecided where the working precision does not prove the phases.
+        """
+        own = ball(time * self.level.rate)
+        phases, turns = self.inversion.phases([self.origin[0] - own, self.origin[1]])
+        if not all(phase.is_finite() for phase in phases):
+            raise Undecided
+        with series_length(length + 1):
+            p, q, r = self._velocity(self._moving(phases), turns)
+            c, energy = self.start.moment, self.start.energy
+            upward = (2 * q.derivative() + p * r) / c
+            across = -r.derivative() / c
+        with series_length(length):
+            along = (energy - p * p - q * q - r * r / 2) / c
+        return self.level.restored((p, q, r, along, across, upward), length)
+
+    def _moving(self, phases: Sequence[arb]) -> list[Any]:
+        """The phases as power series in t, from their differential equations."""
+        moving = [arb_series([phase], prec=ctx.cap) for phase in phases]
+        for _ in range(ctx.cap - 1):
+            v1, v2 = (g.position(x) for g, x in zip(self.inversion.variables, moving, strict=True))
+            first, second = (g.density(v) for g, v in zip(self.inversion.variables, (v1, v2), strict=True))
+            rates = v2 / ((v1 - v2) * first), -v1 / ((v1 - v2) * second)
+            moving = [phase + rate.integral() for phase, rate in zip(phases, rates, strict=True)]
+        return moving
+
+    def _halves(self, variable: int, phase: Any, turns: int) -> list[Any]:
+        """h_kb at every branch point."""
+        gap, ends = self.inversion.variables[variable], self.ends[variable]
+        low, high = gap.ends(phase)
+        side = -1 if turns % 2 else 1
+        v, found = gap.position(phase), []
+        for number, b in enumerate(self.branch):
+            if number in ends:
+                found.append(acb_series(side * (low if number == ends[0] else high)))
+            elif b.imag.is_zero():
+                found.append(acb_series((self._side(variable, number) * (v - b.real)).sqrt()))
+            else:
+                found.append((acb_series(v) - b).sqrt())
+        return found
+
+    def _side(self, variable: int, number: int) -> int:
+        """s with h² = s (v − b)."""
+        low, high = self.ends[variable]
+        b = self.branch[number]
+        if number == low or not b.imag.is_zero():
+            return 1
+        return -1 if number == high or self.branch[low].real < b.real else 1
+
+    def _velocity(self, phases: Sequence[Any], turns: Sequence[int]) -> tuple[Any, Any, Any]:
+        """(p, q, r) from series of the phases."""
+        first, second = (self._halves(k, phases[k], turns[k]) for k in (0, 1))
+        products = [first[i] * second[i] for i in self.cubic]
+        above, below = (sum((a * h for a, h in zip(row, products, strict=True)), acb_series([0])) for row in self.rows)
+        half = 1 / (2 * below)
+        p, q = above * half, first[0] * second[0] * half * acb(0, -1)
+        return _real_part(p), _real_part(q), _real_part(self._spin(phases, first, second) * half * acb(0, 4))
+
+    def _spin(self, phases: Sequence[Any], first: Sequence[Any], second: Sequence[Any]) -> Any:
+        """(N'D − ND')/(h_10 h_20)."""
+        variables = self.inversion.variables
+        v1, v2 = (g.position(x) for g, x in zip(variables, phases, strict=True))
+        speeds = [1 / ((v1 - v2) * g.density(v)) for g, v in zip(variables, (v1, v2), strict=True)]
+        # v2/h_20 = s h_20, and what is left of θ1' but for 1/h_10
+        rates = (
+            acb_series(speeds[0]) * second[0] * self._side(1, 0),
+            acb_series(-speeds[1]) * first[0] * self._side(0, 0),
+        )
+        total = acb_series([0])
+        for a, b in combinations(range(3), 2):
+            i, j = self.cubic[a], self.cubic[b]
+            weight = self.rows[0][a] * self.rows[1][b] - self.rows[0][b] * self.rows[1][a]
+            one = rates[0] * self._turn(0, phases[0], first, i, j) * second[i] * second[j]
+            two = rates[1] * self._turn(1, phases[1], second, i, j) * first[i] * first[j]
+            total += (one + two) * weight
+        return total
+
+    def _turn(self, variable: int, phase: Any, halves: Sequence[Any], i: int, j: int) -> Any:
+        """(h_i' h_j − h_i h_j')/h_0, by θ: ½ s_i s_j (v_i − v_j) dv/dθ/(h_0 h_i h_j), in which the ends cancel."""
+        low, high = self.ends[variable]
+        signs = self._side(variable, i) * self._side(variable, j)
+        value = acb_series(self.inversion.variables[variable].bend(phase))
+        below = {0, i, j}
+        for number in (low, high):
+            if number not in below:
+                value *= halves[number]
+        for number in below - {low, high}:
+            value /= halves[number]
+        return value * (self.branch[i] - self.branch[j]) * (-signs) / 2
+
+    def _with_factors(self, curve: Sequence[Root], mu: arb, phases: Sequence[arb]) -> AbelMotion:
+        """κ_j, certified at the start."""
+        start = self.start
+        alphas, betas = zip(*(_squares(start, root.value) for root in curve if root.cubic), strict=True)
+        values = [root.value for root in curve if root.cubic]
+        matrix = acb_mat([[a, b, -a * e] for a, b, e in zip(alphas, betas, values, strict=True)])
+        try:
+            inverse = matrix.inv()
+        except ZeroDivisionError:
+            raise Undecided from None
+        with series_length(3):
+            p, q = (arb_series(x) for x in start.motion[:2])
+            halves = [self._halves(k, phase, 0) for k, phase in enumerate(self._moving(phases))]
+            ends = halves[0][0] * halves[1][0]
+            kappas = []
+            for i, a, b, e in zip(self.cubic, alphas, betas, values, strict=True):
+                # q P_j, regular where q = 0
+                form = (acb_series(p * p + q * q) - e) * a + acb_series(2 * p) * b
+                left = form * ends * acb(0, -0.5)
+                right = acb_series(q) * halves[0][i] * halves[1][i] * (mu - e)
+                kappas.append(_fourth_root(left, right) * (mu - e))
+        first, second = (tuple(inverse[row, j] * kappas[j] for j in range(3)) for row in (1, 2))
+        return AbelMotion(
+            self.level, start, self.branch, self.ends, self.inversion, self.origin, self.cubic, (first, second)
+        )
+
+
+def _fourth_root(left: Any, right: Any) -> acb:
+    """The one f in {1, i, −1, −i} with left = f right; raises Undecided where more than one can be."""
+    possible = [f for f in _UNITS if all((left[n] - f * right[n]).contains(0) for n in range(3))]
+    if len(possible) != 1:
+        raise Undecided
+    return possible[0]
+
+
+def _squares(start: Start, e: acb) -> tuple[acb, acb]:
+    """(α, β) of a root of the cubic; the larger as a root, the other from the product."""
+    first, second = 2 * (start.energy + e), start.weight + e * e
+    if abs(first).mid() > abs(second).mid():
+        alpha = square_root(first)
+        return alpha, -start.area / alpha
+    beta = square_root(second)
+    return -start.area / beta, beta
+
+
+def square_root(value: acb) -> acb:
+    """A root, whose ball is finite off 0, the negative axis included."""
+    return acb(0, 1) * (-value).sqrt() if value.real < 0 else value.sqrt()
+
+
+def _real(value: acb, like: acb) -> acb:
+    """``value`` without the imaginary part that rounding gave it, where ``like`` is real."""
+    return acb(value.real) if like.imag.is_zero() else value
+
+
+def _real_part(series: Any) -> Any:
+    return arb_series([series[n].real for n in range(ctx.cap)], prec=ctx.cap)
+
+
+def start_phases(start: Start, mu: arb, variables: Sequence[Variable]) -> list[arb]:
+    """θ1, θ2 at t = 0, modulo whole turns."""
+    with series_length(ORDERS):
+        v1, v2 = start.inverses(mu)
+        apart = (v1 - v2)[0]
+        # v2' goes to 0 with v1, to second order in t, where q = 0
+        order = 2 if start.still else 0
+        rates = v1.derivative()[0] / v2[0], -v2.derivative()[order] / v1[order]
+        slopes = [rate * apart * g.density(v[0]) for rate, g, v in zip(rates, variables, (v1, v2), strict=True)]
+    return [g.phase(v[0], slope) for g, v, slope in zip(variables, (v1, v2), slopes, strict=True)]
+
+
+def _variable(branch: Sequence[acb], curve: Sequence[Root], interval: Interval, lead: arb, most: int) -> Variable:
+    """The gap between two simple branch points."""
+    low, high = (branch[number].real for number in interval)
+    if not low < high:
+        raise Undecided
+    many = [1, *(root.multiplicity for root in curve)]
+    others = [(b, many[i]) for i, b in enumerate(branch) if i not in interval]
+    return Gap(low, high, Roots.of(lead, others), most=most)

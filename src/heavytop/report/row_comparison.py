@@ -1,0 +1,230 @@
+"""One row of a baseline against the same row of a candidate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+
+from heavytop.measure.luck import accumulated, assumed, least
+from heavytop.precision import exact
+from heavytop.records import Metric, Row
+from heavytop.report.against import weaker
+from heavytop.report.consistency import contradictions
+from heavytop.report.laws import judge_law, law_text
+from heavytop.report.noise import allowed_loss, noisier
+from heavytop.report.policy import BITS, Limits, Lookup, Policy
+from heavytop.report.series import judge_series
+from heavytop.report.store import AnyRow
+from heavytop.report.verdicts import Judged, Verdict, judge, judge_seconds
+
+_STEPS = 2
+"""The same method with the same setting takes as many steps: a factor beyond this is another method."""
+
+
+class Finding(msgspec.Struct, frozen=True, gc=False):
+    """One metric of one row: verdict, the two values as text, and why.
+
+    metric: "" for a whole row, ``growth NAME`` for the law of a series, ``seconds NAME`` for a timing.
+    """
+
+    key: tuple[str, ...]
+    metric: str
+    verdict: Verdict
+    baseline: str | None
+    candidate: str | None
+    reason: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """The row of `compare --json`."""
+        measure, case, system, integrator, precision = self.key
+        return {
+            "case": case,
+            "metric": self.metric,
+            "verdict": self.verdict.value,
+            "baseline": self.baseline,
+            "candidate": self.candidate,
+            "reason": self.reason,
+            "measure": measure,
+            "system": system,
+            "integrator": integrator,
+            "precision": precision,
+        }
+
+
+class RowComparison:
+    """Compares rows under one policy.
+
+    timed: whether seconds are compared.  list_same: False to count what plainly stayed the same, in :attr:`same`.
+    """
+
+    def __init__(self, policy: Policy, timed: bool, list_same: bool) -> None:
+        self.policy = policy
+        self.list_same = list_same
+        self.same = 0
+        self.lookup = Lookup(policy)
+        self.timed = timed
+
+    def ignores(self, row: AnyRow) -> bool:
+        """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
+        return bool(self.policy.rule) and self.lookup.metric(self.lookup.row(row.measure, row.case), "").ignore
+
+    def compare(self, key: tuple[str, ...], old: AnyRow, new: AnyRow) -> list[Finding]:
+        """All findings about a row that both reports have."""
+        if reason := self._incomparable(old, new):
+            if self.ignores(old):
+                return []
+            return [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
+        rules = self.lookup.row(old.measure, old.case) if self.policy.rule else ()
+        found = self._metrics(key, rules, old, new)
+        if old.laws or new.laws:
+            found += self._laws(key, rules, old, new)
+        if old.series:
+            found += self._series(key, rules, old, new)
+        if not self.ignores(old):
+            found += self._row(key, old, new)
+        if self.timed:
+            found += self._seconds(key, rules, old, new)
+        return found
+
+    def _metrics(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> list[Finding]:
+        loss = self.lookup.metric((), "").loss
+        found = []
+        for name, metric in old.metrics.items():
+            match = new.metrics.get(name)
+            if (
+                # most metrics of most reports: two numbers that differ by less than they may under every rule
+                not rules
+                and match is not None
+                and metric.log10 is not None
+                and match.log10 is not None
+                and metric.kind == match.kind == "error"
+                and -loss <= metric.log10 - match.log10 <= loss
+                and (match.band == metric.band or (match.band or 9e9) < (metric.band or 0.0))
+            ):
+                if self.list_same:
+                    found.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
+                else:
+                    self.same += 1
+            elif not (limits := self.lookup.metric(rules, name)).ignore:
+                if match is None:
+                    found.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
+                    continue
+                verdict, why = self._metric(name, metric, match, limits, old, new)
+                found.append(Finding(key, name, verdict, metric.value, match.value, why))
+        if new.metrics.keys() != old.metrics.keys():
+            found += [
+                Finding(key, name, Verdict.NEW, None, metric.value)
+                for name, metric in new.metrics.items()
+                if name not in old.metrics and not self.lookup.metric(rules, name).ignore
+            ]
+        return found
+
+    def _metric(self, name: str, metric: Metric, match: Metric, limits: Limits, old: AnyRow, new: AnyRow) -> Judged:
+        """The values first; then the noise of the candidate, which is worse where it is more than chance."""
+        least_of = least(old.metrics, name), least(new.metrics, name)
+        known = metric
+        if metric.band is None and (noise := assumed(old.measure, old.integrator)):
+            known = msgspec.structs.replace(metric, band=noise)
+        judged = judge(known, match, limits, _eps(name, old), self.policy.suspicious_digits, least_of)
+        if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
+            return judged
+        if metric.band is not None and match.band is None and match.log10 is not None:
+            return Verdict.INCOMPARABLE, f"its noise is not measured, which was {metric.band:.2g} decades"
+        if noisier(old.measure, metric, match):
+            return Verdict.WORSE, f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
+        return judged
+
+    def _laws(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
+        for name in dict.fromkeys((*old.laws, *new.laws)):
+            metric = f"growth {name}"
+            limits = self.lookup.metric(rules, metric)
+            if limits.ignore:
+                continue
+            a, b = old.laws.get(name), new.laws.get(name)
+            judged: Judged
+            if a is None or b is None:
+                judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
+            else:
+                judged = judge_law(a, b, _noise(name, old, limits))
+            before, after = (None if law is None else law_text(law) for law in (a, b))
+            yield Finding(key, metric, judged[0], before, after, judged[1])
+
+    def _series(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
+        """What changed in a series: that of a candidate which is the same is not a finding."""
+        for name, series in old.series.items():
+            metric = f"series {name}"
+            limits = self.lookup.metric(rules, metric)
+            match = new.series.get(name)
+            if limits.ignore or match == series:
+                continue
+            if match is None:
+                yield Finding(key, metric, Verdict.MISSING, f"{len(series.values)} samples", None, "it is missing")
+                continue
+            exactly = any(m.kind == "value" for n, m in old.metrics.items() if n in (f"{name}_max", f"{name}_final"))
+            allowed = limits.value if exactly else max(limits.loss, _noise(name, old, limits))
+            judged = judge_series(series, match, allowed, limits.floor + _eps(name, old), exactly)
+            if judged[0] is not Verdict.SAME:
+                before, after = (f"{len(each.values)} samples" for each in (series, match))
+                yield Finding(key, metric, judged[0], before, after, judged[1])
+
+    def _row(self, key: tuple[str, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
+        """What makes numbers of a row incomparable beside the numbers themselves."""
+        if old.finite and not new.finite:
+            yield Finding(key, "", Verdict.INCOMPARABLE, "finite", "not finite", "a value is no longer finite")
+        if old.steps != new.steps and self.policy.flags != "ignore":
+            few, many = sorted((old.steps, new.steps))
+            if few * _STEPS < many:
+                yield Finding(key, "", Verdict.INCOMPARABLE, str(old.steps), str(new.steps), "other steps")
+        if old.order != new.order and self.policy.flags != "ignore":
+            yield Finding(key, "", Verdict.INCOMPARABLE, str(old.order), str(new.order), "another order")
+        rounded = old.input_rounding
+        if rounded is not None and new.input_rounding != rounded:
+            eps = exact(2) ** (1 - old.bits)
+            if new.input_rounding is None or exact(new.input_rounding) > max(exact(rounded), eps):
+                why = "the data were rounded by more"
+                yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, why)
+
+    def _seconds(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
+        for name in sorted(old.seconds.keys() & new.seconds.keys()):
+            if not self.lookup.metric(rules, f"seconds {name}").ignore:
+                verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
+                before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
+                yield Finding(key, f"seconds {name}", verdict, before, after, why)
+
+    def _incomparable(self, old: AnyRow, new: AnyRow) -> str:
+        """Why two rows cannot be compared; empty where they can."""
+        for row, which in ((old, "baseline"), (new, "candidate")):
+            if row.outcome != "success":
+                return f"the {which} ended as {row.outcome} at t = {row.time_reached}"
+            # a brief row is checked as it is read
+            if isinstance(row, Row) and (problem := next(contradictions(row), "")):
+                return f"the {which} contradicts itself: {problem}"
+        if old.horizon != new.horizon and exact(old.horizon) != exact(new.horizon):
+            return f"horizon {old.horizon} against {new.horizon}"
+        if old.bits != new.bits:
+            return f"{old.bits} bits against {new.bits}"
+        if old.starts != new.starts:
+            return f"{old.starts} starts against {new.starts}"
+        if (old.steps == 0) != (new.steps == 0):
+            return f"{old.steps} steps against {new.steps}"
+        if old.flags != new.flags and self.policy.flags != "ignore":
+            names = [n for n in sorted({*old.flags, *new.flags}) if old.flags.get(n) != new.flags.get(n)]
+            return "flags differ: " + ", ".join(f"{n} {old.flags.get(n)} -> {new.flags.get(n)}" for n in names)
+        subjects = [row.measured.partition(":")[0] for row in (old, new)]
+        if subjects[0] != subjects[1]:
+            return f"{subjects[0] or 'nothing'} is measured, and {subjects[1] or 'nothing'}"
+        return weaker(old.against, new.against)
+
+
+def _eps(name: str, row: AnyRow) -> float:
+    """log10 of the eps of a row, or of what its roundings add up to."""
+    return (1 - row.bits) * BITS + accumulated(row.measure, name, row.steps)
+
+
+def _noise(name: str, row: AnyRow, limits: Limits) -> float:
+    """Decades by which noise may move what a series or a law is about: as the metrics of its name."""
+    bands = [m for part in ("_final", "_rms", "_max") if (m := row.metrics.get(name + part)) is not None and m.band]
+    widest = max((allowed_loss(metric, metric) for metric in bands), default=0.0)
+    return limits.noise * max(widest, assumed(row.measure, row.integrator))

@@ -1,0 +1,402 @@
+"""Edits of a report that weaken something a user cares about, drawn at random: none of them is the same, or better."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from copy import deepcopy
+from fractions import Fraction
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import msgspec
+
+from heavytop.errors import InputError
+from heavytop.precision import decimal_text, exact, log10
+from heavytop.report import store
+from heavytop.report.compare import compare
+from heavytop.report.policy import Policy
+
+Document = dict[str, Any]
+Edit = Callable[[Document, Random], bool]
+"""Edits a row; whether there was something in it to edit."""
+LARGER = Fraction(10) ** 6
+"""More than noise near a saddle explains."""
+
+
+def _set(metric: Document, value: Fraction) -> None:
+    text = decimal_text(value, 8)
+    metric |= {"value": text, "log10": log10(exact(text))}
+
+
+def _pick(row: Document, random: Random, wanted: Callable[[str, Document], Any]) -> Document | None:
+    found = [metric for name, metric in row["metrics"].items() if wanted(name, metric)]
+    return random.choice(found) if found else None
+
+
+def _numbers(kind: str) -> Callable[[str, Document], bool]:
+    return lambda _, metric: metric["kind"] == kind and metric["log10"] is not None
+
+
+def error_larger(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, _numbers("error"))
+    if metric:
+        eps = Fraction(2) ** (1 - row["bits"]) * max(row["steps"], 1)
+        _set(metric, max(exact(metric["value"]), eps) * LARGER)
+    return bool(metric)
+
+
+def error_excused_by_a_band(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, _numbers("error"))
+    if metric:
+        _set(metric, exact(metric["value"]) * 10**12)
+        metric["band"] = random.choice([4.0, 20.0, 100.0])
+    return bool(metric)
+
+
+def all_errors_excused_by_bands(row: Document, random: Random) -> bool:
+    metrics = [metric for name, metric in row["metrics"].items() if _numbers("error")(name, metric)]
+    factor = 10 ** random.randint(3, 12)
+    for metric in metrics:
+        _set(metric, exact(metric["value"]) * factor)
+        metric["band"] = 20.0
+    return bool(metrics)
+
+
+def band_wider(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, lambda _, metric: metric["band"])
+    if metric:
+        metric["band"] = min(100.0, max(metric["band"], 0.05) * random.uniform(10, 50))
+    return bool(metric)
+
+
+def band_removed(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, lambda _, metric: metric["band"] and metric["log10"] is not None)
+    if metric:
+        metric["band"] = None
+    return bool(metric)
+
+
+def band_where_none_is_measured(row: Document, random: Random) -> bool:
+    if row["measure"] in ("drift", "homoclinic", "growth", "break_away_law"):
+        return False
+    metric = _pick(row, random, _numbers("error"))
+    if metric:
+        metric["band"] = random.choice([0.5, 20.0])
+    return bool(metric)
+
+
+def unresolved(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, _numbers("error"))
+    if metric:
+        bound = max(exact(metric["value"]), Fraction(2) ** (1 - row["bits"]) * max(row["steps"], 1)) * LARGER
+        metric |= {"value": "unresolved", "log10": None, "bound": decimal_text(bound, 3)}
+    return bool(metric)
+
+
+def no_number(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, _numbers("error"))
+    if metric:
+        metric |= {"value": random.choice(["nan", "missing"]), "log10": None}
+        row["finite"] = random.random() < 0.5
+    return bool(metric)
+
+
+def kind_flipped(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, lambda *_: True)
+    if metric:
+        metric["kind"] = random.choice([kind for kind in ("error", "duration", "value") if kind != metric["kind"]])
+    return bool(metric)
+
+
+def log10_alone(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, lambda _, metric: metric["log10"] is not None)
+    if metric:
+        metric["log10"] += random.choice([-3.0, -0.01, 0.001, 2.0])
+    return bool(metric)
+
+
+def duration_shorter(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, _numbers("duration"))
+    if metric:
+        _set(metric, exact(metric["value"]) / random.choice([3, 10, 1000]))
+    return bool(metric)
+
+
+def value_changed(row: Document, random: Random) -> bool:
+    metric = _pick(row, random, lambda name, metric: _numbers("value")(name, metric) and metric["value"] != "0")
+    if metric:
+        _set(metric, exact(metric["value"]) * random.choice([Fraction(1, 2), Fraction(3, 2), Fraction(101, 1)]))
+    return bool(metric)
+
+
+def verdict_turned(row: Document, random: Random) -> bool:
+    if row["measure"] != "audit":
+        return False
+    metric = _pick(row, random, lambda *_: True)
+    if metric:
+        _set(metric, 1 - exact(metric["value"]))
+    return bool(metric)
+
+
+def metric_dropped(row: Document, random: Random) -> bool:
+    return bool(row["metrics"]) and row["metrics"].pop(random.choice(list(row["metrics"]))) is not None
+
+
+def series_dropped(row: Document, random: Random) -> bool:
+    return bool(row["series"]) and row["series"].pop(random.choice(list(row["series"]))) is not None
+
+
+def law_dropped(row: Document, random: Random) -> bool:
+    return bool(row["laws"]) and row["laws"].pop(random.choice(list(row["laws"]))) is not None
+
+
+def _one_series(row: Document, random: Random) -> Document | None:
+    return random.choice(list(row["series"].values())) if row["series"] else None
+
+
+def series_shorter(row: Document, random: Random) -> bool:
+    series = _one_series(row, random)
+    if series and len(series["times"]) > 1:
+        at = random.randrange(len(series["times"]))
+        del series["times"][at], series["values"][at]
+        return True
+    return False
+
+
+def series_larger(row: Document, random: Random) -> bool:
+    series = _one_series(row, random)
+    if series is None:
+        return False
+    floor = Fraction(2) ** (1 - row["bits"]) * max(row["steps"], 1)
+    series["values"] = [
+        value if value in ("nan", "missing", "unresolved") else str(float(max(exact(value), floor) * LARGER))
+        for value in series["values"]
+    ]
+    return any(value not in ("nan", "missing", "unresolved") for value in series["values"])
+
+
+def series_without_its_end(row: Document, random: Random) -> bool:
+    series = _one_series(row, random)
+    if series is None:
+        return False
+    series["values"] = [*series["values"][:-1], random.choice(["nan", "missing"])]
+    return row["finite"]
+
+
+def not_finite_hidden(row: Document, random: Random) -> bool:
+    hidden = [(name, series) for name, series in row["series"].items() if "nan" in series["values"]]
+    for name, series in hidden:
+        series["values"] = [value if value != "nan" else "1E-16" for value in series["values"]]
+        if random.random() < 0.5:
+            quantity = name.removeprefix("claim_evaluation_error_")
+            row["metrics"][f"claim_evaluation_{quantity}_samples_not_finite"] |= {"value": "0", "log10": None}
+    row["finite"] = True
+    return bool(hidden)
+
+
+def outcome(row: Document, random: Random) -> bool:
+    row["outcome"] = random.choice(["step_limit", "time_limit", "non_finite", "incomplete", "fine"])
+    return True
+
+
+def not_finite(row: Document, _: Random) -> bool:
+    was, row["finite"] = row["finite"], False
+    return bool(was)
+
+
+def horizon_shorter(row: Document, random: Random) -> bool:
+    horizon = exact(row["horizon"]) / random.choice([2, 10])
+    row["horizon"] = row["time_reached"] = decimal_text(horizon, 15)
+    return horizon != 0
+
+
+def reached_less(row: Document, _: Random) -> bool:
+    row["time_reached"] = decimal_text(exact(row["horizon"]) / 2, 15)
+    return row["horizon"] != "0"
+
+
+def no_steps(row: Document, _: Random) -> bool:
+    was, row["steps"] = row["steps"], 0
+    return bool(was)
+
+
+def more_steps(row: Document, random: Random) -> bool:
+    row["steps"] *= random.choice([3, 100])
+    return bool(row["steps"])
+
+
+def bits(row: Document, random: Random) -> bool:
+    row["bits"] = random.choice([each for each in (24, 53, 64, 113) if each != row["bits"]])
+    return True
+
+
+def precision(row: Document, random: Random) -> bool:
+    row["precision"] = random.choice([each for each in ("double", "quad", "real:90") if each != row["precision"]])
+    return True
+
+
+def starts_fewer(row: Document, _: Random) -> bool:
+    was, row["starts"] = row["starts"], max(1, row["starts"] // 2)
+    return bool(was > 1)
+
+
+def start_failed(row: Document, random: Random) -> bool:
+    metric = row["metrics"].get("starts_failed")
+    if metric:
+        _set(metric, Fraction(random.randint(1, 9)))
+    return bool(metric)
+
+
+def _reference(pattern: str, change: Callable[[re.Match[str]], str]) -> Edit:
+    def edit(row: Document, _: Random) -> bool:
+        was, row["against"] = row["against"], re.sub(pattern, change, row["against"])
+        return bool(was != row["against"])
+
+    return edit
+
+
+def flags(row: Document, random: Random) -> bool:
+    name = random.choice(list(row["flags"])) if row["flags"] else None
+    if name and random.random() < 0.5:
+        del row["flags"][name]
+    elif name:
+        row["flags"][name] = "true" if row["flags"][name] == "false" else "1e-9"
+    return name is not None
+
+
+def order(row: Document, _: Random) -> bool:
+    was, row["order"] = row["order"], 2
+    return was is not None
+
+
+def rounding(row: Document, random: Random) -> bool:
+    row["input_rounding"], was = random.choice([None, "1E-3"]), row["input_rounding"]
+    return was is not None
+
+
+def subject(row: Document, _: Random) -> bool:
+    was, row["measured"] = row["measured"], "known: closed form"
+    return bool(was)
+
+
+def _law(change: Callable[[Document, Random], Any]) -> Edit:
+    def edit(row: Document, random: Random) -> bool:
+        laws = [law for law in row["laws"].values() if law["low"] is not None]
+        if not laws:
+            return False
+        law = random.choice(laws)
+        before = dict(law)
+        change(law, random)
+        return law != before
+
+    return edit
+
+
+def _scaled(name: str, *factors: float) -> Callable[[Document, Random], None]:
+    def change(law: Document, random: Random) -> None:
+        if law[name] is not None:
+            law[name] = f"{float(law[name]) * random.choice(factors):.3g}"
+
+    return change
+
+
+def _interval_by_itself(law: Document, random: Random) -> None:
+    side = random.choice(["low", "high", "both"])
+    part = random.choice([6, 20, 1000])
+    if side in ("low", "both"):
+        law["low"] -= part * (law["high"] - law["exponent"] + 0.01)
+    if side in ("high", "both"):
+        law["high"] += part * (law["exponent"] - law["low"] + 0.01)
+
+
+def _next_class(law: Document, random: Random) -> None:
+    names = ["bounded", "t^0.5", "t", "t^1.5", "t^2", "exponential"]
+    at = names.index(law["growth"])
+    if at < 5:
+        law["growth"] = names[random.randint(at + 1, 5)]
+        if random.random() < 0.5:
+            place = names.index(law["growth"]) / 2
+            law |= {"exponent": place, "low": place - 0.1, "high": place + 0.1}
+
+
+EDITS: dict[str, Edit] = {
+    edit.__name__.replace("_", " "): edit
+    for edit in (
+        error_larger, error_excused_by_a_band, all_errors_excused_by_bands, band_wider, band_removed,
+        band_where_none_is_measured, unresolved, no_number, kind_flipped, log10_alone, duration_shorter,
+        value_changed, verdict_turned, metric_dropped, series_dropped, law_dropped, series_shorter, series_larger,
+        series_without_its_end, not_finite_hidden, outcome, not_finite, horizon_shorter, reached_less, no_steps,
+        more_steps, bits, precision, starts_fewer, start_failed, flags, order, rounding, subject,
+    )
+} | {
+    "reference computed": _reference("known: |[(]proven[^)]*[)]", lambda found: "computed: " if ":" in found[0] else ""),
+    "reference not proven": _reference("[(]proven[^)]*[)]", lambda _: "(computed)"),
+    "radius larger": _reference(r"radius below (\S+?)(?=;|$)", lambda found: f"radius below {10**9 * float(found[1])}"),
+    "no radius": _reference(r", radius below [^;]+", lambda _: ""),
+    "digits fewer": _reference(r"to (\d+) digits", lambda _: "to 5 digits"),
+    "no certificate": _reference(r"; certified .*", lambda _: ""),
+    "starts not certified": _reference(r"\d+ of (\d+) starts", lambda found: f"3 of {found[1]} starts"),
+    "computed reference worse": _reference(r"is \S+ of the error", lambda _: "is 2 of the error"),
+    "exponent larger in a wide interval": _law(
+        lambda law, _: law.update(exponent=law["exponent"] + 5, low=-50.0, high=50.0)
+    ),
+    "exponent larger": _law(lambda law, _: law.update({k: law[k] + 0.2 for k in ("exponent", "low", "high")})),
+    "interval wider": _law(_interval_by_itself),
+    "interval removed": _law(lambda law, _: law.update(exponent=None, low=None, high=None)),
+    "class loosened": _law(_next_class),
+    "class unresolved": _law(lambda law, _: law.update(growth="unresolved")),
+    "law of fewer starts": _law(lambda law, random: law.update(starts=random.randint(0, law["starts"] - 1))),
+    "detects less": _law(_scaled("detects", 100, 1e6, 1e15)),
+    "detects unknown": _law(lambda law, _: law.update(detects=None)),
+    "lost earlier": _law(_scaled("lost_at", 1e-3, 1e-6)),
+    "span ends earlier": _law(_scaled("last", 1e-1, 1e-2)),
+    "span begins later": _law(_scaled("first", 10, 1e6)),
+}  # fmt: skip
+
+
+def drop_row(document: Document, random: Random) -> None:
+    document["rows"].pop(random.randrange(len(document["rows"])))
+
+
+def repeat_row(document: Document, random: Random) -> None:
+    document["rows"].append(deepcopy(random.choice(document["rows"])))
+
+
+def edited(document: Document, random: Random) -> tuple[str, Document]:
+    """The name of an edit, and the document with it."""
+    names = [*EDITS, "row dropped", "row twice"]
+    while True:
+        name = random.choice(names)
+        changed = {**document, "rows": list(document["rows"])}
+        if name.startswith("row "):
+            (drop_row if name == "row dropped" else repeat_row)(changed, random)
+            return name, changed
+        at = random.randrange(len(changed["rows"]))
+        changed["rows"][at] = deepcopy(changed["rows"][at])
+        if EDITS[name](changed["rows"][at], random):
+            return name, changed
+
+
+def verdict(baseline: Path, folder: Path, changed: Document) -> str:
+    """What a comparison says of the edited report, ``refused`` where it cannot be read."""
+    (folder / store.FILE).write_bytes(msgspec.json.encode(changed))
+    try:
+        return compare(store.read_brief(baseline), store.read_brief(folder), Policy(), list_same=False).verdict
+    except InputError:
+        return "refused"
+
+
+def trials(baseline: Path, folder: Path, seed: int, count: int) -> Iterator[tuple[str, str]]:
+    """``count`` edits, each of three rows of the report at ``baseline``, and what a comparison says of each."""
+    random, document = Random(seed), msgspec.json.decode((baseline / store.FILE).read_bytes())
+    kept = [row for row in document["rows"] if row["outcome"] == "success"]
+    start = folder / "baseline"
+    start.mkdir()
+    for _ in range(count):
+        few = {**document, "rows": random.sample(kept, min(3, len(kept)))}
+        (start / store.FILE).write_bytes(msgspec.json.encode(few))
+        assert verdict(start, folder, few) == "same"
+        name, changed = edited(few, random)
+        yield name, verdict(start, folder, changed)

@@ -1,0 +1,131 @@
+"""Real Abel inversion: periods, the Fourier error, the proof of a solution, whole turns."""
+
+import random
+from itertools import pairwise
+
+import pytest
+from flint import acb, arb
+
+from heavytop.errors import OutOfReach
+from heavytop.exact.abel import Inversion
+from heavytop.exact.balls import working_precision
+from heavytop.exact.gaps import FourierBound, Gap, Roots, SineSums, fourier_rows
+
+BITS = 256
+
+
+def gap_between(roots, lo, hi, count=2, **options):
+    rest = [(acb(b), 1) for b in roots if b not in (lo, hi)]
+    return Gap(arb(lo), arb(hi), Roots.of(arb(1), rest), count, **options)
+
+
+def two_gaps(roots=(-1, 0, 1, 3, 4, 6)):
+    return Inversion((gap_between(roots, 0, 1), gap_between(roots, 3, 4)), (1, -1))
+
+
+def integral(gap, phase, order):
+    """F_j by FLINT's own rigorous integration."""
+    roots = gap.rest.all()
+
+    def density(theta, analytic):
+        v = gap.middle + gap.reach * theta.cos()
+        product = acb(1)
+        for b, many in roots:
+            side = 1 if b.real < gap.middle else -1
+            for _ in range(many):
+                product = product * (side * (v - b)).rsqrt(analytic=analytic)
+        return product * v**order
+
+    return acb.integral(density, 0, phase).real
+
+
+def test_integrals_are_those_of_rigorous_integration():
+    with working_precision(BITS):
+        gap = gap_between((-1, 0, 1, 3, 4, 6), 3, 4)
+        for phase in (arb(1) / 3, arb(-5)):
+            for order, value in enumerate(gap.integrals(phase)):
+                assert value.overlaps(integral(gap, phase, order))
+                assert value.rad() < arb(2) ** (20 - BITS)
+
+
+def test_one_gap_has_the_period_of_the_elliptic_integral():
+    # x'² = (1 − x²)(4 − x²): the period is 4K(1/4)/2
+    with working_precision(BITS):
+        rest = Roots.of(arb(1), [(acb(2), 1), (acb(-2), 1)])
+        gap = Gap(arb(-1), arb(1), rest, 1)
+        assert gap.column[0].overlaps(2 * acb(arb(1) / 4).elliptic_k().real)
+        (phase,), (turns,) = Inversion((gap,), (1,)).phases([gap.column[0] * 1000 + arb(1) / 7])
+        assert turns == 1000
+        assert phase.rad() < arb(2) ** (30 - BITS)
+        assert gap.integrals(phase)[0].overlaps(arb(1) / 7)
+
+
+@pytest.mark.parametrize("other", [acb(1.25), acb(-3), acb(0.5, 0.25), acb(0, 2)])
+def test_the_fourier_error_is_bounded_and_the_bound_is_not_idle(other):
+    # few terms beside many: the difference is below the bound, and not far below it
+    with working_precision(1000):
+        others = [(other, 1)] if other.imag.is_zero() else [(other, 1), (other.conjugate(), 1)]
+        true, few, errors, bounds = Gap(arb(-1), arb(1), Roots.of(arb(1), others)), 256, [], []
+        rows = fourier_rows(true.middle, true.reach, true.rest, few, 2)
+        bound = FourierBound(true.middle, true.reach, true.rest)
+        sums = SineSums([[2 * c / n for n, c in enumerate(row[1:], 1)] for row in rows])
+        for order in range(2):
+            assert abs(rows[order][0] - true.means[order]) < bound.mean_error(few, order).rad()
+            bounds.append(bound.sum_error(few, order).rad())
+            errors.append(
+                max(abs(sums.at(x)[order] - true.sums.at(x)[order]) for x in (arb(k) / 5 for k in range(1, 15)))
+            )
+        for error, limit in zip(errors, bounds, strict=True):
+            assert error < limit
+            # η is 0.9 of what is possible, and no bound of this kind sees cancellation
+            assert error > limit**2
+
+
+def test_solutions_are_found_at_any_number_of_turns():
+    rng = random.Random(3)
+    with working_precision(BITS):
+        inversion = two_gaps()
+        for size in (1, 100, 10**9):
+            phases = [arb(rng.uniform(-size, size)) for _ in range(2)]
+            found, turns = inversion.phases(inversion.values(phases))
+            for phase, near, n in zip(phases, found, turns, strict=True):
+                whole = near + 2 * arb.pi() * n
+                assert whole.contains(phase)
+                assert whole.rad() < arb(2) ** (60 - BITS)
+
+
+def test_half_turns_and_turning_points_are_targets_like_any_other():
+    with working_precision(BITS):
+        inversion = two_gaps()
+        for phases in ([arb.pi(), arb.pi()], [arb.pi() * 3, arb(0)], [arb(0), arb.pi() * -5]):
+            found, turns = inversion.phases(inversion.values(phases))
+            for phase, near, n in zip(phases, found, turns, strict=True):
+                assert (near + 2 * arb.pi() * n).overlaps(phase)
+
+
+def test_a_target_known_too_roughly_is_not_solved():
+    with working_precision(BITS):
+        inversion = two_gaps()
+        target = inversion.values([arb(1), arb(2)])
+        wide = [value + arb(0, 3) for value in target]
+        assert not any(phase.is_finite() for phase in inversion.phases(wide)[0])
+        assert not any(phase.is_finite() for phase in inversion.phases([arb("nan"), arb(1)])[0])
+
+
+def test_a_wide_target_gives_balls_that_hold_every_solution():
+    with working_precision(BITS):
+        inversion = two_gaps()
+        phases = [arb(1), arb(2)]
+        middle, width = inversion.values(phases), arb(2) ** -20
+        found, _ = inversion.phases([value + arb(0, width) for value in middle])
+        for corner in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+            exact, _ = inversion.phases([m + c * width for m, c in zip(middle, corner, strict=True)])
+            assert all(wide.contains(narrow) for wide, narrow in zip(found, exact, strict=True))
+
+
+def test_roots_that_all_but_coincide_are_refused_with_the_number_of_terms():
+    with working_precision(BITS):
+        counts = [gap_between((-1, 0, 1, 1 + distance), 0, 1).terms for distance in (0.5, 0.125, 0.03125)]
+        assert all(1 < b / a < 4 for a, b in pairwise(counts))
+        with pytest.raises(OutOfReach, match="Fourier terms, more than 4096"):
+            gap_between((-1, 0, 1, 1 + 2.0**-20), 0, 1, most=4096)

@@ -1,0 +1,92 @@
+"""Goryachev-Chaplygin motions: random ones, turning points, multiple roots, and what is refused."""
+
+import random
+from fractions import Fraction
+
+import pytest
+from proofs import assert_narrow, assert_solves, positive, rational
+
+from heavytop.errors import NotInClass
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.validated import Validated
+from heavytop.top.heavy_top import HeavyTop, State
+
+F = Fraction
+UP = (F(0), F(0), F(1))
+
+
+def motion_from(moment, omega, gamma, i3=F(1)):
+    return GoryachevChaplygin(HeavyTop((4 * i3, 4 * i3, i3), 1, (*moment, 0)), State(omega, gamma))
+
+
+def random_motion(seed):
+    """The centre anywhere in the plane, |γ| not 1, M·γ = 0."""
+    rng = random.Random(seed)
+    g1, g2, g3 = rational(rng), rational(rng), positive(rng)
+    w1, w2 = rational(rng), rational(rng)
+    moment = positive(rng) * rng.choice((1, -1)), rational(rng)
+    return motion_from(moment, (w1, w2, -4 * (w1 * g1 + w2 * g2) / g3), (g1, g2, g3), positive(rng))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_every_random_motion_solves_all_six_equations(seed):
+    motion = random_motion(seed)
+    assert_solves(motion, rational(random.Random(seed), size=30))
+    assert_narrow(motion, F(10**6))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_enclosure_holds_the_closed_form(seed):
+    motion = random_motion(seed)
+    enclosure = Validated(motion.top, motion.start)
+    for time in (F(3, 2), F(-2)):
+        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
+        assert all(a.overlaps(b) for a, b in pairs)
+
+
+@pytest.mark.parametrize(
+    ("omega", "gamma"),
+    [
+        (("3/4", "1/2", 0), UP),
+        (("3/4", 0, 0), UP),  # y1 = y2 = 0: both at turning points
+        (("3/4", "1/1000000000000000000000000000000", 0), UP),
+        ((1, 0, 3), (0, 1, 0)),
+        ((1, 0, -3), (0, 1, 0)),
+        (("1/2", 0, "-1/2"), ("1/4", "1/3", 1)),
+    ],
+)
+def test_turning_points_are_starts_like_any_other(omega, gamma):
+    motion = motion_from((F(1), F(0)), omega, gamma)
+    assert_solves(motion, F(7, 3))
+    assert_solves(motion, F(-1000))
+
+
+@pytest.mark.parametrize("spin", [-3, -1, 2, F(3, 2)])
+def test_a_double_root_outside_the_gaps_does_no_harm(spin):
+    # G = 0: u = 0 is a root of both factors
+    motion = motion_from((F(1), F(0)), (0, spin, 0), (F(4, 5), 0, F(3, 5)))
+    assert_solves(motion, F(11, 3))
+    assert_narrow(motion, F(10**9))
+
+
+def test_a_thousand_digits_come_out():
+    assert_narrow(motion_from((F(1), F(0)), ("3/4", "1/2", 0), UP), F(10**6), 1000)
+
+
+def test_what_is_outside_is_refused_with_the_test_that_failed():
+    start = State(("3/4", "1/2", 0), UP)
+    with pytest.raises(NotInClass, match="I1 - 4 I3 = -1"):
+        GoryachevChaplygin(HeavyTop((3, 3, 1), 1, (1, 0, 0)), start)
+    with pytest.raises(NotInClass, match=r"P r = \(1, 0, 1\)"):
+        GoryachevChaplygin(HeavyTop((4, 4, 1), 1, (1, 0, 1)), start)
+    with pytest.raises(NotInClass, match="M·gamma = 1/7"):
+        motion_from((F(1), F(0)), ("3/4", "1/2", "1/7"), UP)
+    with pytest.raises(NotInClass, match="gamma = 0"):
+        motion_from((F(1), F(0)), ("3/4", "1/2", "1/7"), (0, 0, 0))
+
+
+def test_levels_that_are_not_done_are_named():
+    with pytest.raises(NotInClass, match="rests at a double root"):
+        motion_from((F(1), F(1, 3)), (0, 0, 0), (F(3, 5), 0, F(4, 5)))
+    with pytest.raises(NotInClass, match="asymptotic to a double root"):
+        motion_from((F(1), F(0)), (0, F(1, 4), 0), (F(3, 5), 0, F(4, 5)))

@@ -1,0 +1,106 @@
+"""Kovalevskaya motions: random ones, turning points and q = 0, degenerate levels, and what is refused."""
+
+import random
+from fractions import Fraction
+
+import pytest
+from proofs import assert_narrow, assert_solves, positive, rational, triple
+
+from heavytop.errors import NotInClass
+from heavytop.exact.kovalevskaya import Kovalevskaya
+from heavytop.exact.validated import Validated
+from heavytop.top.heavy_top import HeavyTop, State
+
+F = Fraction
+UP = (F(0), F(0), F(1))
+TILTED = (F(2, 7), F(3, 7), F(6, 7))
+OTHER = (F(2, 3), F(2, 3), F(1, 3))
+TINY = F(1, 10**30)
+
+
+def motion_from(moment, omega, gamma, i3=F(1)):
+    return Kovalevskaya(HeavyTop((2 * i3, 2 * i3, i3), 1, (*moment, 0)), State(omega, gamma))
+
+
+def random_motion(seed):
+    """The centre anywhere in the plane, |γ| not 1."""
+    rng = random.Random(seed)
+    moment = positive(rng) * rng.choice((1, -1)), rational(rng)
+    return motion_from(moment, triple(rng), triple(rng), positive(rng))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_every_random_motion_solves_all_six_equations(seed):
+    motion = random_motion(seed)
+    assert_solves(motion, rational(random.Random(seed), size=30))
+    assert_narrow(motion, F(10**6))
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_the_enclosure_holds_the_closed_form(seed):
+    motion = random_motion(seed)
+    enclosure = Validated(motion.top, motion.start)
+    for time in (F(3, 2), F(-2)):
+        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
+        assert all(a.overlaps(b) for a, b in pairs)
+
+
+@pytest.mark.parametrize(
+    ("omega", "gamma"),
+    [
+        ((F(1, 2), 0, 1), TILTED),  # q = 0: w1 infinite
+        ((0, 0, 1), TILTED),
+        ((F(1, 2), TINY, 1), TILTED),
+        ((F(1, 2), F(1, 3), 0), (F(3, 5), F(4, 5), 0)),  # r = γ3 = 0: both variables at turning points
+        ((F(1, 2), F(1, 3), TINY), (F(3, 5), F(4, 5), TINY)),
+        ((F(-1, 2), 0, 0), (F(3, 5), F(4, 5), 0)),  # both and q = 0
+        ((0, F(-1, 2), 0), (F(3, 5), 0, F(4, 5))),
+    ],
+)
+def test_turning_points_are_starts_like_any_other(omega, gamma):
+    motion = motion_from((F(1), F(1, 3)), omega, gamma)
+    assert_solves(motion, F(7, 3))
+    assert_solves(motion, F(-1000))
+
+
+@pytest.mark.parametrize(
+    ("omega", "gamma"),
+    [((F(1, 2), F(1, 3), 5), UP), ((2, F(1, 3), F(1, 2)), UP), ((F(-7, 6), -1, F(5, 3)), OTHER)],
+)
+def test_a_double_root_outside_the_gaps_does_no_harm(omega, gamma):
+    motion = motion_from((F(1), F(0)), omega, gamma)
+    assert_solves(motion, F(11, 3))
+    assert_narrow(motion, F(10**9))
+
+
+def test_a_thousand_digits_come_out():
+    assert_narrow(motion_from((F(3, 5), F(1, 3)), (F(1, 3), F(4, 5), F(-7, 10)), TILTED), F(10**6), 1000)
+
+
+def test_what_is_outside_is_refused_with_the_test_that_failed():
+    start = State((1, 2, 3), TILTED)
+    with pytest.raises(NotInClass, match="I1 - I2 = 1/2, I1 - 2 I3 = 0"):
+        Kovalevskaya(HeavyTop((2, "3/2", 1), 1, (1, 0, 0)), start)
+    with pytest.raises(NotInClass, match="I1 - 2 I3 = 1/10"):
+        Kovalevskaya(HeavyTop(("2.1", "2.1", 1), 1, (1, 0, 0)), start)
+    with pytest.raises(NotInClass, match=r"P r = \(1, 0, 1\)"):
+        Kovalevskaya(HeavyTop((2, 2, 1), 1, (1, 0, 1)), start)
+    with pytest.raises(NotInClass, match=r"P r = \(0, 0, 0\)"):
+        Kovalevskaya(HeavyTop((2, 2, 1), 1, (0, 0, 0)), start)
+    with pytest.raises(NotInClass, match="gamma = 0"):
+        motion_from((F(1), F(0)), (1, 2, 3), (0, 0, 0))
+
+
+@pytest.mark.parametrize(
+    ("omega", "gamma", "name"),
+    [
+        ((1, F(1, 2), F(1, 3)), (F(3, 4), 1, F(1, 5)), "Delone"),
+        ((-1, F(1, 4), F(1, 4)), UP, "e = -17/16.*asymptotic"),
+        ((F(1, 3), F(1, 6), 1), OTHER, "e = -29/36.*asymptotic"),
+        ((F(1, 2), F(1, 3), 0), UP, "e = -13/36.*asymptotic"),
+        ((F(-7, 6), F(-5, 6), -1), OTHER, "e = 23/18.*rests at e"),
+    ],
+)
+def test_levels_that_are_not_done_are_named(omega, gamma, name):
+    with pytest.raises(NotInClass, match=name):
+        motion_from((F(1), F(0)), omega, gamma)
