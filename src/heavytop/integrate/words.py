@@ -22,7 +22,7 @@ Observer = Callable[[Fraction, Any], None]
 
 CHUNK_SECONDS = 0.25
 _FIRST_CHUNK = 16
-_OUTCOMES = {
+OUTCOMES = {
     Status.FINE: Outcome.SUCCESS,
     Status.NON_FINITE: Outcome.NON_FINITE,
     Status.TOO_SMALL: Outcome.STEP_TOO_SMALL,
@@ -178,7 +178,7 @@ class _Pace:
             began, before = perf_counter(), self.run.steps
             status = self.run.advance(goal, most)
             if status is not Status.FINE:
-                return _OUTCOMES[status]
+                return OUTCOMES[status]
             a_step = (perf_counter() - began) / max(1, self.run.steps - before)
             self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
         return Outcome.SUCCESS

@@ -12,7 +12,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.integrate.words_check import check
 from heavytop.precision import decimal_text
 from heavytop.top.equations import System
-from heavytop.words import fixed, floating
+from heavytop.words import eight, fixed, floating
 from heavytop.words.digits import MOST_WORDS, grid_for, grid_of
 from heavytop.words.fixed import Fixed
 from heavytop.words.floating import Floating, Ladder
@@ -83,6 +83,7 @@ class DoubleDouble(Arithmetic):
 # the same machine code with every order in double-double, and with nearly all in plain doubles
 _FULL = Ladder(38, -1000.0)
 _PLAIN = Ladder(24, 1000.0)
+_ALLOWED = Ladder(38, 1000.0)
 _PLAIN_BITS = 53
 
 
@@ -155,4 +156,16 @@ def compiled(arithmetic: Arithmetic, system: System, attitude: bool) -> float:
     with _making:
         if key not in _made:
             _made[key] = arithmetic.make(system, attitude)
+        return _made[key]
+
+
+def compiled_lanes(system: System) -> float:
+    """The seconds that compiling the code of eight lanes took; it is checked then as :meth:`Arithmetic.make` does."""
+    key = (eight.Eight, None, system.name, False)
+    with _making:
+        if key not in _made:
+            seconds = eight.machine(system).seconds
+            check(system, False, lambda scaled: eight.OneOfEight(scaled, _ALLOWED, _ALLOWED.order - 1), floating.BITS)
+            check(system, False, lambda scaled: eight.OneOfEight(scaled, _PLAIN, 3), _PLAIN_BITS)
+            _made[key] = seconds
         return _made[key]
