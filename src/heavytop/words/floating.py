@@ -13,12 +13,11 @@ from heavytop.top.equations import System
 from heavytop.words import double_double as dd
 from heavytop.words.machine import Doubles, Machine, Processor, doubles, pointer
 from heavytop.words.pairs import split
-from heavytop.words.recurrence import Layout
+from heavytop.words.recurrence import LEAST_LOW_ORDER, Layout
 from heavytop.words.run import Run, Status
 from heavytop.words.scaled import Scaled
 
 BITS = 106
-_LEAST_LOW_ORDER = 2
 _ROUNDING_BITS = 12
 _LEAST_ROOM = -58.0
 _QUOTIENT_BITS = 140
@@ -80,7 +79,7 @@ class Floating(Run):
         self.clock[dd.ROOM] = ladder.room
         most = ladder.order - 1
         self.counts[[dd.ORDER, dd.LOW_ORDER]] = ladder.order, low_order or most
-        self.counts[[dd.LEAST, dd.MOST]] = _LEAST_LOW_ORDER, most
+        self.counts[[dd.LEAST, dd.MOST]] = LEAST_LOW_ORDER, most
         self.table = _table(problem, ladder.order, self.layout)
         self.scratch = doubles((ladder.order + 5) * self.layout.row)
 

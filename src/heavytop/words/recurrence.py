@@ -13,6 +13,12 @@ from heavytop.words.lanes import GATHERED, LEFT, RIGHT, Sum, turned
 from heavytop.words.pairs import add, multiply
 from heavytop.words.vector import Code, Index, Pair
 
+LEAST_LOW_ORDER = 2
+MOST_ORDER = 40
+"""n0 is at least the one, N at most the other."""
+_NONE = 8
+"""A lane of the second operand of a shuffle, which is 0."""
+
 
 @dataclass(frozen=True, slots=True)
 class Layout:
@@ -119,11 +125,14 @@ class Recurrence:
             self.code.fma(self.code.load(left, self.layout.left(vector)), high, sums[vector]) for vector in self.vectors
         ]
 
-    def _gather(self, word: Any, part: int) -> Any | None:
-        lanes = [lane for lane, _ in GATHERED[part]] + [0, 0]
-        signs = [sign for _, sign in GATHERED[part]] + [0, 0]
-        moved = self.code.shuffle(word, self.code.zero, lanes)
-        return self.code.multiply(moved, self.code.constant(signs))
+    def _gather(self, word: Any, part: int) -> Any:
+        """One of the four summands of the products, without its signs; 0 where there is none."""
+        lanes = [lane if sign else _NONE for lane, sign in GATHERED[part]]
+        return self.code.shuffle(word, self.code.zero, [*lanes, _NONE, _NONE])
+
+    def _signed(self, value: Any, part: int) -> Any:
+        signs = [sign for _, sign in GATHERED[part]]
+        return value if min(signs) >= 0 else self.code.multiply(value, self.code.constant([*signs, 0, 0]))
 
     def _table_place(self, n: Index, vector: int, row: int) -> tuple[Any, int]:
         offset = self.code.builder.mul(self.code.integer(n), self.code.integer(self.layout.table_row))
@@ -132,7 +141,10 @@ class Recurrence:
     def _next_pair(self, n: Index, vector: int, total: Pair, y: Pair) -> Pair:
         """y_(n+1) = A/(n + 1) ∘ gathered S_n + Σ B/(n + 1) ∘ permuted y_n."""
         code = self.code
-        parts = [(self._gather(total[0], k), self._gather(total[1], k)) for k in range(4)]
+        parts = []
+        for k in range(4):
+            high, low = (self._signed(self._gather(word, k), k) for word in total)
+            parts.append((high, low))
         result = add(code, add(code, parts[0], parts[1]), add(code, parts[2], parts[3]))
         base, place = self._table_place(n, vector, 0)
         result = multiply(code, self.pair(base, place), result)
@@ -148,30 +160,29 @@ class Recurrence:
 
     def _next(self, n: Index, vector: int, total: Any, y: Any) -> Any:
         code = self.code
-        parts = [self._gather(total, k) for k in range(4)]
-        result = code.add(code.add(parts[0], parts[1]), code.add(parts[2], parts[3]))
         linear = code.zero
         for k, lanes in enumerate(turned(self.system), 1):
             base, place = self._table_place(n, vector, k)
             linear = code.fma(code.load(base, place), code.shuffle(y, code.zero, lanes), linear)
         base, place = self._table_place(n, vector, 0)
-        return code.fma(code.load(base, place), result, linear)
+        a = code.load(base, place)
+        # two sums side by side, the signs in the factors
+        first, second, third, fourth = ((self._gather(total, k), self._signed(a, k)) for k in range(4))
+        one = code.fma(*second, code.fma(*first, linear))
+        return code.add(one, code.fma(*fourth, code.multiply(*third)))
 
     def orders_in_pairs(self, first: list[Pair], low_order: Any) -> list[Any]:
         """y_1 to y_n0, the last returned; the products of y_n come last, so that the others need not wait for it."""
-        code = self.code
+        code, zeros = self.code, [self.code.zero] * (2 * len(self.vectors))
 
-        def order(n: Any, flat: list[Any]) -> list[Any]:
-            y = [(flat[2 * v], flat[2 * v + 1]) for v in self.vectors]
-            inner = partial(self._inner_pairs, n)
-            sums = code.loop(1, n, inner, [code.zero] * (2 * len(self.vectors)))
-            sums = self._accumulate_pairs(0, n, sums)
-            sums = self._accumulate_pairs(n, 0, sums)
+        def order(n: Any, words: list[Any]) -> list[Any]:
+            y = [(words[2 * v], words[2 * v + 1]) for v in self.vectors]
+            sums = code.loop(1, n, partial(self._inner_pairs, n), zeros)
+            sums = self._accumulate_pairs(n, 0, self._accumulate_pairs(0, n, sums))
             return self._stored_pairs(n, sums, y)
 
-        sums = self._accumulate_pairs(0, 0, [code.zero] * (2 * len(self.vectors)))
-        flat = self._stored_pairs(0, sums, first)
-        return code.loop(1, low_order, order, flat)
+        words = self._stored_pairs(0, self._accumulate_pairs(0, 0, zeros), first)
+        return code.loop(1, low_order, order, words)
 
     def _inner_pairs(self, n: Any, m: Any, sums: list[Any]) -> list[Any]:
         return self._accumulate_pairs(m, self.code.builder.sub(n, m), sums)
@@ -182,31 +193,38 @@ class Recurrence:
         return [word for pair in following for word in pair]
 
     def plain_orders(self, low_order: Any, order: Any, last: list[Any]) -> None:
-        """y_(n0+1) to y_N in plain doubles."""
-        code, b, width = self.code, self.code.builder, len(self.vectors)
+        """y_(n0+1) to y_N in plain doubles; each order has its own code, entered at n0 and left at N."""
+        b = self.code.builder
+        after = b.append_basic_block("summed")
+        switch, before = b.switch(low_order, after), b.block
+        entry, incoming = before, None
+        blocks = {n: b.append_basic_block(f"order_{n}") for n in range(LEAST_LOW_ORDER, MOST_ORDER)}
+        for n, block in blocks.items():
+            switch.add_case(self.code.integer(n), block)
+            b.position_at_end(block)
+            y = [b.phi(value.type) for value in last]
+            for phi, value in zip(y, last, strict=True):
+                phi.add_incoming(value, entry)
+            if incoming is not None:
+                for phi, value in zip(y, incoming, strict=True):
+                    phi.add_incoming(value, before)
+            incoming, before = self._plain_order(n, y), block
+            following = blocks.get(n + 1, after)
+            b.cbranch(b.icmp_signed("==", order, self.code.integer(n + 1)), after, following)
+        b.position_at_end(after)
 
-        def four(n: Any, k: Any, sums: list[Any]) -> list[Any]:
-            m = b.add(b.shl(k, code.integer(2)), code.integer(1))
-            found: list[Any] = []
-            for i in range(4):
-                at = b.add(m, code.integer(i))
-                found += self._accumulate(at, b.sub(n, at), sums[width * i : width * (i + 1)])
-            return found
-
-        def one(n: Any, m: Any, sums: list[Any]) -> list[Any]:
-            return self._accumulate(m, b.sub(n, m), sums)
-
-        def body(n: Any, y: list[Any]) -> list[Any]:
-            fours = b.lshr(b.sub(n, code.integer(1)), code.integer(2))
-            parts = code.loop(0, fours, partial(four, n), [code.zero] * (4 * width))
-            sums = [
-                code.add(code.add(parts[v], parts[width + v]), code.add(parts[2 * width + v], parts[3 * width + v]))
-                for v in self.vectors
-            ]
-            sums = code.loop(b.add(b.shl(fours, code.integer(2)), code.integer(1)), n, partial(one, n), sums)
-            sums = self._accumulate(n, 0, self._accumulate(0, n, sums))
-            following = [self._next(n, v, sums[v], y[v]) for v in self.vectors]
-            self._put_plain(b.add(n, code.integer(1)), following)
-            return following
-
-        code.loop(low_order, order, body, last)
+    def _plain_order(self, n: int, y: list[Any]) -> list[Any]:
+        """y_(n+1), with four sums side by side; the products of y_n come last."""
+        code, width = self.code, len(self.vectors)
+        sums = [code.zero] * (4 * width)
+        for m in range(1, n):
+            at = width * (m % 4)
+            sums[at : at + width] = self._accumulate(m, n - m, sums[at : at + width])
+        totals = [
+            code.add(code.add(sums[v], sums[width + v]), code.add(sums[2 * width + v], sums[3 * width + v]))
+            for v in self.vectors
+        ]
+        totals = self._accumulate(n, 0, self._accumulate(0, n, totals))
+        following = [self._next(n, v, totals[v], y[v]) for v in self.vectors]
+        self._put_plain(n + 1, following)
+        return following
