@@ -254,7 +254,7 @@ def test_threads_do_not_disturb_each_other() -> None:
     assert [bits(run) for run in runs] == alone
 
 
-def test_the_error_falls_with_the_tolerance_and_the_order_is_that_of_heyoka() -> None:
+def test_the_error_falls_with_the_tolerance() -> None:
     rounded = propagate_words(TOP, START, [20], DOUBLE_DOUBLE).problem
     known = propagate(rounded.top, rounded.start, [20], real(160)).states[0]
     last = Fraction(1)
@@ -265,11 +265,6 @@ def test_the_error_falls_with_the_tolerance_and_the_order_is_that_of_heyoka() ->
         assert error < 200 * tolerance
         assert error < last / 50
         last = error
-    loose = Fraction(1, 10**9)
-    assert (
-        propagate_words(TOP, START, [1], DOUBLE, tolerance=loose).order
-        == propagate(TOP, START, [1], DOUBLE, tolerance=loose).order
-    )
 
 
 @pytest.mark.parametrize("tolerance", [0, -1, 1, Fraction(1, 10**5), Fraction(1, 10**40)])

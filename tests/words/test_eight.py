@@ -7,11 +7,11 @@ from words_helpers import LEVELS
 
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.words.eight import Eight
-from heavytop.words.floating import Floating, Ladder
+from heavytop.words.floating import FALL_IN_LANES, Floating, Ladder
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
 
-FINE = Ladder.of(Fraction(1, 2**105))
+FINE = Ladder.of(Fraction(1, 2**105), FALL_IN_LANES)
 SPAN = Fraction(20)
 
 
@@ -21,7 +21,7 @@ def problems(system) -> list[Scaled]:
     return [Scaled.of(system, p, (Fraction(k, 8), Fraction(1, 5), Fraction(k, 3) - 1, *rest)) for k in range(1, 9)]
 
 
-def in_lanes(system, lanes: list[Scaled | None], ladder=FINE, low_order=21, processor=None, forwards=True) -> Eight:
+def in_lanes(system, lanes: list[Scaled | None], ladder=FINE, low_order=22, processor=None, forwards=True) -> Eight:
     eight = Eight(system, ladder, low_order, processor)
     for lane, problem in enumerate(lanes):
         if problem is not None:
@@ -70,7 +70,7 @@ def test_a_lane_that_needs_a_larger_n0_says_so_and_stops() -> None:
 
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
-    given, ladder = list(problems(HEAVY_TOP)), Ladder.of(Fraction(1, 10**20))
+    given, ladder = list(problems(HEAVY_TOP)), Ladder.of(Fraction(1, 10**20), FALL_IN_LANES)
     own, other = (
         in_lanes(HEAVY_TOP, given, ladder, 12, each).samples(dict.fromkeys(range(8), SPAN))
         for each in (None, processor)

@@ -15,13 +15,13 @@ from heavytop.top.equations import System
 from heavytop.words import eight, fixed, floating
 from heavytop.words.digits import MOST_WORDS, grid_for, grid_of
 from heavytop.words.fixed import Fixed
-from heavytop.words.floating import Floating, Ladder
+from heavytop.words.floating import FALL_IN_LANES, Floating, Ladder
 from heavytop.words.kernels import Grid
 from heavytop.words.run import Run
 from heavytop.words.scaled import Scaled
 
 LOOSEST = Fraction(1, 10**6)
-_MOST_SPARE_BITS = 16
+_MOST_SPARE_BITS = 8
 """Of the formats that double-double exceeds: a long run adds its local errors up, and the sum shall stay below eps."""
 _GUARD_BITS = 8
 
@@ -53,10 +53,14 @@ class Arithmetic(ABC):
 
 @dataclass(frozen=True, slots=True)
 class DoubleDouble(Arithmetic):
-    """106 bits that float, with plain doubles above an order n0."""
+    """106 bits that float, with plain doubles above an order n0.
+
+    ladder: of one motion.  in_lanes: of eight.
+    """
 
     tolerance: Fraction
     ladder: Ladder
+    in_lanes: Ladder
 
     @property
     def flags(self) -> dict[str, str]:
@@ -66,7 +70,7 @@ class DoubleDouble(Arithmetic):
             "bits": str(floating.BITS),
             "tolerance": decimal_text(self.tolerance, 6),
             "order": str(self.ladder.order),
-            "step_rule": "Jorba and Zou, ten bits",
+            "step_rule": f"radius of convergence times 2^{self.ladder.reach:.3f}, ten bits",
             "plain_orders": f"where rounding is below 2^{self.ladder.room - 53:.1f}",
         }
 
@@ -80,10 +84,11 @@ class DoubleDouble(Arithmetic):
         return made.seconds
 
 
+_REACH = -2.9
 # the same machine code with every order in double-double, and with nearly all in plain doubles
-_FULL = Ladder(38, -1000.0)
-_PLAIN = Ladder(24, 1000.0)
-_ALLOWED = Ladder(38, 1000.0)
+_FULL = Ladder(38, _REACH, -1000.0)
+_PLAIN = Ladder(24, _REACH, 1000.0)
+_ALLOWED = Ladder(38, _REACH, 1000.0)
 _PLAIN_BITS = 53
 
 
@@ -132,7 +137,7 @@ def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Sc
     start = (*problem.start.flat, *(problem.xi or ()))
     if wanted >= Fraction(1, 2 ** (floating.BITS - 1)):
         scaled = Scaled.of(problem.system, problem.parameters, start)
-        return DoubleDouble(wanted, Ladder.of(wanted)), scaled
+        return DoubleDouble(wanted, Ladder.of(wanted), Ladder.of(wanted, FALL_IN_LANES)), scaled
     scaled = Scaled.of(problem.system, problem.parameters, start, bounded=True)
     asked = wanted.denominator.bit_length() - wanted.numerator.bit_length()
     bits = asked + _GUARD_BITS + fixed.spread(scaled) + fixed.excess(scaled)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import ceil, log
+from math import ceil
 from time import perf_counter
 from typing import Any
 
@@ -40,8 +40,8 @@ class _Motion:
 
 
 def first_low_order(arithmetic: DoubleDouble) -> int:
-    """n0 where coefficients fall like exp(-2 n), as those of a motion near a singularity do at this step."""
-    return ceil(-arithmetic.ladder.room * log(2) / 2)
+    """n0 where coefficients fall by as much from order to order as those of a motion near a singularity do."""
+    return ceil(arithmetic.in_lanes.room / arithmetic.in_lanes.reach)
 
 
 class WordsLanes:
@@ -57,6 +57,11 @@ class WordsLanes:
         self.waiting: deque[_Motion] = deque()
         self.outgrown: deque[_Motion] = deque()
         self.chunk = _FIRST_CHUNK
+
+    def _own_flags(self) -> dict[str, str]:
+        ladder = self.arithmetic.in_lanes
+        rule = f"radius of convergence times 2^{ladder.reach:.3f}, ten bits"
+        return {"lanes": str(LANES), "order": str(ladder.order), "step_rule": rule}
 
     def run(self) -> None:
         """Until no problem is left, with n0 rising for those that outgrow it."""
@@ -75,7 +80,7 @@ class WordsLanes:
         for lane in range(LANES):
             while lane not in self.lanes and (motion := self._next()) is not None:
                 if eight is None:
-                    eight = Eight(motion.problem.system, self.arithmetic.ladder, low_order)
+                    eight = Eight(motion.problem.system, self.arithmetic.in_lanes, low_order)
                 if motion.moved is None:
                     eight.put(lane, motion.scaled, self.forwards, self.work.step_limit)
                 else:
@@ -173,8 +178,8 @@ class WordsLanes:
                 outcome,
                 motion.times[-1] if outcome is Outcome.SUCCESS else reached,
                 steps,
-                self.arithmetic.ladder.order,
+                self.arithmetic.in_lanes.order,
                 {"compile": self.seconds, "run": perf_counter() - motion.began},
-                self.arithmetic.flags | {"lanes": str(LANES)},
+                self.arithmetic.flags | self._own_flags(),
             ),
         )

@@ -4,14 +4,13 @@ The coefficients y_n of a motion fall with n, and the low words of all above som
 the recurrence goes on in plain doubles.  n0 follows the motion: a step is done again with a larger one where
 2^-53 |y_(n0+1)| h^(n0+1) comes out above what is allowed, and n0 falls where a smaller one would do.
 
-The step is that of Jorba and Zou, Exp. Math. 14 (2005) 99, as in heyoka: h = ρ exp(-2 - 0.7/(N - 1)) with ρ from the
-last two coefficients; its significand is cut to ten bits, so that h^4 is a double and h adds to the time exactly.
+The step is h = ρ exp(reach), with the radius ρ from the last two coefficients as Jorba and Zou have it (Exp. Math. 14
+(2005) 99); its significand is cut to ten bits, so that h^4 is a double and h adds to the time exactly.
 """
 
 from __future__ import annotations
 
 import ctypes
-import math
 from typing import Any
 
 from llvmlite import ir
@@ -23,9 +22,9 @@ from heavytop.words.pairs import add, log2, multiply, power_of_two, times
 from heavytop.words.recurrence import Layout, Recurrence
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, POINTER, Index, Pair, function
 
-TIME, TIME_LOW, TARGET, TARGET_LOW, BEGAN, BEGAN_LOW, SIGN, ROOM, CLOCK = range(9)
+TIME, TIME_LOW, TARGET, TARGET_LOW, BEGAN, BEGAN_LOW, SIGN, ROOM, REACH, CLOCK = range(10)
 """Places of the clock, doubles: |time| and its target and the beginning of the last step, in two words each; the
-direction; log2 of the rounding allowed above n0, in units of 2^-53."""
+direction; log2 of the rounding allowed above n0, in units of 2^-53; log2 of h/ρ."""
 ORDER, LOW_ORDER, LEAST, MOST, STATUS, USED, COUNTS = range(7)
 """Places of the counts: N, n0 of the next step, bounds of n0, how the last step ended, its n0."""
 FINE, NON_FINITE, TOO_SMALL = range(3)
@@ -147,16 +146,13 @@ class _Step:
     def _length(self, order: Any, start: Any) -> Any:
         """h > 0, from log2 |y_0| and the last two coefficients."""
         b = self.code.builder
-        before = b.sub(order, self.code.integer(1))
 
         def radius(n: Any) -> Any:
             return b.fdiv(b.fsub(start, log2(self.code, self._norm(n))), b.sitofp(n, DOUBLE))
 
-        one, two = radius(order), radius(before)
+        one, two = radius(order), radius(b.sub(order, self.code.integer(1)))
         least = b.select(b.fcmp_ordered("<", one, two), one, two)
-        margin = b.fdiv(ir.Constant(DOUBLE, 0.7 / math.log(2)), b.sitofp(before, DOUBLE))
-        exponent = b.fsub(b.fsub(least, ir.Constant(DOUBLE, 2 / math.log(2))), margin)
-        return power_of_two(self.code, exponent, LARGEST_STEP, STEP_BITS)
+        return power_of_two(self.code, b.fadd(least, self._time(REACH)), LARGEST_STEP, STEP_BITS)
 
     def _sum(self, order: Any, low_order: Any, step: Any) -> list[Pair]:
         """Σ y_n h^n: four sums in h^4 side by side, each from its highest order, then those of h^2 and h."""

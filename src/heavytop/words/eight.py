@@ -48,6 +48,7 @@ class Eight:
         self.scratch = doubles((ladder.order + 1) * steps.ROW)
         self.signs = [1] * LANES
         self._set(steps.ROOM, [ladder.room] * LANES)
+        self._set(steps.REACH, [ladder.reach] * LANES)
 
     def _set(self, vector: int, values: Any) -> None:
         self.clock[LANES * vector : LANES * (vector + 1)] = values

@@ -18,7 +18,11 @@ from heavytop.words.run import Run, Status
 from heavytop.words.scaled import Scaled
 
 BITS = 106
-_ROUNDING_BITS = 12
+FALL_ALONE, FALL_IN_LANES = 1.45, 2.0
+_MARGIN = 6.0
+_DEEPEST = 75.0
+_DOUBLE_BITS = 53
+_ROUNDING_BITS = 10
 _LEAST_ROOM = -58.0
 _QUOTIENT_BITS = 140
 LARGEST_TIME = Fraction(2) ** 1000
@@ -29,22 +33,29 @@ _making = Lock()
 
 @dataclass(frozen=True, slots=True)
 class Ladder:
-    """How far the series goes, and what is kept in double-double.
+    """How far the series goes, how long a step is, and what is kept in double-double.
 
-    order: N.  room: log2 of the largest |y_n| h^n / |y_0| whose rounding to a double is allowed, at n0 + 1.
+    order: N.  reach: log2 of h/ρ.  room: log2 of the largest |y_n| h^n / |y_0| whose rounding to a double is allowed,
+    at n0 + 1.
     """
 
     order: int
+    reach: float
     room: float
 
     @classmethod
-    def of(cls, tolerance: Fraction) -> Ladder:
-        """For a local error of ``tolerance`` relative to the state: N = ⌈1 - ln(tolerance)/2⌉ as heyoka takes it, and
-        roundings above n0 that are 2^-12 of the tolerance.
+    def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> Ladder:
+        """For a local error of ``tolerance`` relative to the state.
+
+        fall: of the logarithm of y_n h^n from one order to the next.  2 is best where the time goes into N² products
+        (Jorba and Zou); a single motion waits for the last product of each order, so that many orders and long steps
+        are faster.
         """
-        log = math.log(tolerance.numerator) - math.log(tolerance.denominator)
-        order = math.ceil(1 - log / 2)
-        return cls(order, max(53 + log / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM))
+        log_tolerance = math.log(tolerance.numerator) - math.log(tolerance.denominator)
+        depth = min(_MARGIN - log_tolerance, _DEEPEST)
+        order = math.ceil(depth / fall)
+        reach = -(depth / order + 0.7 / (order - 1)) / math.log(2)
+        return cls(order, reach, max(_DOUBLE_BITS - depth / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM))
 
 
 def machine(system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, Layout]:
@@ -77,6 +88,7 @@ class Floating(Run):
         self.clock, self.counts = doubles(dd.CLOCK), numpy.zeros(dd.COUNTS, numpy.int64)
         self.clock[dd.SIGN] = 1.0 if forwards else -1.0
         self.clock[dd.ROOM] = ladder.room
+        self.clock[dd.REACH] = ladder.reach
         most = ladder.order - 1
         self.counts[[dd.ORDER, dd.LOW_ORDER]] = ladder.order, low_order or most
         self.counts[[dd.LEAST, dd.MOST]] = LEAST_LOW_ORDER, most

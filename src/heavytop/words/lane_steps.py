@@ -24,8 +24,8 @@ from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER,
 
 FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
 """Flags of a lane."""
-TIME, TARGET, SIGN, LEFT, ROOM, CLOCK = 0, 2, 4, 5, 6, 7
-"""Vectors of the clock: |time| and its target, two words each; direction, steps left, room as in double_double."""
+TIME, TARGET, SIGN, LEFT, ROOM, REACH, CLOCK = 0, 2, 4, 5, 6, 7, 8
+"""Vectors of the clock: |time| and its target, two words each; direction, steps left, room and reach."""
 _TOLERATED = 1.0
 ROW = 96
 """Doubles of one order: two words of six components."""
@@ -201,16 +201,13 @@ class _Round:
     def _length(self, start: Any) -> Any:
         """Each lane's h > 0, as in :mod:`heavytop.words.double_double`."""
         code, b = self.code, self.code.builder
-        before = b.sub(self.order, code.integer(1))
 
         def radius(n: Any) -> Any:
             return b.fdiv(b.fsub(start, self._norm(n)), code.spread(b.sitofp(n, DOUBLE)))
 
-        one, two = radius(self.order), radius(before)
+        one, two = radius(self.order), radius(b.sub(self.order, code.integer(1)))
         least = b.select(b.fcmp_ordered("<", one, two), one, two)
-        margin = b.fdiv(ir.Constant(DOUBLE, 0.7 / math.log(2)), b.sitofp(before, DOUBLE))
-        exponent = b.fsub(b.fsub(least, code.constant(2 / math.log(2))), code.spread(margin))
-        return power_of_two(code, exponent, LARGEST_STEP, STEP_BITS)
+        return power_of_two(code, b.fadd(least, code.load(self.clock, 8 * REACH)), LARGEST_STEP, STEP_BITS)
 
     def _sum(self, i: int, h: Any) -> Pair:
         """Σ y_n h^n of one component, from the highest order."""

@@ -14,7 +14,7 @@ from heavytop.words.pairs import add, multiply
 from heavytop.words.vector import Code, Index, Pair
 
 LEAST_LOW_ORDER = 2
-MOST_ORDER = 40
+MOST_ORDER = 56
 """n0 is at least the one, N at most the other."""
 _NONE = 8
 """A lane of the second operand of a shuffle, which is 0."""
