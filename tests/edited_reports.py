@@ -268,7 +268,7 @@ def flags(row: Document, random: Random) -> bool:
 
 def order(row: Document, _: Random) -> bool:
     was, row["order"] = row["order"], 2
-    return was is not None
+    return was not in (None, 2)
 
 
 def rounding(row: Document, random: Random) -> bool:
@@ -331,9 +331,9 @@ EDITS: dict[str, Edit] = {
         more_steps, bits, precision, starts_fewer, start_failed, flags, order, rounding, subject,
     )
 } | {
-    "reference computed": _reference("known: |[(]proven[^)]*[)]", lambda found: "computed: " if ":" in found[0] else ""),
+    "reference computed": _reference("known: |[(]proven[^)]*[)]", lambda at: "computed: " if ":" in at[0] else ""),
     "reference not proven": _reference("[(]proven[^)]*[)]", lambda _: "(computed)"),
-    "radius larger": _reference(r"radius below (\S+?)(?=;|$)", lambda found: f"radius below {10**9 * float(found[1])}"),
+    "radius larger": _reference(r"radius below (\S+?)(?=;|$)", lambda at: f"radius below {10**9 * float(at[1])}"),
     "no radius": _reference(r", radius below [^;]+", lambda _: ""),
     "digits fewer": _reference(r"to (\d+) digits", lambda _: "to 5 digits"),
     "no certificate": _reference(r"; certified .*", lambda _: ""),

@@ -30,3 +30,9 @@ class OutOfReach(HeavyTopError):
     """A reference that cannot be proven to the digits asked for; says how many could be reached."""
 
     exit_code = 3
+
+
+class PeerFailed(HeavyTopError):
+    """An integrator of others that raised or broke its contract; says which and how.  Its row says so, others go on."""
+
+    exit_code = 3

@@ -131,6 +131,12 @@ def shown(value: Fraction) -> str:
     return str(value) if short else decimal_text(value, 6)
 
 
+def exact_text(value: Fraction) -> str:
+    """An exact number as ``str`` writes it; Python refuses to write whole numbers of more than 4300 digits itself."""
+    numerator, denominator = Decimal(value.numerator), Decimal(value.denominator)
+    return f"{numerator}" if denominator == 1 else f"{numerator}/{denominator}"
+
+
 def physical(value: Fraction, what: str) -> Fraction:
     """``value``; raises InputError if it is larger than 10^150."""
     if abs(value) > LARGEST:

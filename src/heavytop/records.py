@@ -11,8 +11,10 @@ import msgspec
 
 SCHEMA = "heavytop-report/1"
 
-UNMEASURED = OUT_OF_REACH, CONTRADICTION = "out_of_reach", "contradiction"
-"""Outcomes of a row that came to nothing: it has no metrics, and says why in the place of a reference."""
+UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED = "out_of_reach", "contradiction", "failed"
+"""Outcomes of a row that came to nothing: it has no metrics, and says why in the place of a reference.
+
+failed: an integrator of others raised an error, or gave back what is no motion."""
 
 Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Starts = Annotated[int, msgspec.Meta(ge=1)]
@@ -75,6 +77,7 @@ class Row(msgspec.Struct):
     measured: what is held (known, claimed or computed); against: what it is held against, with method and radius.
     outcome, time_reached, steps, finite travel with every number.  seconds: timings, not compared.
     evaluations: of the field, where the integrator counts them.
+    samples: how many times the largest values are over; 0 where that is not said.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     """
 
@@ -96,6 +99,7 @@ class Row(msgspec.Struct):
     flags: dict[str, str] = {}
     input_rounding: str | None = None
     series: dict[str, Series] = {}
+    samples: Count = 0
     starts: Starts = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, Seconds] = {}

@@ -4,10 +4,15 @@ import random
 from fractions import Fraction
 
 import pytest
+from flint import arb
 from proofs import assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass
+from heavytop.exact.balls import working_precision
 from heavytop.exact.kovalevskaya import Kovalevskaya
+from heavytop.exact.kovalevskaya_abel import AbelMotion
+from heavytop.exact.kovalevskaya_level import Level
+from heavytop.exact.kovalevskaya_theta import ThetaMotion
 from heavytop.exact.validated import Validated
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -55,6 +60,7 @@ def test_the_enclosure_holds_the_closed_form(seed):
         ((F(1, 2), F(1, 3), TINY), (F(3, 5), F(4, 5), TINY)),
         ((F(-1, 2), 0, 0), (F(3, 5), F(4, 5), 0)),  # both and q = 0
         ((0, F(-1, 2), 0), (F(3, 5), 0, F(4, 5))),
+        ((0, 0, 0), TILTED),  # at rest: w1 infinite and w2 at a turning point
     ],
 )
 def test_turning_points_are_starts_like_any_other(omega, gamma):
@@ -71,6 +77,70 @@ def test_a_double_root_outside_the_gaps_does_no_harm(omega, gamma):
     motion = motion_from((F(1), F(0)), omega, gamma)
     assert_solves(motion, F(11, 3))
     assert_narrow(motion, F(10**9))
+
+
+def tilted(exponent):
+    """γ beside axis 3, where every start is on a degenerate level, at a distance of about 10^-exponent."""
+    t = F(1, 10**exponent)
+    return 2 * t / (1 + t * t), 0, (1 - t * t) / (1 + t * t)
+
+
+NEAR = {"outside": (2, F(1, 3), F(1, 2)), "asymptotic": (-1, F(1, 4), F(1, 4)), "both": (F(1, 2), F(1, 3), 1)}
+
+
+@pytest.mark.parametrize("level", NEAR)
+@pytest.mark.parametrize("exponent", [1, 3])
+def test_near_a_degenerate_level_every_digit_comes_out(level, exponent):
+    motion = motion_from((F(1), F(0)), NEAR[level], tilted(exponent))
+    assert_solves(motion, F(7, 3))
+    assert_narrow(motion, F(10**6))
+
+
+@pytest.mark.parametrize(("level", "exponent"), [("asymptotic", 8), ("both", 4), ("both", 7)])
+def test_nearer_theta_functions_take_over(level, exponent):
+    motion = motion_from((F(1), F(0)), NEAR[level], tilted(exponent))
+    assert_solves(motion, F(7, 3))
+    assert any(isinstance(form, ThetaMotion) for form in motion.made.values())
+    pairs = zip(motion.state(F(2), 100), Validated(motion.top, motion.start).state(F(2), 100), strict=True)
+    assert all(a.overlaps(b) for a, b in pairs)
+
+
+@pytest.mark.parametrize("level", ["asymptotic", "both"])
+def test_nearer_still_the_motion_is_refused_with_the_distance(level):
+    with pytest.raises(NotInClass, match=r"but for .*e-12, the distance"):
+        motion_from((F(1), F(0)), NEAR[level], tilted(12))
+    with pytest.raises(NotInClass, match=r"but for .*e-200, the distance|too near"):
+        motion_from((F(1), F(0)), NEAR[level], tilted(200))
+
+
+def test_a_double_root_outside_the_gaps_does_no_harm_however_near():
+    motion = motion_from((F(1), F(0)), NEAR["outside"], tilted(200))
+    assert_solves(motion, F(7, 3))
+
+
+@pytest.mark.parametrize("seed", range(9))
+def test_theta_functions_and_abel_inversion_meet(seed):
+    motion = random_motion(seed)
+    level = Level.of(motion.top, motion.start)
+    with working_precision(256):
+        forms = AbelMotion.of(level, 1 << 17), ThetaMotion.of(level)
+        for time in (F(0), F(1), F(-1000), F(10**9)):
+            one, two = (form.at(time, 1) for form in forms)
+            assert all(a.overlaps(b) for a, b in zip(one, two, strict=True))
+            assert max(abs(a - b).upper() for a, b in zip(one, two, strict=True)) < arb("1e-45")
+
+
+@pytest.mark.parametrize("omega", [(0, 0, 0), (F(1, 2), 0, 1)])
+def test_theta_functions_and_abel_inversion_meet_where_q_vanishes(omega):
+    motion = motion_from((F(1), F(0)), omega, TILTED)
+    with working_precision(320):
+        theta = ThetaMotion.of(Level.of(motion.top, motion.start))
+        for time in (F(0), F(7, 3)):
+            assert all(a.overlaps(b) for a, b in zip(theta.at(time, 1), motion.state(time, 200), strict=True))
+        rows = theta.at(F(7, 3), 3)
+    series = motion.series(F(7, 3), 3, 200)
+    with working_precision(320):
+        assert all(a[n].overlaps(b[n]) for a, b in zip(rows, series, strict=True) for n in range(3))
 
 
 def test_a_thousand_digits_come_out():

@@ -265,6 +265,16 @@ def test_too_many_digits_are_refused_with_the_digits_that_could_be_reached():
     assert 100 < digits < 20000
 
 
-def test_motions_too_fast_for_the_bounds_are_refused():
-    with pytest.raises(OutOfReach, match="rate"):
-        Validated(HeavyTop((1, 2, 3), 1, (0, 0, 1)), State(("1e80", 0, 0), (0, 0, 1)))
+def test_a_motion_that_changes_far_faster_than_it_turns_is_refused():
+    for size in ("1e80", "1e1000"):
+        top = HeavyTop((1, 1 / Fraction(size), 3), 1, (0, 1, 1))
+        with pytest.raises(OutOfReach, match="times as fast as it turns"):
+            Validated(top, State((1, 1, 0), (0, 0, 1)))
+
+
+def test_bits_are_given_though_the_forecast_was_too_low(monkeypatch):
+    """The ladder of precisions is met at every offset: the last bit asked for counts."""
+    monkeypatch.setattr(Validated, "_forecast", lambda *_: (-8.0, 20.0))
+    solution = motion(VECTORS[0])
+    for bits in range(96, 130):
+        assert min(map(relative_bits, solution.state(Fraction(3), bits))) >= bits

@@ -8,13 +8,16 @@ import msgspec
 import pytest
 from flint import arb
 
-from heavytop.errors import Contradiction, InputError
+from heavytop.errors import Contradiction, InputError, OutOfReach
 from heavytop.exact.balls import midpoint, radius, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.exact.euler import Euler
 from heavytop.exact.validated import Validated
-from heavytop.measure.certify import agreed_digits, certified_state, certify
+from heavytop.measure.certify import _digits, agreed_digits, certified_state, certify
+from heavytop.measure.known import certified
 from heavytop.measure.reference import reference
+from heavytop.measure.scalar import GUARD_BITS
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -110,6 +113,127 @@ def test_reference_serves_the_gyrostat():
     record = reference(known.top, known.start, ["-1/2"], 40, GYROSTAT)
     for ball, value in zip(record.states[0], known.state(Fraction(-1, 2), 160), strict=True):
         assert abs(Fraction(ball.value) - midpoint(value)) <= Fraction(ball.radius) + radius(value)
+
+
+TURNING = Euler(HeavyTop((3, 2, 1), 1, (0, 0, 0)), State((1, "1/2", "-1/3"), ("2/3", "-1/3", "2/3")))
+
+
+class Late(Shifted):
+    """A motion that goes too fast by a part of 10^-30 after t = 5: its first integrals are right throughout."""
+
+    def __init__(self):
+        super().__init__(TURNING, 0, 5)
+
+    def state(self, time, bits):
+        return self.known.state(time * (1 + Fraction(1, 10**30)) if abs(time) > 5 else time, bits)
+
+
+class WideAtFirst(Shifted):
+    """A motion known to 25 digits only up to t = 5."""
+
+    def __init__(self):
+        super().__init__(TURNING, 0, 5)
+
+    def state(self, time, bits):
+        values = self.known.state(time, bits)
+        with working_precision(bits + 32):
+            return [value + arb(0, 1e-25) for value in values] if 0 < abs(time) <= 5 else values
+
+
+@pytest.mark.parametrize(("solution", "least", "most"), [(TURNING, 50, 99), (Late(), 25, 31), (WideAtFirst(), 23, 25)])
+def test_each_end_counts_where_the_middle_is_out_of_reach(solution, least, most):
+    certificate = certify(solution, Fraction(10**6), 50)
+    assert certificate.kind == "proven at both ends"
+    assert least <= certificate.agreed_digits <= most
+
+
+class Blurred(Shifted):
+    """A motion known within ``radius`` at all times."""
+
+    def __init__(self, radius):
+        super().__init__(TURNING, 0, 5)
+        self.radius = radius
+
+    def state(self, time, bits):
+        with working_precision(bits + 32):
+            return [value + arb(0, self.radius) for value in self.known.state(time, bits)]
+
+
+def test_a_motion_scores_only_what_has_three_digits_less_than_it():
+    """In double precision, of 15 whole digits: 18 are needed."""
+    assert certified(Blurred(9e-19), Fraction(1), 53 + GUARD_BITS) is not None
+    assert certified(Blurred(1.1e-18), Fraction(1), 53 + GUARD_BITS) is None
+
+
+class Fixed:
+    """One ball m ± r in all six components, whatever is asked; the state at 0 is that of a known motion."""
+
+    def __init__(self, middle, radius):
+        self.middle, self.radius = middle, radius
+        known = KNOWN[0]
+        self.method, self.system, self.top, self.start = "fixed", known.system, known.top, known.start
+
+    def state(self, time, bits):
+        with working_precision(300):
+            return [arb((self.middle, -100), (self.radius, -100))] * 6
+
+
+@pytest.mark.parametrize("middle", [0, 1 << 90])
+def test_balls_that_just_touch_agree_and_balls_just_apart_contradict(middle):
+    one = Fixed(middle, 1000)
+    certify(one, Fraction(1), 20, enclosure=Fixed(middle + 3000, 2000))
+    certify(one, Fraction(1), 20, enclosure=Fixed(middle - 3000, 2000))
+    for apart in (3001, -3001):
+        with pytest.raises(Contradiction, match="component 1"):
+            certify(one, Fraction(1), 20, enclosure=Fixed(middle + apart, 2000))
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [((3 << 98, 7), ((3 << 98) + 900, 50)), ((-(1 << 110), 7), (12 - (1 << 110), 0))]
+)
+def test_agreed_digits_are_those_of_the_farthest_points_of_two_balls(first, second):
+    apart = Fraction(abs(first[0] - second[0]) + first[1] + second[1], 2**100)
+    size = max(Fraction(1), Fraction(abs(first[0]), 2**100))
+    digits = agreed_digits(Fixed(*first).state(0, 0), Fixed(*second).state(0, 0))
+    assert Fraction(1, 10 ** (digits + 1)) < apart / size <= Fraction(1, 10**digits)
+
+
+def test_digits_of_a_gap_are_exact_at_powers_of_ten():
+    for digits in (0, 1, 2, 17, 40, 1000):
+        for gap, found in (
+            (Fraction(1, 10**digits), digits),
+            (Fraction(1, 10**digits) * (1 + Fraction(1, 10**9)), digits - 1),
+        ):
+            assert _digits(gap) == max(0, found)
+
+
+class Wide:
+    """A solution that gives fewer digits than it was asked for: balls of ``radius`` around (1, 0, ...)."""
+
+    method, system = "too wide", KNOWN[0].system
+
+    def __init__(self, middle, radius):
+        self.middle, self.radius = middle, radius
+
+    def state(self, time, bits):
+        with working_precision(200):
+            return [arb(self.middle, self.radius), *[arb(0)] * 5]
+
+
+@pytest.mark.parametrize(("middle", "wide", "narrow"), [("100", "1e-28", "0.9e-28"), ("0", "1.01e-30", "0.99e-30")])
+def test_a_radius_beyond_the_digits_promised_is_not_printed(middle, wide, narrow):
+    def asked(radius):
+        return reference(KNOWN[0].top, KNOWN[0].start, ["1"], 30, finder=lambda *_: Wide(middle, radius))
+
+    assert Fraction(asked(narrow).states[0][0].radius) >= Fraction(narrow)
+    with pytest.raises(OutOfReach, match="not to 30 digits, by too wide"):
+        asked(wide)
+
+
+def test_more_digits_than_python_reads_at_once_are_printed():
+    record = reference(KNOWN[0].top, KNOWN[0].start, ["1e-5000", 1], 5000)
+    assert record.times == ["1/1" + 5000 * "0", "1"]
+    assert all(4990 < len(ball.value.lstrip("-0.")) <= 5002 for ball in record.states[1])
 
 
 @pytest.mark.parametrize("digits", [0, -1, 20001])

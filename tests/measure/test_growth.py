@@ -1,11 +1,12 @@
 """Laws of growth on synthetic ensembles whose law is known: what is recognised, how sure it is, what is refused."""
 
 import collections
+import math
 
 import numpy
 import pytest
 
-from heavytop.measure.growth import FEWEST_STARTS, Ensemble, band, law
+from heavytop.measure.growth import FEWEST_STARTS, Ensemble, band, finite_time_rates, law, median_interval
 from synthetic_ensembles import EPS, EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic, walks
 
 
@@ -177,3 +178,42 @@ def test_the_band_holds_the_rms_of_other_starts() -> None:
 def test_the_same_starts_give_the_same_bits() -> None:
     errors = synthetic("walk", numpy.random.default_rng(9))
     assert law(Ensemble(TIMES, errors, STEP)) == law(Ensemble(TIMES, errors.copy(), STEP))
+
+
+@pytest.mark.parametrize("starts", [16, 64])
+@pytest.mark.parametrize("spread", [0.05, 0.12])
+def test_the_interval_of_a_rate_holds_the_median_of_rates_that_scatter(starts: int, spread: float) -> None:
+    rng, times = numpy.random.default_rng(31), 10 ** (numpy.arange(32 * 4 + 1) / 32)
+    laws = [law(Ensemble(times, chaotic(rng, starts, 0.15, times, spread), STEP)) for _ in range(50)]
+    assert all(each.growth == "exponential" for each in laws)
+    assert sum(each.low <= 0.15 <= each.high for each in laws) >= 46
+    assert all(each.low <= each.exponent <= each.high for each in laws)
+
+
+@pytest.mark.parametrize(("count", "last", "outside"), [(8, 0, 2), (16, 3, 1394), (64, 23, None)])
+def test_the_interval_of_a_median_is_the_narrowest_that_is_exact(count: int, last: int, outside: int | None) -> None:
+    values = numpy.arange(count)[::-1].astype(float)
+    assert median_interval(values) == (last, count - 1 - last)
+    below = sum(math.comb(count, k) for k in range(last + 1))
+    assert 2 * below <= 0.05 * 2**count < 2 * (below + math.comb(count, last + 1))
+    assert outside in (None, 2 * below)
+
+
+def test_a_rate_is_that_of_each_start_and_zeros_count_for_nothing() -> None:
+    times = numpy.array([1.0, 2, 4, 8, 16])
+    errors = numpy.exp(numpy.array([[0.1], [0.5], [2.0]]) * times)
+    assert finite_time_rates(times, errors) == pytest.approx([0.1, 0.5, 2.0], rel=1e-12)
+    errors[1, 2] = 0
+    errors[2, 1:] = 0
+    assert finite_time_rates(times, errors) == pytest.approx([0.1, 0.5, 0.0], rel=1e-12)
+
+
+def test_what_all_starts_share_widens_the_interval_of_a_power() -> None:
+    rng = numpy.random.default_rng(12)
+    errors = synthetic("linear", rng)
+    wiggly = errors * numpy.exp(0.3 * numpy.sin(3 * numpy.arange(len(TIMES))))
+    plain, shared = (law(Ensemble(TIMES, each, STEP)) for each in (errors, wiggly))
+    x = numpy.log(TIMES[TIMES >= 100 * 0.999])
+    expected = 2 * 0.3 / 2**0.5 / ((x - x.mean()) ** 2).sum() ** 0.5
+    assert (shared.high - shared.low) / 2 == pytest.approx(expected, rel=0.25)
+    assert (plain.high - plain.low) / 2 < expected / 2

@@ -5,11 +5,13 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import Contradiction
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.known import Known, certified, known_motion
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.suite.cases import CASES
+from heavytop.top.heavy_top import HeavyTop, State
 
 
 def problem(name: str, precision=DOUBLE) -> Problem:
@@ -81,3 +83,24 @@ def test_a_reference_with_fewer_digits_than_the_format_scores_nothing() -> None:
     known = known_motion(problem("euler"), Fraction(3))
     assert isinstance(known, Known)
     assert certified(Blurred(known.solution), Fraction(3), 117) is None
+
+
+@pytest.mark.parametrize("axes", ALL)
+def test_no_naming_of_the_axes_costs_a_motion_its_reference(axes) -> None:
+    case = CASES["delone"]
+    given = Problem.of(renamed_top(case.top, axes), renamed_state(case.start, axes), QUAD, case.system)
+    known = known_motion(given, Fraction(10**4))
+    assert isinstance(known, Known)
+    assert "closed form" in known.solution.method
+    assert known.certificate.agreed_digits >= 37
+
+
+@pytest.mark.parametrize("power", [-90, -30, 30, 90])
+def test_no_unit_of_time_costs_a_motion_its_reference(power) -> None:
+    case, rate = CASES["delone"], Fraction(2) ** power
+    top = HeavyTop(case.top.inertia, case.top.weight * rate**2, case.top.centre)
+    start = State([rate * w for w in case.start.omega], case.start.gamma)
+    known = known_motion(Problem.of(top, start, QUAD, case.system), 10**4 / rate)
+    assert isinstance(known, Known)
+    assert known.certificate.kind == "proven at both ends"
+    assert known.certificate.agreed_digits >= 37

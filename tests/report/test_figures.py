@@ -9,7 +9,7 @@ import numpy
 import pytest
 
 from heavytop.claims.ershkov import PartialCase
-from heavytop.report.curves import PAPER_FIGURES, gyrostat_curves, parting_time, true_curves
+from heavytop.report.curves import PAPER_FIGURES, gyrostat_curves, true_curves
 from heavytop.report.figures import draw_figures
 
 
@@ -43,12 +43,6 @@ def test_the_drawn_truth_and_claim_are_as_far_apart_as_they_are(ratio, time, dis
     assert abs(found - distance) < 1e-6
 
 
-def test_claim_and_truth_part_by_one_percent_where_the_distance_reaches_it():
-    # early on the distance grows like t²: 0.0024912 at 0.1 for I1/I3 = 2, where max|Ω| = 2
-    assert parting_time(case(2), Fraction(1)) == pytest.approx(0.1 * (0.02 / 0.0024912) ** 0.5, rel=0.03)
-    assert parting_time(case(6), Fraction(1)) == pytest.approx(0.1 * (0.06 / 0.181054) ** 0.5, rel=0.03)
-
-
 def test_angles_of_the_truth_satisfy_3_2():
     for ratio in (2, 6):
         curves, _ = true_curves(case(ratio), [Fraction(index, 10) for index in range(-20, 21)])
@@ -66,6 +60,12 @@ def test_the_files_are_complete_and_the_same_every_time(tmp_path):
     assert {"truth-ratio2.svg", "truth-ratio6.svg", "momentum-sphere.svg"} <= set(names)
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes()
+        if one.name == "truth-ratio2.svg":
+            for said in (
+                "as printed: Ω off by 1 % of α at t = 0.0100",
+                "smooth branch: Ω off by 1 % of α at t = 0.2014",
+            ):
+                assert said in one.read_text("utf-8")
         if one.suffix == ".svg":
             assert ElementTree.parse(one).getroot().tag.endswith("svg")
         else:

@@ -83,7 +83,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("pages")
     baseline, candidate = full_report(), full_report(HOSTILE)
-    candidate.rows[5].metrics["solution_error_gamma_final"] = error("1e-7")
+    candidate.rows[5].metrics["solution_error_relative_max"] = error("1e-7")
     html.write_report(candidate, folder / "report.html")
     html.write_report(store.read(Path(__file__).parents[2] / "results" / "default"), folder / "results.html")
     (folder / "comparison.html").write_text(

@@ -131,6 +131,21 @@ def test_rows_come_back_but_for_those_that_were_cut_short_or_damaged(tmp_path: P
     assert not (tmp_path / "out").exists()
 
 
+def test_what_was_cut_short_is_gone_before_a_shorter_row_is_added(tmp_path: Path) -> None:
+    file, longer = killed(tmp_path / "out", 2), tmp_path / "longer"
+    with suppress(KeyboardInterrupt), checkpoint(longer) as kept:
+        kept.add(2, row("x" * 4000))
+        raise KeyboardInterrupt
+    cut = (longer / "rows.jsonl").read_bytes().splitlines(keepends=True)[1][:-300]
+    whole = file.read_bytes()
+    file.write_bytes(whole + cut)
+    with suppress(KeyboardInterrupt), checkpoint(tmp_path / "out") as kept:
+        assert file.read_bytes() == whole
+        kept.add(2, row("case 2"))
+        raise KeyboardInterrupt
+    assert file.read_bytes() == killed(tmp_path / "other", 3).read_bytes()
+
+
 @pytest.mark.parametrize("changed", [{"heavytop": "0.2.0"}, {"plan name": "other"}, {"simd": "8"}])
 def test_a_checkpoint_of_another_run_is_refused_with_what_differs(tmp_path: Path, changed: dict[str, str]) -> None:
     file = killed(tmp_path / "out", 2)

@@ -44,8 +44,7 @@ def test_values_are_narrow_certified_and_keep_the_integrals_of_the_start(entry):
         assert state["certificate"]["agreed_digits"] >= 100
         y = [Fraction(ball["value"]) for ball in state["state"]]
         for ball in state["state"]:
-            # half a unit of the hundredth digit is up to 5e-100 of the value
-            assert Fraction(ball["radius"]) <= Fraction(6, 10**100) * max(1, abs(Fraction(ball["value"])))
+            assert Fraction(ball["radius"]) <= Fraction(1, 10**100) * max(1, abs(Fraction(ball["value"])))
         for integral in (area, energy, length):
             assert abs(integral(y) - integral(start)) < Fraction(1, 10**96)
 

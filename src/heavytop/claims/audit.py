@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
 from heavytop.claims.guard import in_time
-from heavytop.claims.judge import AuditReport, Finding, judge
+from heavytop.claims.judge import AuditReport, Finding, Row, judge
 from heavytop.claims.statement import Setting, Statement
 from heavytop.errors import InputError
 from heavytop.top.equations import HEAVY_TOP, System, system
@@ -34,8 +35,11 @@ class Auditable(Protocol):
         """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
         ...
 
-    def explain(self) -> tuple[list[Finding], tuple[str, ...]]:
-        """The steps that explain the verdict, and the names of the systems whose motions the claim is."""
+    def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
+        """The steps that explain the verdict, and the names of the systems whose motions the claim is.
+
+        rows: the verdicts about the system ``about``, so that they need not be found again.
+        """
         ...
 
 
@@ -69,7 +73,7 @@ def audit(name: str, system_name: str = HEAVY_TOP.name) -> AuditReport:
 def audit_claim(claim: Auditable, about: System) -> AuditReport:
     """The audit of a claim that is at hand, as a motion of ``about``."""
     rows = judge(claim.statements(about), claim.setting)
-    why, solves = claim.explain()
+    why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
     return AuditReport(claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind)
 

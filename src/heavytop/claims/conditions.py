@@ -12,7 +12,7 @@ import sympy
 from flint import arb
 
 from heavytop.claims.evaluate import evaluate
-from heavytop.claims.signs import Unprovable
+from heavytop.claims.signs import Sign, Unprovable
 
 _LONGEST = 120
 _BITS = 512
@@ -24,6 +24,12 @@ class Kind(Enum):
     NONZERO = "{} ≠ 0"
     POSITIVE = "{} > 0"
     NONNEGATIVE = "{} ≥ 0"
+
+    def is_met_by(self, sign: Sign) -> bool:
+        """Whether an expression of that sign meets it."""
+        if self is Kind.NONZERO:
+            return sign.strict
+        return sign.value > 0 and (sign.strict or self is Kind.NONNEGATIVE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,12 +117,12 @@ def is_exactly_zero(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fracti
     """
     from heavytop.claims.algebra import Assumptions, Field
 
+    if not all(need.is_met(values) for need in conditions_of([expression])):
+        return None
     exact = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in values.items()}
     value = expression.subs(exact, simultaneous=True) if expression.free_symbols else expression
     if value.is_Rational:
         return bool(value == 0)
-    if not all(need.is_met(values) for need in conditions_of([expression])):
-        return None
     ball: arb = evaluate(expression, values, _BITS)
     if ball.is_finite() and not ball.contains(0):
         return False

@@ -6,7 +6,7 @@ formula can be replaced to see what the audit makes of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations_with_replacement
@@ -18,7 +18,7 @@ from heavytop.claims import ershkov, ershkov_general
 from heavytop.claims.conditions import conditions_of
 from heavytop.claims.ershkov_general import GeneralConstants
 from heavytop.claims.explain import explain
-from heavytop.claims.judge import Finding
+from heavytop.claims.judge import Finding, Row
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Formulas, Setting, Statement
 from heavytop.claims.statements import SYMBOLIC, Motion, attitude, motion_statements
 from heavytop.top.angles import gamma_from_angles
@@ -75,7 +75,7 @@ class PartialClaim:
         about = [statement for motion in motions for statement in motion_statements(motion, self.parameters, system)]
         return [*about, *self._steps()]
 
-    def explain(self) -> tuple[list[Finding], tuple[str, ...]]:
+    def explain(self, _about: System, _rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
         """See :class:`heavytop.claims.audit.Auditable`."""
         return explain(self.motion, self.parameters, self.setting)
 
@@ -227,7 +227,7 @@ class GeneralClaim:
         about = [statement for motion in motions for statement in motion_statements(motion, self.parameters, system)]
         return [*about, *self._steps()]
 
-    def explain(self) -> tuple[list[Finding], tuple[str, ...]]:
+    def explain(self, _about: System, _rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
         """See :class:`heavytop.claims.audit.Auditable`."""
         return explain(self.motion, self.parameters, self.setting)
 

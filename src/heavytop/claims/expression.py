@@ -28,8 +28,9 @@ _MAX_LENGTH = 10_000
 _MAX_DEPTH = 60
 _MAX_NODES = 2_000
 _MAX_BITS = 4_096
-_MAX_DEGREE = 64
-_MAX_TERMS = 200_000
+_MAX_EXPONENT = 64
+_MAX_DEGREE = 1_024
+_MAX_TERMS = 10**15
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _TOKEN = re.compile(rf"\s*(?:{_NUMBER}|[A-Za-z]\w*|\*\*|[-+*/^(),])", re.ASCII)
 
@@ -164,8 +165,10 @@ class _Parser:
         power = self._factor()
         exponent, needs = power.expression, base.needs | power.needs
         self._depth -= 1
-        if not exponent.is_Rational or exponent.q > 2 or abs(exponent.p) > _MAX_DEGREE:
-            raise self._error(f"the exponent is no integer or half-integer up to {_MAX_DEGREE}; write exp() for others")
+        if not exponent.is_Rational or exponent.q > 2 or abs(exponent.p) > _MAX_EXPONENT:
+            raise self._error(
+                f"the exponent is no integer or half-integer up to {_MAX_EXPONENT}; write exp() for others"
+            )
         if base.expression == 0 and exponent < 0:
             raise self._error("a division by 0")
         whole = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1

@@ -20,6 +20,7 @@ from heavytop.claims.rational import Quotient
 from heavytop.claims.regularity import Regularity
 from heavytop.claims.signs import NUMBER_BITS, Unprovable, used
 from heavytop.claims.statement import Place, Setting, Statement
+from heavytop.claims.structure import sign_of
 from heavytop.exact.balls import working_precision
 
 _EVERYWHERE = "proven all over the domain"
@@ -120,17 +121,20 @@ class Region:
 
     def discharge(self, need: Need) -> str:
         """How it is discharged all over the region; "" where it is not."""
+        plain = sign_of(need.expression)
+        if (
+            plain.strict
+            if need.kind is Kind.NONZERO
+            else plain.value > 0 and (plain.strict or need.kind is Kind.NONNEGATIVE)
+        ):
+            return _EVERYWHERE
         try:
             value = self.field.enter(need.expression)
         except Unprovable:
             return ""
         sign = self.field.tower.sign(value)
-        positive = sign.value > 0
-        if need.kind is Kind.NONZERO:
-            met = bool(value.numerator) and self._factors_nowhere_zero(value.numerator)
-        else:
-            met = positive and (sign.strict or need.kind is Kind.NONNEGATIVE)
-        if met:
+        apart = need.kind is Kind.NONZERO and bool(value.numerator) and self._factors_nowhere_zero(value.numerator)
+        if apart or need.kind.is_met_by(sign):
             return _EVERYWHERE
         if self._flow is not None and value.numerator and self.is_kept(value.numerator):
             return "kept by the flow: where it is so at first, it stays so"

@@ -10,8 +10,8 @@ from heavytop.claims.algebra import Field
 from heavytop.claims.conditions import Kind, Need
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.proof import Condition, Region
-from heavytop.claims.signs import NUMBER_BITS, Unprovable
-from heavytop.claims.statement import Place, Setting, Statement
+from heavytop.claims.signs import NUMBER_BITS, PLUS, Unprovable
+from heavytop.claims.statement import Domain, Place, Setting, Statement
 
 _CONTINUOUS = "the formulas are real and continuous all over the domain"
 _ATTITUDE = "the attitude of the angles is continuous inside the domain"
@@ -80,7 +80,7 @@ class Prover:
             return []
         region = Region(base, self._setting, statement, [])
         kept = [need.expression for need in needs if region.is_kept(base.enter(need.expression).numerator)]
-        return [expression for expression in kept if not base.tower.sign(base.enter(expression)).value]
+        return [expression for expression in kept if base.tower.sign(base.enter(expression)) != PLUS]
 
     def _region(self, statement: Statement, sign: int, *, strict: bool) -> Region | None:
         field = self.field(statement, sign, strict=strict)
@@ -140,7 +140,12 @@ class Prover:
     def is_defined(self, statement: Statement, place: Place) -> bool:
         """Whether every formula and the residual is certainly defined and real at a place."""
         formulas = statement.formulas
-        if not all(need.is_met(place) for need in formulas.needs | formulas.angle_needs):
+        if not all(need.is_met(place) for need in formulas.sampled or formulas.needs | formulas.angle_needs):
+            return False
+        # a derivative of |u| is none where u is 0
+        if any(
+            Need(Kind.NONZERO, kink.args[0]).is_met(place) is not True for kink in statement.residual.atoms(sympy.sign)
+        ):
             return False
         try:
             return bool(evaluate(statement.residual, place, NUMBER_BITS).is_finite())
@@ -182,6 +187,20 @@ class Prover:
             kept = region.field.vanishes(rate) or region.field.is_forced(rate, radical=False)
             reason = "its rate is a combination of the conditions" if kept else "its rate is not shown to be 0 there"
             yield Condition(f"{text} = 0 is kept by the flow", kept, reason)
+
+
+def shortest(formula: sympy.Expr, setting: Setting, domain: Domain) -> sympy.Expr:
+    """The formula as the algebra writes it, if that is shorter and proven to be equal, but for removable gaps."""
+    statement = Statement("", 0, "", domain, formula, "")
+    try:
+        field = Field(setting.assumptions(domain.sign, strict=domain.label == "t>0"), [formula])
+        short = field.expression(field.enter(formula))
+    except Unprovable:
+        return formula
+    region = Region(field, setting, statement, list(setting.places(statement)))
+    if sympy.count_ops(short) >= sympy.count_ops(formula) or next(region.divisors(forced=False), None) is not None:
+        return formula
+    return short
 
 
 def _sorted(needs: Iterable[Need]) -> list[Need]:

@@ -59,6 +59,7 @@ class Signs:
         self._forms: dict[int, Any] = {}
         self._below_one: set[int] = set()
         self._facts: list[tuple[Any, Sign]] = []
+        self._products: list[tuple[Any, Sign]] = []
         self._known: dict[str, tuple[Sign, int]] = {}
         self._factors: dict[str, Any] = {}
         self._left = _BUDGET
@@ -82,7 +83,7 @@ class Signs:
         self._below_one.add(index)
 
     def declare(self, p: Any, sign: Sign) -> None:
-        """The claim assumes this sign of ``p``: it is that of the one factor whose sign nothing else tells."""
+        """The claim assumes this sign of ``p``: it is that of the factors whose sign nothing else tells."""
         constant, factors = self.factors(p)
         total = Sign(1 if constant > 0 else -1, True)
         open_factors = []
@@ -93,9 +94,15 @@ class Signs:
                 open_factors.append(factor)
             else:
                 total = total.times(known if power % 2 else Sign(1, True))
+        known = Sign(sign.value * total.value, sign.strict)
         if len(open_factors) == 1:
-            self._facts.append((open_factors[0], Sign(sign.value * total.value, sign.strict)))
-            self._known.clear()
+            self._facts.append((open_factors[0], known))
+        elif open_factors:
+            product = self._tower.one
+            for factor in open_factors:
+                product = product * factor
+            self._products.append((product, known))
+        self._known.clear()
 
     def factors(self, p: Any) -> Any:
         """(constant, [(factor, power)]), made once."""
@@ -114,6 +121,10 @@ class Signs:
             self._left = _BUDGET
         if self._depth > _DEPTH or self._left <= 0 or len(p) > _MAX_TERMS or max(p.degrees()) > _MAX_DEGREE:
             return UNKNOWN
+        for product, sign in self._products:
+            quotient, rest = divmod(p, product)
+            if not rest:
+                return self.of(quotient).times(sign)
         self._depth += 1
         try:
             constant, factors = self.factors(p)
@@ -191,7 +202,7 @@ class Signs:
             rest = tuple(0 if index in self.numbers else power for index, power in enumerate(monomial))
             groups.setdefault(rest, {})[number] = coefficient
         signs = [self._of_term(rest, numbers) for rest, numbers in groups.items()]
-        return signs[0] if len(signs) == 1 else _sum_of(signs)
+        return signs[0] if len(signs) == 1 else sum_of(signs)
 
     def _of_term(self, monomial: Any, numbers: dict[Any, Any]) -> Sign:
         coefficient = self._tower.context.from_dict(numbers)
@@ -287,7 +298,7 @@ class Signs:
     def _as_polynomial_in(self, index: int, p: Any, parts: dict[int, Any]) -> Iterator[Sign]:
         g, degree = self._tower.generators[index], max(parts)
         if len(parts) > 1:
-            yield _sum_of(
+            yield sum_of(
                 self.of(part).times(Sign(g.sign if power % 2 else 1, g.strict or not power))
                 for power, part in parts.items()
             )
@@ -351,13 +362,13 @@ class Signs:
                 quotient, rest = divmod(p, part)
                 if quotient and rest and len(rest) < len(p) + len(fact):
                     fact_sign = sign if part is fact else Sign(-sign.value, sign.strict)
-                    found = _sum_of((self.of(quotient).times(fact_sign), self.of(rest)))
+                    found = sum_of((self.of(quotient).times(fact_sign), self.of(rest)))
                     if found.value:
                         return found
         return UNKNOWN
 
 
-def _sum_of(signs: Iterable[Sign]) -> Sign:
+def sum_of(signs: Iterable[Sign]) -> Sign:
     """The sign of a sum: that of its parts where they have one and the same."""
     values, strict = set(), False
     for value, part_strict in signs:

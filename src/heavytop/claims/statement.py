@@ -49,6 +49,7 @@ class Formulas:
     values: must be real and continuous all over the domain.  needs: for these to be defined.
     attitude: functions of the angles that must be continuous inside the domain.  angle_needs: for the angles.
     pole: the condition under which the angles are defined, where they are not defined all over the domain.
+    sampled: the same needs in the symbols of the samples, where first integrals in them have got names.
     """
 
     values: tuple[sympy.Expr, ...] = ()
@@ -56,6 +57,7 @@ class Formulas:
     attitude: tuple[sympy.Expr, ...] = ()
     angle_needs: frozenset[Need] = frozenset()
     pole: str = ""
+    sampled: frozenset[Need] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,9 @@ class Transcendental:
         argument, factor = self._without_logarithms(argument)
         if not argument.numerator:
             return factor
+        parts = self._in_parts(argument)
+        if len(parts) > 1:
+            return self._tower.product((factor, *(self.exponential(part) for part in parts)))
 
         def make(base: Quotient, _divisor: int) -> int:
             meaning = sympy.exp(self._field.expression(base))
@@ -82,6 +85,19 @@ class Transcendental:
             "csch": (two, sine),
         }[name]
         return t.divide(above, below)
+
+    def _in_parts(self, argument: Quotient) -> list[Quotient]:
+        """What is constant in time apart from what moves; all terms apart where each is a multiple of a known base."""
+        terms = terms_of(argument, self._field)
+        still = [term for term in terms if self._field.is_constant(term)]
+        if still and len(still) < len(terms):
+            moving = [term for term in terms if not self._field.is_constant(term)]
+            return [self._tower.sum(still), self._tower.sum(moving)]
+        return terms if all(self._is_multiple(term) for term in terms) else [argument]
+
+    def _is_multiple(self, argument: Quotient) -> bool:
+        ratios = (self._tower.divide(argument, base) for kind, base, _ in self._bases if kind == "exp")
+        return any(not used(ratio.numerator) and ratio.denominator == self._tower.one for ratio in ratios)
 
     def _without_logarithms(self, argument: Quotient) -> tuple[Quotient, Quotient]:
         """(argument without multiples of logarithms, their exponentials)."""
@@ -145,7 +161,7 @@ class Transcendental:
         total: Circle = (t.number(0), t.number(1))
         if not argument.numerator:
             return total
-        for part in _terms(argument, self._field):
+        for part in terms_of(argument, self._field):
             total = self._turn(total, self._circle_of_term(part))
         return total
 
@@ -300,7 +316,7 @@ def _single(monomial: Any) -> int | None:
     return powers[0][0] if len(powers) == 1 and powers[0][1] == 1 else None
 
 
-def _terms(argument: Quotient, field: Field) -> list[Quotient]:
+def terms_of(argument: Quotient, field: Field) -> list[Quotient]:
     """The summands of an argument; in one piece where it has a denominator."""
     t = field.tower
     return [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -15,13 +15,14 @@ from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
 from heavytop.claims.from_file import ClaimFile, MotionTable, sample_rows
-from heavytop.claims.judge import Finding, judge, verdict_of
+from heavytop.claims.judge import Finding, Row, judge, verdict_of
+from heavytop.claims.prover import shortest
 from heavytop.claims.signs import Unprovable
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Setting, Statement
 from heavytop.claims.statements import SYMBOLIC, SYSTEMS, Motion, Triple, attitude, motion_statements
 from heavytop.errors import InputError
 from heavytop.precision import exact
-from heavytop.top.angles import gamma_from_angles, omega_from_angles
+from heavytop.top.angles import omega_from_angles
 from heavytop.top.equations import GYROSTAT, Parameters, System
 
 TIME = sympy.Symbol("t", real=True)
@@ -44,6 +45,11 @@ class Ground:
     rotor: sympy.Expr | None
     needs: frozenset[Need]
     rotor_needs: frozenset[Need]
+
+    @property
+    def systems(self) -> tuple[System, ...]:
+        """The systems that the claim says something about."""
+        return tuple(system for system in SYSTEMS if system is not GYROSTAT or self.rotor is not None)
 
     def parameters(self, system: System) -> Parameters:
         """Parameters of the field; raises InputError where `gyrostat` is asked for and the file gives no rotor."""
@@ -150,7 +156,8 @@ class UserMotion:
     def __post_init__(self) -> None:
         object.__setattr__(self, "ground", lay_ground(self.content, [TIME]))
         assert self.content.motion is not None
-        object.__setattr__(self, "motion", _read_motion(self.content, self.content.motion, self.ground))
+        motion = _read_motion(self.content, self.content.motion, self.ground)
+        object.__setattr__(self, "motion", motion)
 
     @property
     def name(self) -> str:
@@ -183,29 +190,32 @@ class UserMotion:
     def _angles_give_gamma(self) -> Iterator[Statement]:
         table = self.content.motion
         if table is not None and table.angles is not None and table.gamma is not None:
-            phi, theta, _ = _expressions(_three(table.angles, self.ground.names, "motion.angles"))
-            turned = gamma_from_angles(phi, theta, SYMBOLIC)
+            turned = self.motion.attitude[:3]
             for component, (ours, theirs) in enumerate(zip(turned, self.motion.gamma, strict=True), 1):
                 text = "(3.2): gamma of the angles is gamma"
                 formulas = self.motion.angle_formulas
                 yield Statement("3.2", component, "smooth", self.motion.domain, ours - theirs, text, formulas)
 
-    def explain(self) -> tuple[list[Finding], tuple[str, ...]]:
+    def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
         """No steps; the systems whose (1.1), (1.2) are proven."""
-        solves = []
-        for system in SYSTEMS:
-            if system is not GYROSTAT or self.ground.rotor is not None:
-                rows = judge([s for s in self.statements(system) if s.equation in ("1.1", "1.2")], self.setting)
-                if verdict_of(rows) == "holds":
-                    solves.append(system.name)
-        return [], tuple(solves)
+        return [], tuple(s.name for s in self.ground.systems if self._verdict(s, about, rows) == "holds")
+
+    def _verdict(self, system: System, about: System, rows: Sequence[Row]) -> str:
+        if system is about:
+            return verdict_of([row for row in rows if row.equation in ("1.1", "1.2")])
+        return verdict_of(judge([s for s in self.statements(system) if s.equation in ("1.1", "1.2")], self.setting))
 
 
 def _read_motion(content: ClaimFile, table: MotionTable, ground: Ground) -> Motion:
     def rate(value: sympy.Expr) -> sympy.Expr:
         return sympy.diff(value, TIME)
 
-    names, needs = ground.names, ground.needs
+    names, needs, domain = ground.names, ground.needs, _domain(content)
+
+    def reduced(formulas: Triple) -> Triple:
+        first, second, third = (shortest(formula, setting_of(ground, TIME), domain) for formula in formulas)
+        return first, second, third
+
     if table.angles is None and (table.omega is None or table.gamma is None):
         raise InputError("[motion] has neither angles nor both omega and gamma.", "Give omega and gamma, or angles.")
     phi = rates = None
@@ -213,21 +223,20 @@ def _read_motion(content: ClaimFile, table: MotionTable, ground: Ground) -> Moti
     angle_needs: frozenset[Need] = frozenset()
     if table.angles is not None:
         formulas = _three(table.angles, names, "motion.angles")
-        phi, theta, psi = _expressions(formulas)
+        phi, theta, psi = reduced(_expressions(formulas))
         rates, turned = (rate(phi), rate(theta), rate(psi)), attitude(phi, theta, psi)
         angle_needs = needs_of(formulas)
     gamma: Triple
     if table.gamma is not None:
         formulas = _three(table.gamma, names, "motion.gamma")
-        gamma, needs = _expressions(formulas), needs | needs_of(formulas)
+        gamma, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
     else:
         gamma, needs = turned[:3], needs | angle_needs
     if table.omega is not None:
         formulas = _three(table.omega, names, "motion.omega")
-        omega, needs = _expressions(formulas), needs | needs_of(formulas)
+        omega, needs = reduced(_expressions(formulas)), needs | needs_of(formulas)
     else:
         omega, needs = omega_from_angles(gamma, phi, rates, SYMBOLIC), needs | angle_needs
-    domain = _domain(content)
     return Motion(
         "smooth", domain, omega, gamma, rate, phi, rates, needs=needs, attitude=turned, angle_needs=angle_needs
     )

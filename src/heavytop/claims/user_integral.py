@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import sympy
 
+from heavytop.claims.algebra import Assumptions, Field
+from heavytop.claims.conditions import Need
 from heavytop.claims.expression import Formula, parse
 from heavytop.claims.from_file import ClaimFile, IntegralTable
-from heavytop.claims.judge import Finding, judge, verdict_of
+from heavytop.claims.judge import Finding, Row, judge, verdict_of
+from heavytop.claims.signs import Unprovable
 from heavytop.claims.statement import ALL, Flow, Formulas, Setting, Statement
-from heavytop.claims.statements import SYSTEMS
+from heavytop.claims.structure import Names
 from heavytop.claims.user_claim import STATE, TIME, Ground, lay_ground, needs_of, setting_of
 from heavytop.precision import exact
 from heavytop.top.equations import GYROSTAT, System
+
+Rate = Callable[[sympy.Expr], sympy.Expr]
 
 
 @dataclass(frozen=True)
@@ -73,22 +79,45 @@ class UserIntegral:
             return sum((sympy.diff(value, x) * dx for x, dx in zip(STATE, rates, strict=True)), sympy.Integer(0))
 
         kept = tuple((str(formula.expression), rate(formula.expression)) for formula in self.where)
-        flow = Flow(rate, frozenset(STATE), kept, self.kind == "relation")
         needs = needs_of([self.value, *self.where]) | self.ground.needs
         if system is GYROSTAT:
             needs |= self.ground.rotor_needs
-        values = (self.value.expression, *(formula.expression for formula in self.where))
         text = "dF/dt = 0 along the motion"
         if self.kind == "relation":
             text += ", where F = 0"
         if self.where:
             text += ", where the conditions hold"
+        value, named, names = self._with_names(rate, needs)
+        flow = Flow(rate, frozenset((*STATE, *names)), kept, self.kind == "relation")
+        values = (value, *(formula.expression for formula in self.where))
         domain = replace(ALL, points=(Fraction(0),))
-        residual = rate(self.value.expression)
-        return [Statement("dF/dt", 1, "smooth", domain, residual, text, Formulas(values, needs), flow)]
+        formulas = Formulas(values, named, sampled=needs)
+        return [Statement("dF/dt", 1, "smooth", domain, rate(value), text, formulas, flow)]
 
-    def explain(self) -> tuple[list[Finding], tuple[str, ...]]:
-        """No steps; the systems that conserve it, by proof."""
-        systems = [system for system in SYSTEMS if system is not GYROSTAT or self.ground.rotor is not None]
-        proven = [s.name for s in systems if verdict_of(judge(self.statements(s), self.setting)) == "holds"]
-        return [], tuple(proven)
+    def _with_names(self, rate: Rate, needs: frozenset[Need]) -> tuple[sympy.Expr, frozenset[Need], list[sympy.Symbol]]:
+        """(F, its needs, symbols): first integrals in F have got symbols, where nothing else of the state is left."""
+        value = self.value.expression
+        if self.kind == "relation":
+            return value, needs, []
+        assumptions = self.setting.assumptions(0)
+        state = frozenset(STATE)
+        names = Names(state, lambda e: _is_constant(rate(e), assumptions))
+        named = names.put_into(value)
+        if named.free_symbols & state:
+            return value, needs, []
+        renamed = frozenset(Need(need.kind, names.put_into(need.expression), need.text) for need in needs)
+        return named, renamed, names.symbols
+
+    def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
+        """No steps; the systems that keep it, by proof."""
+        found = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.ground.systems}
+        return [], tuple(name for name, rows in found.items() if verdict_of(rows) == "holds")
+
+
+def _is_constant(rate: sympy.Expr, assumptions: Assumptions) -> bool:
+    """Whether a rate is proven to be 0 by an algebra that divides by nothing that may be 0."""
+    try:
+        field = Field(assumptions, [rate])
+    except Unprovable:
+        return False
+    return field.is_zero(rate) and all(field.tower.signs.of(p).strict for p in field.tower.divisors.values())

@@ -38,7 +38,7 @@ def score(
     else:
         from heavytop.report.score_text import score_text
 
-        show_on_terminal(score_text(row, digits_kept(row)))
+        show_on_terminal(score_text(row))
     return 0 if complete(row) else 3
 
 

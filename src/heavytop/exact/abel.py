@@ -17,10 +17,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from flint import arb, arb_mat, ctx
+from flint import arb, arb_mat
 from numpy.typing import NDArray
 
 from heavytop.exact.balls import whole, working_precision
+from heavytop.exact.flint_context import current_precision
 
 _FLOAT_BITS = 46
 _ITERATIONS, _SHORTEST, _SETTLED = 100, 1e-4, 1e-13
@@ -141,7 +142,7 @@ class Inversion:
 
     def _refined(self, phases: list[float], rest: arb_mat) -> list[arb]:
         """Newton's iteration in balls at growing precision, and the proof at the last."""
-        needed, precisions = ctx.prec // 2 + 8, []
+        needed, precisions = current_precision() // 2 + 8, []
         while needed > _FLOAT_BITS:
             precisions.append(needed)
             needed = needed // 2 + 8
@@ -159,7 +160,7 @@ class Inversion:
         """Krawczyk's image of a box around the phases, if it lies inside the box."""
         inverse = self._inverse(near)
         step = (inverse * (arb_mat([[v] for v in self.values(near)]) - rest)).entries()
-        floor = arb(2) ** (-ctx.prec)
+        floor = arb(2) ** (-current_precision())
         for widening in (2, 16, 256):
             off = [arb(0, (widening * (abs(s).upper() + floor)).upper()) for s in step]
             box = [x + o for x, o in zip(near, off, strict=True)]

@@ -22,6 +22,7 @@ from flint import arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.closed_form import series_length
 from heavytop.exact.motion import initial_xi
 from heavytop.exact.solution import ExactSolution
 from heavytop.top.equations import System
@@ -84,9 +85,10 @@ class Renamed:
         return self.solution.system
 
     def _renamed(self, values: Sequence[Any]) -> list[Any]:
-        omega = permuted(values[:3], self.axes)
+        omega: tuple[Any, ...] = permuted(values[:3], self.axes)
         if orientation(self.axes) < 0:
-            omega = (-omega[0], -omega[1], -omega[2])
+            # a ball is negated exactly: the minus sign would round it to FLINT's precision of the moment
+            omega = tuple(w.neg(exact=True) if isinstance(w, arb) else -w for w in omega)
         return [*omega, *permuted(values[3:6], self.axes)]
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
@@ -95,7 +97,8 @@ class Renamed:
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return self._renamed(self.solution.series(time, length, bits))
+        with series_length(length):
+            return self._renamed(self.solution.series(time, length, bits))
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
         """ξ, starting where :func:`heavytop.exact.motion.initial_xi` says in the new names.

@@ -17,7 +17,7 @@ from flint import arb, fmpq
 from heavytop.errors import OutOfReach
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.flint_context import working_precision as working_precision
-from heavytop.precision import decimal_text, quotient_text
+from heavytop.precision import decimal_text, exact, quotient_text
 
 FUNCTIONS = SimpleNamespace(
     sqrt=arb.sqrt,
@@ -36,6 +36,10 @@ _HALF = arb(0.5)
 _INTEGER = re.compile(r"-?[0-9]+")
 _GUARD, _STEP = 16, 64
 _RADIUS_BITS = 30
+_ENOUGH = 1 << 15
+"""Working bits that are always tried: tops whose moments, weight and spin differ by a thousand decades need them."""
+_SERIES_DIVISION = ("leading term in denominator is not nonzero", "quotient would not be a power series")
+"""What python-flint says of a division by a power series whose first coefficient may be 0, instead of nan."""
 
 
 def ball(value: Fraction | int) -> arb:
@@ -95,7 +99,7 @@ def _integer(text: str) -> int:
 def value_text(value: arb, digits: int) -> tuple[str, str]:
     """(value, radius) as decimal text: the radius encloses the ball and the rounding of the printed value."""
     text = decimal_text(midpoint(value), digits)
-    return text, radius_text(radius(value) + abs(Fraction(text) - midpoint(value)))
+    return text, radius_text(radius(value) + abs(exact(text) - midpoint(value)))
 
 
 @whole_evaluation
@@ -134,15 +138,20 @@ def to_bits(
 
     Bits count relative to a value above 1 and absolutely below it.  time: what it is evaluated at; it costs its own
     bits, and the precision then comes in steps, so that lattices are made once.  length: of power series meanwhile.
-    Raises OutOfReach where even a
-    precision of 16 times the asked bits plus 4096 does not give them.
+    Raises OutOfReach where even a precision of 16 times the asked bits plus 4096, or of 32768, does not give them.
     """
     extra = -1 if time is None else _GUARD + (abs(time.numerator) // time.denominator).bit_length()
     working, smallest = bits + 32, -16 * bits - 4096
-    while working <= -smallest:
+    most = max(-smallest, _ENOUGH)
+    while True:
         inside = working if extra < 0 else -(-(working + extra) // _STEP) * _STEP
         with working_precision(inside, length):
-            values = evaluate(inside)
+            try:
+                values = evaluate(inside)
+            except ValueError as error:
+                if str(error) not in _SERIES_DIVISION:
+                    raise
+                values = [arb("nan")]
         right = [value.rel_one_accuracy_bits() for value in values]
         if min(right) >= bits:
             # only exact, infinite and very small values have more bits right than that
@@ -151,7 +160,9 @@ def to_bits(
             if all(value.is_finite() for value in values):
                 return [v if r < -smallest else _graspable(v, smallest) for v, r in zip(values, right, strict=True)]
         reached = min(map(relative_bits, values))
-        working += max(bits - reached, working // 2) if reached >= 0 else working
-    raise OutOfReach(
-        f"Only {max(reached, 0)} of {bits} bits could be proven.", "Ask for fewer digits or an earlier time."
-    )
+        if working >= most:
+            raise OutOfReach(
+                f"Only {max(reached, 0)} of {bits} bits could be proven at a working precision of {inside} bits.",
+                "Ask for fewer digits or an earlier time; moments, weights and rates of very different size cost most.",
+            )
+        working = min(most, working + (max(bits - reached, working // 2) if reached >= 0 else working))

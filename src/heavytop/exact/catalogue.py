@@ -21,6 +21,7 @@ from heavytop.exact.gyrostat import Gyrostat
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.lagrange import Lagrange
 from heavytop.exact.pendulum import Pendulum
+from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.staude import Staude
 from heavytop.exact.validated import Validated
@@ -79,8 +80,9 @@ _GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
 def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator[ExactSolution]:
     """Every closed form of this motion, the simplest first; none for a motion that has none here.
 
-    Raises InputError where the system does not admit the top and start.
+    Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
+    require_handy(top, start)
     system.parameters(top, start)
     for case, namings in _GYROSTAT if system is GYROSTAT else _HEAVY_TOP:
         for axes in namings:
@@ -95,6 +97,6 @@ def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator
 def find(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> ExactSolution:
     """The simplest closed form of this motion, or its validated enclosure.
 
-    Raises InputError where the system does not admit the top and start.
+    Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
     return next(matches(top, start, system), None) or Validated(top, start, system)

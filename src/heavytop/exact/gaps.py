@@ -29,12 +29,13 @@ from math import ceil, isqrt, log, pi
 from typing import Any
 
 import numpy as np
-from flint import acb, arb, arb_mat, ctx, fmpq
+from flint import acb, arb, arb_mat, fmpq
 from numpy.typing import NDArray
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import working_precision
 from heavytop.exact.closed_form import constant
+from heavytop.exact.flint_context import current_precision
 
 MOST_TERMS = 1 << 17
 _WIDTH, _FARTHEST, _BOUND_BITS = 0.9, 100, 64
@@ -156,7 +157,7 @@ class FourierBound:
     """The error of the Fourier series of v^j/√g; see the head of this file."""
 
     def __init__(self, middle: arb, reach: arb, rest: Roots) -> None:
-        self.bits = ctx.prec
+        self.bits = current_precision()
         with working_precision(_BOUND_BITS):
             heights = [(_cosh((b - middle) / reach), many) for b, many in rest.all()]
             nearest = min((height.lower() for height, _ in heights), default=arb(_FARTHEST))

@@ -31,12 +31,13 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from flint import acb, arb, arb_series, ctx, fmpq_poly
+from flint import acb, arb, arb_series, fmpq_poly
 
 from heavytop.errors import NotInClass
 from heavytop.exact.abel import Inversion
 from heavytop.exact.balls import ball, midpoint, working_precision
 from heavytop.exact.closed_form import ClosedForm, series_length
+from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.gaps import Gap, Roots
 from heavytop.exact.motion import kept
 from heavytop.exact.reduced import Reduced, Undecided, polynomial
@@ -86,7 +87,7 @@ class GoryachevChaplygin(ClosedForm):
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         try:
-            return _motion(self, ctx.prec).at(time, ctx.cap)
+            return _motion(self, current_precision()).at(time, current_length())
         except Undecided:
             return [arb("nan")] * 6
 
@@ -249,8 +250,8 @@ class Motion:
 
     def _moving(self, phases: Sequence[arb]) -> list[Any]:
         """The phases as power series in t, from their differential equations."""
-        moving = [arb_series([phase], prec=ctx.cap) for phase in phases]
-        for _ in range(ctx.cap - 1):
+        moving = [arb_series([phase], prec=current_length()) for phase in phases]
+        for _ in range(current_length() - 1):
             u1, u2 = (gap.position(x) for gap, x in zip(self.gaps, moving, strict=True))
             rates = [-1 / ((u1 - u2) * gap.density(u)) for gap, u in zip(self.gaps, (u1, u2), strict=True)]
             moving = [phase + rate.integral() for phase, rate in zip(phases, rates, strict=True)]
@@ -304,6 +305,7 @@ def _gap(curve: Sequence[Root], ends: tuple[int, int]) -> Gap:
     return Gap(low, high, Roots.of(arb(1) / 4, others))
 
 
+@whole_evaluation
 def _require_done(level: Level) -> None:
     """Raises NotInClass on the levels that are not done here."""
     sextic = level.sextic()

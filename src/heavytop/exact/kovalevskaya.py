@@ -1,31 +1,39 @@
-"""Kovalevskaya's top, I1 = I2 = 2 I3, c = 0: every start but those on four kinds of degenerate levels.
+"""Kovalevskaya's top, I1 = I2 = 2 I3, c = 0: every start but those on three kinds of degenerate levels.
 
 The centre of mass may lie anywhere in the plane of the equal moments, and |γ| be anything but 0.  The two separated
 variables (:mod:`heavytop.exact.kovalevskaya_level`) move along a straight line in Abel's integrals, which are inverted
-in balls (:mod:`heavytop.exact.kovalevskaya_abel`): the cost does not depend on the time.
+in balls (:mod:`heavytop.exact.kovalevskaya_abel`): the cost does not depend on the time.  Near levels where the curve
+has a multiple root the Fourier series there grow like the root of the distance; where they need more than 2^14 terms,
+theta functions of two variables take over (:mod:`heavytop.exact.kovalevskaya_theta`), down to a distance of two roots
+of 2^-27 of the largest.  Nearer than that the motion is refused, with the distance, and left to the enclosure.
 
 Levels where the quintic has a multiple root, found exactly (Appelrot, Trudy otd. fiz. nauk 16 (1911)):
 
     k = 0                            Delone's class, elliptic: :mod:`heavytop.exact.delone`
-    double root outside both gaps    as any other level
-    double root at an end of a gap, a variable at rest on it, a double root of the cubic: not done here
+    double root outside both gaps    as any other level, at any distance from it
+    double root at an end of a gap   asymptotic motions: refused
+    a variable at rest on it         Appelrot's especially remarkable motions: refused
+    double root of the cubic         refused
 
 Source: S. Kovalevskaya, Acta Math. 12 (1889) 177; recovery of Ω and γ without Kötter's formulas.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import arb, ctx
+from flint import arb
 
-from heavytop.errors import NotInClass
+from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.balls import working_precision
 from heavytop.exact.closed_form import ClosedForm
-from heavytop.exact.kovalevskaya_abel import AbelMotion, intervals
-from heavytop.exact.kovalevskaya_level import Level, roots, start_of
+from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
+from heavytop.exact.kovalevskaya_abel import AbelMotion, Interval, intervals, pole
+from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
+from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
 from heavytop.exact.motion import kept
 from heavytop.exact.reduced import Undecided
 from heavytop.precision import shown
@@ -33,6 +41,10 @@ from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 MOST_TERMS = 1 << 14
+SEPARATION = 2.0**-27
+"""Where two roots are nearer than this, over the largest, the periods are not integrated."""
+_DISTANCE = 3e-4
+"""cosh β − 1 of :func:`pole` where the Fourier series take :data:`MOST_TERMS` terms for 50 digits."""
 _REMEDY = "The validated enclosure holds for every motion."
 _DECISIONS = (64, 256, 1024, 4096)
 
@@ -41,7 +53,7 @@ _DECISIONS = (64, 256, 1024, 4096)
 class Kovalevskaya(ClosedForm):
     """A motion of Kovalevskaya's top with the small moment on axis 3.
 
-    Raises NotInClass unless I1 = I2 = 2 I3, P c = 0, P r ≠ 0 and γ ≠ 0, and on the levels that are not done.
+    Raises NotInClass unless I1 = I2 = 2 I3, P c = 0, P r ≠ 0 and γ ≠ 0, and on and near the levels that are not done.
     """
 
     top: HeavyTop
@@ -69,16 +81,24 @@ class Kovalevskaya(ClosedForm):
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         try:
-            return _motion(self, ctx.prec).at(time, ctx.cap)
+            return _motion(self, current_precision()).at(time, current_length())
         except Undecided:
             return [arb("nan")] * 6
 
 
 @kept
-def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion:
-    return AbelMotion.of(Level.of(case.top, case.start), MOST_TERMS)
+def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion | ThetaMotion:
+    level = Level.of(case.top, case.start)
+    try:
+        return AbelMotion.of(level, MOST_TERMS)
+    except OutOfReach:
+        values = [root.value for root in roots(level)]
+        if len(values) < 5 or separation(values) < SEPARATION:
+            return AbelMotion.of(level, 8 * MOST_TERMS)
+    return ThetaMotion.of(level)
 
 
+@whole_evaluation
 def _require_done(level: Level) -> None:
     """Raises NotInClass on the levels that are not done here."""
     cubic, double = level.cubic(), level.double()
@@ -86,19 +106,27 @@ def _require_done(level: Level) -> None:
         raise NotInClass("k = 0: the motion is in Delone's class.", "Use that class: its motions are elliptic.")
     if cubic.gcd(cubic.derivative()).degree() > 0:
         raise NotInClass("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", _REMEDY)
-    if double * double != level.fourth:
-        return
-    name = f"The level is degenerate: l^2 = 2 |gamma|^2 (h + e) with e = {shown(double)}, e^2 = k^2"
-    if level.separated(double) == 0:
-        raise NotInClass(f"{name}, and one separated variable rests at e.", _REMEDY)
+    name = "The level is degenerate"
+    if double * double == level.fourth:
+        name = f"{name}: l^2 = 2 |gamma|^2 (h + e) with e = {shown(double)}, e^2 = k^2"
+        if level.separated(double) == 0:
+            raise NotInClass(f"{name}, and one separated variable rests at e.", _REMEDY)
     for bits in _DECISIONS:
         with working_precision(bits):
             try:
                 curve = roots(level)
                 ends = intervals(level, curve, start_of(level))
+                _require_apart(curve, ends, name)
             except Undecided:
                 continue
-        if any(curve[number - 1].multiplicity > 1 for interval in ends for number in interval if number):
-            raise NotInClass(f"{name}, and the motion is asymptotic to it.", _REMEDY)
         return
-    raise NotInClass(f"{name}, and the start is too near to it to tell on which side.", _REMEDY)
+    raise NotInClass("The motion is too near to one on a degenerate level to tell them apart.", _REMEDY)
+
+
+def _require_apart(curve: Sequence[Root], ends: Sequence[Interval], name: str) -> None:
+    """Raises NotInClass where neither of the two forms evaluates the motion."""
+    if any(curve[number - 1].multiplicity > 1 for interval in ends for number in interval if number):
+        raise NotInClass(f"{name}, and the motion is asymptotic to it.", _REMEDY)
+    nearest = separation([root.value for root in curve])
+    if nearest < SEPARATION and pole(curve, ends)[1] < _DISTANCE:
+        raise NotInClass(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", _REMEDY)

@@ -21,8 +21,8 @@ and r = 2p'/q, in which h_10 h_20 cancels term by term.  γ follows from q', r' 
 
     γ3 = (2q' + pr)/c,   γ2 = −r'/c,   γ1 = (h − p² − q² − r²/2)/c
 
-f_j is found by exclusion: q P_j h_10 h_20 = q κ_j h_1j h_2j at the start, to the third order in t, where one of the
-coefficients differs from 0 (turning points and q = 0 included); the three other f_j are excluded by balls.
+f_j is found by exclusion: q P_j h_10 h_20 = q κ_j h_1j h_2j at the start, as power series in t of which one coefficient
+differs from 0 (turning points and q = 0 included: both at once make a zero of order 4); balls exclude the other f_j.
 Source: the squares are Kovalevskaya's and Kötter's; derived here, and checked by sympy for a generic level.
 """
 
@@ -34,13 +34,14 @@ from fractions import Fraction
 from itertools import combinations, pairwise
 from typing import Any
 
-from flint import acb, acb_mat, acb_series, arb, arb_series, ctx
+from flint import acb, acb_series, arb, arb_series
 
 from heavytop.exact.abel import Inversion, Variable
 from heavytop.exact.balls import ball, midpoint
 from heavytop.exact.closed_form import series_length
+from heavytop.exact.flint_context import coefficient, current_length
 from heavytop.exact.gaps import Gap, Roots
-from heavytop.exact.kovalevskaya_level import ORDERS, Level, Root, Start, roots, start_of
+from heavytop.exact.kovalevskaya_level import ORDERS, Level, Root, Start, linear, real_part, roots, start_of
 from heavytop.exact.reduced import Undecided
 
 _UNITS = (acb(1), acb(0, 1), acb(-1), acb(0, -1))
@@ -82,32 +83,33 @@ def ordered(curve: Sequence[Root]) -> list[int]:
     return real
 
 
-def pole(curve: Sequence[Root], occupied: Sequence[Interval]) -> float:
-    """μ: outside both gaps, where the branch points in v come to lie as far from the gaps as possible."""
-    places = [complex(float(root.value.real), float(root.value.imag)) for root in curve]
-    real = [places[i].real for i in ordered(curve)]
-    taken = {(places[upper - 1].real, places[lower - 1].real if lower else None) for upper, lower in occupied}
-    candidates = [real[-1] + share * (real[-1] - real[0]) for share in _BEYOND]
+def pole(curve: Sequence[Root], occupied: Sequence[Interval]) -> tuple[arb, float]:
+    """μ, outside both gaps, where the branch points in v come to lie as far from the gaps as possible; and how far."""
+    real = ordered(curve)
+    taken = {(upper - 1, lower - 1) for upper, lower in occupied}
+    lowest, highest = (curve[i].value.real.mid() for i in (real[0], real[-1]))
+    candidates = [highest + share * (highest - lowest) for share in _BEYOND]
     for low, high in pairwise(real):
         if (high, low) not in taken:
-            candidates += [low + share * (high - low) for share in _SHARES]
+            start, width = curve[low].value.real.mid(), (curve[high].value.real - curve[low].value.real).mid()
+            candidates += [start + share * width for share in _SHARES]
 
-    def distance(mu: float) -> float:
-        if mu in real:
-            return 0.0
-        points = [0j, *(1 / (place - mu) for place in places)]
+    def distance(mu: arb) -> float:
+        points = [acb(0), *(1 / (root.value - mu) for root in curve)]
         return min(_distance(points, interval) for interval in occupied)
 
-    return max(candidates, key=distance)
+    distances = [distance(mu.mid()) for mu in candidates]
+    best = max(range(len(candidates)), key=distances.__getitem__)
+    return candidates[best].mid(), distances[best]
 
 
-def _distance(points: Sequence[complex], interval: Interval) -> float:
+def _distance(points: Sequence[acb], interval: Interval) -> float:
     """cosh β − 1 of the nearest other branch point (:mod:`heavytop.exact.gaps`); 0 for no gap."""
     low, high = (points[i].real for i in interval)
     if not low < high:
         return 0.0
     scaled = [(2 * b - low - high) / (high - low) for i, b in enumerate(points) if i not in interval]
-    return min((abs(z + 1) + abs(z - 1)) / 2 for z in scaled) - 1
+    return min(float((abs(z + 1) + abs(z - 1)) / 2 - 1) for z in scaled)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +137,7 @@ class AbelMotion:
         """
         start, curve = start_of(level), roots(level)
         ends = intervals(level, curve, start)
-        mu = arb(pole(curve, ends))
+        mu, _ = pole(curve, ends)
         branch = (acb(0), *(_real(1 / (root.value - mu), root.value) for root in curve))
         lead = arb(2)
         for root in curve:
@@ -158,18 +160,13 @@ class AbelMotion:
         if not all(phase.is_finite() for phase in phases):
             raise Undecided
         with series_length(length + 1):
-            p, q, r = self._velocity(self._moving(phases), turns)
-            c, energy = self.start.moment, self.start.energy
-            upward = (2 * q.derivative() + p * r) / c
-            across = -r.derivative() / c
-        with series_length(length):
-            along = (energy - p * p - q * q - r * r / 2) / c
-        return self.level.restored((p, q, r, along, across, upward), length)
+            velocity = self._velocity(self._moving(phases), turns)
+        return self.level.restored(self.start.state(velocity, length), length)
 
     def _moving(self, phases: Sequence[arb]) -> list[Any]:
         """The phases as power series in t, from their differential equations."""
-        moving = [arb_series([phase], prec=ctx.cap) for phase in phases]
-        for _ in range(ctx.cap - 1):
+        moving = [arb_series([phase], prec=current_length()) for phase in phases]
+        for _ in range(current_length() - 1):
             v1, v2 = (g.position(x) for g, x in zip(self.inversion.variables, moving, strict=True))
             first, second = (g.density(v) for g, v in zip(self.inversion.variables, (v1, v2), strict=True))
             rates = v2 / ((v1 - v2) * first), -v1 / ((v1 - v2) * second)
@@ -206,7 +203,7 @@ class AbelMotion:
         above, below = (sum((a * h for a, h in zip(row, products, strict=True)), acb_series([0])) for row in self.rows)
         half = 1 / (2 * below)
         p, q = above * half, first[0] * second[0] * half * acb(0, -1)
-        return _real_part(p), _real_part(q), _real_part(self._spin(phases, first, second) * half * acb(0, 4))
+        return real_part(p), real_part(q), real_part(self._spin(phases, first, second) * half * acb(0, 4))
 
     def _spin(self, phases: Sequence[Any], first: Sequence[Any], second: Sequence[Any]) -> Any:
         """(N'D − ND')/(h_10 h_20)."""
@@ -243,14 +240,9 @@ class AbelMotion:
     def _with_factors(self, curve: Sequence[Root], mu: arb, phases: Sequence[arb]) -> AbelMotion:
         """κ_j, certified at the start."""
         start = self.start
-        alphas, betas = zip(*(_squares(start, root.value) for root in curve if root.cubic), strict=True)
         values = [root.value for root in curve if root.cubic]
-        matrix = acb_mat([[a, b, -a * e] for a, b, e in zip(alphas, betas, values, strict=True)])
-        try:
-            inverse = matrix.inv()
-        except ZeroDivisionError:
-            raise Undecided from None
-        with series_length(3):
+        alphas, betas, inverse = linear(start, values)
+        with series_length(ORDERS):
             p, q = (arb_series(x) for x in start.motion[:2])
             halves = [self._halves(k, phase, 0) for k, phase in enumerate(self._moving(phases))]
             ends = halves[0][0] * halves[1][0]
@@ -269,34 +261,16 @@ class AbelMotion:
 
 def _fourth_root(left: Any, right: Any) -> acb:
     """The one f in {1, i, −1, −i} with left = f right; raises Undecided where more than one can be."""
-    possible = [f for f in _UNITS if all((left[n] - f * right[n]).contains(0) for n in range(3))]
+    sides = [(coefficient(left, n), coefficient(right, n)) for n in range(ORDERS)]
+    possible = [f for f in _UNITS if all((one - f * other).contains(0) for one, other in sides)]
     if len(possible) != 1:
         raise Undecided
     return possible[0]
 
 
-def _squares(start: Start, e: acb) -> tuple[acb, acb]:
-    """(α, β) of a root of the cubic; the larger as a root, the other from the product."""
-    first, second = 2 * (start.energy + e), start.weight + e * e
-    if abs(first).mid() > abs(second).mid():
-        alpha = square_root(first)
-        return alpha, -start.area / alpha
-    beta = square_root(second)
-    return -start.area / beta, beta
-
-
-def square_root(value: acb) -> acb:
-    """A root, whose ball is finite off 0, the negative axis included."""
-    return acb(0, 1) * (-value).sqrt() if value.real < 0 else value.sqrt()
-
-
 def _real(value: acb, like: acb) -> acb:
     """``value`` without the imaginary part that rounding gave it, where ``like`` is real."""
     return acb(value.real) if like.imag.is_zero() else value
-
-
-def _real_part(series: Any) -> Any:
-    return arb_series([series[n].real for n in range(ctx.cap)], prec=ctx.cap)
 
 
 def start_phases(start: Start, mu: arb, variables: Sequence[Variable]) -> list[arb]:

@@ -16,19 +16,21 @@ h, ℓ², c², k² and the polynomials in w are rational.  φ has a multiple roo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from flint import acb, arb, arb_series, ctx, fmpq_poly
+from flint import acb, acb_mat, arb, arb_series, fmpq_poly
 
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import series_length
-from heavytop.exact.reduced import Reduced, polynomial
+from heavytop.exact.flint_context import coefficient, current_length
+from heavytop.exact.reduced import Reduced, Undecided, polynomial
 from heavytop.top.equations import Parameters, heavy_top
 
-ORDERS = 4
-"""Length of the power series in t at the start that fixes phases and signs."""
+ORDERS = 5
+"""Length of the power series in t at the start that fixes phases and signs: zeros there have an order of up to 4."""
 
 
 class Level(Reduced):
@@ -107,6 +109,16 @@ class Start:
     upper: Any
     still: bool
 
+    def state(self, velocity: Sequence[Any], length: int) -> tuple[Any, ...]:
+        """The six components from series of p, q, r that are one longer than ``length``."""
+        p, q, r = velocity
+        with series_length(length + 1):
+            upward = (2 * q.derivative() + p * r) / self.moment
+            across = -r.derivative() / self.moment
+        with series_length(length):
+            along = (self.energy - p * p - q * q - r * r / 2) / self.moment
+        return p, q, r, along, across, upward
+
     def above(self, variable: int, w: arb) -> arb:
         """w_k − w times something positive; k = 1 for variable 0."""
         if variable == 0:
@@ -152,8 +164,40 @@ def start_of(level: Level) -> Start:
 def _flow(c: arb, start: list[arb]) -> tuple[Any, ...]:
     """The power series of the motion from the start, by Picard's iteration on the field itself."""
     parameters = Parameters((2, 2, 1), (c, arb(0), arb(0)), arb(0))
-    motion = [arb_series([value], prec=ctx.cap) for value in start]
-    for _ in range(ctx.cap - 1):
+    motion = [arb_series([value], prec=current_length()) for value in start]
+    for _ in range(current_length() - 1):
         rates = heavy_top(parameters, motion)
         motion = [value + arb_series(rate).integral() for value, rate in zip(start, rates, strict=True)]
     return tuple(motion)
+
+
+def linear(start: Start, values: Sequence[acb]) -> tuple[list[acb], list[acb], acb_mat]:
+    """α_j, β_j and 𝓜^−1, where P_j = α_j (X − e_j Z) + β_j Y and (X, Y, Z) = 𝓜^−1 P.
+
+    values: the roots e_j of the cubic.  Raises Undecided where the working precision does not give the inverse.
+    """
+    alphas, betas = [], []
+    for e in values:
+        first, second = 2 * (start.energy + e), start.weight + e * e
+        # the larger as a root, the other from α_j β_j = −C
+        if abs(first).mid() > abs(second).mid():
+            alphas.append(square_root(first))
+            betas.append(-start.area / alphas[-1])
+        else:
+            betas.append(square_root(second))
+            alphas.append(-start.area / betas[-1])
+    try:
+        return alphas, betas, acb_mat([[a, b, -a * e] for a, b, e in zip(alphas, betas, values, strict=True)]).inv()
+    except ZeroDivisionError:
+        raise Undecided from None
+
+
+def square_root(value: acb) -> acb:
+    """A root, whose ball is finite off 0, the negative axis included."""
+    return acb(0, 1) * (-value).sqrt() if value.real < 0 else value.sqrt()
+
+
+def real_part(series: Any) -> Any:
+    """The real part of a complex series."""
+    length = current_length()
+    return arb_series([coefficient(series, n).real for n in range(length)], prec=length)

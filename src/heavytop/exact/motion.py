@@ -116,7 +116,9 @@ def initial_xi(gamma: Vector) -> list[arb]:
     """ξ at t = 0 where nobody gave it: :func:`perpendicular` of γ/|γ|; raises InputError for γ = 0."""
     square = dot(gamma, gamma)
     if square == 0:
-        raise InputError("gamma is the zero vector: no attitude stands on it.", "Give the direction of the weight.")
+        raise InputError(
+            "gamma is the zero vector: no attitude stands on it.", "Give the direction that points vertically up."
+        )
     root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
     if root * root == square:
         return [ball(x) for x in perpendicular((gamma[0] / root, gamma[1] / root, gamma[2] / root))]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import lcm
+from math import inf, lcm
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,7 @@ class Quadratic:
     pairs: the products y_j y_k that occur.  rows: the components.
     q, l: the largest row sums of absolute coefficients of the two parts, so |f(y)| ≤ q |y|² + l |y| and the Jacobian
     has |J(y)| ≤ 2 q |y| + l, in the maximum norm.
-    jacobian: J(y)_ij = Σ_k jacobian[i, j, k] y_k + slope[i, j], rounded to binary64.
+    jacobian: J(y)_ij = Σ_k jacobian[i, j, k] y_k + slope[i, j], rounded to binary64; infinite where it has no such.
     """
 
     pairs: tuple[tuple[int, int], ...]
@@ -87,10 +87,17 @@ def _assemble(table: list[dict[tuple[int, int], Fraction]], lines: list[dict[int
             )
         )
         for (j, k), c in products.items():
-            jacobian[i, j, k] += float(c)
-            jacobian[i, k, j] += float(c)
+            jacobian[i, j, k] += _rounded(c)
+            jacobian[i, k, j] += _rounded(c)
         for j, c in linear.items():
-            slope[i, j] = float(c)
+            slope[i, j] = _rounded(c)
     q = max(sum((abs(c) for c in row.values()), Fraction(0)) for row in table)
     l = max(sum((abs(c) for c in row.values()), Fraction(0)) for row in lines)  # noqa: E741
     return Quadratic(pairs, tuple(rows), q, l, jacobian, slope)
+
+
+def _rounded(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return inf if value > 0 else -inf

@@ -67,7 +67,9 @@ def staude_rate_squared(top: HeavyTop, gamma: Vector) -> Fraction | None:
     turning = cross(top.angular_momentum(gamma), gamma)
     torque = cross(top.moment, gamma)
     if not any(gamma):
-        raise InputError("gamma is the zero vector, which has no direction.", "Give the direction of the weight.")
+        raise InputError(
+            "gamma is the zero vector, which has no direction.", "Give the direction that points vertically up."
+        )
     if not any(turning) and not any(torque):
         return None
     off = cross(turning, torque)

@@ -1,5 +1,8 @@
 """Enclosure of any motion of either system, by Taylor series with a proven tail: no closed form is needed.
 
+A motion of very fast or slow rates is enclosed in its own unit of time, a power of two: with Ω = s ω, τ = s t and
+P r = s² n the equations of ω, γ, n are the same (:func:`unit_of_time`).
+
 The step and its theorem are in :mod:`heavytop.exact.enclosure`.  Here the working precision is chosen so that the asked
 bits come out: the bits that the motion loses are measured on a short pilot run, and carried on linearly to the time
 asked for.  Precisions come from a ladder and steps depend on the node that they start from alone, so a ball does not
@@ -25,7 +28,9 @@ from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, relative_bits, working_precision
 from heavytop.exact.enclosure import Node, Step, coefficient_bound, start_node, step
 from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.quadratic import Quadratic, quadratic
+from heavytop.exact.quadratic import Matrix, Quadratic, quadratic
+from heavytop.exact.scales import exponent, require_handy, unit_of_time
+from heavytop.precision import decimal_text
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector
@@ -35,6 +40,8 @@ _PILOT_STEPS = 1000
 _KEPT_NODES = 512
 _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
+_FAR = Fraction(10**12)
+_HOPELESS = 100
 
 
 @dataclass(slots=True)
@@ -121,11 +128,17 @@ class Pilot:
     motion: Quadratic
     ahead: _Ahead
 
-    def forecast(self, span: Fraction) -> tuple[float, float]:
-        """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go."""
+    def forecast(self, span: Fraction, effort: float) -> tuple[float, float]:
+        """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go.
+
+        The pilot is given up early where a hundred times ``effort`` seconds of the model of the cost would not do.
+        """
         node, known, bits = self.ahead
         times, losses = list(known), list(bits)
         while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
+            forecast = len(times) * _times_as_far(span, times[-1]) * _seconds_a_step(_PILOT_BITS) if times else 0.0
+            if len(times) >= _HOPELESS and forecast > _HOPELESS * effort:
+                break
             found = step(self.motion, node, _PILOT_BITS)
             if found is None:
                 break
@@ -135,10 +148,15 @@ class Pilot:
         if len(times) > len(known):
             self.ahead = _Ahead(node, tuple(times), tuple(losses))
         if not times:
-            return float(_PILOT_BITS), 64 * float(span)
+            return float(_PILOT_BITS), 64 * float(min(span, _FAR))
         index = min(bisect_left(times, span), len(times) - 1)
-        more = max(1.0, float(span / times[index]))
+        more = _times_as_far(span, times[index])
         return 16 + losses[index] * more, (index + 1) * more
+
+
+def _times_as_far(span: Fraction, reached: Fraction) -> float:
+    """span/reached, at least 1 and at most 10^12."""
+    return max(1.0, float(min(span / reached, _FAR)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +166,7 @@ class Validated:
     top, start, system: any.  rotor: λ of the gyrostat where the start is rounded and (2.1) no longer holds exactly;
     None for P b/(M·γ).  xi: the attitude vector at time 0; None for :func:`heavytop.top.angles.perpendicular`.
     effort: what a request may cost, in seconds of the cost model; beyond it the request is refused.
+    unit: the unit of time of the enclosure is 2^-unit (:func:`heavytop.exact.scales.unit_of_time`).
     Raises InputError where the system does not admit the top and start, OutOfReach where they are too large.
     """
 
@@ -158,14 +177,20 @@ class Validated:
     xi: Vector | None = None
     effort: float = 900.0
     method: str = "validated: Taylor enclosure"
+    unit: int = field(default=0, init=False, repr=False, compare=False)
     _runs: dict[tuple[int, int, int], Run] = field(default_factory=dict, init=False, repr=False, compare=False)
     _pilots: dict[tuple[int, int], Pilot] = field(default_factory=dict, init=False, repr=False, compare=False)
     _fields: dict[tuple[int, int], Quadratic] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        rate = coefficient_bound(self._field(1, 6), max(map(abs, self.start.flat)))
+        require_handy(self.top, self.start)
+        object.__setattr__(self, "unit", unit_of_time(self.parameters, self.start.flat))
+        rate = coefficient_bound(self._field(1, 6), max(map(abs, self._scaled(self.start.flat))))
         if rate > _LARGEST_RATE:
-            raise OutOfReach(f"The motion may change at a rate of 2^{log2(rate):.0f}.", "Choose other units.")
+            raise OutOfReach(
+                f"The motion may change 2^{exponent(rate)} times as fast as it turns.",
+                "Validated integration needs moments, weight and rates of less different size.",
+            )
 
     @property
     def parameters(self) -> Parameters:
@@ -173,6 +198,11 @@ class Validated:
         if self.rotor is not None and self.system is GYROSTAT:
             return Parameters(self.top.inertia, self.top.moment, self.rotor)
         return self.system.parameters(self.top, self.start)
+
+    def _scaled(self, start: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
+        """Ω and whatever follows it, with Ω in the motion's own unit of time."""
+        factor = Fraction(2) ** -self.unit
+        return (*(factor * w for w in start[:3]), *start[3:])
 
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`; ``time`` of either sign.
@@ -196,8 +226,9 @@ class Validated:
     @whole_evaluation
     def _extended(self, values: list[arb], length: int, bits: int) -> list[arb_series]:
         motion = self._field(1, 6)
-        with working_precision(bits + 4 * length + 32, length):
-            y = [[value] for value in values]
+        with working_precision(bits + 4 * length + 32 + abs(self.unit), length):
+            unit = arb(2) ** self.unit
+            y = [[value / unit] for value in values[:3]] + [[value] for value in values[3:]]
             for n in range(length - 1):
                 sums = [sum((y[j][m] * y[k][n - m] for m in range(n + 1)), arb(0)) for j, k in motion.pairs]
                 last = [component[n] for component in y]
@@ -205,12 +236,17 @@ class Validated:
                     total = sum((c * sums[pair] for c, pair in row.products), arb(0))
                     total += sum((c * last[j] for c, j in row.linear), arb(0))
                     component.append(total / (row.denominator * (n + 1)))
-            return [arb_series(component, prec=length) for component in y]
+            # in the unit of time given, ε^n counts unit^n, and Ω once more
+            return [
+                arb_series([c * unit ** (n + (axis < 3)) for n, c in enumerate(component)], prec=length)
+                for axis, component in enumerate(y)
+            ]
 
     def _field(self, direction: int, dimension: int) -> Quadratic:
         """The field of y, or of y and ξ; backwards in time with its sign changed."""
         if (direction, dimension) not in self._fields:
-            p = self.parameters
+            given, factor = self.parameters, Fraction(2) ** -self.unit
+            p = Parameters(given.inertia, [factor * factor * n for n in given.moment], factor * Fraction(given.rotor))
 
             def rates(y: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
                 found = self.system.field(p, y[:6])
@@ -231,21 +267,22 @@ class Validated:
     def _enclosure(self, time: Fraction, bits: int, start: tuple[Fraction, ...]) -> list[arb]:
         if time == 0:
             return _rounded(start, bits + 8)
-        direction, span = (1 if time > 0 else -1), abs(time)
-        loss, steps = self._forecast(direction, span, start)
+        unit = Fraction(2) ** self.unit
+        direction, span, scaled = (1 if time > 0 else -1), abs(time) * unit, self._scaled(start)
+        loss, steps = self._forecast(direction, span, scaled)
         for _ in range(_ATTEMPTS):
             precision = _ladder(bits + loss + 8)
             self._require_reach(time, bits, loss, steps, precision)
-            run = self._run(direction, precision, start)
+            run = self._run(direction, precision, scaled)
             found = run.at(span)
             if found is not None:
-                values = _evaluated(*found, precision + 64)
+                values = _evaluated(*found, found[0].radii(found[1]), precision + 64, unit)
                 reached = min(map(relative_bits, values))
                 if reached >= bits:
                     return values
                 loss = precision - reached + 16
             else:
-                loss = 1.25 * precision * float(span / run.lost_at) if run.lost_at else 2.0 * precision
+                loss = 1.25 * precision * float(min(span / run.lost_at, _FAR)) if run.lost_at else 2.0 * precision
         raise self._refusal(time, bits, 0)
 
     def _forecast(self, direction: int, span: Fraction, start: tuple[Fraction, ...]) -> tuple[float, float]:
@@ -254,7 +291,7 @@ class Validated:
         if key not in self._pilots:
             motion = self._field(*key)
             self._pilots[key] = Pilot(motion, _Ahead(start_node(motion, start, _PILOT_BITS)))
-        return self._pilots[key].forecast(span)
+        return self._pilots[key].forecast(span, self.effort)
 
     def _require_reach(self, time: Fraction, bits: int, loss: float, steps: float, precision: int) -> None:
         if steps * _seconds_a_step(precision) <= self.effort:
@@ -266,7 +303,7 @@ class Validated:
 
     def _refusal(self, time: Fraction, bits: int, reachable: float) -> OutOfReach:
         return OutOfReach(
-            f"{bits * log10(2):.0f} digits at t = {float(time):.6g} are out of reach of a validated integration.",
+            f"{bits * log10(2):.0f} digits at t = {decimal_text(time, 6)} are out of reach of a validated integration.",
             f"About {int(reachable * log10(2))} digits could be proven there: ask for fewer, or for an earlier time.",
         )
 
@@ -278,6 +315,9 @@ def _rounded(start: tuple[Fraction, ...], bits: int) -> list[arb]:
 
 
 @whole_evaluation
-def _evaluated(found: Step, tau: Fraction, bits: int) -> list[arb]:
+def _evaluated(found: Step, tau: Fraction, radii: Matrix, bits: int, unit: Fraction) -> list[arb]:
+    """The state at ``tau`` with Ω in the unit of time given."""
+    # numpy would let other threads in amid the balls: the radii are there already
     with working_precision(bits):
-        return found.at(tau)
+        values = found.around(tau, radii)
+        return [value * ball(unit) for value in values[:3]] + values[3:]

@@ -17,10 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from math import lcm
 from typing import Any
 
-from flint import acb, acb_series, arb, arb_poly, arb_series, fmpz_poly
+from flint import acb, acb_series, arb, arb_poly, arb_series
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, working_precision
@@ -239,7 +238,9 @@ def from_invariants(g2: Scalar, g3: Scalar) -> AnyLattice:
             "Give the invariants exactly, or as narrower balls.",
         )
     near = _cubic_roots(*(Fraction(midpoint(g)) for g in (g2, g3)))
-    return _from_roots([_enclose(root, g2, g3) for root in near])
+    one, two, three = (_enclose(root, g2, g3) for root in near.values)
+    gaps = ((one - two).real, (two - three).real) if near.gaps else None
+    return _from_roots(_Roots((one, two, three), gaps))
 
 
 @lru_cache(maxsize=64)
@@ -251,12 +252,40 @@ def exact_lattice(g2: Fraction, g3: Fraction, bits: int) -> AnyLattice:
         return _from_roots(_cubic_roots(g2, g3))
 
 
-def _cubic_roots(g2: Fraction, g3: Fraction) -> list[acb]:
-    """The roots of 4x³ − g2 x − g3, each to the working precision however close they are."""
-    common = lcm(g2.denominator, g3.denominator)
-    cubic = fmpz_poly([int(-g3 * common), int(-g2 * common), 0, 4 * common])
-    found: Any = cubic.complex_roots()
-    return [root for root, _ in found]
+@dataclass(frozen=True, slots=True)
+class _Roots:
+    """e1, e2, e3 as in :class:`Lattice`.  gaps: e1 − e2 and e2 − e3 where all are real, e1 > e2 > e3; else None."""
+
+    values: tuple[acb, acb, acb]
+    gaps: tuple[arb, arb] | None
+
+
+def _cubic_roots(g2: Fraction, g3: Fraction) -> _Roots:
+    """The roots of 4x³ − g2 x − g3, discriminant not 0, by the formulas of Viète and Cardano.
+
+    Nothing cancels but the exact g2³ − 27 g3²: roots and gaps are right to about the working precision however close
+    roots are, after a number of operations that does not depend on it.
+    """
+    discriminant = g2**3 - 27 * g3**2
+    if discriminant > 0:
+        # e = √(g2/3) cos(θ/3 + 2kπ/3) with cos θ = g3 √27/g2^(3/2)
+        sine, cosine, third = ball(discriminant).sqrt(), ball(g3) * arb(27).sqrt(), arb.pi() * 2 / 3
+        angle, beside = arb.atan2(sine, cosine) / 3, arb.atan2(sine, -cosine) / 3
+        size, wide = ball(g2 / 3).sqrt(), ball(g2).sqrt()
+        one, two, three = (acb(size * (angle + turn).cos()) for turn in (0, -third, third))
+        return _Roots((one, two, three), (wide * beside.sin(), wide * angle.sin()))
+    # u³, v³ = |g3|/8 ± half, uv = g2/12, e = u + v, and the others −e/2 ± (u − v) i√3/2
+    half, product = ball(-discriminant / 1728).sqrt(), ball(g2 / 12)
+    first = (ball(abs(g3) / 8) + half).root(3)
+    second = product / first
+    squares = first * first + second * second
+    if g2 < 0:
+        root, apart = ball(abs(g3) / 4) / (squares - product), first - second
+    else:
+        root, apart = first + second, 2 * half / (squares + product)
+    root = -root if g3 < 0 else root
+    pair = acb(-root / 2, apart * arb(3).sqrt() / 2)
+    return _Roots((acb(root), pair.conjugate(), pair), None)
 
 
 def _enclose(near: acb, g2: arb, g3: arb) -> acb:
@@ -271,24 +300,23 @@ def _enclose(near: acb, g2: arb, g3: arb) -> acb:
     return narrow
 
 
-def _from_roots(roots: list[acb]) -> Lattice:
+def _from_roots(roots: _Roots) -> Lattice:
     """The lattice of three different roots; real half-periods by the arithmetic-geometric mean (DLMF 23.22(ii))."""
-    reals = sorted((root.real for root in roots if root.imag == 0), key=midpoint, reverse=True)
-    if len(reals) == 3:
-        e1, e2, e3 = reals
-        side = (e1 - e3).sqrt()
-        half = arb.pi() / (2 * acb(side).agm((e1 - e2).sqrt()).real)
-        imaginary = arb.pi() / (2 * acb(side).agm((e2 - e3).sqrt()).real)
-        return _with_thetas((acb(e1), acb(e2), acb(e3)), half, acb(0, imaginary / half))
-    e, pair = reals[0], next(root for root in roots if root.imag > 0)
-    apart = acb(e - pair.real, pair.imag)
+    if roots.gaps is not None:
+        upper, lower = roots.gaps
+        side = acb((upper + lower).sqrt())
+        half = arb.pi() / (2 * side.agm(upper.sqrt()).real)
+        imaginary = arb.pi() / (2 * side.agm(lower.sqrt()).real)
+        return _with_thetas(roots.values, half, acb(0, imaginary / half))
+    e, _, pair = roots.values
+    apart = acb(e.real - pair.real, pair.imag)
     # √(e − pair) has these real and imaginary parts; each from the sum that does not cancel
     size = (apart.real**2 + apart.imag**2).sqrt()
     larger = ((size + abs(apart.real)) / 2).sqrt()
     smaller = apart.imag / (2 * larger)
     along, across = (larger, smaller) if apart.real > 0 else (smaller, larger)
     half, imaginary = (arb.pi() / (2 * acb(size.sqrt()).agm(part).real) for part in (along, across))
-    return _with_thetas((acb(e), pair.conjugate(), pair), half, acb(arb(1) / 2, imaginary / (2 * half)))
+    return _with_thetas(roots.values, half, acb(arb(1) / 2, imaginary / (2 * half)))
 
 
 def _with_thetas(roots: tuple[acb, acb, acb], half: arb, ratio: acb) -> Lattice:

@@ -4,7 +4,8 @@ The second source of a closed form is the validated integration from the same ex
 it is any other motion that is handed in (a heyoka run at twice the precision, say: computed, not proven), and where
 none is, the closed form is held against the validated integration at an early time from the start, and over the last
 unit of time before t from its own state there: a formula that is a motion near 0 and near t, and in between the same
-analytic function.  No reference below its certified digits is used to score anything: :func:`certified_state`
+analytic function.  The unit is 1, or that of the motion (:func:`heavytop.exact.scales.unit_of_time`) where its rates
+are far from 1.  No reference below its certified digits is used to score anything: :func:`certified_state`
 widens the balls to what is certified.
 """
 
@@ -22,6 +23,7 @@ from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.validated import Validated
+from heavytop.precision import shown
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import State
 from heavytop.top.integrals import holding
@@ -76,7 +78,8 @@ def certify(
 
     second: name and values of a computed source, taken where validated integration does not reach.
     enclosure: :func:`enclosure_of` the solution, to be used again for many times; None for a new one.
-    Raises Contradiction where two proven sources exclude each other: one of them is wrong.
+    Raises Contradiction where two proven sources exclude each other: one of them is wrong.  Raises OutOfReach where no
+    second source reaches.
     """
     bits = bits_of(digits)
     values = solution.state(time, bits)
@@ -84,12 +87,14 @@ def certify(
         if second is None:
             return Certificate(solution.method, "its own proven tail", agreed_digits(values, values), "proven")
         return Certificate(solution.method, second[0], agreed_digits(values, second[1](time, bits)), "computed")
-    enclosure = enclosure or enclosure_of(solution)
     try:
+        enclosure = enclosure or enclosure_of(solution)
         other = enclosure.state(time, bits)
     except OutOfReach:
         if second is not None:
             return Certificate(solution.method, second[0], agreed_digits(values, second[1](time, bits)), "computed")
+        if enclosure is None:
+            raise
         return _early_and_last(solution, enclosure, time, values, bits)
     _require_overlap(solution, time, values, other)
     return Certificate(solution.method, "validated integration", agreed_digits(values, other), "proven")
@@ -124,15 +129,17 @@ def enclosure_of(solution: ExactSolution, start: State | None = None, effort: fl
 def _early_and_last(
     solution: ExactSolution, enclosure: Validated, time: Fraction, values: Sequence[arb], bits: int
 ) -> Certificate:
-    sign = 1 if time > 0 else -1
-    early = sign * _EARLY
+    direction = Fraction(1 if time > 0 else -1) / Fraction(2) ** enclosure.unit
+    early, while_last = direction * _EARLY, direction * _LAST
     known = solution.state(early, bits)
     enclosed = enclosure.state(early, bits)
     _require_overlap(solution, early, known, enclosed)
-    before = [midpoint(value) for value in solution.state(time - sign * _LAST, bits + 64)]
-    last = enclosure_of(solution, State(before[:3], before[3:])).state(sign * _LAST, bits + 16)
+    before = [midpoint(value) for value in solution.state(time - while_last, bits + 64)]
+    last = enclosure_of(solution, State(before[:3], before[3:])).state(while_last, bits + 16)
     agreed = min(agreed_digits(known, enclosed), agreed_digits(values, last), _integral_digits(solution, values, bits))
-    source = f"validated integration from 0 to {early} and from t - {sign * _LAST} to t".replace("- -", "+ ")
+    source = f"validated integration from 0 to {shown(early)} and from t - {shown(while_last)} to t".replace(
+        "- -", "+ "
+    )
     source += "; first integrals at t"
     return Certificate(solution.method, source, agreed, "proven at both ends")
 
@@ -175,4 +182,4 @@ def _digits(gap: Fraction) -> int:
     digits = max(0, int((gap.denominator.bit_length() - gap.numerator.bit_length() - 1) / _BITS_A_DIGIT) - 1)
     while gap * 10 ** (digits + 1) <= 1:
         digits += 1
-    return digits if gap * 10**digits <= 1 else 0
+    return digits

@@ -32,7 +32,6 @@ LOST = 0.1
 RESOLVED = 10
 """Times the error of the reference, below which an error is unresolved."""
 _RESAMPLES = 1000
-_CALIBRATED = 1.1
 _ROUNDS = 3
 _SEED = 20261121
 
@@ -240,12 +239,9 @@ def _widened(slope: float, interval: tuple[float, float], scatter: float) -> tup
     """The interval of an exponent, such that 95 % hold the truth for every law.
 
     The bootstrap alone knows nothing of what all starts share: an error that oscillates is seen at a few phases, the
-    same in each, which bends the line by its own standard error, ``scatter``.  And it reaches 94 % with 16 starts: it
-    is widened by a tenth (`benchmarks/coverage.py` counts).
+    same in each, which bends the line by its own standard error, ``scatter`` (`benchmarks/coverage.py` counts).
     """
-    low, high = (
-        math.hypot(_CALIBRATED * max(part, 0.0), 2 * scatter) for part in (slope - interval[0], interval[1] - slope)
-    )
+    low, high = (math.hypot(max(part, 0.0), 2 * scatter) for part in (slope - interval[0], interval[1] - slope))
     return slope - low, slope + high
 
 
@@ -295,7 +291,8 @@ def finite_time_rates(times: Array, errors: Array) -> Array:
     centred = times - (weights * times).sum(axis=1, keepdims=True) / total
     spread = (weights * centred**2).sum(axis=1)
     moment = (weights * centred * logs).sum(axis=1)
-    return numpy.divide(moment, spread, out=numpy.zeros_like(moment), where=spread > 0)
+    rates: Array = numpy.divide(moment, spread, out=numpy.zeros_like(moment), where=spread > 0)
+    return rates
 
 
 def median_interval(values: Array) -> tuple[float, float]:

@@ -70,10 +70,10 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
     source excludes it: then something is wrong with this program.
     """
     bits = problem.precision.bits + GUARD_BITS
-    found = closed_form(problem)
-    if found is None and abs(horizon) > _VALIDATED_HORIZON:
-        return f"no closed form, and no enclosure beyond |t| = {_VALIDATED_HORIZON}"
     try:
+        found = closed_form(problem)
+        if found is None and abs(horizon) > _VALIDATED_HORIZON:
+            return f"no closed form, and no enclosure beyond |t| = {_VALIDATED_HORIZON}"
         known = certified(found or Validated(problem.top, problem.start, problem.system), horizon, bits)
     except OutOfReach as error:
         return error.cause

@@ -10,13 +10,15 @@ from typing import Any
 
 from flint import arb
 
+from heavytop.errors import OutOfReach
 from heavytop.exact.balls import FUNCTIONS, working_precision
 from heavytop.exact.flint_context import whole_evaluation
+from heavytop.exact.scales import least_rate
 from heavytop.integrate.integrators import named
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
 from heavytop.measure.scalar import GUARD_BITS, text, to_ball
-from heavytop.precision import Precision, decimal_text, exact, number
+from heavytop.precision import Precision, decimal_text, exact, exact_text, number
 from heavytop.records import Metric
 from heavytop.top.angles import euler_angles, perpendicular, unwrap
 from heavytop.top.equations import System
@@ -25,6 +27,7 @@ from heavytop.top.integrals import Integral, holding
 
 _DENSE = 32
 _MOST_DENSE = 200_000
+_MOST_TURNS = 10**13
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +60,11 @@ class Motion:
             "states": self.states,
             "time_reached": decimal_text(run.time_reached, precision.digits),
             "order": run.order,
-            "inertia": [str(value) for value in self.top.inertia],
-            "weight": str(self.top.weight),
-            "centre": [str(value) for value in self.top.centre],
-            "omega": [str(value) for value in self.start.omega],
-            "gamma": [str(value) for value in self.start.gamma],
+            "inertia": [exact_text(value) for value in self.top.inertia],
+            "weight": exact_text(self.top.weight),
+            "centre": [exact_text(value) for value in self.top.centre],
+            "omega": [exact_text(value) for value in self.start.omega],
+            "gamma": [exact_text(value) for value in self.start.gamma],
             "integrator": run.integrator,
             "flags": run.flags,
             "seconds": run.seconds,
@@ -108,10 +111,12 @@ def compute(
 
     attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
-    integrator: ``heyoka`` or ``words``; raises InputError for any other.
+    integrator: ``heyoka`` or ``words``; raises InputError for any other, OutOfReach where the run would take more steps
+    than anyone waits for.
     """
     xi = perpendicular(start.gamma) if attitude else None
     problem = Problem.of(top, start, precision, system, xi)
+    _require_reach(problem, times[-1])
     wanted = frozenset(exact(number(time, precision)) for time in times)
     watcher = _Watcher(problem, holding(top, start, system), wanted)
     samples = _dense(problem, times) if attitude else times
@@ -124,6 +129,18 @@ def compute(
     angles = [_angles(state, followed, precision) for _, state, followed in watcher.kept] if attitude else None
     attitudes = [line[6:] for line in texts] if attitude else None
     return Motion(top, start, run, [line[:6] for line in texts], watcher.drift.metrics(), attitudes, angles)
+
+
+def _require_reach(problem: Problem, end: Fraction) -> None:
+    """Raises OutOfReach where the motion turns more often until ``end`` than any integrator can follow."""
+    p, start = problem.parameters, problem.start.flat
+    turns = abs(end) * least_rate(p, start)
+    if turns > _MOST_TURNS and any(problem.system.field(p, start)):
+        raise OutOfReach(
+            f"Until t = {decimal_text(end, 6)} the motion turns about {decimal_text(turns, 2)} times.",
+            f"Integrators take several steps for each: up to {_MOST_TURNS:.0e} are tried; `heavytop reference` needs "
+            "none where there is a closed form.",
+        )
 
 
 def _dense(problem: Problem, times: Sequence[Fraction]) -> list[Fraction]:

@@ -12,13 +12,17 @@ from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.trajectory import Problem
+from heavytop.measure.digits import relative_error
 from heavytop.measure.drift import Running, Sums, parameter_balls
 from heavytop.measure.scalar import GUARD_BITS, largest, resolved, to_ball
 from heavytop.records import Metric, Series
 
+_ERRORS = ("omega", "gamma", "along", "across")
+
 
 class SolutionError:
-    """Error of Ω and of γ (largest component), and of the state along the flow (phase) and across it (Euclidean).
+    """Error of Ω and of γ (largest component), of the state along the flow (phase) and across it (Euclidean), and
+    relative: the largest |error|/max(1, |true value|) of a component, which says how many digits are kept.
 
     known: the exact motion; its start and top are those of ``problem``, rounded, so no input rounding is charged.
     threshold: the error of Ω, in units of Ω, whose first crossing is the break-away time.
@@ -36,7 +40,7 @@ class SolutionError:
         self.keep = frozenset(keep)
         self.threshold = threshold
         self.break_away: Fraction | None = None
-        self.running = {name: Running() for name in ("omega", "gamma", "along", "across")}
+        self.running = {name: Running() for name in (*_ERRORS, "relative")}
         self.system = problem.system
         self.parameters = parameter_balls(problem, self.bits)
 
@@ -56,19 +60,22 @@ class SolutionError:
             delta = [to_ball(value) - true for value, true in zip(state[:6], truth, strict=True)]
             flow = self.system.field(self.parameters, truth)
             omega = largest(delta[:3])
-            values = omega, largest(delta[3:]), *split(delta, flow)
+            relative = relative_error(delta, truth)
+            values = omega, largest(delta[3:]), *split(delta, flow), relative
             sums = [running.following(value) for running, value in zip(self.running.values(), values, strict=True)]
             return sums, self.threshold is not None and bool(omega > ball(self.threshold))
 
     @whole_evaluation
     def metrics(self, prefix: str = "solution_error") -> dict[str, Metric]:
-        """``PREFIX_omega_max``, ... for omega, gamma, along and across."""
+        """``PREFIX_omega_max``, ``_rms``, ``_final``; the same for gamma, along, across; ``PREFIX_relative_max``."""
         with working_precision(self.bits):
-            return {k: m for name, run in self.running.items() for k, m in run.metrics(f"{prefix}_{name}").items()}
+            found = {k: m for name in _ERRORS for k, m in self.running[name].metrics(f"{prefix}_{name}").items()}
+            relative = f"{prefix}_relative_max"
+            return found | {relative: self.running["relative"].metrics(f"{prefix}_relative")[relative]}
 
     def series(self, time_text: Callable[[Fraction], str], prefix: str = "solution_error") -> dict[str, Series]:
-        """The same over the kept times."""
-        return {f"{prefix}_{name}": run.series(time_text) for name, run in self.running.items()}
+        """The same over the kept times, but for the relative error."""
+        return {f"{prefix}_{name}": self.running[name].series(time_text) for name in _ERRORS}
 
     def content(self) -> dict[str, Any]:
         """What was taken in so far, as plain text and integers, exact."""

@@ -44,24 +44,27 @@ def claim_error(sources: Sources) -> Section | None:
             "true motion of the heavy top from the same data. Evaluation: the formulas in floating point against the "
             "same formulas exactly evaluated. Integration: an integrator on the motion that the formulas do solve, "
             "against that motion.",
+            "The model’s error of the attitude is the angle between the two attitudes: both motions start at the pole "
+            "γ = e3, where φ and ψ are undefined and their differences say nothing. Beside it the error of the formula "
+            "for ψ, which turns the attitude by as much.",
             "Crosses along the top mark times at which floating point gives no number; an error of exactly 0 has no "
             "place on these axes.",
         ],
-        columns=["case", "error", "quantity", "|t| = 1", "largest", "no number from |t|"],
+        columns=["case", "error", "quantity", "|t| = 1", "largest drawn", "no number from |t|"],
         across=2,
     )
     names = list(bases)[: MOST_PLOTS // 2]
     left_out(section, len(bases) - len(names), "case")
     for number, case in enumerate(names):
-        for quantity, symbol, unit in (("omega", "Ω", "1/time unit"), ("psi", "ψ", "rad")):
-            axes = new_axes(TIME, f"error of {symbol} ({unit})")
+        for quantity, title, unit in (("omega", "Ω", "1/time unit"), ("attitude", "attitude and of ψ", "rad")):
+            axes = new_axes(TIME, f"error of {title} ({unit})")
             decades(axes.xaxis)
             decades(axes.yaxis)
             heard: list[str] = []
             for source, report in sources:
-                for key, series, scale in _claim_parts(report, case, quantity, source):
+                for key, series, scale, symbol in _claim_parts(report, case, quantity, source):
                     heard += _claim_curve(axes, section, section.key(key), series, scale, case, symbol)
-            title = f"{clip(case.removesuffix('/forward'), 40)}: error of {symbol}"
+            title = f"{clip(case.removesuffix('/forward'), 40)}: error of {title}"
             if heard:
                 box = axes.dataLim
                 if math.isfinite(box.y0):
@@ -79,29 +82,33 @@ def _forward(case: str) -> str:
     return case.removesuffix("/backward") + "/forward"
 
 
-def _claim_parts(report: Report, case: str, quantity: str, source: str) -> Iterator[tuple[Key, Series, float]]:
-    """The curves of one case: label, series, and what a unit of its times is in |t|."""
+def _claim_parts(report: Report, case: str, quantity: str, source: str) -> Iterator[tuple[Key, Series, float, str]]:
+    """The curves of one case: label, series, what a unit of its times is in |t|, and what it is an error of.
+
+    quantity: omega or attitude; of formulas in floating point the part of the attitude is ψ.
+    """
     rows = [row for row in report.rows if row.case == case]
     bits = min((row.bits for row in rows if row.measure == "claim_evaluation"), default=53)
     old, suffix = source == "baseline", f", {source}" if source else ""
     for row in rows:
-        series = row.series.get(
-            {"homoclinic": "integration_error"}.get(row.measure, row.measure + "_error") + f"_{quantity}"
-        )
+        name = "psi" if quantity == "attitude" and row.measure == "claim_evaluation" else quantity
+        symbol = {"omega": "Ω", "psi": "ψ"}.get(name, name)
+        prefix = "integration_error" if row.measure == "homoclinic" else f"{row.measure}_error"
+        series = row.series.get(f"{prefix}_{name}")
         if series is None or not series.times:
             continue
         if row.measure == "claim_model" and row.integrator == "claim:smooth":
-            yield Key(f"model{suffix}", 1, "s", "", old), series, 1.0
+            yield Key(f"model{suffix}", 1, "s", "", old), series, 1.0, symbol
         elif row.measure == "claim_evaluation" and row.bits == bits:
             form = row.integrator.partition(":")[2]
             ends = [logarithm(end) for end in (row.horizon, series.times[-1])]
             scale = 10 ** ((ends[0] or 0.0) - (ends[1] or 0.0))
             colour, marker = (3, "D") if form == "printed" else (2, "^")
             label = f"evaluation, {clip(form, 20)} form, {clip(row.precision, 20)}{suffix}"
-            yield Key(label, colour, marker, "", old), series, scale
+            yield Key(label, colour, marker, "", old), series, scale, symbol
         elif row.measure == "homoclinic" and row.bits == bits:
             label = f"integration, {clip(row.integrator, 20)}, {clip(row.precision, 20)}{suffix}"
-            yield Key(label, 0, "o", "", old), series, 1.0
+            yield Key(label, 0, "o", "", old), series, 1.0, symbol
 
 
 def _claim_curve(
@@ -130,7 +137,7 @@ def _claim_curve(
         ]
     )
     tail = f", no number from |t| = {scientific(lost[0])}" if lost else ""
-    return [f"{key.label}: at most {largest}{tail}."]
+    return [f"{key.label}: largest sample {largest}{tail}."]
 
 
 def break_away(sources: Sources) -> Section | None:

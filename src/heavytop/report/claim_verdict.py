@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from heavytop.records import Report, Row, Series
 from heavytop.report.text import short
 
+_PARTS = "claim_parts_by_1_percent_at"
 SYSTEMS = {"heavy_top": "the heavy top", "gyrostat": "the gyrostat"}
 
 
@@ -28,11 +29,18 @@ class Audited:
 
 @dataclass(frozen=True, slots=True)
 class Wrongness:
-    """How far a claim is from the true motion.  Rows of ``at``: |t|, error of Ω, error of γ."""
+    """How far a claim is from the true motion, forward in time.
+
+    branch: the one that the figures below are of.  parts_at: |t| at which Ω is off by 1 % of α there; other_branches:
+    the same on the others, (branch, |t|).  largest: error of Ω over that many ``samples`` up to ``horizon``.
+    Rows of ``at``: |t|, error of Ω, error of γ.
+    """
 
     case: str
     branch: str
     parts_at: str
+    other_branches: list[tuple[str, str]]
+    samples: int
     largest: str
     horizon: str
     at: list[tuple[str, str, str]]
@@ -60,30 +68,38 @@ def _audited(row: Row) -> Audited:
 
 
 def wrongness(report: Report, times: Sequence[str] = ("0.1", "1", "2", "5")) -> list[Wrongness]:
-    """How wrong a claim is, per case; forward in time, and the smooth branch, where there are several."""
+    """How wrong a claim is, per case; forward in time, and in full on the smooth branch, where there are several."""
     rows = [
         row
         for row in report.rows
-        if row.measure == "claim_model"
-        and "claim_parts_by_1_percent_at" in row.metrics
-        and not row.case.endswith("/backward")
+        if row.measure == "claim_model" and _PARTS in row.metrics and not row.case.endswith("/backward")
     ]
     smooth = {row.case for row in rows if row.integrator == "claim:smooth"}
-    return [_wrongness(row, times) for row in rows if row.case not in smooth or row.integrator == "claim:smooth"]
+    return [
+        _wrongness(row, [other for other in rows if other.case == row.case and other is not row], times)
+        for row in rows
+        if row.case not in smooth or row.integrator == "claim:smooth"
+    ]
 
 
-def _wrongness(row: Row, times: Sequence[str]) -> Wrongness:
+def _wrongness(row: Row, others: Sequence[Row], times: Sequence[str]) -> Wrongness:
     omega, gamma = (_values(row.series.get(f"claim_model_error_{name}")) for name in ("omega", "gamma"))
     largest = row.metrics.get("claim_model_error_omega_max")
     return Wrongness(
         case=row.case.removesuffix("/forward"),
-        branch=row.integrator.partition(":")[2],
-        parts_at=short(row.metrics["claim_parts_by_1_percent_at"].value),
+        branch=_branch(row),
+        parts_at=short(row.metrics[_PARTS].value),
+        other_branches=[(_branch(other), short(other.metrics[_PARTS].value)) for other in others],
+        samples=row.samples,
         largest=short(largest.value) if largest else "missing",
         horizon=short(row.horizon.removeprefix("-")),
         at=[(t, short(omega[t]), short(gamma.get(t, "missing"))) for t in times if t in omega],
         against=row.against,
     )
+
+
+def _branch(row: Row) -> str:
+    return row.integrator.partition(":")[2]
 
 
 def _values(series: Series | None) -> dict[str, str]:

@@ -19,8 +19,6 @@ NUMERIC = SimpleNamespace(
     sqrt=numpy.sqrt, exp=numpy.exp, log=numpy.log, arctan=numpy.arctan, arccos=numpy.arccos, atan2=numpy.arctan2
 )
 _BITS = 64
-PART = 0.01
-"""The relative distance max|ΔΩ| / max|Ω| at which claim and truth are said to part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,13 +123,3 @@ def _exact(motion: ErshkovPartial | DeloneHomoclinic, times: list[Fraction]) -> 
     states = numpy.array([[float(value.mid()) for value in motion.state(time, _BITS)] for time in times])
     angles = numpy.array([[float(value.mid()) for value in motion.angles(time, _BITS)] for time in times])
     return Curves(t, states, angles)
-
-
-def parting_time(case: ershkov.PartialCase, limit: Fraction = Fraction(2)) -> float:
-    """The first t > 0 where max|ΔΩ| of claim (smooth branch) and truth is 1 % of max|Ω(0)|, to 1/500 of ``limit``."""
-    times = [limit * index / 500 for index in range(1, 501)]
-    truth, _ = true_curves(case, [-times[0], Fraction(0), *times])
-    ours = gyrostat_curves(case.solves, times)
-    distance = numpy.abs(truth.states[2:, :3] - ours.states[:, :3]).max(axis=1)
-    first = int(numpy.argmax(distance >= PART * float(case.solves.start.omega[2])))
-    return float(times[first])

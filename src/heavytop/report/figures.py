@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy
 
-from heavytop.claims.ershkov import PartialCase
+from heavytop.claims.ershkov import Branch, PartialCase
+from heavytop.measure.parting import parting
 from heavytop.report.curves import (
     PAPER_FIGURES,
     Curves,
     PaperFigure,
     claim_curves,
     gyrostat_curves,
-    parting_time,
     true_curves,
 )
 from heavytop.report.svg import document
@@ -37,6 +37,8 @@ _FORMULAS = {
 }
 _U = r"$u=\sqrt{\alpha}\,\frac{e^{-A\sqrt{\alpha}\,t}-1}{e^{-A\sqrt{\alpha}\,t}+1}$"
 RATIOS = (2, 6)
+_BRANCHES: dict[Branch, str] = {"printed": "as printed", "smooth": "smooth branch"}
+_LINES: dict[Branch, tuple[str, Any]] = {"printed": (VERMILION, (0, (1, 1))), "smooth": (GREEN, "-.")}
 
 
 def draw_figures(directory: Path) -> list[Path]:
@@ -130,14 +132,18 @@ def _comparison(ratio: int) -> Any:
         ("gyrostat: what the formulas solve", gyrostat_curves(case.solves, times), ORANGE, "--", 2.4),
         ("claim as printed", claim_curves(case, times), VERMILION, ":", 2.4),
     )
-    parting = parting_time(case, Fraction(1))
+    parted = {branch: parting(case, times[-1], branch) for branch in _BRANCHES}
     figure = _new(10, 6.2)
     grid = figure.subplots(2, 3, sharex=True)
     names = ("φ (rad)", "θ (rad)", "ψ (rad)", "Ω1", "Ω2", "Ω3")
     for index, (axes, name) in enumerate(zip(grid.flat, names, strict=True)):
         for label, curves, colour, style, width in drawn:
             axes.plot(curves.times, _column(curves, index), style, color=colour, lw=width, label=label)
-        axes.axvline(parting, color=GREEN, lw=1.2, ls="-.", label=f"1 % apart in Ω: t = {parting:.3f}")
+        for branch, found in parted.items():
+            if found:
+                colour, dashes = _LINES[branch]
+                label = f"{_BRANCHES[branch]}: Ω off by 1 % of α at t = {float(found.time):.4f}"
+                axes.axvline(float(found.time), color=colour, lw=1.2, ls=dashes, label=label)
         axes.set_title(name, loc="left")
     for axes in grid[1]:
         axes.set_xlabel("t")

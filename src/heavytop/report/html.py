@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from heavytop.measure.digits import digits_kept
 from heavytop.records import Report, Row
 from heavytop.report import claim_plots, claim_verdict, method_growth, plots, work_plots
 from heavytop.report.compare import Comparison
 from heavytop.report.comparison_text import row_name
-from heavytop.report.plots import digits_at_end
 from heavytop.report.section import Section, Sources, clip
 from heavytop.report.svg import quiet_style
 from heavytop.report.text import failed, short
@@ -105,7 +105,7 @@ def _by_measure(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def _badness(row: Row) -> tuple[bool, bool, float]:
-    kept = digits_at_end(row)
+    kept = digits_kept(row)
     return row.outcome == "success", row.finite, float("inf") if kept is None else kept
 
 

@@ -8,11 +8,11 @@ import math
 
 from heavytop.records import Kind, Metric
 
-FACTORS = {"drift": 5.0, "growth": 4.0, "homoclinic": 8.0, "break_away_law": 8.0}
+FACTORS = {"drift": 5.0, "growth": 6.0, "homoclinic": 8.0, "break_away_law": 8.0}
 """The measures whose rows carry bands, and the factor by which the band of a rerun with other roundings may be wider.
 
 A band is itself an estimate from 16 runs, or from the starts of an ensemble.  Of bands of two such estimates one is
-wider than the other by at most 4.2 (drift), 2.5 (growth) and 5.7 (homoclinic, where one random amplitude decides
+wider than the other by at most 4.2 (drift), 4.4 (growth) and 5.7 (homoclinic, where one random amplitude decides
 everything) in 175,000 pairs: `benchmarks/false_alarms.py`.
 """
 _TIMES = ("break_away_time", "break_away_slope")

@@ -11,9 +11,10 @@ from msgspec import structs
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.records import Report, Row
+from heavytop.measure.digits import digits_kept, digits_text
+from heavytop.records import Metric, Report, Row
 from heavytop.report.store import AnyReport, AnyRow
-from heavytop.report.text import failed, head, short, summary, table, title
+from heavytop.report.text import failed, head, summary, table, title, with_noise
 
 MOST_ROWS = 200
 """More rows than these are summed up after a run, not listed."""
@@ -34,14 +35,19 @@ def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
 
 
 def worst(report: AnyReport, rows: Iterable[AnyRow], hint: str) -> RenderableType:
-    """The largest error of each metric, and how many rows ended how, by measure and format; then the hint."""
+    """The largest error of each metric with its rounding noise, the fewest digits kept, and how many rows ended how, by
+    measure and format; then the hint.
+    """
     counts: dict[tuple[str, str], Counter[str]] = {}
-    largest: dict[tuple[str, str], dict[str, tuple[float, str, str]]] = {}
+    largest: dict[tuple[str, str], dict[str, tuple[float, Metric, str]]] = {}
+    fewest: dict[tuple[str, str], tuple[float, str]] = {}
     words: dict[tuple[str, str, str], Counter[str]] = {}
     for row in rows:
         group = row.measure, row.precision
         counts.setdefault(group, Counter())[row.outcome] += 1
         found = largest.setdefault(group, {})
+        if (kept := digits_kept(row)) is not None:
+            fewest[group] = min(fewest.get(group, (inf, "")), (kept, row.case))
         for name, metric in row.metrics.items():
             if metric.kind != "error":
                 continue
@@ -49,15 +55,25 @@ def worst(report: AnyReport, rows: Iterable[AnyRow], hint: str) -> RenderableTyp
                 words.setdefault((*group, name), Counter())[metric.value] += 1
             size = inf if metric.value == "nan" else -inf if metric.log10 is None else metric.log10
             if name not in found or size > found[name][0]:
-                found[name] = size, metric.value, row.case
+                found[name] = size, metric, row.case
     parts: list[RenderableType] = [head(report, sum(count.total() for count in counts.values()))]
     for group, found in largest.items():
         outcomes = ", ".join(f"{number} {outcome}" for outcome, number in sorted(counts[group].items()))
-        parts += [Text(), title(f"{' in '.join(filter(None, group))}: {outcomes}; the largest errors")]
-        lines = [
-            [name, short(value), case, ", ".join(f"{n} {word}" for word, n in words.get((*group, name), {}).items())]
-            for name, (_, value, case) in found.items()
+        parts += [
+            Text(),
+            title(f"{' in '.join(filter(None, group))}: {outcomes}; the largest errors over their samples"),
         ]
+        lines = [
+            [
+                name,
+                with_noise(metric),
+                case,
+                ", ".join(f"{n} {word}" for word, n in words.get((*group, name), {}).items()),
+            ]
+            for name, (_, metric, case) in found.items()
+        ]
+        if group in fewest:
+            lines.append(["digits kept, fewest", digits_text(fewest[group][0]), fewest[group][1], ""])
         parts.append(table(["metric", "largest", "in", "no number"], lines))
     return Group(*parts, Text(), Text(hint))
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
 from heavytop.records import Law, Metric, Row
 from heavytop.report.section import (
     DASHED,
@@ -53,32 +54,12 @@ def _lane_name(lane: tuple[str, ...], most: int = 40) -> str:
     return clip(case, most) + (f" ({clip(extra, most)})" if extra else "")
 
 
-def digits_at_end(row: Row) -> float | None:
-    """-log10 of the error of γ at the horizon, at most the digits of the format; |γ| = 1, so the error is relative.
-
-    None where there is no number.
-    """
-    metric = row.metrics.get("solution_error_gamma_final")
-    if metric is None or row.outcome != "success":
-        return None
-    most = row.bits * math.log10(2)
-    if metric.value == "unresolved":
-        bound = logarithm(metric.bound)
-        return None if bound is None else min(most, -bound)
-    if metric.value in _WORDS:
-        return None
-    return most if metric.log10 is None else min(most, -metric.log10)
-
-
-_WORDS = ("nan", "missing", "never", "unresolved")
-
-
 def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
-    """Digits that each format holds at the end of its run, beside the digits it started with."""
+    """Digits that each format keeps over its run, beside the digits it started with."""
     lanes: dict[tuple[str, ...], list[tuple[str, Row]]] = {}
     for source, report in sources:
         for row in report.rows:
-            if row.measure not in _ELSEWHERE and "solution_error_gamma_final" in row.metrics:
+            if row.measure not in _ELSEWHERE and RELATIVE in row.metrics:
                 lanes.setdefault(_lane(row), []).append((source, row))
     if not lanes:
         return None
@@ -86,11 +67,12 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "digits",
         "Digits kept per format",
         [
-            "Correct decimal digits of γ at the end of each run, −log10 of its error against the known motion, or for "
-            "many starts without one against runs in a wider format, which prove nothing; since |γ| = 1 the error is "
-            "relative. A thin line leads from the digits that the format has to those it kept."
+            "Digits kept: −log10 of the largest |error|/max(1, |true value|) of a component of Ω or γ over the "
+            "samples, against the known motion, or for many starts without one against runs in a wider format, which "
+            "prove nothing; of many starts the root mean square over them. A thin line leads from the digits of the "
+            "format to those it kept."
         ],
-        columns=["case", "format", "T", "digits", "kept", "lost", "± digits"],
+        columns=["case", "format", "T", "samples", "digits", "kept", "lost", "± digits"],
     )
     formats = _formats(sources)
     wanted = set(first)
@@ -98,29 +80,33 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     left_out(section, len(lanes) - len(names), "case")
     count = max(len(members) for members in lanes.values())
     lines = (count + 1) * len(names)
-    axes = new_axes("γ at the end (correct decimal digits)", "case", max(2.4, 0.8 + 0.12 * lines), 0.4)
+    axes = new_axes("digits kept (of Ω and γ, over the samples)", "case", max(2.4, 0.8 + 0.12 * lines), 0.4)
     height = 0.8 / count
     heard = []
     for index, lane in enumerate(names):
         for place, (source, row) in enumerate(sorted(lanes[lane], key=lambda each: each[1].bits)):
             key = section.key(_format_key(row.precision, formats.get(row.precision, 0), source, line=False))
             y = index + (place - (len(lanes[lane]) - 1) / 2) * height
-            full, kept = row.bits * math.log10(2), digits_at_end(row)
-            band = row.metrics["solution_error_gamma_final"].band
+            full = row.bits * math.log10(2)
+            kept = digits_kept(row) if row.outcome == "success" else None
+            band = row.metrics[RELATIVE].band
             if kept is None:
                 axes.plot([0], [y], "x", color=COLOURS[key.colour], mew=1.6, ms=6)
-                said = row.outcome if row.outcome != "success" else row.metrics["solution_error_gamma_final"].value
+                said = row.outcome if row.outcome != "success" else row.metrics[RELATIVE].value
             else:
                 axes.plot([kept, full], [y, y], "-", color=COLOURS[key.colour], lw=0.9)
                 axes.plot([full], [y], "|", color=COLOURS[key.colour], ms=6)
                 if band:
                     axes.plot([kept - band, kept + band], [y, y], "-", color=COLOURS[key.colour], lw=4, alpha=0.3)
                 draw(axes, key, [kept], [y], 5)
-                said = f"{kept:.1f}"
+                said = digits_text(kept)
             heard.append(f"{_lane_name(lane)}, {key.label}: {said} of {full:.1f}.")
-            lost = "" if kept is None else f"{full - kept:.1f}"
+            lost = "" if kept is None else f"{full - max(kept, 0.0):.1f}"
             spread = "" if band is None else f"{band:.2f}"
-            section.rows.append([_lane_name(lane), key.label, short(row.horizon), f"{full:.1f}", said, lost, spread])
+            samples = str(row.samples or "")
+            section.rows.append(
+                [_lane_name(lane), key.label, short(row.horizon), samples, f"{full:.1f}", said, lost, spread]
+            )
     axes.set_yticks(range(len(names)), [_lane_name(lane, 15).replace(" (", "\n(", 1) for lane in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.set_xlim(left=0)
@@ -281,7 +267,7 @@ def _law_said(label: str, law: Law) -> str:
     growth, exponent, _ = _law_words(law)
     if not exponent:
         return f"{label}: law {growth}."
-    return f"{label}: {growth}, {'rate' if growth == 'exponential' else 'exponent'} {exponent}."
+    return f"{label}: {growth}, {'median rate of the starts' if growth == 'exponential' else 'exponent'} {exponent}."
 
 
 def _law_words(law: Law | None) -> list[str]:

@@ -9,7 +9,7 @@ import msgspec
 
 from heavytop.measure.luck import accumulated, assumed, least
 from heavytop.precision import exact
-from heavytop.records import Metric, Row
+from heavytop.records import UNMEASURED, Metric, Row
 from heavytop.report.against import weaker
 from heavytop.report.consistency import contradictions
 from heavytop.report.laws import judge_law, law_text
@@ -197,7 +197,8 @@ class RowComparison:
         """Why two rows cannot be compared; empty where they can."""
         for row, which in ((old, "baseline"), (new, "candidate")):
             if row.outcome != "success":
-                return f"the {which} ended as {row.outcome} at t = {row.time_reached}"
+                why = f": {row.against.removeprefix('nothing: ')}" if row.outcome in UNMEASURED else ""
+                return f"the {which} ended as {row.outcome} at t = {row.time_reached}{why}"
             # a brief row is checked as it is read
             if isinstance(row, Row) and (problem := next(contradictions(row), "")):
                 return f"the {which} contradicts itself: {problem}"

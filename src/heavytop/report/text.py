@@ -12,9 +12,10 @@ from rich.table import Table
 from rich.text import Text
 
 from heavytop.errors import InputError
+from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import decimal_text, exact
-from heavytop.records import UNMEASURED, Law, Report, Row
+from heavytop.records import FAILED, UNMEASURED, Law, Metric, Report, Row
 from heavytop.report.printable import printable
 from heavytop.report.store import AnyReport
 from heavytop.report.work_precision import leads, panels
@@ -35,6 +36,25 @@ def short(value: str, digits: int = 3) -> str:
     if exact(text) == number:  # a time such as 10^6 has no more digits
         mantissa = mantissa.rstrip("0").removesuffix(".")
     return f"{mantissa}e{int(exponent)}"
+
+
+def with_noise(metric: Metric | None, digits: int = 3) -> str:
+    """The value of a metric and, where it was measured, the half-width of its rounding noise in decades."""
+    if metric is None:
+        return "-"
+    return short(metric.value, digits) + (f" ± {metric.band:.2f}" if metric.band else "")
+
+
+def largest_over(rows: Iterable[Row]) -> str:
+    """``largest over N samples``, with the least and the most where rows have different numbers of them."""
+    counts = sorted({row.samples for row in rows if row.samples})
+    if not counts:
+        return "largest over the samples"
+    return f"largest over {counts[0]}{f' to {counts[-1]}' if len(counts) > 1 else ''} samples"
+
+
+_DIGITS = "Digits kept: −log10 of the largest |error|/max(1, |true value|) of a component of Ω or γ."
+_NOISE = "± is the rounding noise in decades: half the interval that holds 95 % of it."
 
 
 def summary(report: Report) -> RenderableType:
@@ -74,6 +94,8 @@ def failed(row: Row) -> bool:
 
 
 def _failure(row: Row) -> str:
+    if row.outcome == FAILED:
+        return f"  {row.against.removeprefix('nothing: ')} in {row.precision}"
     if row.outcome in UNMEASURED:
         return f"  {row.measure} of {row.case}, {row.integrator} in {row.precision}: {row.outcome}, {row.against}"
     return f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}"
@@ -122,6 +144,7 @@ def _claim_model(rows: Sequence[Row]) -> list[RenderableType]:
     parts: list[RenderableType] = [
         title("Claim against truth: the paper's (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0"),
         Text("  Error of Ω, largest component; the same for γ. Exactly evaluated: no rounding is in these numbers."),
+        Text("  Off 1 %: the first |t| at which the largest component of |ΔΩ| is 1 % of α, proven, not a sample."),
     ]
     times = [time for time in ("0.1", "1", "2", "5") if any(_at(row, "omega", time) for row in rows)]
     columns = [
@@ -129,7 +152,7 @@ def _claim_model(rows: Sequence[Row]) -> list[RenderableType]:
         "branch",
         *(f"Ω at |t|={t}" for t in times),
         *(f"γ at |t|={t}" for t in times[:2]),
-        "Ω off 1% from |t|",
+        "Ω off 1 % of α at |t|",
     ]
     lines = [
         [
@@ -173,6 +196,7 @@ def _claim_evaluation(rows: Sequence[Row]) -> list[RenderableType]:
     columns = ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω from |t|"]
     return [
         title("Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated"),
+        Text(f"  Errors are the {largest_over(rows)}."),
         table(columns, both(lines)),
     ]
 
@@ -193,11 +217,12 @@ def _homoclinic(rows: Sequence[Row]) -> list[RenderableType]:
     lines = []
     for row in rows:
         prefix = "integration_error" if "integration_error_omega_max" in row.metrics else "solution_error"
-        error = row.metrics[f"{prefix}_omega_max"].value if f"{prefix}_omega_max" in row.metrics else "-"
-        lines.append([row.case, row.precision, short(error), short(row.metrics["break_away_time"].value), row.outcome])
+        error = with_noise(row.metrics.get(f"{prefix}_omega_max"))
+        lines.append([row.case, row.precision, error, with_noise(row.metrics["break_away_time"]), row.outcome])
     return [
         title("Integrators on a homoclinic motion, against its closed form"),
-        Text("  Ω error while rate·|t| <= 10; break-away: Ω wrong by 1e-3 α, where the saddle has eaten every digit."),
+        Text("  Ω error: the largest over the samples with rate·|t| <= 10; break-away: Ω wrong by 1e-3 α, where the"),
+        Text(f"  saddle has eaten every digit. {_NOISE}"),
         table(["case", "format", "Ω error", "break-away |t|", "outcome"], both(lines)),
     ]
 
@@ -241,7 +266,9 @@ def _local_error(rows: Sequence[Row]) -> list[RenderableType]:
 def _drift(rows: Sequence[Row]) -> list[RenderableType]:
     return [
         title("Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals"),
-        Text("  Both absolute and largest on the way: an invariant that holds is no proof that the motion is right."),
+        Text(f"  Both absolute, {largest_over(rows)}: an invariant that holds is no proof that the motion is right."),
+        Text(f"  {_DIGITS}"),
+        Text(f"  {_NOISE}"),
         _motions(rows),
     ]
 
@@ -249,7 +276,8 @@ def _drift(rows: Sequence[Row]) -> list[RenderableType]:
 def _scored(rows: Sequence[Row]) -> list[RenderableType]:
     return [
         title("Motions computed elsewhere: distance from the true motion, and drift of the first integrals"),
-        Text("  Both absolute and largest on the way."),
+        Text(f"  Both absolute, {largest_over(rows)}."),
+        Text(f"  {_DIGITS}"),
         _motions([structs.replace(row, case=f"{row.case} {row.integrator}") for row in rows]),
     ]
 
@@ -258,19 +286,31 @@ def _motions(rows: Sequence[Row]) -> Table:
     lines = []
     for row in rows:
         worst = [
-            (name[6:-4], metric.value)
+            (name[6:-4], metric)
             for name, metric in row.metrics.items()
             if name.startswith("drift_") and name.endswith("_max")
         ]
-        cells = "  ".join(f"{name} {short(value, 2)}" for name, value in worst)
+        cells = "  ".join(f"{name} {with_noise(metric, 2)}" for name, metric in worst)
         error, across = (
-            short(row.metrics[f"solution_error_{name}_max"].value, 2)
+            with_noise(row.metrics[f"solution_error_{name}_max"], 2)
             if f"solution_error_{name}_max" in row.metrics
             else "no reference"
             for name in ("along", "across")
         )
-        lines.append([row.case, row.precision, row.horizon, str(row.steps), row.outcome, error, across, cells])
-    columns = ["case", "format", "T", "steps", "outcome", "error along", "across", "largest drift of each integral"]
+        kept = digits_kept(row)
+        digits = "-" if kept is None else digits_text(kept)
+        lines.append([row.case, row.precision, row.horizon, str(row.steps), row.outcome, digits, error, across, cells])
+    columns = [
+        "case",
+        "format",
+        "T",
+        "steps",
+        "outcome",
+        "digits kept",
+        "error along",
+        "across",
+        "drift of each integral",
+    ]
     made = table(columns, lines)
     made.columns[-1].justify = "left"
     return made
@@ -317,9 +357,11 @@ def _growth(rows: Sequence[Row]) -> list[RenderableType]:
         "detects",
         "lost at |t|",
     ]
+    chaotic = any(law.growth == "exponential" for row in rows for law in row.laws.values())
     return [
         title("Growth laws: root mean square over random starts, drift of the first integrals and distance from truth"),
         Text("  Detects: the smallest relative fault a step that these starts would have told from the healthy law."),
+        *([Text("  Rate: the median over the starts of their finite-time rates.")] if chaotic else []),
         table(columns, lines),
     ]
 

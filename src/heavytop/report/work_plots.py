@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from heavytop.records import Report, Row
+from heavytop.records import UNMEASURED, Report, Row
 from heavytop.report.section import MOST_PLOTS, Key, Section, Sources, clip, draw, left_out, scientific
 from heavytop.report.svg import COLOURS, MARKERS, Picture, decades, finish, new_axes, spoken
 from heavytop.report.text import short
 from heavytop.report.work_precision import Line, leads, panels
 
-_METRICS = (("error_max", "largest on the way"), ("error_final", "at the end"))
+_NO_RUN = ("success", *UNMEASURED)
+"""Outcomes that are no giving up: a run to the end, and none at all."""
+_METRICS = (("error_max", "largest over the samples"), ("error_final", "at the end"))
 
 
 def work_precision(sources: Sources) -> Section | None:
@@ -107,4 +109,4 @@ def _numbers(source: str, row: Row) -> list[str]:
 
 def gave_up(report: Report) -> int:
     """How many runs of such rows did not reach the end: a finding about the integrator, in its chart."""
-    return sum(row.measure == "work_precision" and row.outcome != "success" for row in report.rows)
+    return sum(row.measure == "work_precision" and row.outcome not in _NO_RUN for row in report.rows)

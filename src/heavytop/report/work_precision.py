@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from heavytop.records import Row
+from heavytop.records import UNMEASURED, Row
 
 OURS = "heyoka"
 CONSTANTS = "heyoka:constants"
@@ -129,7 +129,7 @@ def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Lin
     """The lines of each case.  metric: error_max (over the whole horizon) or error_final."""
     found: dict[str, dict[tuple[str, str], Line]] = {}
     for row in rows:
-        if row.measure != "work_precision":
+        if row.measure != "work_precision" or row.outcome in UNMEASURED:
             continue
         name, _, setting = row.integrator.partition(" ")
         line = found.setdefault(row.case, {}).setdefault((name, row.precision), Line(name, row.precision))

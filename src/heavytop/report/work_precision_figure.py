@@ -82,7 +82,7 @@ def work_precision_axes(axes: Any, lines: Sequence[Line], styles: dict[str, dict
         axes.set(xlim=(1e-16, 1.0))
         if not any(line.failures for line in lines):
             axes.set(ylim=(1e-3, 1.0))
-    axes.set(xscale="log", yscale="log", xlabel="largest error of a component on the way", ylabel="seconds")
+    axes.set(xscale="log", yscale="log", xlabel="largest error of a component over the samples", ylabel="seconds")
     axes.grid(True, color="#dddddd")
     axes.spines[["top", "right"]].set_visible(False)
 

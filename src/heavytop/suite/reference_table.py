@@ -93,7 +93,7 @@ def cases() -> Iterator[Case]:
     turning = State(("1/6", "-1/6", "2/3"), ("2/3", "-1/3", "2/3"))
     yield Case("gyrostat", HeavyTop((4, 2, 1), 1, (0, 1, 0)), turning, GYROSTAT)
     turning = State(("2/3", "2/3", "2/9"), ("2/3", "1/3", "2/3"))
-    yield Case("gyrostat, weight downwards", HeavyTop((1, "1/2", 3), 1, (0, -2, 0)), turning, GYROSTAT)
+    yield Case("gyrostat, b < 0", HeavyTop((1, "1/2", 3), 1, (0, -2, 0)), turning, GYROSTAT)
     yield _of("gyrostat, homoclinic (4.2)-(4.6)", ErshkovPartial(f(1), f(6), f(1)))
     yield _of("staude", staude_motion((f(3), f(2), f(1)), (f(2, 3), f(-1, 3), f(2, 3)), f(3, 2), f(1, 2)))
     yield _of("grioli", grioli_motion(f(1, 3), f(1, 4), f(2, 7), f(3, 2)))

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from fractions import Fraction
 
 import msgspec
 
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.measure.digits import digits_kept
 from heavytop.measure.drift import Drift
 from heavytop.measure.known import known_motion
 from heavytop.measure.solution_error import SolutionError
 from heavytop.precision import round_to
-from heavytop.records import Metric, Row
+from heavytop.records import Row
 from heavytop.suite.cases import Case
 from heavytop.suite.measurements.computed import computed_row
 from heavytop.suite.measurements.shared import time_text
@@ -20,6 +20,8 @@ from heavytop.suite.tables import log_spaced
 from heavytop.suite.task import Task
 from heavytop.suite.trajectory_file import Given
 from heavytop.top.integrals import holding
+
+__all__ = ["complete", "digits_kept", "score"]
 
 
 def score(given: Given) -> Row:
@@ -63,17 +65,6 @@ def score(given: Given) -> Row:
     row = computed_row(task, run, metrics, series, against)
     reached = time_text(run.time_reached)
     return msgspec.structs.replace(row, measured=f"given: {given.integrator}", order=None, time_reached=reached)
-
-
-def digits_kept(row: Row) -> float | None:
-    """Decimal places of Ω and γ that are right at every sample; None without a reference or a finite state."""
-    errors = [row.metrics.get(f"solution_error_{part}_max", Metric("missing", None)) for part in ("omega", "gamma")]
-    if any(metric.value in ("missing", "nan") for metric in errors):
-        return None
-    logs = [metric.log10 for metric in errors if metric.log10 is not None]
-    # below what the reference resolves, or exactly 0: all digits of the format
-    most = row.bits * math.log10(2)
-    return round(min([most, *(-value for value in logs)]), 2)
 
 
 def complete(row: Row) -> bool:

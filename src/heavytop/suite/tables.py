@@ -192,13 +192,13 @@ class WorkPrecision(Strict, tag="work_precision"):
     samples: int = 100
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row; raises InputError also for an integrator that is not there."""
+        """One a row; raises InputError also for an integrator that is unknown, or built in and not installed."""
         (horizon,) = _positive([self.horizon], "horizon")
         count = _samples(self.samples)
         times = tuple(horizon * i / count for i in range(1, count + 1))
         keep = tuple(times[i - 1] for i in log_spaced(count))
         for ladder in self.ladders:
-            peers.peer(ladder.integrator)
+            peers.require(ladder.integrator)
             if not ladder.tolerances and not ladder.steps:
                 raise InputError(f"The ladder of {ladder.integrator} is empty.", "Give it tolerances, or steps.")
             for text in ladder.tolerances + ladder.steps:

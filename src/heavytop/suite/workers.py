@@ -58,7 +58,8 @@ def rows(
     saved: for the index of a task, where its row keeps its place; None where it keeps none, as on a cluster, which may
     have no disk in common with this machine.
 
-    A task whose worker died is run again, three times in all.
+    A task whose worker died is run again, three times in all; an integrator of another package that it ran is then a
+    row that failed.
     Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
     InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
     """
@@ -105,6 +106,11 @@ def _in_processes(
             queue.extendleft(reversed(lost))
             worst, times = max(deaths.items(), key=itemgetter(1), default=(0, 0))
             if times > 2:
+                if (ended := _ended_by_peer(tasks[worst], times)) is not None:
+                    queue.remove(worst)
+                    del deaths[worst]
+                    yield worst, ended
+                    continue
                 raise HeavyTopError(
                     f"A worker process died {times} times during {tasks[worst].label}.",
                     f"{_RESUME}, perhaps with fewer --workers.",
@@ -130,6 +136,9 @@ def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Ite
                 try:
                     row = future.result()
                 except KilledWorker as error:
+                    if (ended := _ended_by_peer(tasks[index], error.allowed_failures + 1)) is not None:
+                        yield index, ended
+                        continue
                     raise HeavyTopError(
                         f"{error.allowed_failures + 1} workers died during {tasks[index].label}.", f"{_RESUME}."
                     ) from None
@@ -172,6 +181,17 @@ def _measure(task: Task, saved: Saved) -> Row:
         return unmeasured(task, error)
     except InputError as error:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
+
+
+def _ended_by_peer(task: Task, times: int) -> Row | None:
+    """The failed row of a task that ended its process, where an integrator of another package ran in it; else None."""
+    from heavytop.integrate.peers import BUILT_IN
+    from heavytop.suite.measurements.shared import peer_failure
+
+    name = task.form.partition(" ")[0]
+    if task.kind != "work_precision" or name in BUILT_IN:
+        return None
+    return peer_failure(task, f"{name} ended its process {times} times")
 
 
 def _measure_as(expected: Versions, task: Task) -> Row:

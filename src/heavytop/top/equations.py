@@ -1,6 +1,7 @@
 """The two vector fields, written once over any ring.  The order of the state and every sign are decided here.
 
-State y = (Ω1, Ω2, Ω3, γ1, γ2, γ3).  The same functions serve heyoka expressions, Fractions, mpf, balls, power series
+State y = (Ω1, Ω2, Ω3, γ1, γ2, γ3); γ is the unit vector pointing vertically up, in body axes.
+The same functions serve heyoka expressions, Fractions, mpf, balls, power series
 and sympy symbols: they use +, -, * and division by the principal moments, and no literals.
 """
 
@@ -18,7 +19,9 @@ VARIABLES = ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3")
 
 
 class Parameters(NamedTuple):
-    """What enters the fields, in any ring: principal moments I, moment of the weight n = P r, rotor λ."""
+    """What enters the fields, in any ring: principal moments I, n = P r, and λ, by which the rotor makes the body turn
+    faster about axis 2 (its angular momentum relative to the body is −I2 λ).
+    """
 
     inertia: Any
     moment: Any
@@ -42,6 +45,7 @@ def heavy_top(p: Parameters, y: Any) -> tuple[Any, ...]:
 def gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
     """M' = M × ω and γ' = γ × ω with ω = Ω + λ e2: the free gyrostat with a constant rotor along axis 2.
 
+    M = IΩ = Iω − I2 λ e2 is the angular momentum of body and rotor, so −I2 λ is the rotor's own, relative to the body.
     This is the system that the paper's formulas solve exactly, with λ = P b / (M·γ) from :func:`rotor`.
     """
     (i1, i2, i3), rotor = p.inertia, p.rotor
@@ -99,7 +103,7 @@ def rotor(top: HeavyTop, start: State) -> Any:
     area = dot(momentum, start.gamma)
     if area == 0:
         raise InputError(
-            "The gyrostat needs M·gamma != 0: its rotor is P b / (M·gamma).", "Choose a start that turns about gamma."
+            "The gyrostat needs M·gamma != 0: its lambda is P b / (M·gamma).", "Choose a start that turns about gamma."
         )
     off = cross(momentum, start.gamma)
     if any(off):

@@ -101,7 +101,10 @@ def require_physical(top: HeavyTop, start: State) -> None:
 
 @dataclass(frozen=True, slots=True, init=False)
 class State:
-    """Angular velocity Ω and unit vector of weight γ on the principal axes, as exact rationals."""
+    """Angular velocity Ω and γ, the unit vector pointing vertically up, both in body axes, as exact rationals.
+
+    Up: the equations are M' = M × Ω + P γ × r, γ' = γ × Ω and the energy is ½ Ω·M + P r·γ, higher with r along γ.
+    """
 
     omega: Vector
     gamma: Vector
@@ -130,7 +133,9 @@ class State:
         """The state with γ at a rational point of the unit sphere within 2^(2-bits) of γ/|γ| (stereographic)."""
         square = dot(self.gamma, self.gamma)
         if square == 0:
-            raise InputError("gamma is the zero vector, which has no direction.", "Give the direction of the weight.")
+            raise InputError(
+                "gamma is the zero vector, which has no direction.", "Give the direction that points vertically up."
+            )
         if square == 1:
             return self
         largest = max(abs(g) for g in self.gamma)

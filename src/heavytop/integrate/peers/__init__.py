@@ -20,7 +20,8 @@ from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, PeerFailed
+from heavytop.integrate.peers.contract import Contained, contained, quiet, said
 from heavytop.integrate.trajectory import Trajectory
 
 GROUP = "heavytop.peers"
@@ -61,29 +62,53 @@ def peer(name: str) -> Peer:
     if entry is None:
         raise InputError(f"Unknown integrator {name[:60]!r}.", f"Known: {', '.join(known())}.")
     try:
-        loaded: Any = entry.load()
+        with quiet():
+            loaded: Any = entry.load()
     except ImportError as error:
-        raise InputError(f"The integrator {name} is not available: {error}.", _remedy(entry)) from error
-    except Exception as error:  # whatever another package's module does when it is imported
-        raise InputError(
-            f"The integrator {name} is broken: {type(error).__name__}: {error}.", _remedy(entry)
-        ) from error
+        raise InputError(f"The integrator {name} is not available: {said(error)}.", _remedy(entry)) from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # whatever another package's module does when it is imported
+        why = f"{type(error).__name__}: {said(error)}"
+        raise InputError(f"The integrator {name} is broken: {why}.", _remedy(entry)) from error
     if not callable(loaded):
         raise InputError(f"The integrator {name} is broken: {entry.value} is not callable.", _remedy(entry))
     return loaded  # type: ignore[no-any-return]
 
 
-def ready(name: str, setting: tuple[str, Fraction] | None = None) -> Peer:
+def require(name: str) -> None:
+    """Raises InputError for an unknown integrator, and for one of this program's that cannot be imported.
+
+    One of another package is not imported: how that goes is for the rows to say.
+    """
+    if name not in known() or name in BUILT_IN:
+        peer(name)
+
+
+def ready(name: str, setting: tuple[str, Fraction] | None = None) -> Contained:
     """The peer of that name with ``setting``, ("tolerance", 1e-9) or ("step", 1/50): nothing is looked up in its calls.
 
-    Raises InputError for a setting that this peer does not have.
+    Its calls raise PeerFailed for whatever others do wrong (:mod:`heavytop.integrate.peers.contract`).
+    Raises InputError for an unknown integrator and for a setting that one of this program's does not have; PeerFailed
+    where another package's cannot be used.
     """
-    chosen = peer(name)
+    own = name in BUILT_IN
+    try:
+        chosen = peer(name)
+    except InputError as error:
+        if own or name not in known():
+            raise
+        raise PeerFailed(error.cause.removesuffix(".")) from None
     if setting is None:
-        return chosen
-    if setting[0] not in inspect.signature(chosen).parameters:
+        return Contained(name, chosen, own)
+    with contained(name, " when its arguments were looked at"):
+        arguments = inspect.signature(chosen).parameters
+        takes = setting[0] in arguments or any(each.kind is each.VAR_KEYWORD for each in arguments.values())
+    if not takes and own:
         raise InputError(f"The integrator {name} has no {setting[0]}.", "Fixed steps take a step, others a tolerance.")
-    return partial(chosen, **dict([setting]))
+    if not takes:
+        raise PeerFailed(f"{name} has no {setting[0]}")
+    return Contained(name, partial(chosen, **dict([setting])), own)
 
 
 def run(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:

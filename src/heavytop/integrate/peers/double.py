@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, wraps
 from threading import RLock
 from time import perf_counter
 from typing import Any, TypeVar
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, exact, number
 from heavytop.top import heavy_top
@@ -72,7 +72,10 @@ def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") ->
     def integrate(problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Trajectory:
         given = _given(name, knob, problem, times, setting)
         began = perf_counter()
-        solved = solve(given)
+        # the times are judged by as they were, whatever is done to those that are given
+        solved = solve(replace(given, times=given.times.copy()))
+        if not isinstance(solved, Solved):
+            raise PeerFailed(f"{name} returned a {type(solved).__name__} instead of Solved")
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
         flags = {knob: repr(given.setting), "field": field_kind()}
         return _judged(problem, name, order, given.times, solved, seconds, flags)
@@ -127,7 +130,7 @@ def _judged(
     """What was solved, up to the first state that is not finite."""
     import numpy
 
-    states = numpy.asarray(solved.states, dtype=float).reshape(-1, 6)[: len(times)]
+    states = _states(name, solved.states, len(times))
     finite = numpy.isfinite(states).all(axis=1)
     count = len(states) if finite.all() else int(finite.argmin())
     reached = times[-1] if count == len(times) else solved.reached
@@ -145,6 +148,20 @@ def _judged(
         flags,
         solved.evaluations,
     )
+
+
+def _states(name: str, given: Any, count: int) -> Any:
+    """The states as an array of doubles, shape (m, 6) with m <= count; raises PeerFailed for anything else."""
+    import numpy
+
+    states = numpy.asarray(given)
+    if not states.size:
+        return numpy.zeros((0, 6))
+    if states.dtype.kind not in "fiu":
+        raise PeerFailed(f"{name} returned states of {states.dtype}, not numbers of double")
+    if states.ndim != 2 or states.shape[1] != 6 or len(states) > count:
+        raise PeerFailed(f"{name} returned states of the shape {states.shape} for {count} times")
+    return states.astype(float)
 
 
 Made = TypeVar("Made")

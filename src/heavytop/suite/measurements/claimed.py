@@ -11,13 +11,13 @@ from flint import arb
 from heavytop.claims.audit import audit as audit_of
 from heavytop.claims.ershkov import PartialCase
 from heavytop.errors import OutOfReach
-from heavytop.exact.balls import FUNCTIONS, ball, radius_text, working_precision
+from heavytop.exact.balls import FUNCTIONS, radius_text, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
-from heavytop.exact.validated import Validated
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure import claim_error
 from heavytop.measure.computed_reference import ComputedReference
 from heavytop.measure.known import certified
+from heavytop.measure.parting import CLAIM_XI, parting, true_solution
 from heavytop.measure.scalar import largest, metric, of_fraction, text
 from heavytop.precision import parse
 from heavytop.records import Metric, Row, Series
@@ -26,13 +26,7 @@ from heavytop.suite.task import Task
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP
 
-PARTED = Fraction(1, 100)
-"""Claim and truth have parted when Ω differs by this, in units of α."""
-_EFFORT = 20.0
-"""Seconds that a validated truth may cost before two runs at different precisions take its place."""
 CLAIM = "claimed: (4.2)-(4.6)"
-CLAIM_XI = (Fraction(0), Fraction(-1), Fraction(0))
-"""ξ at t = 0 of the claimed attitude, where φ + ψ = π/2 and θ = 0."""
 
 
 def audit(task: Task) -> Row:
@@ -67,7 +61,8 @@ def audit(task: Task) -> Row:
 
 
 def claim_model(task: Task) -> Row:
-    """The largest errors of the claim (4.2)-(4.6), exactly evaluated, as a motion of the heavy top, and when it parts.
+    """The largest errors of the claim (4.2)-(4.6) over the times, exactly evaluated, as a motion of the heavy top, and
+    from when on Ω is off by 1 % of α (:mod:`heavytop.measure.parting`).
 
     The task: a case with a claim, its ``form`` the branch, smooth or printed; exact times of one sign, t ≠ 0.
     Errors of Ω in 1/time unit, of γ none, of the angles in rad.  Raises OutOfReach where the true motion is not proven.
@@ -81,9 +76,8 @@ def claim_model(task: Task) -> Row:
             f"claim_model_error_{name}_max": metric(largest(getattr(e, name) for e in errors.values()), "value")
             for name in names
         }
-        limit = claim.alpha * PARTED
-        parted = next((time for time in task.times if errors[time].omega > ball(limit)), None)
-        metrics["claim_parts_by_1_percent_at"] = time_metric(parted, "value")
+        parted = parting(claim, task.times[-1], branch)
+        metrics["claim_parts_by_1_percent_at"] = time_metric(None if parted is None else parted.time, "value")
         series = {
             f"claim_model_error_{name}": Series(
                 [time_text(t) for t in task.keep], [text(abs(getattr(errors[t], name)), 12) for t in task.keep]
@@ -106,6 +100,7 @@ def claim_model(task: Task) -> Row:
         measured=f"{CLAIM}, {branch} branch, exactly evaluated",
         against=against,
         series=series,
+        samples=len(task.times),
     )
 
 
@@ -115,8 +110,8 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_er
     times: those at which it will be asked for.  Raises OutOfReach where it is not known up to the last of them.
     """
     bits = claim_error.MODEL_BITS
-    if claim.i1 == 2 * claim.i3:
-        known = DeloneHomoclinic(claim.alpha, claim.i1)
+    known = true_solution(claim)
+    if isinstance(known, DeloneHomoclinic):
         proven = certified(known, max(times, key=abs), bits)
         if proven is None:
             raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
@@ -128,12 +123,10 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_er
             return known.state(time, bits), list(xi)
 
         return delone, proven.text
-    top, start = claim.solves.top, claim.solves.start
-    enclosed = Validated(top, start, xi=CLAIM_XI, effort=_EFFORT)
     try:
-        enclosed.state(max(times, key=abs), bits)
+        known.state(max(times, key=abs), bits)
     except OutOfReach:
-        computed = ComputedReference(top, start, times, xi=CLAIM_XI)
+        computed = ComputedReference(known.top, known.start, times, xi=CLAIM_XI)
 
         def runs(time: Fraction) -> tuple[list[arb], list[arb]]:
             values = computed.state(time)
@@ -142,9 +135,9 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_er
         return runs, computed.method
 
     def validated(time: Fraction) -> tuple[list[arb], list[arb]]:
-        return enclosed.state(time, bits), enclosed.attitude(time, bits)
+        return known.state(time, bits), known.attitude(time, bits)
 
-    return validated, f"known: {enclosed.method}, radius below {radius_text(Fraction(1, 2**bits))}"
+    return validated, f"known: {known.method}, radius below {radius_text(Fraction(1, 2**bits))}"
 
 
 def claim_evaluation(task: Task) -> Row:
@@ -189,4 +182,5 @@ def claim_evaluation(task: Task) -> Row:
         measured=f"{CLAIM}, {task.form} form, evaluated in {precision.name}; times of the series are k t",
         against="the same form exactly evaluated from the same rounded data",
         series=series,
+        samples=len(times),
     )

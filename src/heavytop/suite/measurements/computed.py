@@ -188,5 +188,6 @@ def computed_row(
         flags=run.flags,
         input_rounding=decimal_text(input_rounding(case.top, case.start, run.problem), 3),
         series=series,
+        samples=len(run.times),
         seconds=run.seconds,
     )

@@ -15,6 +15,7 @@ from flint import arb
 
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.measure.digits import RELATIVE
 from heavytop.measure.drift import Drift
 from heavytop.measure.growth import Ensemble, band, law, root_mean_square
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
@@ -133,6 +134,8 @@ def growth(task: Task, saved: Saved) -> Row:
         quantities |= _errors(starts, times, motions, held_against)
     for name, quantity in quantities.items():
         _add(row, name, quantity, task.times, float(times[-1]) / steps if steps else 0.0)
+    if any(errors):
+        row.metrics[RELATIVE] = _largest(_values(RELATIVE.removesuffix("_max"), times, motions))
     row.finite = row.finite and not any(m.value in ("nan", "missing") for m in row.metrics.values())
     return row
 
@@ -237,6 +240,11 @@ def _add(row: Row, name: str, quantity: _Quantity, times: Sequence[Fraction], st
     row.laws[name] = law(ensemble)
 
 
+def _largest(values: Array) -> Metric:
+    """The root mean square over the starts that reached the end of the largest of their ``values``."""
+    return _metric(values[numpy.isfinite(values).all(axis=1)].max(axis=1), True)
+
+
 def _text(value: float, measured: bool) -> str:
     if not numpy.isfinite(value):
         return UNRESOLVED if measured else "missing"
@@ -280,6 +288,7 @@ def _row(
         order=first.order,
         flags=first.flags | {"bias": run.bias or "none"},
         input_rounding=decimal_text(rounding, 3),
+        samples=len(task.times),
         starts=len(motions),
         seconds=seconds,
     )

@@ -31,6 +31,8 @@ from heavytop.top.integrals import holding
 
 _STEPS = 500_000
 """A longer run is rerun over about its first so many steps only."""
+_STEPS_SINGLY = 2000
+"""The same for a planted fault, some of which take their steps one by one."""
 _SAMPLES = 64
 _BITS = 32
 """Bits of a top whose multiples by 1 + j/2^20 are exact in double: all its reruns then have one reference."""
@@ -60,7 +62,8 @@ def drift_bands(task: Task, run: Trajectory, metrics: Metrics) -> Metrics:
     if run.outcome is not Outcome.SUCCESS:
         return metrics
     case, horizon = task.case, task.times[-1]
-    end = horizon if run.steps <= _STEPS else horizon * _STEPS / run.steps
+    most = _STEPS if task.integrator == "heyoka" else _STEPS_SINGLY
+    end = horizon if run.steps <= most else horizon * most / run.steps
     times = [exact(number(end * i / _SAMPLES, DOUBLE)) for i in range(1, _SAMPLES + 1)]
     problem = _short(Problem.of(case.top, case.start, DOUBLE, case.system))
     integrals = holding(case.top, case.start, case.system)

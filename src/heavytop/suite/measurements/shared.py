@@ -8,14 +8,14 @@ from fractions import Fraction
 from typing import Any
 
 from heavytop.claims.ershkov import Branch, PartialCase
-from heavytop.errors import Contradiction, OutOfReach
+from heavytop.errors import Contradiction, OutOfReach, PeerFailed
 from heavytop.integrate import taylor
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.luck import reroll
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import decimal_text, parse
-from heavytop.records import CONTRADICTION, OUT_OF_REACH, Kind, Metric, Row
+from heavytop.records import CONTRADICTION, FAILED, OUT_OF_REACH, Kind, Metric, Row
 from heavytop.suite.cases import Case
 from heavytop.suite.task import Task
 from heavytop.top.equations import HEAVY_TOP
@@ -72,7 +72,7 @@ def integrator_text(task: Task) -> str:
     return task.form if task.kind == "work_precision" else f"{task.integrator} {task.form}".rstrip()
 
 
-def unmeasured(task: Task, reason: OutOfReach | Contradiction) -> Row:
+def unmeasured(task: Task, reason: OutOfReach | Contradiction | PeerFailed) -> Row:
     """The row of a task that came to nothing: an outcome of its own, no metric, and why in the place of a reference."""
     system = task.form if task.case is None else HEAVY_TOP.name if task.kind == "claim_model" else task.case.system.name
     return Row(
@@ -81,7 +81,7 @@ def unmeasured(task: Task, reason: OutOfReach | Contradiction) -> Row:
         integrator=integrator_text(task),
         precision=task.precision or "exact",
         bits=parse(task.precision).bits if task.precision else 0,
-        outcome=CONTRADICTION if isinstance(reason, Contradiction) else OUT_OF_REACH,
+        outcome={Contradiction: CONTRADICTION, PeerFailed: FAILED}.get(type(reason), OUT_OF_REACH),
         horizon=time_text(task.times[-1]) if task.times else "0",
         time_reached="0",
         steps=0,
@@ -91,6 +91,12 @@ def unmeasured(task: Task, reason: OutOfReach | Contradiction) -> Row:
         measured="nothing",
         against=f"nothing: {reason.cause}",
     )
+
+
+def peer_failure(task: Task, cause: str) -> Row:
+    """The row of work against precision whose integrator failed: ``cause``, and in which case at which setting."""
+    setting = task.form.partition(" ")[2]
+    return unmeasured(task, PeerFailed(f"{cause} in {task.name} {setting}"))
 
 
 def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:

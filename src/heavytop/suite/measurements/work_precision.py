@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from heavytop.errors import PeerFailed
 from heavytop.exact.solution import ExactSolution
 from heavytop.integrate import peers
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -21,7 +22,7 @@ from heavytop.measure.solution_error import SolutionError
 from heavytop.precision import exact, number, parse
 from heavytop.records import Metric, Row
 from heavytop.suite.measurements.computed import computed_row
-from heavytop.suite.measurements.shared import case_of, time_text
+from heavytop.suite.measurements.shared import case_of, peer_failure, time_text
 from heavytop.suite.task import Task
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import State
@@ -37,10 +38,18 @@ MISSING = Metric("missing", None)
 
 
 def work_precision(task: Task) -> Row:
-    """error_final and error_max (largest component, at the end and on the way), return_error, and drift.
+    """error_final and error_max (largest component, at the end and over the samples), return_error, and drift.
 
     seconds: ``run`` is the median and ``least`` the fastest of ``repeats`` runs to the end alone; ``compile`` is apart.
+    Where the integrator fails, the row says how, and holds nothing else.
     """
+    try:
+        return _measured(task)
+    except PeerFailed as error:
+        return peer_failure(task, error.cause)
+
+
+def _measured(task: Task) -> Row:
     case, precision = case_of(task), parse(task.precision)
     name, setting = _setting(task.form)
     problem = Problem.of(case.top, case.start, precision, case.system)

@@ -1,0 +1,103 @@
+"""What the structure of an expression tells, before anything is expanded: its sign, and the first integrals in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+
+import sympy
+
+from heavytop.claims.signs import PLUS, UNKNOWN, Sign, sum_of
+
+_BOUNDS = {"sin": Fraction(1), "cos": Fraction(1), "tanh": Fraction(1), "sech": Fraction(1), "atan": Fraction(11, 7)}
+
+
+def sign_of(e: sympy.Expr) -> Sign:
+    """Its sign wherever it is defined and real, from positive symbols, squares, roots, exponentials."""
+    if e.is_Rational:
+        return Sign(1 if e >= 0 else -1, bool(e != 0))
+    if e.is_Symbol or e.is_NumberSymbol:
+        return PLUS if e.is_positive else UNKNOWN
+    if e.is_Mul:
+        total = PLUS
+        for part in e.args:
+            total = total.times(sign_of(part))
+        return total
+    if e.is_Add:
+        return _sign_of_sum(e)
+    if isinstance(e, (sympy.exp, sympy.cosh, sympy.sech)):
+        return PLUS
+    if e.is_Pow and e.args[1].is_Rational:
+        return _sign_of_power(*e.args)
+    if isinstance(e, sympy.Abs):
+        return Sign(1, sign_of(e.args[0]).strict)
+    if isinstance(e, (sympy.tanh, sympy.sinh, sympy.atan, sympy.asin)):
+        return sign_of(e.args[0])
+    return Sign(1, False) if isinstance(e, sympy.acos) else UNKNOWN
+
+
+def _sign_of_power(base: sympy.Expr, exponent: sympy.Expr) -> Sign:
+    inside = sign_of(base)
+    strict = inside.strict or bool(exponent < 0)
+    if exponent.q == 2 or exponent.p % 2 == 0:
+        return Sign(1, strict)
+    return Sign(inside.value, strict) if exponent.q == 1 else UNKNOWN
+
+
+def _sign_of_sum(e: sympy.Expr) -> Sign:
+    """Of parts of one sign; bounded functions count against the constant part."""
+    constant, signs = Fraction(0), []
+    for part in e.args:
+        coefficient, rest = part.as_coeff_Mul()
+        size = abs(Fraction(int(coefficient.p), int(coefficient.q))) if coefficient.is_Rational else None
+        if part.is_Rational:
+            constant += Fraction(int(part.p), int(part.q))
+        elif size is not None and type(rest).__name__ in _BOUNDS and sign_of(part).value <= 0:
+            constant -= size * _BOUNDS[type(rest).__name__]
+        else:
+            signs.append(sign_of(part))
+    if constant:
+        signs.append(Sign(1 if constant > 0 else -1, True))
+    elif not signs:
+        return UNKNOWN
+    # a constant part below 0 is a bound from below, and tells nothing
+    return sum_of(signs) if constant >= 0 else UNKNOWN
+
+
+class Names:
+    """Symbols for the polynomials of the state that are constant in time, the smallest first."""
+
+    def __init__(self, state: frozenset[sympy.Symbol], is_constant: Callable[[sympy.Expr], bool]) -> None:
+        self._state = state
+        self._is_constant = is_constant
+        self._names: dict[sympy.Expr, sympy.Symbol | None] = {}
+
+    @property
+    def symbols(self) -> list[sympy.Symbol]:
+        """Those given so far."""
+        return [name for name in self._names.values() if name is not None]
+
+    def put_into(self, e: sympy.Expr) -> sympy.Expr:
+        """``e`` with its first integrals replaced by their symbols."""
+        if not e.free_symbols & self._state:
+            return e
+        if not e.args:
+            return self._name(e)
+        if e.is_Add:
+            return self._into_sum(e)
+        named = e.func(*(self.put_into(part) for part in e.args))
+        return self._name(e) if e.is_Mul and named.free_symbols & self._state else named
+
+    def _into_sum(self, e: sympy.Expr) -> sympy.Expr:
+        parts = {part: self.put_into(part) for part in e.args}
+        left = [part for part, named in parts.items() if named.free_symbols & self._state]
+        done = [named for part, named in parts.items() if part not in left]
+        whole = sympy.Add(*left)
+        name = self._name(whole) if left else whole
+        return sympy.Add(*done, name) if name != whole else sympy.Add(*parts.values())
+
+    def _name(self, e: sympy.Expr) -> sympy.Expr:
+        if e not in self._names:
+            constant = e.is_polynomial(*self._state) and self._is_constant(e)
+            self._names[e] = sympy.Dummy(f"integral{len(self.symbols) + 1}", real=True) if constant else None
+        return self._names[e] or e

@@ -1,0 +1,180 @@
+"""What is asked of an integrator of others, and the one place that checks it.
+
+Whatever the code of others does, short of ending the process, comes out as a Trajectory that keeps the contract or as
+PeerFailed, which says in a sentence what it did.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from copy import deepcopy
+from fractions import Fraction
+from math import isfinite
+from numbers import Real
+from threading import RLock
+from typing import Any
+
+from heavytop.errors import HeavyTopError, PeerFailed
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.precision import DOUBLE, Precision, exact, number
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+_MOST_SAID = 200
+_MOST_FLAGS = 20
+_ALONE = RLock()
+"""Where a process prints and what it warns of are its own, not a thread's: the code of others runs alone."""
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Drops what code of others prints and warns of, and leaves NumPy's error state as it was."""
+    import numpy
+
+    with (
+        _ALONE,
+        redirect_stdout(io.StringIO()),
+        redirect_stderr(io.StringIO()),
+        warnings.catch_warnings(),
+        numpy.errstate(all="ignore"),
+    ):
+        warnings.simplefilter("ignore")
+        yield
+
+
+@contextmanager
+def contained(name: str, when: str = "", own: bool = False) -> Iterator[None]:
+    """Runs code of others: what it prints and warns of is dropped, what it raises, ``sys.exit`` too, is PeerFailed.
+
+    when: what it was doing, for the message.  own: whether it is code of this program, whose own errors pass.
+    KeyboardInterrupt passes.
+    """
+    try:
+        with quiet():
+            yield
+    except (KeyboardInterrupt, PeerFailed):
+        raise
+    except BaseException as error:
+        if own and isinstance(error, HeavyTopError):
+            raise
+        raise PeerFailed(f"{name} {_did(error)}{when}") from None
+
+
+def _did(error: BaseException) -> str:
+    if isinstance(error, SystemExit):
+        return f"called sys.exit({said(error.code)})"
+    message = said(error.cause if isinstance(error, HeavyTopError) else error)
+    return f"raised {type(error).__name__}" + (f": {message}" if message else "")
+
+
+def said(what: object) -> str:
+    """What others say, as one line of at most 200 characters that can be shown."""
+    try:
+        text = str(what)
+    except Exception:  # a message that cannot be made is none
+        return ""
+    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * _MOST_SAID]).split())
+    return line if len(line) <= _MOST_SAID else f"{line[: _MOST_SAID - 1]}…"
+
+
+class Contained:
+    """A peer that keeps the contract: the call of :mod:`heavytop.integrate.peers`, or PeerFailed.
+
+    own: whether it is one of this program's: these say in words what they cannot be asked, and end as ``non_finite``
+    where a state is not finite, which is a finding about them and no failure.
+    """
+
+    def __init__(self, name: str, call: Any, own: bool) -> None:
+        self.name, self.call, self.own = name, call, own
+
+    def __call__(
+        self,
+        top: HeavyTop,
+        start: State,
+        times: Sequence[Fraction],
+        precision: Precision = DOUBLE,
+        *,
+        system: System = HEAVY_TOP,
+        **setting: Any,
+    ) -> Trajectory:
+        """The run; raises PeerFailed for one that breaks the contract, and what an own peer raises for bad input."""
+        problem = Problem.of(top, start, precision, system)
+        asked = [exact(number(time, precision)) for time in times]
+        # copies, so that what a peer does to its arguments is its own affair
+        given = deepcopy((top, start, tuple(times), precision))
+        with contained(self.name, own=self.own):
+            run = self.call(*given, system=system, **setting)
+        with contained(self.name, " in what it returned"):
+            return self._kept(run, problem, asked)
+
+    def _kept(self, run: Any, problem: Problem, asked: list[Fraction]) -> Trajectory:
+        """A plain Trajectory of what was returned."""
+        self._require(issubclass(type(run), Trajectory), f"a {type(run).__name__} instead of a Trajectory")
+        self._require(isinstance(run.outcome, Outcome), f"the outcome {said(repr(run.outcome))}, which is none")
+        states = tuple(self._state(state, problem.precision) for state in run.states)
+        self._require(len(states) <= len(asked), f"{len(states)} states for {len(asked)} times")
+        done = len(states) == len(asked)
+        self._require(
+            done == (run.outcome is Outcome.SUCCESS),
+            f"{len(states)} of {len(asked)} states, and the outcome {run.outcome.value}",
+        )
+        times = tuple(exact(time) for time in run.times)
+        self._require(times == tuple(asked[: len(states)]), "other times than it was asked for")
+        diverged = run.outcome is Outcome.NON_FINITE and not self.own
+        self._require(not diverged, f"a state that is not finite after {len(states)} of {len(asked)} times")
+        reached = asked[-1] if done else exact(run.time_reached)
+        self._require(0 <= reached / asked[-1] <= 1, f"the time {said(run.time_reached)} as reached")
+        named = type(run.integrator) is str and 0 < len(run.integrator) <= _MOST_SAID and run.integrator.isprintable()
+        self._require(named, "no name of an integrator")
+        return Trajectory(
+            problem,
+            run.integrator,
+            times,
+            states,
+            run.outcome,
+            reached,
+            self._count(run.steps, "steps"),
+            self._count(run.order, "order"),
+            {name: self._seconds(run.seconds[name]) for name in ("compile", "run")},
+            self._flags(run.flags),
+            None if run.evaluations is None else self._count(run.evaluations, "evaluations"),
+        )
+
+    def _require(self, condition: bool, what: str) -> None:
+        if not condition:
+            raise PeerFailed(f"{self.name} returned {what}")
+
+    def _state(self, state: Any, precision: Precision) -> Any:
+        """Six numbers of the format, as it holds them."""
+        import numpy
+
+        self._require(not isinstance(state, str | bytes | dict | set), f"a {type(state).__name__} as a state")
+        dtype = getattr(state, "dtype", None)
+        self._require(dtype is None or dtype != numpy.dtype(object), "an array of objects as a state")
+        values = list(state)
+        self._require(len(values) == 6, f"a state of {len(values)} components instead of 6")
+        native = type(number(Fraction(1), precision))
+        for value in values:
+            plain = isinstance(value, native | Real) and not isinstance(value, bool | numpy.bool_)
+            self._require(plain, f"a {type(value).__name__} in a state, not a number of {precision.name}")
+            self._require(bool(numpy.isfinite(value)), "a state that is not finite")
+        return numpy.array([number(exact(value), precision) for value in values])
+
+    def _count(self, value: Any, what: str) -> int:
+        self._require(hasattr(value, "__index__") and not isinstance(value, bool), f"{what} that are no count")
+        self._require(value >= 0, f"a negative count of {what}")
+        return int(value)
+
+    def _seconds(self, value: Any) -> float:
+        seconds = float(value)
+        self._require(isfinite(seconds) and seconds >= 0, "seconds that are none")
+        return seconds
+
+    def _flags(self, flags: Any) -> dict[str, str]:
+        words = [part for pair in dict(flags).items() for part in pair]
+        plain = all(type(word) is str and len(word) <= _MOST_SAID and word.isprintable() for word in words)
+        self._require(plain and len(words) <= 2 * _MOST_FLAGS, "flags that are not short texts")
+        return dict(flags)

@@ -1,0 +1,50 @@
+"""How many digits of a motion are right: one definition, for every table, page and document."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+from flint import arb
+
+from heavytop.measure.scalar import largest
+from heavytop.precision import exact, log10
+from heavytop.records import Metric
+
+RELATIVE = "solution_error_relative_max"
+"""The metric behind the digits kept: the largest |error|/max(1, |true value|) of a component of Ω or γ over the
+samples."""
+
+
+def relative_error(deltas: Sequence[arb], truth: Sequence[arb]) -> arb:
+    """The largest |δ|/max(1, |true value|) over the components of one state, at the working precision."""
+    one = arb(1)
+    return largest(delta / abs(value).max(one) for delta, value in zip(deltas, truth, strict=True))
+
+
+class Measured(Protocol):
+    """A row, as far as its digits are concerned."""
+
+    bits: int
+    metrics: dict[str, Metric]
+
+
+def digits_kept(row: Measured) -> float | None:
+    """−log10 of the largest |error|/max(1, |true value|) over the samples and the components of Ω and γ.
+
+    Rounded to two places, and at most the digits that the format has.  Where the reference does not resolve the error,
+    the digits that are proven.  Of an ensemble: from the root mean square over its starts of each start's largest.
+    None without a reference, without a sample, and for a value that is not finite.
+    """
+    metric = row.metrics.get(RELATIVE)
+    if metric is None or (metric.log10 is None and metric.bound is None and metric.value != "0"):
+        return None
+    size = metric.log10 if metric.bound is None else log10(exact(metric.bound))
+    most = row.bits * math.log10(2)
+    return round(most if size is None else min(most, -size), 2)
+
+
+def digits_text(kept: float) -> str:
+    """Digits kept, for people: to one place, and none where the error is larger than the value."""
+    return f"{max(kept, 0.0):.1f}"

@@ -1,0 +1,183 @@
+"""A proof has conditions: what is undefined, not real, jumps or is not kept by the flow never holds, and is named."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from heavytop.claims.audit import audit, audit_claim
+from heavytop.claims.from_file import claim_from_table
+from heavytop.claims.judge import AuditReport
+from heavytop.errors import InputError
+from heavytop.top.equations import HEAVY_TOP
+
+
+def upright(spin: str, domain: str = "all", **parts) -> dict:
+    """A Lagrange top that spins about the vertical with the rate ``spin``: true where that is constant."""
+    return {
+        "name": "upright",
+        "kind": "motion",
+        "domain": domain,
+        "parameters": {"a": ["1", "2"]},
+        "top": {"inertia": ["2", "2", "3"], "weight": "1", "centre": ["0", "0", "1"]},
+        "motion": {"omega": ["0", "0", spin], "gamma": ["0", "0", "1"]},
+    } | parts
+
+
+def free(value: str, where: tuple[str, ...] = (), kind: str = "integral", state: str = "", **parts) -> dict:
+    """A claim about the free asymmetric top I = (2, 3, 5)."""
+    states = {"states": [state.split()]} if state else {}
+    return {
+        "name": "free",
+        "kind": kind,
+        "top": {"inertia": ["2", "3", "5"], "weight": "0", "centre": ["0", "0", "1"]},
+        "integral": {"value": value, "where": list(where), **states},
+    } | parts
+
+
+def judged(table: dict) -> AuditReport:
+    return audit_claim(claim_from_table(table, "test"), HEAVY_TOP)
+
+
+def open_conditions(report: AuditReport) -> str:
+    return "; ".join(f"{c.text} {c.reason}" for row in report.rows for c in row.conditions if not c.discharged)
+
+
+@pytest.mark.parametrize(
+    ("spin", "domain", "named"),
+    [
+        ("sqrt(t^2)/t", "all", "t ≠ 0"),
+        ("atan(t) + atan(1/t)", "all", "t ≠ 0"),
+        ("1 + atan(tan(t)) - t", "all", "cos(t) ≠ 0"),
+        ("sqrt(sin(a*t)^2)/sin(a*t)", "t>0", "sin(a*t) ≠ 0"),
+        ("sqrt(1 - 2*t + t^2)/(1 - t)", "t>0", "1 - t ≠ 0"),
+        ("1 + atan2(sin(t), cos(t)) - t", "all", "may jump"),
+        ("sqrt(a^2)/a", "all", "a ≠ 0"),
+        ("2 + 0*sqrt(1 - 4*a^2)", "all", "1 - 4*a**2 ≥ 0"),
+        ("exp(log(-1 - t^2)) + 1 + t^2", "all", "-t**2 - 1 > 0"),
+        ("1 + 0*log(t)", "all", "t > 0"),
+        ("1 + 0*sqrt(-t)", "t>0", "-t ≥ 0"),
+        ("1 + 0*asin(2 + t^2)", "all", "at no sample in the domain"),
+        ("(t + sqrt(t^2))/(t + sqrt(t^2))", "all", "t + Abs(t) ≠ 0"),
+        ("t*(sqrt(3 + 2*sqrt(2)) - 1 - sqrt(2))/(sqrt(3 + 2*sqrt(2)) - 1 - sqrt(2)) - t + 1", "all", "≠ 0"),
+    ],
+)
+def test_a_formula_that_jumps_or_is_undefined_is_undecided_and_the_condition_is_named(spin, domain, named):
+    report = judged(upright(spin, domain))
+    assert report.verdict == "undecided"
+    assert named in open_conditions(report)
+
+
+@pytest.mark.parametrize(
+    ("spin", "domain", "assume"),
+    [
+        ("sqrt(t^2)/t", "t>0", []),
+        ("sqrt(t^2)/t", "t<=0", []),
+        ("sin(t)/sin(t)", "all", []),
+        ("(t^2 - 1)/((t - 1)*(t + 1))", "all", []),
+        ("1 + 0*log(t)", "t>0", []),
+        ("sqrt(a^2)/a", "all", ["a > 0"]),
+        ("1 + 0*sqrt(9 - a^2)", "all", ["a > 0", "a < 3"]),
+        ("1 + 0*sqrt(5 - 4*cos(t)*sin(a*t))", "all", []),
+        ("cos(atan(sinh(t)))*cosh(t)", "all", []),
+        ("tanh(log(2 + t^2))*((2 + t^2)^2 + 1)/((2 + t^2)^2 - 1)", "all", []),
+    ],
+)
+def test_what_is_defined_or_removable_holds(spin, domain, assume):
+    report = judged(upright(spin, domain, assume=assume))
+    assert report.verdict == "holds", open_conditions(report)
+
+
+ON_AXIS_1 = "0 1 2 1 0 0"
+
+
+@pytest.mark.parametrize(
+    ("table", "named"),
+    [
+        (free("Omega3", ("Omega1",), state=ON_AXIS_1), "Omega1 = 0 is kept by the flow"),
+        (free("Omega3", ("Omega1*Omega2",), state=ON_AXIS_1), "Omega1*Omega2 = 0 is kept"),
+        (free("sqrt(Omega1)", kind="relation", state=ON_AXIS_1), "Omega1"),
+        (free("Omega1^2 + 1", kind="relation", state=ON_AXIS_1), "no sample is proven to lie on the relations"),
+        (free("sqrt(Omega1^2)/Omega1"), "Omega1 ≠ 0"),
+        (free("sqrt(Omega1) - sqrt(Omega1) + gamma1^2 + gamma2^2 + gamma3^2"), "Omega1 ≥ 0"),
+        (free("Omega3", ("Omega1", "Omega2"), state="1e-200 1 2 1 0 0"), "no sample is proven"),
+        (free("acos(2 + gamma1^2 + gamma2^2 + gamma3^2)"), "at no sample"),
+    ],
+)
+def test_a_side_condition_that_the_flow_leaves_and_a_set_without_points_are_undecided(table, named):
+    report = judged(table)
+    assert report.verdict == "undecided"
+    assert named in open_conditions(report)
+
+
+def test_the_square_of_what_does_not_stay_0_is_no_invariant_relation():
+    assert judged(free("Omega1^2", kind="relation", state=ON_AXIS_1)).verdict == "undecided"
+    assert judged(free("Omega1", kind="relation", state=ON_AXIS_1)).verdict == "refuted"
+    area = "2*Omega1*gamma1 + 3*Omega2*gamma2 + 5*Omega3*gamma3"
+    assert judged(free(area, kind="relation", state="0 0 2 1 0 0")).verdict == "holds"
+
+
+def test_a_state_off_its_condition_by_1e_200_refutes_nothing():
+    table = free("Omega3", ("Omega1", "Omega2"))
+    table["integral"]["states"] = [["0", "0", "2", "1", "0", "0"], ["1e-200", "1", "2", "1", "0", "0"]]
+    assert judged(table).verdict == "holds"
+
+
+def test_a_parameter_off_a_relation_by_1e_400_is_refused():
+    table = upright("1 + t*(a - 1)", relations=["a - 1"]) | {"parameters": {"a": "1." + "0" * 399 + "1"}}
+    with pytest.raises(InputError, match="breaks the relation"):
+        judged(table)
+
+
+def test_a_witness_lies_in_the_domain():
+    with pytest.raises(InputError, match="outside t>0"):
+        judged(upright("1", "t>0", times=["0"]))
+    report = judged(upright("sqrt(t)", "t>0"))
+    assert report.verdict == "refuted"
+    assert all(float(eval(row.witness["t"])) > 0 for row in report.rows if row.witness)
+
+
+def test_the_witness_of_an_integral_has_no_time_and_its_text_no_equations_of_motion(tmp_path):
+    from heavytop.cli import app
+
+    path = tmp_path / "integral.toml"
+    path.write_text(
+        'name = "spin"\nkind = "integral"\n[top]\ninertia = ["2", "2", "5"]\nweight = "1"\ncentre = ["0", "0", "1"]\n'
+        '[integral]\nvalue = "Omega3"\n'
+    )
+    text = CliRunner().invoke(app, ["audit", str(path)]).stdout
+    assert "first integral" in text
+    assert "proven to be constant along the motions of: heavy_top" in text
+    assert "equations of motion" not in text
+    path.write_text(path.read_text().replace("Omega3", "Omega1"))
+    document = json.loads(CliRunner().invoke(app, ["audit", str(path), "--json"]).stdout)
+    assert document["verdict"] == "refuted"
+    assert "t" not in document["equations"][0]["witness"]
+
+
+def test_conditions_stand_in_the_text_and_in_the_json(tmp_path):
+    from heavytop.cli import app
+
+    path = tmp_path / "jump.toml"
+    path.write_text(
+        'name = "jump"\nkind = "motion"\n[top]\ninertia = ["2", "2", "3"]\nweight = "1"\ncentre = ["0", "0", "1"]\n'
+        '[motion]\nomega = ["0", "0", "sqrt(t^2)/t"]\ngamma = ["0", "0", "1"]\n'
+    )
+    result = CliRunner().invoke(app, ["audit", str(path)])
+    assert result.exit_code == 3
+    assert "not discharged: t ≠ 0" in result.stdout
+    document = json.loads(CliRunner().invoke(app, ["audit", str(path), "--json"]).stdout)
+    assert all(row["holds"] is None for row in document["equations"])
+    conditions = document["equations"][0]["conditions"]
+    assert {"text": "t ≠ 0", "discharged": False, "reason": "not shown"} in conditions
+
+
+def test_the_papers_angles_list_their_pole_as_removable():
+    for system in ("heavy_top", "gyrostat"):
+        rows = [row for row in audit("ershkov-partial", system).rows if row.equation in ("3.1", "4.5", "4.6", "6.1")]
+        assert rows
+        for row in rows:
+            poles = [c for c in row.conditions if c.text == "t ≠ 0 (pole of the angles)"]
+            assert [(c.discharged, c.reason) for c in poles] == [(True, "removable in gamma")]

@@ -1,0 +1,47 @@
+"""Claims at random against an evaluation of their own: no false ``holds``, no false ``refuted``, few left undecided."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+_PATH = Path(__file__).parents[2] / "benchmarks" / "random_claims.py"
+
+
+@pytest.fixture(scope="module")
+def random_claims():
+    spec = importlib.util.spec_from_file_location("random_claims", _PATH)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _judged(module, make, count, seed, monkeypatch):
+    monkeypatch.setattr(module, "random_claim", make)
+    return list(module.outcomes(count, 4, seed))
+
+
+@pytest.mark.parametrize(("kind", "count"), [("integral_claim", 160), ("motion_claim", 40)])
+def test_no_verdict_is_false_and_what_is_true_by_construction_holds(random_claims, kind, count, monkeypatch):
+    found = _judged(random_claims, getattr(random_claims, kind), count, 3, monkeypatch)
+    assert [(o.fault, o.claim.table) for o in found if o.fault] == []
+    true = [o for o in found if o.claim.truth == "true"]
+    missed = [o.claim.table for o in true if o.verdict != "holds"]
+    assert len(true) > count / 4
+    assert len(missed) <= len(true) / 20, missed
+
+
+def test_the_evaluation_of_its_own_sees_a_mistake_and_what_is_not_real(random_claims):
+    import random
+
+    draw = random.Random(5)
+    claim = next(c for c in iter(lambda: random_claims.motion_claim(draw), None) if c.truth == "true")
+    assert random_claims.passes(claim, 6, draw)
+    claim.table["motion"]["omega"][0] += " + 1e-9*t"
+    assert random_claims.passes(claim, 6, draw) is False
+    claim.table["motion"]["omega"][0] += " + 0*sqrt(-1 - t^2)"
+    assert random_claims.passes(claim, 6, draw) is None

@@ -1,0 +1,340 @@
+"""Every bound of a proven step, held against exact arithmetic on the same numbers.
+
+What binary64 gives must be at least what the theorem asks for, and the room left for rounding must be there.
+"""
+
+from dataclasses import replace
+from fractions import Fraction
+from math import factorial
+from random import Random
+
+import numpy as np
+import pytest
+from flint import fmpq, fmpq_mat, fmpq_poly
+
+from heavytop.exact import enclosure
+from heavytop.exact.balls import midpoint, radius, working_precision
+from heavytop.exact.enclosure import CAP, Errors, Node, start_node, step
+from heavytop.exact.quadratic import quadratic
+from heavytop.exact.validated import Validated
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State
+
+TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
+START = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+PARAMETERS = HEAVY_TOP.parameters(TOP, START)
+FIELD = quadratic(lambda y: HEAVY_TOP.field(PARAMETERS, y), 6)
+# a rotor so fast that the linear part counts most
+ROTOR = PARAMETERS._replace(rotor=Fraction(40))
+WITH_ROTOR = quadratic(lambda y: GYROSTAT.field(ROTOR, y), 6)
+FIELDS = {"heavy top": FIELD, "gyrostat": WITH_ROTOR}
+SIX = range(6)
+
+
+def node_with(precision, size, seed=0, field=FIELD):
+    """The start with a set of errors of about ``size`` ulps in a turned frame."""
+    rng = np.random.default_rng(seed)
+    node = start_node(field, START.flat, precision)
+    frame = np.linalg.qr(rng.standard_normal((6, 6)))[0]
+    return Node(node.time, node.centre, Errors(frame, size * (0.5 + rng.random(6)), 0), node.halvings)
+
+
+STEPS = [(precision, size) for precision in (64, 128, 400) for size in (0.5, 1e4, 2.0 ** (precision - 30))]
+
+
+@pytest.fixture(params=FIELDS)
+def field(request):
+    return FIELDS[request.param]
+
+
+@pytest.fixture(params=STEPS, ids=lambda case: f"{case[0]} bits, errors {case[1]:.1g}")
+def made(request, field):
+    precision, size = request.param
+    found = step(field, node_with(precision, size, field=field), precision)
+    assert found is not None
+    return found
+
+
+def ulp(found):
+    return Fraction(1, 2**found.precision)
+
+
+def betas(found):
+    return [max(abs(int(value)) for value in column) * ulp(found) for column in zip(*found.coefficients, strict=True)]
+
+
+def exponential(value):
+    """e^value from below, to 30 digits."""
+    return sum(value**k / factorial(k) for k in range(60))
+
+
+def exact(matrix):
+    return [[Fraction(float(value)) for value in row] for row in matrix]
+
+
+def norm(rows):
+    return max(sum(map(abs, row)) for row in rows)
+
+
+def set_size(errors):
+    return (
+        max(
+            sum(abs(a) * Fraction(float(r)) for a, r in zip(row, errors.radii, strict=True))
+            for row in exact(errors.frame)
+        )
+        * Fraction(2) ** errors.exponent
+    )
+
+
+def theorem(found, field):
+    """(D, W, the bound of |v|) of the module's theorem, exactly but for e^Λ from below; as numbers."""
+    h, q, slope, beta = found.length, field.q, field.l, betas(found)
+    order = found.order
+    defect = Fraction(order, 2) * ulp(found)
+    for n in range(order, 2 * order + 1):
+        pairs = sum(beta[j] * beta[n - j] for j in range(max(0, n - order), min(n, order) + 1))
+        defect += h * (q * pairs + (slope * beta[n] if n <= order else 0)) / (n + 1)
+    growth = exponential(h * (2 * q * sum(beta) + slope) + h * q * Fraction(CAP))
+    widest = (set_size(found.node.errors) * ulp(found) + defect) * growth
+    return defect, widest, growth * (defect + h * q * widest**2)
+
+
+@pytest.mark.parametrize("precision", [64, 400, 1500])
+def test_each_coefficient_is_rounded_to_nearest(precision):
+    """b_(n+1) is h f_n/(n + 1) within half an ulp, whichever way its products were summed: 1500 bits take blocks."""
+    found = step(FIELD, node_with(precision, 0.5), precision)
+    series = [[int(value) for value in component] for component in found.coefficients]
+    p = PARAMETERS._replace(
+        inertia=[rational(i) for i in TOP.inertia], moment=[rational(n) for n in TOP.moment], rotor=fmpq(0)
+    )
+    rates = HEAVY_TOP.field(p, [fmpq_poly([fmpq(c, 2**precision) for c in component]) for component in series])
+    for component, rate in zip(series, rates, strict=True):
+        for n in range(found.order):
+            exactly = rational(found.length) * rate[n] * 2**precision / (n + 1)
+            assert abs(component[n + 1] - exactly) <= fmpq(1, 2)
+
+
+def test_the_defect_is_what_the_coefficients_leave(made, field):
+    defect, _, _ = theorem(made, field)
+    h = float(made.length)
+    bound = enclosure._defect(made.coefficients, made.precision, h * float(field.q), h * float(field.l))
+    # β is bounded by a power of two: up to 4 times too large in a product
+    assert defect <= Fraction(bound) * ulp(made) <= 16 * defect
+
+
+def test_local_and_widest_errors_are_those_of_the_theorem(made, field):
+    defect, widest, local = theorem(made, field)
+    scale = Fraction(2) ** made.node.errors.exponent * ulp(made)
+    assert widest <= Fraction(made.widest) <= 2 * widest + 32 * defect
+    assert local <= Fraction(made.local) * scale <= 4 * local + 64 * defect
+
+
+def test_a_set_of_errors_is_as_large_as_its_components_say():
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        errors = Errors(rng.standard_normal((6, 6)), rng.random(6) * 10.0 ** rng.integers(-5, 20), 0)
+        matrix, slack = rng.standard_normal((6, 6)), float(rng.random())
+        for frame, found, more in ((errors.frame, errors.sizes(), 0.0), (matrix, errors.sizes(matrix, slack), slack)):
+            widest = Fraction(float(errors.radii.max()))
+            for row, bound in zip(exact(frame), found, strict=True):
+                true = sum(abs(a) * Fraction(float(r)) for a, r in zip(row, errors.radii, strict=True))
+                true += Fraction(more) * widest
+                assert true <= Fraction(float(bound)) <= true * (1 + Fraction(1, 2**30))
+
+
+def rational(value):
+    return fmpq(value.numerator, value.denominator)
+
+
+def exact_variation(found, top):
+    """V by powers of τ up to ``top``, of the step's polynomial as it is: V_{n+1} = Σ_j J_j V_{n−j}/(n + 1), exact."""
+    unit = [tuple(Fraction(int(i == j)) for i in SIX) for j in SIX]
+
+    def rates(y):
+        return HEAVY_TOP.field(PARAMETERS, y)
+
+    zero = rates((Fraction(0),) * 6)
+    linear = [[(a - b) / 2 for a, b in zip(rates(e), rates(tuple(-x for x in e)), strict=True)] for e in unit]
+
+    def jacobian(column, constant):
+        columns = []
+        for e, line in zip(unit, linear, strict=True):
+            both, alone = rates(tuple(x + y for x, y in zip(column, e, strict=True))), rates(e)
+            columns.append(
+                [b - a - c + z + (x if constant else 0)
+                 for b, a, c, z, x in zip(both, alone, rates(column), zero, line, strict=True)]
+            )  # fmt: skip
+        return fmpq_mat(6, 6, [rational(found.length * columns[j][i]) for i in SIX for j in SIX])
+
+    columns = [tuple(int(v) * ulp(found) for v in column) for column in zip(*found.coefficients, strict=True)]
+    parts = [jacobian(column, n == 0) for n, column in enumerate(columns[: top + 1])]
+    rows = [fmpq_mat(6, 6, [int(i == j) for i in SIX for j in SIX])]
+    for n in range(top):
+        total = fmpq_mat(6, 6)
+        for j in range(min(n, len(parts) - 1) + 1):
+            total += parts[j] * rows[n - j]
+        rows.append(total * fmpq(1, n + 1))
+    return [[[Fraction(int(m[i, j].p), int(m[i, j].q)) for j in SIX] for i in SIX] for m in rows]
+
+
+@pytest.mark.parametrize("precision", [64, 128])
+def test_the_variation_is_known_within_its_error(precision):
+    found = step(FIELD, node_with(precision, 0.5), precision)
+    true = exact_variation(found, 40)
+    summed = [[sum((m[i][j] for m in true), Fraction(0)) for j in SIX] for i in SIX]
+    given = exact(found.variation.sum(axis=0))
+    off = norm([[a - b for a, b in zip(x, y, strict=True)] for x, y in zip(summed, given, strict=True)])
+    error = Fraction(found._summed_error)
+    # beyond τ^40 next to nothing is left at half the radius of convergence
+    assert off <= error
+    assert error < Fraction(1, 2**40)
+    for n, matrix in enumerate(found.variation):
+        gap = norm([[a - b for a, b in zip(x, y, strict=True)] for x, y in zip(true[n], exact(matrix), strict=True)])
+        assert gap <= Fraction(found.variation_error)
+        assert norm(exact(matrix)) <= Fraction(found._powers)
+
+
+@pytest.mark.parametrize("h", [0.25, 2.0, 16.0])
+def test_the_error_of_the_variation_holds_its_defect(h, field):
+    """At a state that stays, J is constant: V̂' − J V̂ is what the rounding of V̂ and its last power leave, exactly."""
+    node = start_node(field, START.flat, 64)
+    series = [[value] for value in node.centre]
+    slopes = h * 2 * float(field.q) * np.array([float(max(map(abs, node.centre))) / 2.0**64])
+    given, error = enclosure._variation(field, series, 64, h, slopes)
+    state = [Fraction(int(value), 2**64) for value in node.centre]
+    slope = [[Fraction(h) * (sum(Fraction(float(field.jacobian[i, j, k])) * state[k] for k in SIX)
+                             + Fraction(float(field.slope[i, j]))) for j in SIX] for i in SIX]  # fmt: skip
+    powers = [*map(exact, given), [[Fraction(0)] * 6] * 6]
+    defect = Fraction(0)
+    for n in range(len(powers) - 1):
+        left = [[(n + 1) * value for value in row] for row in powers[n + 1]]
+        defect += norm(minus(left, product(slope, powers[n]))) / (n + 1)
+    assert defect <= Fraction(error)
+
+
+def inverse_of(matrix):
+    found = fmpq_mat(6, 6, [rational(value) for row in matrix for value in row]).inv()
+    return [[Fraction(int(found[i, j].p), int(found[i, j].q)) for j in SIX] for i in SIX]
+
+
+def product(a, b):
+    return [[sum((a[i][k] * b[k][j] for k in SIX), Fraction(0)) for j in range(len(b[0]))] for i in SIX]
+
+
+def minus(a, b):
+    return [[x - y for x, y in zip(p, q, strict=True)] for p, q in zip(a, b, strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("uncertain", "size", "skew"), [(0.0, 1, 0.0), (1e-14, 1, 0.0), (1e-6, 1, 0.0), (0.0, 1e-4, 1e-9), (0.0, 1, 1e-9)]
+)
+def test_a_new_frame_pays_for_all_that_it_is_not(uncertain, size, skew, monkeypatch):
+    """size: of the variation.  skew: how far the factorisation is from orthogonal, which binary64 alone would hide."""
+    rng, factorised = np.random.default_rng(8), np.linalg.qr
+    for _ in range(6):
+        variation = size * (np.eye(6) + 0.7 * rng.standard_normal((6, 6)))
+        errors = Errors(factorised(rng.standard_normal((6, 6)))[0], rng.random(6), 0)
+        noise = skew * rng.standard_normal((6, 6))
+        monkeypatch.setattr(np.linalg, "qr", lambda matrix, noise=noise: (factorised(matrix)[0] + noise, None))
+        frame, turned, slack = enclosure._new_frame(variation, uncertain, errors)
+        back, bound = inverse_of(exact(frame)), Fraction(slack)
+        assert norm(minus(back, exact(frame.T))) <= bound
+        # the disturbance that the bound is for: all of it in the row and with the signs that count most
+        carried = product(exact(variation), exact(errors.frame))
+        for row in SIX:
+            signs = [1 if value >= 0 else -1 for value in (errors.frame.sum(axis=1))]
+            moved = [[Fraction(uncertain) * s / 6 if i == row else Fraction(0) for s in signs] for i in SIX]
+            whole = [[a + b for a, b in zip(p, q, strict=True)]
+                     for p, q in zip(carried, product(moved, exact(errors.frame)), strict=True)]  # fmt: skip
+            assert norm(minus(product(back, whole), exact(turned))) <= bound
+        assert bound <= Fraction(1, 10**11) + 20 * Fraction(uncertain) + 10**4 * Fraction(skew)
+
+
+def test_the_value_of_the_polynomial_is_within_its_rounding():
+    """With all errors but that of Horner's scheme taken away: half an ulp a power is left, and some of it is used."""
+    found = step(FIELD, node_with(128, 0.5), 128)
+    still = Errors(found.node.errors.frame, np.zeros(6), 0)
+    bare = replace(found, node=replace(found.node, errors=still), local=0.0, variation_error=0.0)
+    used = Fraction(0)
+    for tau in (Fraction(n, 97) for n in range(0, 98, 4)):
+        with working_precision(300):
+            balls = bare.at(tau)
+        for ball, component in zip(balls, found.coefficients, strict=True):
+            true = sum((int(c) * tau**n for n, c in enumerate(component)), Fraction(0)) * ulp(found)
+            off = abs(midpoint(ball) - true)
+            assert off <= radius(ball) <= Fraction(found.order + 1, 2) * ulp(found)
+            used = max(used, off / ulp(found))
+    assert used > Fraction(1, 2)
+
+
+@pytest.mark.parametrize("uncertain", [0.0, 1e-9, 1e-3])
+def test_what_is_not_known_of_the_variation_widens_the_state(uncertain):
+    found = replace(step(FIELD, node_with(128, 1e6), 128), local=0.0, variation_error=uncertain)
+    errors, unit = found.node.errors, ulp(found)
+    with working_precision(300):
+        balls = found.at(Fraction(1))
+    moved = product(exact(found.variation.sum(axis=0)), exact(errors.frame))
+    for ball, row in zip(balls, moved, strict=True):
+        linear = sum(abs(a) * Fraction(float(r)) for a, r in zip(row, errors.radii, strict=True))
+        assert radius(ball) >= (linear + Fraction(uncertain) * set_size(errors)) * unit
+    with_it, without = found.end().errors, replace(found, variation_error=0.0).end().errors
+    assert all(with_it.radii >= without.radii)
+    assert with_it.radii.max() >= without.radii.max() + uncertain * float(errors.radii.max()) / 3
+
+
+def test_what_a_step_adds_is_carried_into_every_direction_of_the_new_frame():
+    """|v| ≤ local in the maximum norm: component i of Q'^-1 v may come to local times the sum of row i."""
+    found = step(FIELD, node_with(128, 1e4), 128)
+    still = Errors(found.node.errors.frame, np.zeros(6), 0)
+    following = replace(found, node=replace(found.node, errors=still), local=1e6).end()
+    for row, r in zip(inverse_of(exact(following.errors.frame)), following.errors.radii, strict=True):
+        needed = sum(map(abs, row)) * 10**6
+        assert needed <= Fraction(float(r)) <= needed * (1 + Fraction(1, 10**6))
+
+
+def true_motion(displaced, time, bits=300):
+    return Validated(TOP, State(displaced[:3], displaced[3:])).state(time, bits)
+
+
+@pytest.mark.parametrize("size", [2.0**-18, 2.0**-24, 2.0**-40])
+def test_motions_from_the_edge_of_the_set_stay_inside(size):
+    """Displaced as far as the set goes, and so that one component moves most: the linear part alone is too small."""
+    precision = 128
+    node = start_node(FIELD, START.flat, precision)
+    centre = [Fraction(int(value), 2**precision) for value in node.centre]
+    node = Node(node.time, node.centre, Errors(np.eye(6), np.full(6, size * 2.0**precision), 0), node.halvings)
+    found = step(FIELD, node, precision)
+    with working_precision(2 * precision):
+        sets = {tau: found.at(tau) for tau in (Fraction(1, 3), Fraction(1))}
+    following = found.end()
+    for component in SIX:
+        rows = np.sign(found.variation.sum(axis=0)[component])
+        for sign in (1, -1):
+            moved = [c + Fraction(size) * int(sign * s) for c, s in zip(centre, rows, strict=True)]
+            for tau, balls in sets.items():
+                for ball, true in zip(balls, true_motion(moved, tau * found.length), strict=True):
+                    assert abs(midpoint(ball) - midpoint(true)) <= radius(ball) + radius(true)
+            gap = [
+                [midpoint(true) - Fraction(int(c), 2**precision)]
+                for true, c in zip(true_motion(moved, found.length), following.centre, strict=True)
+            ]
+            for (x,), r in zip(product(inverse_of(exact(following.errors.frame)), gap), following.errors.radii,
+                               strict=True):  # fmt: skip
+                scale = Fraction(2) ** following.errors.exponent / 2**precision
+                assert abs(x) <= Fraction(float(r)) * scale + Fraction(1, 2**200)
+
+
+def test_errors_beyond_what_the_theorem_admits_are_no_step():
+    precision = 128
+    found = step(FIELD, node_with(precision, 2.0 ** (precision - 20)), precision)
+    assert found is None or found.widest < CAP
+    assert step(FIELD, node_with(precision, 2.0 ** (precision - 16)), precision) is None
+
+
+def test_a_start_is_rounded_by_at_most_half_an_ulp():
+    rng = Random(3)
+    for _ in range(50):
+        start = tuple(Fraction(rng.randint(-99, 99), rng.randint(1, 99)) for _ in SIX)
+        node = start_node(FIELD, start, 70)
+        for value, whole, error in zip(start, node.centre, node.errors.radii, strict=True):
+            assert abs(value * 2**70 - int(whole)) <= Fraction(float(error))

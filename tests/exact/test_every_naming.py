@@ -1,0 +1,94 @@
+"""Digits promised are delivered: by every class, under every naming of the axes, whatever FLINT's settings are.
+
+FLINT's working precision and length of power series are settings of the whole process.  Nobody's ball may be touched at
+those that happen to stand there, so each test runs at 53 bits, as a program starts, and at settings that spoil at once
+whatever is touched.
+"""
+
+from fractions import Fraction
+
+import pytest
+from flint import ctx
+from test_catalogue import SAMPLES
+
+from heavytop.errors import HeavyTopError, NotInClass
+from heavytop.exact import catalogue
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
+from heavytop.exact.balls import radius, relative_bits
+from heavytop.exact.catalogue import find
+from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.measure.reference import reference
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State
+
+DIGITS, BITS, LENGTH = 40, 140, 14
+TIME = Fraction(7, 3)
+GENERIC = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+PARTIAL = ErshkovPartial(Fraction(1), Fraction(2), Fraction(1))
+# Ω = I⁻¹ γ, so that M = γ; and a permanent rotation
+GYROSTATS = {
+    "partial": (PARTIAL.top, PARTIAL.start),
+    "general": (HeavyTop((4, 2, 1), 1, (0, 1, 0)), State(("1/6", "-1/6", "2/3"), ("2/3", "-1/3", "2/3"))),
+    "permanent": (HeavyTop((3, 2, 1), 1, (0, 1, 0)), State((0, 1, 0), (0, 1, 0))),
+}
+MOTIONS = [(case.__name__, sample.top, sample.start, HEAVY_TOP) for case, sample in SAMPLES.items()]
+MOTIONS += [("generic", *GENERIC, HEAVY_TOP)]
+MOTIONS += [(name, top, start, GYROSTAT) for name, (top, start) in GYROSTATS.items()]
+NAMED = [
+    pytest.param(top, start, system, axes, id=f"{name}-{''.join(str(axis + 1) for axis in axes)}")
+    for name, top, start, system in MOTIONS
+    for axes in ALL
+    # the gyrostat's rotor lies along axis 2
+    if system is HEAVY_TOP or axes[1] == 1
+]
+
+
+@pytest.fixture(params=[(53, 10), (2, 1)], ids=["as a program starts", "spoiling"])
+def settings(request):
+    before = ctx.prec, ctx.cap
+    ctx.prec, ctx.cap = request.param
+    yield request.param
+    assert (ctx.prec, ctx.cap) == request.param
+    ctx.prec, ctx.cap = before
+
+
+def test_the_samples_have_every_class_of_the_catalogue():
+    for system, cases in ((HEAVY_TOP, catalogue._HEAVY_TOP), (GYROSTAT, catalogue._GYROSTAT)):
+        for case, _ in cases:
+            assert any(admits(case, top, start) for _, top, start, which in MOTIONS if which is system), case
+
+
+def admits(case, top, start):
+    for axes in ALL:
+        try:
+            case(renamed_top(top, axes), renamed_state(start, axes))
+        except HeavyTopError:
+            continue
+        return True
+    return False
+
+
+@pytest.mark.parametrize(("top", "start", "system", "axes"), NAMED)
+def test_a_reference_gives_the_digits_it_promises(settings, top, start, system, axes):
+    record = reference(renamed_top(top, axes), renamed_state(start, axes), [TIME, -TIME], DIGITS, system)
+    for state in record.states:
+        for ball in state:
+            assert Fraction(ball.radius) <= Fraction(1, 10**DIGITS) * max(1, abs(Fraction(ball.value)))
+
+
+@pytest.mark.parametrize(("top", "start", "system", "axes"), NAMED)
+def test_state_series_and_attitude_do_not_see_the_settings(settings, top, start, system, axes):
+    solution = find(renamed_top(top, axes), renamed_state(start, axes), system)
+    state, series = solution.state(TIME, BITS), solution.series(TIME, LENGTH, BITS)
+    assert min(map(relative_bits, [*state, *attitude(solution)])) >= BITS
+    assert [part.prec for part in series] == [LENGTH] * 6
+    for value, part in zip(state, series, strict=True):
+        assert part[0].overlaps(value)
+        assert max(radius(part[n]) for n in range(LENGTH)) < Fraction(1, 10**30)
+
+
+def attitude(solution):
+    try:
+        return solution.attitude(TIME, BITS)
+    except (AttributeError, NotInClass):
+        return []

@@ -1,0 +1,288 @@
+"""A report that was weakened is never the same, or better: a few edits of `benchmarks/edited_reports.py`, and edges."""
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from edited_reports import EDITS, trials
+from heavytop.errors import InputError
+from heavytop.records import Law, Metric, Row, Series
+from heavytop.report import store
+from heavytop.report.compare import compare
+from heavytop.report.consistency import contradictions
+from heavytop.report.policy import Policy
+from small_reports import error, report, row
+
+RESULTS = Path(__file__).parents[2] / "results"
+
+
+@pytest.mark.parametrize("name", ["default", "growth", "peers"])
+def test_no_edit_passes(tmp_path: Path, name: str) -> None:
+    found = list(trials(RESULTS / name, tmp_path, 5, 50))
+    assert {verdict for _, verdict in found} <= {"worse", "incomparable", "refused"}, found
+    assert len({edit for edit, _ in found}) > len(EDITS) / 3
+
+
+def one(band: float | None = 0.3, value: str = "1e-12", **changes) -> Row:
+    metric = msgspec.structs.replace(error(value), band=band)
+    return row(metrics={"drift_energy_max": metric}, **changes)
+
+
+def judged(old: Row, new: Row, **policy) -> tuple[str, str]:
+    result = compare(report(old), report(new), Policy(**policy))
+    return result.verdict, "; ".join(finding.reason for finding in result.changed)
+
+
+@pytest.mark.parametrize(
+    ("measure", "factor"), [("drift", 5.0), ("growth", 6.0), ("homoclinic", 8.0), ("break_away_law", 8.0)]
+)
+def test_a_candidate_may_be_noisier_by_chance_and_no_more(measure: str, factor: float) -> None:
+    needed = {
+        "homoclinic": {"break_away_time": Metric("never", None, "duration")},
+        "break_away_law": {
+            "break_away_slope": error("1"),
+            "break_away_slope_expected": error("1"),
+            "break_away_slope_off_by": error("0"),
+        },
+    }.get(measure, {})
+
+    def noisy(band: float | None) -> Row:
+        return row(
+            measure=measure, metrics={**needed, "drift_energy_max": msgspec.structs.replace(error("1e-9"), band=band)}
+        )
+
+    if measure == "break_away_law":  # the noise is added there
+        assert judged(noisy(0.1), noisy(0.1))[0] == "same"
+        assert judged(noisy(0.1), noisy(1.2))[0] == "worse"
+        assert judged(noisy(0.1), noisy(0.45))[0] == "same"
+    else:
+        assert judged(noisy(0.1), noisy(0.1 * factor * 0.999))[0] == "same"
+        assert judged(noisy(0.1), noisy(0.1 * factor * 1.001)) == (
+            "worse",
+            f"noise: {0.1 * factor:.2g} decades, not 0.1",
+        )
+        # a band too narrow to excuse anything is taken as 0.05
+        assert judged(noisy(0.001), noisy(0.05 * factor * 0.999))[0] == "same"
+        assert judged(noisy(0.001), noisy(0.05 * factor * 1.001))[0] == "worse"
+    assert judged(noisy(0.3), noisy(0.1))[0] == "same"
+    assert judged(noisy(None), noisy(0.1))[0] == "same"
+    assert judged(noisy(0.1), noisy(None)) == ("incomparable", "its noise is not measured, which was 0.1 decades")
+
+
+def test_the_noise_allowed_for_is_that_of_the_baseline() -> None:
+    # 2 · 0.3 · √(1 + 1.4²) = 1.0323 decades, however noisy the candidate is
+    for band in (0.42, 0.5, 1.4):
+        assert judged(one(), one(band, "1.07e-11"))[0] == "same"
+        assert judged(one(), one(band, "1.08e-11"))[0] == "worse"
+    # a gain must be beyond the noise of both
+    assert judged(one(), one(1.4, "1.0e-14"))[0] == "same"
+    assert judged(one(), one(0.3, "1.0e-14"))[0] == "better"
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "own", "widest"),
+    [
+        # 50 · 10^(−2 · 0.05 √2), and √(1 + 1.4²) in the place of √2 where the candidate is noisier
+        ("duration", "break_away_time", ("36.2", "36.0"), ("33.7", "33.5")),
+        # 50 · (2 − 10^(2 · 0.05 √2)): a part of the larger of the two
+        ("value", "break_away_slope", ("30.8", "30.7"), ("25.8", "25.6")),
+    ],
+)
+def test_a_time_moves_within_the_noise_of_the_baseline(kind: str, name: str, own, widest) -> None:
+    def at(value: str, band: float) -> Row:
+        return row(metrics={name: msgspec.structs.replace(error(value), kind=kind, band=band)})
+
+    old = at("50", 0.05)
+    for band, (near, far) in ((0.05, own), (0.2, widest)):
+        assert judged(old, at(near, band))[0] == "same"
+        assert judged(old, at(far, band))[0] == "worse"
+    assert judged(old, at(own[0], 0.05), noise=0)[0] == "worse"
+    if kind == "duration":  # 50 · 10^(2 · 0.05 √2), and with the noise of both 50 · 10^(2 · √(0.05² + 0.1²))
+        for band, near, far in ((0.05, "69.2", "69.3"), (0.1, "83.6", "83.8")):
+            assert judged(old, at(near, band))[0] == "same"
+            assert judged(old, at(far, band))[0] == "better"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "verdict"),
+    [
+        # floor and loss: four times; the bound of an unresolved error moves by a factor of 11 beside
+        (Metric("unresolved", None, "error", "1e-12"), Metric("unresolved", None, "error", "3.99e-12"), "same"),
+        (Metric("unresolved", None, "error", "1e-12"), Metric("unresolved", None, "error", "4.01e-12"), "incomparable"),
+        (Metric("unresolved", None, "error", "1e-12"), Metric("unresolved", None, "error", "2.28e-14"), "same"),
+        (Metric("unresolved", None, "error", "1e-12"), Metric("unresolved", None, "error", "2.27e-14"), "incomparable"),
+        (error("1e-12"), Metric("unresolved", None, "error", "3.99e-12"), "same"),
+        (error("1e-12"), Metric("unresolved", None, "error", "4.01e-12"), "incomparable"),
+        (error("1e-12"), Metric("unresolved", None, "error", "2.28e-14"), "same"),
+        (error("1e-12"), Metric("unresolved", None, "error", "2.27e-14"), "incomparable"),
+        # below the floor all errors are the same; two bounds there are those of two references
+        (error("1e-17"), Metric("unresolved", None, "error", "1e-30"), "same"),
+        (Metric("unresolved", None, "error", "1e-30"), Metric("unresolved", None, "error", "4.3e-29"), "same"),
+        (Metric("unresolved", None, "error", "1e-30"), Metric("unresolved", None, "error", "4.5e-29"), "incomparable"),
+        (Metric("unresolved", None, "error", "1e-30"), Metric("unresolved", None, "error", "1e-35"), "incomparable"),
+    ],
+)
+def test_the_bound_of_an_unresolved_error_may_move_so_far(old: Metric, new: Metric, verdict: str) -> None:
+    two = [row(metrics={"drift_energy_max": metric}) for metric in (old, new)]
+    assert judged(*two)[0] == verdict
+
+
+LAW = Law("t^0.5", 64, 0.5, 0.47, 0.53, "100", "1e5", "1e-19", "1e30")
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        ({"exponent": 0.56, "low": 0.53, "high": 0.59}, "same"),
+        ({"exponent": 0.57, "low": 0.531, "high": 0.6}, "worse"),
+        # an interval twice as wide counts as one of the width of the baseline: 0.54 to 0.6
+        ({"exponent": 0.57, "low": 0.51, "high": 0.63}, "worse"),
+        ({"low": 0.35, "high": 0.649}, "same"),
+        ({"low": 0.35, "high": 0.652}, "worse"),
+        ({"starts": 63}, "incomparable"),
+        ({"starts": 65}, "same"),
+        ({"detects": "7.9e-19"}, "same"),
+        ({"detects": "8.1e-19"}, "worse"),
+        ({"detects": None}, "incomparable"),
+        ({"last": "5.1e4"}, "same"),
+        ({"last": "4.9e4"}, "incomparable"),
+        ({"first": "199"}, "same"),
+        ({"first": "201"}, "incomparable"),
+        ({"first": None}, "incomparable"),
+        ({"lost_at": "5.1e29"}, "same"),
+        ({"lost_at": "4.9e29"}, "worse"),
+        ({"lost_at": None}, "incomparable"),
+        ({"exponent": 5.5, "low": -50.0, "high": 50.0}, "incomparable"),
+        ({"exponent": 0.76, "low": 0.45, "high": 0.8}, "incomparable"),
+        ({"low": 0.51}, "incomparable"),
+        ({"high": 1.0}, "incomparable"),
+        ({"growth": "t"}, "incomparable"),
+        ({"growth": "unresolved"}, "incomparable"),
+        ({"low": float("nan")}, "incomparable"),
+        ({"first": "1e6"}, "incomparable"),
+    ],
+)
+def test_a_law_may_change_within_its_noise(change: dict, verdict: str) -> None:
+    two = [one(laws={"drift_area": law}) for law in (LAW, msgspec.structs.replace(LAW, **change))]
+    assert judged(*two)[0] == verdict
+    # what the noise of the error moves, the time of the last digit follows: 2 · 0.1 · √2 / 0.5 = 0.57 decades
+    metric = msgspec.structs.replace(error("1e-12"), band=0.1)
+    noisy = [row(metrics={"drift_area_final": metric}, laws=each.laws) for each in two]
+    if change in ({"lost_at": "4.9e29"},):
+        assert judged(*noisy)[0] == "same"
+
+
+KNOWN = "known: closed form: Euler, radius below 6.02E-36; certified at t = 100 to 50 digits by validated (proven)"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "verdict"),
+    [
+        ("6.02E-36", "6.0E-35", "same"),
+        ("6.02E-36", "6.1E-35", "incomparable"),
+        (", radius below 6.02E-36", "", "incomparable"),
+        ("50 digits", "40 digits", "same"),
+        ("50 digits", "39 digits", "incomparable"),
+        ("t = 100", "t = 51", "same"),
+        ("t = 100", "t = 49", "incomparable"),
+        ("(proven)", "(proven at both ends)", "same"),
+        ("(proven)", "(computed)", "incomparable"),
+        ("known: closed form: Euler", "known: validated: Taylor enclosure", "same"),
+        ("known", "computed", "incomparable"),
+    ],
+)
+def test_a_reference_may_be_another_and_not_a_weaker_one(old: str, new: str, verdict: str) -> None:
+    assert old in KNOWN
+    assert judged(one(against=KNOWN), one(against=KNOWN.replace(old, new)))[0] == verdict
+    if verdict == "incomparable" and old != "known":
+        assert judged(one(against=KNOWN.replace(old, new)), one(against=KNOWN))[0] == "same"
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        ({"steps": 20}, "same"),
+        ({"steps": 21}, "incomparable"),
+        ({"steps": 5}, "same"),
+        ({"steps": 4}, "incomparable"),
+        ({"steps": 0}, "incomparable"),
+        ({"starts": 2}, "incomparable"),
+        ({"order": 19}, "incomparable"),
+        ({"measured": "claimed: by somebody"}, "incomparable"),
+        ({"input_rounding": "2.2e-16"}, "same"),
+        ({"input_rounding": "2.3e-16"}, "incomparable"),
+        ({"input_rounding": None}, "incomparable"),
+        ({"precision": "double", "bits": 64}, "incomparable"),
+    ],
+)
+def test_what_a_row_says_of_its_run_stays(change: dict, verdict: str) -> None:
+    assert (
+        judged(one(order=20, input_rounding="1e-17"), one(**({"order": 20, "input_rounding": "1e-17"} | change)))[0]
+        == verdict
+    )
+
+
+TIMES = ["1", "50", "100"]
+
+
+@pytest.mark.parametrize(
+    ("values", "verdict"),
+    [
+        (["3.9e-13", "3.9e-13", "1e-12"], "same"),
+        (["4.1e-13", "4.1e-13", "1e-12"], "worse"),
+        (["nan", "1e-13", "1e-12"], "incomparable"),
+        (["1e-13", "1e-13", "9e-13"], "incomparable"),
+        (["1e-13", "1.1e-12", "1e-12"], "incomparable"),
+        (["1e-13", "1e-13", "unresolved"], "incomparable"),
+        (["1e-13", "unresolved", "1e-12"], "same"),
+    ],
+)
+def test_a_series_agrees_with_its_metrics_and_with_its_baseline(values: list[str], verdict: str) -> None:
+    metrics = {f"drift_energy_{part}": error("1e-12") for part in ("max", "final")}
+    old = row(metrics=metrics, series={"drift_energy": Series(TIMES, ["1e-13", "1e-13", "1e-12"])})
+    new = row(metrics=metrics, series={"drift_energy": Series(TIMES, values)})
+    assert judged(old, new)[0] == verdict
+    assert judged(old, row(metrics=metrics))[0] == "incomparable"
+    later = Series([*TIMES[:-1], "99"], ["1e-13", "1e-13", "1e-12"])
+    assert judged(old, row(metrics=metrics, series={"drift_energy": later}))[0] == "incomparable"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"measure": "local_error", "metrics": {"local_error_ulp_max": msgspec.structs.replace(error("1"), band=0.1)}},
+        {"measure": "growth", "metrics": {"starts_failed": msgspec.structs.replace(error("0"), band=0.1)}},
+        {"metrics": {"drift_energy_max": error("1e-12"), "drift_energy_rms": error("1.001e-12")}},
+        {"metrics": {"drift_energy_max": error("1e-12"), "drift_energy_final": error("2e-12")}},
+        {"metrics": {"starts_failed": error("1")}},
+        {"metrics": {"break_away_time": msgspec.structs.replace(error("101"), kind="duration")}},
+        {"precision": "quad"},
+        {"series": {"drift_energy": Series(["1"], ["nan"])}},
+        {"series": {"drift_energy": Series(["1"], ["1.001e-12"])}},
+    ],
+)
+def test_a_row_that_contradicts_itself_is_refused(tmp_path: Path, change: dict) -> None:
+    bad = row(case="lagrange", **change)
+    assert list(contradictions(bad))
+    (tmp_path / "bad").mkdir()
+    store.write(report(row(), bad), tmp_path / "bad")
+    for read in (store.read, lambda path: list(store.read_brief(path).rows)):
+        with pytest.raises(InputError, match="lagrange"):
+            read(tmp_path / "bad")
+    # one that was never on disk is not the same either
+    assert judged(bad, bad)[0] == "incomparable"
+
+
+def test_numbers_that_agree_to_their_digits_are_no_contradiction() -> None:
+    metrics = {"drift_energy_max": error("1.00000e-12"), "drift_energy_rms": error("1.00001e-12")}
+    assert not list(contradictions(row(metrics=metrics)))
+    slope = {
+        "break_away_slope": "1.4045707",
+        "break_away_slope_expected": "1.3862944",
+        "break_away_slope_off_by": "0.013183566",
+    }
+    law = row(measure="break_away_law", metrics={name: error(value) for name, value in slope.items()})
+    assert not list(contradictions(law))
+    law.metrics["break_away_slope_off_by"] = error("0.0131")
+    assert list(contradictions(law))
