@@ -105,7 +105,7 @@ def test_observer_and_finished_are_called_in_order() -> None:
     )
     assert sorted(over) == list(range(9))
     assert all(times == [Fraction(t) for t in TIMES] for times in seen.values())
-    assert all(run.states == () and len(run.times) == 4 for run in runs)
+    assert all(len(run.states) == 0 and len(run.times) == 4 for run in runs)
 
 
 def test_an_observer_that_raises_ends_the_ensemble() -> None:

@@ -31,6 +31,8 @@ from heavytop.top.integrals import holding
 SecondSource = Callable[[Fraction, int], Sequence[arb]]
 """Six balls at (time, bits), computed elsewhere."""
 
+EXACTLY = 10**6
+"""More digits than anyone may ask for: those of two sources without any gap between them."""
 _EARLY = Fraction(4)
 _LAST = Fraction(1)
 # a second source may cost this many seconds of the model of the cost
@@ -42,7 +44,8 @@ _BITS_A_DIGIT = log2(10)
 class Certificate:
     """Two sources and how far they agree.
 
-    method, second_source: in words.  agreed_digits: digits that both give, relative above 1 and absolute below.
+    method, second_source: in words.  agreed_digits: digits that both give, relative above 1 and absolute below;
+    :data:`EXACTLY` where both are the same numbers without a radius, as at t = 0 and at rest.
     kind: ``proven`` if both are balls that hold the motion at the time itself, ``proven at both ends`` if the second is
     one near 0 and over the last unit of time only, ``computed`` if the second is no ball.
     """
@@ -51,6 +54,11 @@ class Certificate:
     second_source: str
     agreed_digits: int
     kind: str
+
+    @property
+    def agreement(self) -> str:
+        """``exactly``, or ``to N digits``."""
+        return "exactly" if self.agreed_digits >= EXACTLY else f"to {self.agreed_digits} digits"
 
 
 def bits_of(digits: int) -> int:
@@ -176,9 +184,9 @@ def _require_overlap(solution: ExactSolution, time: Fraction, first: Sequence[ar
 
 
 def _digits(gap: Fraction) -> int:
-    """The largest d ≥ 0 with gap ≤ 10^-d; for no gap at all, more digits than anyone may ask for."""
+    """The largest d ≥ 0 with gap ≤ 10^-d; :data:`EXACTLY` for no gap at all."""
     if gap == 0:
-        return 10**6
+        return EXACTLY
     digits = max(0, int((gap.denominator.bit_length() - gap.numerator.bit_length() - 1) / _BITS_A_DIGIT) - 1)
     while gap * 10 ** (digits + 1) <= 1:
         digits += 1

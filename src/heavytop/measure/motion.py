@@ -14,7 +14,7 @@ from heavytop.errors import OutOfReach
 from heavytop.exact.balls import FUNCTIONS, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.scales import least_rate
-from heavytop.integrate.integrators import named
+from heavytop.integrate import registry
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
 from heavytop.measure.scalar import GUARD_BITS, text, to_ball
@@ -111,8 +111,9 @@ def compute(
 
     attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
-    integrator: ``heyoka`` or ``words``; raises InputError for any other, OutOfReach where the run would take more steps
-    than anyone waits for.
+    integrator: a name that `heavytop list` shows.
+
+    Raises InputError for another integrator, OutOfReach where the run would take more steps than anyone waits for.
     """
     xi = perpendicular(start.gamma) if attitude else None
     problem = Problem.of(top, start, precision, system, xi)
@@ -120,8 +121,9 @@ def compute(
     wanted = frozenset(exact(number(time, precision)) for time in times)
     watcher = _Watcher(problem, holding(top, start, system), wanted)
     samples = _dense(problem, times) if attitude else times
-    propagate = named(integrator)
-    run = propagate(top, start, samples, precision, system=system, xi=xi, step_limit=step_limit, observer=watcher)
+    asked = {"xi": xi, "step_limit": step_limit, "observer": watcher}
+    options = {name: value for name, value in asked.items() if value is not None}
+    run = registry.propagator(integrator, options)(top, start, samples, precision, system=system)
     run = replace(
         run, times=tuple(time for time, *_ in watcher.kept), states=tuple(state for _, state, _ in watcher.kept)
     )
