@@ -149,6 +149,7 @@ def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
         ({"precision": "single"}, "Unknown precision"),
         ({"precision": 53}, "Unknown precision"),
         ({"precision": None, "bits": "1.5"}, "is not a count"),
+        ({"precision": "double", "bits": 113}, "bits = 113, but double has 53"),
         ({"precision": None, "bits": 10**6}, "not a format"),
         ({"outcome": "fine"}, "Unknown outcome"),
         ({"steps": -1}, "not a count"),

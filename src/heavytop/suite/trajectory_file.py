@@ -308,7 +308,13 @@ def _state(values: list[Fraction | None], precision: Precision) -> tuple[Fractio
 def _precision(document: dict[str, Any], rows: list[list[Any]]) -> Precision:
     """The format that the file names, or the narrowest that holds every state as it is written."""
     if "precision" in document:
-        return parse(_text(document, "precision"))
+        precision = parse(_text(document, "precision"))
+        bits = _integer(document["bits"], "bits") if "bits" in document else precision.bits
+        if bits != precision.bits:
+            raise InputError(
+                f"bits = {bits}, but {precision.name} has {precision.bits}.", "Give either of precision and bits."
+            )
+        return precision
     if "bits" in document:
         bits = _integer(document["bits"], "bits")
         return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits == form.bits), None) or real(bits)
