@@ -2,8 +2,8 @@
 
 import importlib
 import json
-import subprocess
 import signal
+import subprocess
 import sys
 import threading
 from fractions import Fraction
@@ -169,7 +169,7 @@ FAILURES = {
     "leaves": "called sys.exit(goodbye)",
     "nothing": "returned a NoneType instead of a Trajectory",
     "words": "returned a str instead of a Trajectory",
-    "states_alone": "returned a tuple instead of a Trajectory",
+    "states_alone": "returned a ndarray instead of a Trajectory",
     "few": "1 of 2 states, and the outcome success",
     "fewer_times": "returned other times",
     "many": "returned 3 states for 2 times",
@@ -178,8 +178,8 @@ FAILURES = {
     "flat": "float64' object is not iterable",
     "imaginary": "a complex128 in a state",
     "objects": "an array of objects",
-    "texts": "a str in a state",
-    "one_text": "a str as a state",
+    "texts": "a str_ in a state",
+    "one_text": "a str_ as a state",
     "truths": "a bool in a state",
     "nan": "a state that is not finite",
     "inf": "a state that is not finite",
