@@ -9,10 +9,12 @@ import pytest
 from flint import arb
 
 from heavytop.errors import Contradiction, InputError, OutOfReach
+from heavytop.exact.axes import Renamed
 from heavytop.exact.balls import midpoint, radius, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
+from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.validated import Validated
 from heavytop.measure.certify import _digits, agreed_digits, certified_state, certify
 from heavytop.measure.known import certified
@@ -53,6 +55,28 @@ def test_far_times_are_certified_at_both_ends(known):
     assert "from t - 1 to t; first integrals" in certificate.second_source
     assert certificate.kind == "proven at both ends"
     assert certificate.agreed_digits >= 50
+
+
+KOVALEVSKAYA = Kovalevskaya(
+    HeavyTop((2, 2, 1), 1, ("3/5", "1/3", 0)), State(("1/3", "4/5", "-7/10"), ("2/7", "3/7", "6/7"))
+)
+
+
+@pytest.mark.parametrize("known", [KOVALEVSKAYA, Renamed(KOVALEVSKAYA, (2, 0, 1))], ids=["as it is", "renamed"])
+def test_a_second_closed_form_certifies_far_times_at_the_time_itself(known):
+    certificate = certify(known, Fraction(10**6), 50)
+    assert certificate.second_source.endswith("first integrals at t; a second closed form at t")
+    assert certificate.kind == "proven"
+    assert certificate.agreed_digits >= 50
+
+
+def test_a_second_closed_form_that_excludes_the_first_is_a_contradiction():
+    class Wrong(Shifted):
+        def second_state(self, time, bits):
+            return Shifted(self.known, arb("1e-40"), 5).state(time, bits)
+
+    with pytest.raises(Contradiction, match="its second closed form exclude each other at t = 1e\\+06"):
+        certify(Wrong(KOVALEVSKAYA, arb(0), 5), Fraction(10**6), 50)
 
 
 def test_a_wrong_closed_form_is_refused():

@@ -149,7 +149,15 @@ def _early_and_last(
         "- -", "+ "
     )
     source += "; first integrals at t"
-    return Certificate(solution.method, source, agreed, "proven at both ends")
+    try:
+        other = solution.second_state(time, bits) if hasattr(solution, "second_state") else None
+    except OutOfReach:
+        other = None
+    if other is None:
+        return Certificate(solution.method, source, agreed, "proven at both ends")
+    _require_overlap(solution, time, values, other, "its second closed form")
+    source += "; a second closed form at t"
+    return Certificate(solution.method, source, min(agreed, agreed_digits(values, other)), "proven")
 
 
 @whole_evaluation
@@ -172,12 +180,18 @@ def _parameters(solution: ExactSolution) -> Parameters:
     return own or solution.system.parameters(solution.top, solution.start)
 
 
-def _require_overlap(solution: ExactSolution, time: Fraction, first: Sequence[arb], second: Sequence[arb]) -> None:
+def _require_overlap(
+    solution: ExactSolution,
+    time: Fraction,
+    first: Sequence[arb],
+    second: Sequence[arb],
+    source: str = "validated integration",
+) -> None:
     for component, (one, two) in enumerate(zip(first, second, strict=True), 1):
         apart = abs(midpoint(one) - midpoint(two))
         if apart > radius(one) + radius(two):
             raise Contradiction(
-                f"{solution.method} and validated integration exclude each other at t = {float(time):.6g}: component "
+                f"{solution.method} and {source} exclude each other at t = {float(time):.6g}: component "
                 f"{component} differs at digit {_digits(apart)}.",
                 "One of them is wrong: neither can serve as a reference.",
             )
