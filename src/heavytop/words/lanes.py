@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 from heavytop.top.equations import Parameters, System
@@ -77,6 +78,7 @@ class Coefficients:
         )
 
 
+@lru_cache(maxsize=256)
 def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
     """Those of the field, exactly, for exact parameters."""
 
