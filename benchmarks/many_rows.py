@@ -17,7 +17,7 @@ def child(count: int) -> None:
     from msgspec.structs import replace
 
     import heavytop.suite.run
-    from heavytop.cli import run as command
+    from heavytop.report.run_folder import Run
     from heavytop.suite.cases import CASES
     from heavytop.suite.measurements import measure
     from heavytop.suite.task import Task
@@ -32,8 +32,8 @@ def child(count: int) -> None:
     heavytop.suite.run.rows = rows
     with tempfile.TemporaryDirectory() as folder:
         began = perf_counter()
-        where = {"workers": 1, "scheduler": None}
-        code = command._run(tasks, {"name": "many"}, Path(folder) / "out", False, 10.0, where)
+        asked = Run({"name": "many"}, tasks, [], Path(folder) / "out", False, 1, None, 10.0, False)
+        code = 0 if asked.measure(lambda task: None).good else 3
         size = (Path(folder) / "out" / "report.json").stat().st_size
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"{count} rows: exit {code}, report {size / 1e6:.1f} MB, {perf_counter() - began:.1f} s, peak {peak:.0f} MB")

@@ -1,9 +1,9 @@
 """Claims at random against an evaluation of their own: is what is called ``holds`` true, and what is refuted false?
 
-Every claim is made of a known true motion or first integral, in which parts are replaced by equal ones (roots, inverse
-functions, quotients, half angles, exponentials), and of mistakes: a wrong term, a jump, a formula that is nowhere
-real, a side condition that the flow does not keep.  mpmath evaluates the formulas as written, in real numbers, at random
-points, and takes the derivatives by differences: nothing of heavytop's algebra is used for it.
+Every claim is made of a known true motion or first integral, in which parts are replaced by equal ones (roots,
+inverse functions, quotients, half angles, exponentials), and of mistakes: a wrong term, a jump, a formula that is
+nowhere real, a side condition that the flow does not keep.  mpmath evaluates the formulas as written, in real numbers,
+at random points, and takes the derivatives by differences: nothing of heavytop's algebra is used for it.
 
     python benchmarks/random_claims.py [--claims 2000] [--points 200] [--seed 1]
 """
@@ -429,7 +429,7 @@ def compiled(text: str) -> Callable[[dict[str, Any]], Any]:
 
     def value(names: dict[str, Any]) -> Any:
         try:
-            found = eval(code, {**_FUNCTIONS, "half": mpmath.mpf(1) / 2}, names)  # noqa: S307 - texts of this file
+            found = eval(code, {**_FUNCTIONS, "half": mpmath.mpf(1) / 2}, names)
         except ZeroDivisionError:
             raise Undefined from None
         if not mpmath.isfinite(found) or mpmath.im(found) != 0:

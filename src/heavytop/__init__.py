@@ -4,29 +4,89 @@ The public names; each is imported when it is first used, so that ``import heavy
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING
 
-_PUBLIC = {
-    "HeavyTop": "heavytop.top.heavy_top",
-    "State": "heavytop.top.heavy_top",
-    "HEAVY_TOP": "heavytop.top.equations",
-    "GYROSTAT": "heavytop.top.equations",
-    "holding": "heavytop.top.integrals",
-    "DOUBLE": "heavytop.precision",
-    "EXTENDED": "heavytop.precision",
-    "QUAD": "heavytop.precision",
-    "real": "heavytop.precision",
-    "available": "heavytop.precision",
-    "propagate": "heavytop.integrate.taylor",
-    "Trajectory": "heavytop.integrate.trajectory",
-    "Outcome": "heavytop.integrate.trajectory",
-    "HeavyTopError": "heavytop.errors",
+if TYPE_CHECKING:
+    from heavytop.api.claims import Audit, audit
+    from heavytop.api.motions import ensemble, propagate, reference
+    from heavytop.api.reports import Comparison, Report, compare, read_report, run
+    from heavytop.api.scores import Score, Summary, drift, score
+    from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
+    from heavytop.integrate.trajectory import Outcome, Trajectory
+    from heavytop.measure.reference import Reference
+    from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, available, real
+    from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+    from heavytop.top.heavy_top import HeavyTop, State
+    from heavytop.top.integrals import holding
+
+    __version__: str
+
+_PLACES = {
+    "api.claims": ("Audit", "audit"),
+    "api.motions": ("ensemble", "propagate", "reference"),
+    "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
+    "api.scores": ("Score", "Summary", "drift", "score"),
+    "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
+    "integrate.trajectory": ("Outcome", "Trajectory"),
+    "measure.reference": ("Reference",),
+    "precision": ("DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),
+    "top.equations": ("GYROSTAT", "HEAVY_TOP", "System"),
+    "top.heavy_top": ("HeavyTop", "State"),
+    "top.integrals": ("holding",),
 }
+_ROOM = {name: room for room, names in _PLACES.items() for name in names}
 
-__all__ = sorted(_PUBLIC)
+__all__ = [
+    "DOUBLE",
+    "EXTENDED",
+    "GYROSTAT",
+    "HEAVY_TOP",
+    "QUAD",
+    "Audit",
+    "Comparison",
+    "Contradiction",
+    "HeavyTop",
+    "HeavyTopError",
+    "InputError",
+    "OutOfReach",
+    "Outcome",
+    "Precision",
+    "Reference",
+    "Report",
+    "Score",
+    "State",
+    "Summary",
+    "System",
+    "Trajectory",
+    "__version__",
+    "audit",
+    "available",
+    "compare",
+    "drift",
+    "ensemble",
+    "holding",
+    "propagate",
+    "read_report",
+    "real",
+    "reference",
+    "run",
+    "score",
+]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'heavytop' has no attribute {name!r}")
-    return getattr(import_module(_PUBLIC[name]), name)
+if not TYPE_CHECKING:  # it would tell a type checker that every name is there
+
+    def __getattr__(name: str) -> object:
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version("heavytop")
+        if name not in _ROOM:
+            raise AttributeError(f"module 'heavytop' has no attribute {name!r}")
+        found = getattr(import_module(f"heavytop.{_ROOM[name]}"), name)
+        globals()[name] = found
+        return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,6 +1,15 @@
 """The program's own errors.  The text of each is the cause, with the offending value, then the remedy."""
 
 
+def quoted(value: object, most: int = 60) -> str:
+    """Any value for a message: its ``repr`` on one line, cut short; what has none is named by its type."""
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # an integer of more digits than Python prints, or a foreign __repr__ that raises
+        return f"<{type(value).__name__}>"
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
 class HeavyTopError(Exception):
     """A request that cannot be carried out: ``cause`` says what was wrong, ``remedy`` what to do about it."""
 

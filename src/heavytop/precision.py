@@ -11,9 +11,11 @@ import re
 from dataclasses import dataclass
 from decimal import MAX_EMAX, MIN_EMIN, ROUND_HALF_EVEN, Context, Decimal, Overflow
 from fractions import Fraction
+from numbers import Rational
+from operator import index
 from typing import Any
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, quoted
 
 REAL_BITS = range(24, 20001)
 _MAX_TEXT = 100_000
@@ -53,19 +55,31 @@ QUAD = Precision("quad", 113)
 
 def real(bits: int) -> Precision:
     """The arbitrary-precision format with ``bits`` (24 to 20000) significant bits; raises InputError outside."""
-    if bits not in REAL_BITS:
-        raise InputError(f"real:{bits} is not a format.", "The bits of real:BITS go from 24 to 20000.")
-    return Precision(f"real:{bits}", bits)
+    count = whole(bits, "the bits of real:BITS")
+    if count not in REAL_BITS:
+        raise InputError(f"real:{quoted(count)} is not a format.", "The bits of real:BITS go from 24 to 20000.")
+    return Precision(f"real:{count}", count)
 
 
 def parse(name: str) -> Precision:
     """The format of that name (``double``, ``extended``, ``quad``, ``real:BITS``); raises InputError for any other."""
-    for precision in (DOUBLE, EXTENDED, QUAD):
-        if name == precision.name:
-            return precision
-    if re.fullmatch(r"real:[1-9][0-9]{0,8}", name):
-        return real(int(name[5:]))
-    raise InputError(f"Unknown precision {name[:60]!r}.", "Use double, extended, quad or real:BITS, such as real:237.")
+    if isinstance(name, str):
+        for precision in (DOUBLE, EXTENDED, QUAD):
+            if name == precision.name:
+                return precision
+        if re.fullmatch(r"real:[1-9][0-9]{0,8}", name):
+            return real(int(name[5:]))
+    raise InputError(f"Unknown precision {quoted(name)}.", "Use double, extended, quad or real:BITS, such as real:237.")
+
+
+def whole(value: Any, what: str) -> int:
+    """``value`` as an integer; raises InputError for a bool, for a float even if it is whole, and for anything else."""
+    try:
+        if type(value).__name__ != "bool":  # Python's or numpy's
+            return index(value)
+    except Exception:  # no integer, or a foreign __index__ that raises
+        pass
+    raise InputError(f"{what}: {quoted(value)} is not an integer.", "Give an integer such as 53.")
 
 
 def available() -> dict[str, str | None]:
@@ -92,32 +106,64 @@ def require(precision: Precision) -> Precision:
     return precision
 
 
+def usable_tolerance(value: Any, precision: Precision) -> Fraction:
+    """An exact tolerance; raises InputError unless it goes from the eps of the format to 1."""
+    tolerance = exact(value)
+    if not precision.eps <= tolerance <= 1:
+        raise InputError(
+            f"The tolerance {shown(tolerance)} cannot be kept in {precision.name}.",
+            f"Give one from its eps, {decimal_text(precision.eps, 3)}, to 1; without one it is eps.",
+        )
+    return tolerance
+
+
 def exact(value: Any) -> Fraction:
-    """The exact value of an int, Fraction, decimal or fraction string, or binary float of any format.
+    """The exact value of an int, Fraction, Decimal, decimal or fraction string, or binary float of any format.
 
     A float is the exact binary number it is, not the decimal that it prints as.  Raises InputError for text that is
-    no number, for NaN and infinities, and for text beyond 100,000 characters or an exponent beyond that size.
+    no number, for bools, NaN and infinities, and for text beyond 100,000 characters or an exponent beyond that size.
     """
     if isinstance(value, Fraction):
         return value
-    if isinstance(value, bool):
-        raise InputError(f"{value!r} is not a number.", _REMEDY)
-    if isinstance(value, int):
-        return Fraction(value)
     if isinstance(value, str):
         return _from_text(value)
-    if hasattr(value, "as_integer_ratio"):
-        try:
-            return Fraction(*value.as_integer_ratio())
-        except (ValueError, OverflowError):
-            raise InputError(f"{value} is not a finite number.", _REMEDY) from None
     kind = type(value).__name__
     if kind in ("real", "real128"):
         bits = QUAD.bits if kind == "real128" else int(value.prec)
         return round_to(_from_text(str(value)), bits)
-    if hasattr(value, "__index__"):
-        return Fraction(value.__index__())
-    raise InputError(f"A {kind} is not a number: {str(value)[:60]!r}.", _REMEDY)
+    if isinstance(value, Decimal) and value.is_finite() and abs(value.adjusted()) > _MAX_TEXT:
+        raise _too_large(value)
+    # numpy.bool and bool are integers to Python, and no numbers to anyone
+    if kind != "bool":
+        try:
+            if isinstance(value, Rational):
+                return Fraction(int(value.numerator), int(value.denominator))
+            if hasattr(value, "as_integer_ratio"):
+                return Fraction(*value.as_integer_ratio())
+            return Fraction(index(value))
+        except Exception:  # NaN, infinities, and whatever a foreign number does
+            pass
+    if kind == "mpf":
+        return _from_mantissa(value)
+    if kind == "ndarray" and value.ndim == 0:
+        return exact(value[()])
+    if isinstance(value, float | Decimal) or (kind != "bool" and hasattr(value, "as_integer_ratio")):
+        raise InputError(f"{quoted(value)} is not a finite number.", _REMEDY)
+    raise InputError(f"A {kind} is not a number: {quoted(value)}.", _REMEDY)
+
+
+def _from_mantissa(value: Any) -> Fraction:
+    """The exact value of mpmath's mpf."""
+    sign, mantissa, exponent, _ = value._mpf_
+    if not mantissa and exponent:
+        raise InputError(f"{quoted(value)} is not a finite number.", _REMEDY)
+    if abs(exponent) > 4 * _MAX_TEXT:
+        raise _too_large(value)
+    return Fraction(-int(mantissa) if sign else int(mantissa)) * Fraction(2) ** int(exponent)
+
+
+def _too_large(value: object) -> InputError:
+    return InputError(f"The exponent of {quoted(value)} is too large.", f"Exponents go up to {_MAX_TEXT}.")
 
 
 def shown(value: Fraction) -> str:
@@ -146,19 +192,19 @@ def _from_text(text: str) -> Fraction:
         return top
     bottom = _from_decimal(denominator, text)
     if bottom == 0:
-        raise InputError(f"{text!r} divides by zero.", _REMEDY)
+        raise InputError(f"{quoted(text)} divides by zero.", _REMEDY)
     return top / bottom
 
 
-def _from_decimal(text: str, whole: str) -> Fraction:
+def _from_decimal(text: str, given: str) -> Fraction:
     text = text.strip()
     if len(text) > _MAX_TEXT:
         raise InputError(f"A number of {len(text)} characters is too long.", f"At most {_MAX_TEXT} are read.")
     match = _DECIMAL.fullmatch(text)
     if not match or not text.isascii():
-        raise InputError(f"{whole[:60]!r} is not a finite number.", _REMEDY)
+        raise InputError(f"{quoted(given)} is not a finite number.", _REMEDY)
     if match[3] and abs(int(match[3][1:])) > _MAX_TEXT:
-        raise InputError(f"The exponent of {whole[:60]!r} is too large.", f"Exponents go up to {_MAX_TEXT}.")
+        raise _too_large(given)
     return Fraction(*Decimal(text).as_integer_ratio())
 
 

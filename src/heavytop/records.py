@@ -5,7 +5,8 @@ Numbers that measure something are decimal text with their log10 beside them, so
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import math
+from typing import Annotated, Any, Literal, SupportsFloat
 
 import msgspec
 
@@ -38,6 +39,25 @@ class Metric(msgspec.Struct, gc=False):
     kind: Kind = "error"
     bound: str | None = None
     band: Annotated[float, msgspec.Meta(ge=0, le=100)] | None = None
+
+    def __float__(self) -> float:
+        """The nearest double, 0 where that is too small; the bound of what is unresolved, nan for the other words."""
+        try:
+            return float(self.bound if self.bound is not None else self.value)
+        except ValueError:
+            return math.inf if self.value == "never" else math.nan
+
+    def __lt__(self, other: SupportsFloat) -> bool:
+        return float(self) < float(other)
+
+    def __le__(self, other: SupportsFloat) -> bool:
+        return float(self) <= float(other)
+
+    def __gt__(self, other: SupportsFloat) -> bool:
+        return float(self) > float(other)
+
+    def __ge__(self, other: SupportsFloat) -> bool:
+        return float(self) >= float(other)
 
 
 class Series(msgspec.Struct):

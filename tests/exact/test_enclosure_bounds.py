@@ -10,7 +10,7 @@ from random import Random
 
 import numpy as np
 import pytest
-from flint import fmpq, fmpq_mat
+from flint import fmpq, fmpq_mat, fmpq_poly
 
 from heavytop.exact import enclosure
 from heavytop.exact.balls import midpoint, radius, working_precision
@@ -97,6 +97,21 @@ def theorem(found, field):
     growth = exponential(h * (2 * q * sum(beta) + slope) + h * q * Fraction(CAP))
     widest = (set_size(found.node.errors) * ulp(found) + defect) * growth
     return defect, widest, growth * (defect + h * q * widest**2)
+
+
+@pytest.mark.parametrize("precision", [64, 400, 1500])
+def test_each_coefficient_is_rounded_to_nearest(precision):
+    """b_(n+1) is h f_n/(n + 1) within half an ulp, whichever way its products were summed: 1500 bits take blocks."""
+    found = step(FIELD, node_with(precision, 0.5), precision)
+    series = [[int(value) for value in component] for component in found.coefficients]
+    p = PARAMETERS._replace(
+        inertia=[rational(i) for i in TOP.inertia], moment=[rational(n) for n in TOP.moment], rotor=fmpq(0)
+    )
+    rates = HEAVY_TOP.field(p, [fmpq_poly([fmpq(c, 2**precision) for c in component]) for component in series])
+    for component, rate in zip(series, rates, strict=True):
+        for n in range(found.order):
+            exactly = rational(found.length) * rate[n] * 2**precision / (n + 1)
+            assert abs(component[n + 1] - exactly) <= fmpq(1, 2)
 
 
 def test_the_defect_is_what_the_coefficients_leave(made, field):

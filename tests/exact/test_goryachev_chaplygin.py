@@ -69,6 +69,21 @@ def test_a_double_root_outside_the_gaps_does_no_harm(spin):
     assert_narrow(motion, F(10**9))
 
 
+@pytest.mark.parametrize(
+    ("omega", "gamma"),
+    [
+        ((F(-8, 5), 4, F(-24, 5)), (F(-3, 5), 0, F(4, 5))),
+        ((F(81, 230), F(13, 23), F(-216, 115)), (F(4, 5), 0, F(3, 5))),
+        ((F(486, 793), F(24, 61), F(810, 793)), (F(-5, 13), 0, F(12, 13))),
+    ],
+)
+def test_asymptotic_motions_are_motions_like_any_other(omega, gamma):
+    motion = motion_from((F(1), F(0)), omega, gamma)
+    for time in (F(7, 3), F(-40), F(10**6)):
+        assert_solves(motion, time)
+        assert_narrow(motion, time)
+
+
 def test_a_thousand_digits_come_out():
     assert_narrow(motion_from((F(1), F(0)), ("3/4", "1/2", 0), UP), F(10**6), 1000)
 
@@ -88,5 +103,20 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
 def test_levels_that_are_not_done_are_named():
     with pytest.raises(NotInClass, match="rests at a double root"):
         motion_from((F(1), F(1, 3)), (0, 0, 0), (F(3, 5), 0, F(4, 5)))
-    with pytest.raises(NotInClass, match="asymptotic to a double root"):
+    with pytest.raises(NotInClass, match="both separated variables"):
         motion_from((F(1), F(0)), (0, F(1, 4), 0), (F(3, 5), 0, F(4, 5)))
+
+
+@pytest.mark.parametrize("exponent", [1, 2, 3])
+def test_near_a_degenerate_level_every_digit_comes_out(exponent):
+    spin = F(1, 10**exponent)
+    motion = motion_from((F(1), F(0)), (0, F(1, 4), spin), (F(3, 5), -spin * F(4, 5), F(4, 5)))
+    assert_solves(motion, F(7, 3))
+    assert_narrow(motion, F(10**6))
+
+
+def test_nearer_the_motion_is_refused_with_the_distance():
+    for exponent in (12, 100):
+        spin = F(1, 10**exponent)
+        with pytest.raises(NotInClass, match=r"degenerate but for .*, the distance|too near"):
+            motion_from((F(1), F(0)), (0, F(1, 4), spin), (F(3, 5), -spin * F(4, 5), F(4, 5)))

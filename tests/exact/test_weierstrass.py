@@ -9,7 +9,7 @@ from flint import acb, arb
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, radius, working_precision
 from heavytop.exact.quartic import QuarticMotion
-from heavytop.exact.weierstrass import DegenerateLattice, Lattice, from_invariants
+from heavytop.exact.weierstrass import DegenerateLattice, Lattice, _cubic_roots, from_invariants
 
 NARROW = Fraction(1, 10**35)
 TINY = Fraction(1, 10**30)
@@ -157,3 +157,43 @@ def test_irrational_starts_come_as_balls():
     point = motion.lattice.point(Fraction(3), 2)
     x = motion.position(point, 1 / motion.denominator(point))
     is_zero(x[1] ** 2 - (2 - 3 * x[0] ** 2 + x[0] ** 4 / 2))
+
+
+CLOSE = [Fraction(1, 10**3000), Fraction(1, 7), Fraction(10**3000)]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("off", [*(s * d for d in CLOSE for s in (1, -1)), Fraction(-15)])
+def test_roots_and_gaps_are_right_however_close_they_are(sign, off):
+    """g2 = 12, g3 = ±(8 + off): a double root where off = 0.  16 (e1 − e2)²(e1 − e3)²(e2 − e3)² = g2³ − 27 g3²."""
+    g2, g3 = Fraction(12), sign * (8 + off)
+    found = _cubic_roots(g2, g3)
+    discriminant, (one, two, three) = g2**3 - 27 * g3**2, found.values
+    size = max(abs(g3), 1)
+    for root in found.values:
+        residual = 4 * root**3 - ball(g2) * root - ball(g3)
+        assert residual.contains(0)
+        assert radius(residual.real) < size * NARROW
+    assert (one + two + three).contains(0)
+    assert (found.gaps is not None) == (discriminant > 0)
+    if found.gaps is None:
+        assert two.imag < 0 < three.imag
+        across = (one - two) * (one - three) * acb(0, (two - three).imag)
+    else:
+        upper, lower = found.gaps
+        assert upper > 0
+        assert lower > 0
+        assert upper.overlaps((one - two).real)
+        assert lower.overlaps((two - three).real)
+        across = acb(upper * lower * (upper + lower))
+    quotient = 16 * across**2 / ball(discriminant)
+    is_zero(quotient - 1)
+
+
+def test_invariants_as_balls_are_decided_or_refused():
+    with pytest.raises(OutOfReach, match="no certain sign"):
+        from_invariants(ball(Fraction(12)), arb(8, 1e-9))
+    wide = from_invariants(arb(12, 1e-30), arb(7, 1e-30))
+    for root, exact in zip(wide.roots, from_invariants(Fraction(12), Fraction(7)).roots, strict=True):
+        assert root.contains(exact)
+        assert 1e-33 < float(root.real.rad()) < 1e-28

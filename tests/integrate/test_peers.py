@@ -75,6 +75,20 @@ def test_backwards_is_forwards_of_the_reversed_motion(name: str) -> None:
         np.testing.assert_allclose(one, signs * other, rtol=0, atol=1e-10)
 
 
+@pytest.mark.parametrize("name", [*peers.BUILT_IN])
+@pytest.mark.parametrize("times", [[0], [0, "1/4"]], ids=str)
+def test_the_start_is_its_own_sample(name: str, times: list) -> None:
+    need(name)
+    case = CASES["lagrange"]
+    asked = [Fraction(time) for time in times]
+    run = peers.run(name, case.top, case.start, asked, DOUBLE)
+    ours = propagate(case.top, case.start, asked, DOUBLE)
+    assert (run.outcome, run.times, run.states.shape) == (Outcome.SUCCESS, tuple(asked), (len(asked), 6))
+    np.testing.assert_allclose(run.to_numpy(), ours.to_numpy(), rtol=0, atol=1e-3)
+    if asked[0] == 0:
+        assert [exact(value) for value in run.states[0]] == list(run.problem.start.flat)
+
+
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda s: s.name)
 def test_the_compiled_field_is_the_field(system) -> None:
     generator = np.random.default_rng(7)
@@ -153,7 +167,7 @@ def test_a_run_that_gives_up_says_where(capfd) -> None:
     assert 5 < run.time_reached < 10
     alone = peers.run("sundials:CVODE", case.top, case.start, times[-1:], setting=finer)
     assert alone.outcome is Outcome.STEP_TOO_SMALL
-    assert not alone.states
+    assert len(alone.states) == 0
     assert 5 < alone.time_reached < 10
     assert capfd.readouterr() == ("", "")
 

@@ -9,12 +9,17 @@ import pytest
 from flint import arb
 
 from heavytop.errors import Contradiction, InputError, OutOfReach
+from heavytop.exact.axes import Renamed
 from heavytop.exact.balls import midpoint, radius, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.exact.euler import Euler
+from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.validated import Validated
 from heavytop.measure.certify import _digits, agreed_digits, certified_state, certify
+from heavytop.measure.known import certified
 from heavytop.measure.reference import reference
+from heavytop.measure.scalar import GUARD_BITS
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -50,6 +55,28 @@ def test_far_times_are_certified_at_both_ends(known):
     assert "from t - 1 to t; first integrals" in certificate.second_source
     assert certificate.kind == "proven at both ends"
     assert certificate.agreed_digits >= 50
+
+
+KOVALEVSKAYA = Kovalevskaya(
+    HeavyTop((2, 2, 1), 1, ("3/5", "1/3", 0)), State(("1/3", "4/5", "-7/10"), ("2/7", "3/7", "6/7"))
+)
+
+
+@pytest.mark.parametrize("known", [KOVALEVSKAYA, Renamed(KOVALEVSKAYA, (2, 0, 1))], ids=["as it is", "renamed"])
+def test_a_second_closed_form_certifies_far_times_at_the_time_itself(known):
+    certificate = certify(known, Fraction(10**6), 50)
+    assert certificate.second_source.endswith("first integrals at t; a second closed form at t")
+    assert certificate.kind == "proven"
+    assert certificate.agreed_digits >= 50
+
+
+def test_a_second_closed_form_that_excludes_the_first_is_a_contradiction():
+    class Wrong(Shifted):
+        def second_state(self, time, bits):
+            return Shifted(self.known, arb("1e-40"), 5).state(time, bits)
+
+    with pytest.raises(Contradiction, match="its second closed form exclude each other at t = 1e\\+06"):
+        certify(Wrong(KOVALEVSKAYA, arb(0), 5), Fraction(10**6), 50)
 
 
 def test_a_wrong_closed_form_is_refused():
@@ -112,6 +139,56 @@ def test_reference_serves_the_gyrostat():
         assert abs(Fraction(ball.value) - midpoint(value)) <= Fraction(ball.radius) + radius(value)
 
 
+TURNING = Euler(HeavyTop((3, 2, 1), 1, (0, 0, 0)), State((1, "1/2", "-1/3"), ("2/3", "-1/3", "2/3")))
+
+
+class Late(Shifted):
+    """A motion that goes too fast by a part of 10^-30 after t = 5: its first integrals are right throughout."""
+
+    def __init__(self):
+        super().__init__(TURNING, 0, 5)
+
+    def state(self, time, bits):
+        return self.known.state(time * (1 + Fraction(1, 10**30)) if abs(time) > 5 else time, bits)
+
+
+class WideAtFirst(Shifted):
+    """A motion known to 25 digits only up to t = 5."""
+
+    def __init__(self):
+        super().__init__(TURNING, 0, 5)
+
+    def state(self, time, bits):
+        values = self.known.state(time, bits)
+        with working_precision(bits + 32):
+            return [value + arb(0, 1e-25) for value in values] if 0 < abs(time) <= 5 else values
+
+
+@pytest.mark.parametrize(("solution", "least", "most"), [(TURNING, 50, 99), (Late(), 25, 31), (WideAtFirst(), 23, 25)])
+def test_each_end_counts_where_the_middle_is_out_of_reach(solution, least, most):
+    certificate = certify(solution, Fraction(10**6), 50)
+    assert certificate.kind == "proven at both ends"
+    assert least <= certificate.agreed_digits <= most
+
+
+class Blurred(Shifted):
+    """A motion known within ``radius`` at all times."""
+
+    def __init__(self, radius):
+        super().__init__(TURNING, 0, 5)
+        self.radius = radius
+
+    def state(self, time, bits):
+        with working_precision(bits + 32):
+            return [value + arb(0, self.radius) for value in self.known.state(time, bits)]
+
+
+def test_a_motion_scores_only_what_has_three_digits_less_than_it():
+    """In double precision, of 15 whole digits: 18 are needed."""
+    assert certified(Blurred(9e-19), Fraction(1), 53 + GUARD_BITS) is not None
+    assert certified(Blurred(1.1e-18), Fraction(1), 53 + GUARD_BITS) is None
+
+
 class Fixed:
     """One ball m ± r in all six components, whatever is asked; the state at 0 is that of a known motion."""
 
@@ -151,8 +228,7 @@ def test_digits_of_a_gap_are_exact_at_powers_of_ten():
             (Fraction(1, 10**digits), digits),
             (Fraction(1, 10**digits) * (1 + Fraction(1, 10**9)), digits - 1),
         ):
-            with working_precision(5000):
-                assert _digits(gap) == max(0, found)
+            assert _digits(gap) == max(0, found)
 
 
 class Wide:

@@ -85,6 +85,23 @@ def test_a_reference_with_fewer_digits_than_the_format_scores_nothing() -> None:
     assert certified(Blurred(known.solution), Fraction(3), 117) is None
 
 
+@pytest.mark.parametrize(
+    ("top", "start"),
+    [
+        (HeavyTop((3, 2, 1), 1, ("1/2", "1/4", "1/8")), State((1, 2, 3), (0, 0, 1))),
+        (HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 0), (0, 0, -1))),
+        (HeavyTop((2, 2, 2), 0, (0, 0, 0)), State((0, 0, 0), (0, 1, 0))),
+    ],
+)
+def test_values_that_are_exact_are_said_to_agree_exactly(top: HeavyTop, start: State) -> None:
+    at_start, later = (known_motion(Problem.of(top, start, DOUBLE), Fraction(time)) for time in (0, 7))
+    assert isinstance(at_start, Known)
+    assert "certified at t = 0 exactly by " in at_start.text
+    assert isinstance(later, Known)
+    assert f"certified at t = 7 to {later.certificate.agreed_digits} digits by " in later.text
+    assert later.certificate.agreed_digits < 100
+
+
 @pytest.mark.parametrize("axes", ALL)
 def test_no_naming_of_the_axes_costs_a_motion_its_reference(axes) -> None:
     case = CASES["delone"]

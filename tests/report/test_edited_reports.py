@@ -223,6 +223,40 @@ def test_what_a_row_says_of_its_run_stays(change: dict, verdict: str) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("measure", "old", "new", "verdict"),
+    [
+        ("drift", 1000, 1000, "same"),
+        ("drift", 1000, 1001, "same"),
+        ("drift", 1000, 999, "incomparable"),
+        ("drift", 1000, 0, "incomparable"),
+        ("drift", 3, 0, "same"),  # its series hold three
+        ("drift", 4, 0, "incomparable"),
+        # a baseline that does not say: its series hold three
+        ("drift", 0, 0, "same"),
+        ("drift", 0, 3, "same"),
+        ("drift", 0, 2, "incomparable"),
+        # samples that are steps
+        ("local_error", 101, 51, "same"),
+        ("local_error", 101, 50, "incomparable"),
+    ],
+)
+def test_the_largest_of_fewer_samples_is_no_better(tmp_path: Path, measure: str, old: int, new: int, verdict: str):
+    series = {"drift_energy": Series(["1", "2", "100"], ["1e-13", "1e-13", "1e-12"])}
+    two = [one(None, measure=measure, samples=samples, series=series) for samples in (old, new)]
+    assert judged(*two)[0] == verdict
+    assert judged(*two, flags="ignore")[0] == verdict
+    for name, each in zip(("old", "new"), two, strict=True):
+        (tmp_path / name).mkdir()
+        store.write(report(each), tmp_path / name)
+    briefs = [store.read_brief(tmp_path / name) for name in ("old", "new")]
+    if 0 < new < 3:
+        with pytest.raises(InputError, match="samples: 2, where drift_energy has 3"):
+            compare(*briefs, Policy())
+    else:
+        assert compare(*briefs, Policy()).verdict == verdict
+
+
 TIMES = ["1", "50", "100"]
 
 

@@ -10,10 +10,9 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-import heavytop.report.environment
 import heavytop.report.html
 import heavytop.suite.run
-from heavytop.cli import run as command
+from heavytop.report import run_folder
 from heavytop.suite.files import replace
 from heavytop.suite.measurements import measure
 from heavytop.suite.plan import expand, load
@@ -22,7 +21,7 @@ warnings.simplefilter("ignore")  # of forks in a process with threads: those do 
 PLAN, ROOT = sys.argv[1], Path(sys.argv[2])
 TASKS = expand(load(PLAN)[0])
 ROWS = {task.label: measure(task) for task in TASKS}
-SURROUNDINGS = heavytop.report.environment.environment()
+SURROUNDINGS = run_folder.environment()
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "os.rmdir", "fcntl.flock")
 
 
@@ -34,7 +33,7 @@ def rows(tasks, workers, scheduler, done, saved) -> Iterator:
 
 
 heavytop.suite.run.rows = rows
-heavytop.report.environment.environment = lambda: SURROUNDINGS
+run_folder.environment = lambda: SURROUNDINGS
 heavytop.report.html.write_report = lambda report, path: replace(path, repr(report.rows).encode())  # quick
 
 
@@ -57,7 +56,8 @@ def run(out: Path, killed_at: int) -> int:
     sys.addaudithook(count)
     code = 99
     try:
-        code = command._run(TASKS, {"name": "x"}, out, True, 10.0, {"workers": 1, "scheduler": None}, False)
+        asked = run_folder.Run({"name": "x"}, TASKS, [], out, True, 1, None, 10.0, False)
+        code = 0 if asked.measure(lambda task: None).good else 3
     finally:
         os._exit(code)
 

@@ -1,5 +1,6 @@
 """Plans: what ships expands, what is impossible is refused with its place."""
 
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.suite.cases import CASES, case
-from heavytop.suite.plan import BUILT_IN, expand, load
+from heavytop.suite.plan import BUILT_IN, expand, load, read, warnings
 from heavytop.suite.tables import log_spaced
 
 MEASURE = '[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "double", horizon = "10" }]\n'
@@ -134,3 +135,68 @@ def test_log_spaced_indices_start_at_1_and_end_at_the_count() -> None:
     assert picked[0] == 1
     assert picked[-1] == 1000
     assert 20 <= len(picked) <= 26
+
+
+OWN = """name = "own"
+[[top]]
+name = "odd"
+inertia = ["3", "2", "1"]
+weight = "1"
+centre = ["0", "0", "1"]
+omega = ["0", "0", "1"]
+gamma = ["1", "1", "0"]
+[[measure]]
+kind = "drift"
+cases = ["odd"]
+runs = [{ precision = "double", horizon = "1" }]
+"""
+
+
+def test_a_gamma_that_is_none_names_file_and_top_and_a_remedy_that_run_has(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(OWN)
+    with pytest.raises(InputError) as caught:
+        read(str(file))
+    assert caught.value.cause == f"{file}: The plan's top 'odd': gamma is not a unit vector: |gamma|^2 - 1 = 1."
+    assert "--normalize" not in caught.value.remedy
+    near = re.search(r"near this one is (\S+), (\S+), (\S+)\.$", caught.value.remedy)
+    file.write_text(OWN.replace('["1", "1", "0"]', str([*near.groups()]).replace("'", '"')))
+    assert len(read(str(file))[2]) == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "section", "near"),
+    [("drft", "measure", "drift"), ("workprecision", "measure", "work_precision"), ("grids", "sweep", "grid")],
+)
+def test_an_unknown_kind_is_answered_with_those_that_are_there(
+    kind: str, section: str, near: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(f'name = "own"\nmeasure = []\n[[{section}]]\nkind = "{kind}"\n'.replace("measure = []\n[[m", "[[m"))
+    with pytest.raises(InputError, match=f"kind = '{kind}' in .*{section}.0.* is none of .*; did you mean {near}"):
+        load(str(file))
+
+
+def test_moments_that_no_body_has_are_told(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(OWN.replace('"2", "1"]\nweight', '"2", "7"]\nweight').replace('["1", "1", "0"]', '["0", "0", "1"]'))
+    (warning,) = warnings(load(str(file))[0])
+    assert warning == "top odd: I3 = 7 exceeds the sum 5 of the other two: no rigid body has such moments."
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "integrator", "refused"),
+    [("1e-20", "heyoka", True), ("1e-15", "heyoka", False), ("1e-16", "sundials:CVODE", False), ("0", "heyoka", True)],
+)
+def test_a_tolerance_below_eps_is_refused_before_anything_runs(
+    tolerance: str, integrator: str, refused: bool, tmp_path: Path
+) -> None:
+    pytest.importorskip("sksundae")
+    file = tmp_path / "work.toml"
+    ladder = ONE.replace("'heyoka'", f"'{integrator}'").replace("1e-3", tolerance)
+    file.write_text(f'name = "work"\n{ladder}')
+    if refused:
+        with pytest.raises(InputError, match="olerance"):
+            read(str(file))
+    else:
+        assert len(read(str(file))[2]) == 1

@@ -50,9 +50,7 @@ def in_time(path: str, system_name: str, seconds: float = SECONDS) -> AuditRepor
     try:
         answer = msgspec.json.decode(done.stdout, type=Answer)
     except msgspec.DecodeError:
-        raise HeavyTopError(
-            f"{path}: the process of the audit {_end_of(done)}.", "Try again; report it if it recurs."
-        ) from None
+        raise AuditEnded(f"{path}: the process of the audit {_end_of(done)}.", "Try again.") from None
     if answer.report is not None:
         return answer.report
     if answer.error is not None:

@@ -25,17 +25,19 @@ from heavytop.exact.flint_context import current_precision
 
 _FLOAT_BITS = 46
 _ITERATIONS, _SHORTEST, _SETTLED = 100, 1e-4, 1e-13
+_REPEATED = 6
 
 
 class Variable(Protocol):
     """A variable of an :class:`Inversion`: swinging (:class:`heavytop.exact.gaps.Gap`), or tending to a double root.
 
     turn: its phase grows by this and its integrals by ``column`` with every turn; for a variable that never returns,
-    what its integrals grow by with every unit of the phase, at last.  periodic: which of both.
+    what its integrals grow by with every unit of the phase, at last.  periodic: which of both.  middle: of its gap.
     """
 
     turn: float
     periodic: bool
+    middle: arb
 
     @property
     def column(self) -> list[arb]: ...
@@ -136,7 +138,7 @@ class Inversion:
                 share /= 2
                 following = defect(now - share * step)
             now, error = now - share * step, following
-            if np.abs(share * step).max() < _SETTLED:
+            if np.abs(share * step).max() < _SETTLED * (1 + np.abs(now).max()):
                 break
         return [float(x) for x in now]
 
@@ -149,8 +151,12 @@ class Inversion:
         near = [arb(x) for x in phases]
         for precision in reversed(precisions):
             with working_precision(precision):
-                step = self._inverse(near) * (arb_mat([[v] for v in self.values(near)]) - rest)
-                near = [(x - s).mid() for x, s in zip(near, step.entries(), strict=True)]
+                for _ in range(_REPEATED):
+                    step = (self._inverse(near) * (arb_mat([[v] for v in self.values(near)]) - rest)).entries()
+                    near = [(x - s).mid() for x, s in zip(near, step, strict=True)]
+                    # the next one would be of the size of its square
+                    if all(abs(s) < arb(2) ** (8 - precision // 2) for s in step):
+                        break
         return self._proven(near, rest)
 
     def _inverse(self, phases: list[arb]) -> arb_mat:

@@ -20,7 +20,7 @@ from typing import Any
 
 from flint import arb, arb_series
 
-from heavytop.errors import NotInClass
+from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.motion import initial_xi
@@ -99,6 +99,13 @@ class Renamed:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
         with series_length(length):
             return self._renamed(self.solution.series(time, length, bits))
+
+    def second_state(self, time: Fraction, bits: int) -> list[arb]:
+        """The state by the solution's second closed form.  Raises OutOfReach where it has none."""
+        second = getattr(self.solution, "second_state", None)
+        if second is None:
+            raise OutOfReach("There is one closed form of this motion only.", "Certify it by the enclosure.")
+        return self._renamed(second(time, bits))
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
         """ξ, starting where :func:`heavytop.exact.motion.initial_xi` says in the new names.

@@ -118,16 +118,23 @@ class Step:
 
     def at(self, tau: Fraction) -> list[arb]:
         """The state at 0 ≤ τ ≤ 1, as balls."""
+        return self.around(tau, self.radii(tau))
+
+    def radii(self, tau: Fraction) -> Matrix:
+        """Bounds of the errors at 0 ≤ τ ≤ 1, in ulps 2^errors.exponent; in binary64, without FLINT."""
         slack = self._summed_error
         variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(self.variation))
         errors = self.node.errors
         # the second term: the rounding of the product below
         spread = (slack + 64 * _UNIT * self._powers) * float(np.abs(errors.frame).sum(axis=1).max()) * _UP
-        radii = errors.sizes(variation @ errors.frame, spread) + self.local
+        return np.asarray(errors.sizes(variation @ errors.frame, spread) + self.local)
+
+    def around(self, tau: Fraction, radii: Matrix) -> list[arb]:
+        """The state at 0 ≤ τ ≤ 1 as balls, from its :meth:`radii`."""
         # each of the N roundings of Horner's scheme is at most half an ulp
         rounding = arb(self.order) / 2
         unit = arb(2) ** -self.precision
-        scale = arb(2) ** errors.exponent
+        scale = arb(2) ** self.node.errors.exponent
         return [
             arb(fmpz(int(_horner(component, tau))) * unit, (arb(float(r * _UP)) * scale + rounding).upper() * unit)
             for component, r in zip(self.coefficients, radii, strict=True)

@@ -75,6 +75,15 @@ def _note() -> None:
     ctx.prec, ctx.cap = wanted
 
 
+def _set(context: tuple[int, int]) -> None:
+    """Set what is not set already: FLINT's setter works out decimal digits each time."""
+    precision, length = context
+    if ctx.prec != precision:
+        ctx.prec = precision
+    if ctx.cap != length:
+        ctx.cap = length
+
+
 def current_precision() -> int:
     """The precision of the block that this stands in, whatever another thread has made of ``flint.ctx`` meanwhile."""
     return _held.context[0]
@@ -115,7 +124,7 @@ class _Block:
             length if self.length is None else self.length,
         )
         try:
-            ctx.prec, ctx.cap = _held.context
+            _set(_held.context)
         except BaseException:  # no precision: FLINT says what is wrong with it
             ctx.prec, ctx.cap = _held.context = self.before
             self.__exit__(BaseException)
@@ -126,11 +135,12 @@ class _Block:
             _note()
         disturbed = _held.disturbed
         if self.outermost:
-            ctx.prec, ctx.cap = _held.own
+            _set(_held.own)
             _held.thread = 0
             _lock.release()
         else:
-            ctx.prec, ctx.cap = _held.context = self.before
+            _held.context = self.before
+            _set(self.before)
         if disturbed and (kind is None or (self.outermost and issubclass(kind, Exception))):
             raise ContextChanged
 
@@ -180,7 +190,8 @@ def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
                 try:
                     _held.disturbed, _held.context = False, _DEFAULTS
                     _held.thread = me
-                    ctx.prec, ctx.cap = _DEFAULTS
+                    if _held.own != _DEFAULTS:
+                        ctx.prec, ctx.cap = _DEFAULTS
                     if _held.ever:
                         interval = getswitchinterval()
                         setswitchinterval(max(interval, _UNHURRIED * 4**attempt))
@@ -195,7 +206,8 @@ def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
                     _note()
                 finally:
                     _held.thread = 0
-                    ctx.prec, ctx.cap = _held.own
+                    if (ctx.prec, ctx.cap) != _held.own:
+                        ctx.prec, ctx.cap = _held.own
                     if interval is not None:
                         setswitchinterval(interval)
         raise ContextChanged

@@ -23,13 +23,13 @@ with every degree.  Source: Trefethen and Weideman, SIAM Review 56 (2014), theor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from math import ceil, isqrt, log, pi
 from typing import Any
 
 import numpy as np
-from flint import acb, arb, arb_mat, fmpq
+from flint import acb, arb, arb_mat, arb_poly, fmpq
 from numpy.typing import NDArray
 
 from heavytop.errors import OutOfReach
@@ -66,6 +66,19 @@ class Roots:
         for x, y, many in self.pairs:
             product = product * ((v - x) * (v - x) + y * y) ** many
         return (-product if constant(product) < 0 else product).rsqrt()
+
+    def scaled(self, factor: arb) -> Roots:
+        """factor · g."""
+        return replace(self, lead=self.lead * factor)
+
+    def polynomial(self, place: arb) -> arb_poly:
+        """g as a polynomial, with the sign that makes it positive at ``place``."""
+        found = arb_poly([self.lead])
+        for b, many in self.real:
+            found *= arb_poly([-b, 1]) ** many
+        for x, y, many in self.pairs:
+            found *= arb_poly([x * x + y * y, -2 * x, 1]) ** many
+        return -found if found(place) < 0 else found
 
     def all(self) -> list[tuple[acb, int]]:
         """Every b; of a pair the one above the real axis, with twice its multiplicity."""
@@ -112,7 +125,7 @@ class Gap:
         self.errors = [bound.sum_error(self.terms, j) for j in range(count)]
         sines = [[2 * c / n for n, c in enumerate(row[1:], 1)] for row in rows]
         self.sums = SineSums(sines)
-        self._floats = _significant(np.array([[float(a) for a in row] for row in sines]))
+        self._floats = significant(np.array([[float(a) for a in row] for row in sines]))
         self._mean_floats = np.array([float(mean) for mean in self.means])
         self._orders = np.arange(1, self._floats.shape[1] + 1)
 
@@ -154,9 +167,12 @@ class Gap:
 
 
 class FourierBound:
-    """The error of the Fourier series of v^j/√g; see the head of this file."""
+    """The error of the Fourier series of v^j/√g; see the head of this file.
 
-    def __init__(self, middle: arb, reach: arb, rest: Roots) -> None:
+    divided: of (v^j/√g − its value at an end)/(1 − y²) (:mod:`heavytop.exact.asymptotic`).
+    """
+
+    def __init__(self, middle: arb, reach: arb, rest: Roots, divided: bool = False) -> None:
         self.bits = current_precision()
         with working_precision(_BOUND_BITS):
             heights = [(_cosh((b - middle) / reach), many) for b, many in rest.all()]
@@ -166,6 +182,8 @@ class FourierBound:
             for height, many in heights:
                 square = square * (reach * (height - self.width.cosh())) ** many
             self.largest = square.rsqrt()
+            if divided:
+                self.largest *= 4 / (self.width.cosh() - 1)
             self.farthest = abs(middle) + reach * self.width.cosh()
             excess = 7 * self.largest / (rest.density(middle) * (1 - (-self.width).exp()))
             self.wanted = 2 * (float(excess.log()) + self.bits * log(2)) / float(self.width)
@@ -193,25 +211,44 @@ class FourierBound:
         return arb(0, (factor * self.largest * self.farthest**order).upper())
 
 
+def distance_of_others(points: Sequence[acb], ends: tuple[int, int]) -> float:
+    """cosh β − 1 of the root nearest to the gap between two of the points; 0 for no gap."""
+    low, high = (points[i].real for i in ends)
+    if not low < high:
+        return 0.0
+    scaled = [(2 * b - low - high) / (high - low) for i, b in enumerate(points) if i not in ends]
+    return min(float(_cosh(z) - 1) for z in scaled)
+
+
 def _cosh(z: acb) -> arb:
     """cosh of |Im arccos z|, at least 1."""
     return (abs(z + 1) + abs(z - 1)) / 2
 
 
 def fourier_rows(middle: arb, reach: arb, rest: Roots, terms: int, count: int) -> list[list[arb]]:
-    """c_n, n < N/2, of v^j/√g, j < count, from ``terms`` = N values, 4 | N: without the error of aliasing."""
+    """c_n, n < N/2, of v^j/√g, j < count, from ``terms`` = N values: without the error of aliasing."""
+
+    def values(cosine: arb) -> list[arb]:
+        v = middle + reach * cosine
+        found = [rest.density(v)]
+        for _ in range(count - 1):
+            found.append(v * found[-1])
+        return found
+
+    return even_rows(values, terms)
+
+
+def even_rows(values: Callable[[arb], list[arb]], terms: int) -> list[list[arb]]:
+    """c_n, n < N/2, of several functions of cos θ, from ``terms`` = N values, 4 | N: without the error of aliasing."""
     half = terms // 2
     cosines = [arb.cos_pi_fmpq(fmpq(i, half)) for i in range(half + 1)]
-    places = [middle + reach * cosine for cosine in cosines]
-    even = [rest.density(v) for v in places]
+    samples = list(zip(*map(values, cosines), strict=True))
     rows: list[list[arb]] = []
-    while len(rows) < count:
-        odd = [v * value for v, value in zip(places, even, strict=True)]
+    for even, odd in zip(samples[::2], [*samples[1::2], samples[-1]], strict=False):
         # all coefficients are real, so two functions fit into one transform
         found = _cosine_sums([acb(a, b) for a, b in zip(even, odd, strict=True)], cosines)
         rows += [[c.real / terms for c in found], [c.imag / terms for c in found]]
-        even = [v * value for v, value in zip(places, odd, strict=True)]
-    return rows[:count]
+    return rows[: len(samples)]
 
 
 def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
@@ -231,7 +268,7 @@ def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
     return sums[:half]
 
 
-def _significant(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def significant(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """The rows without the terms that no float sees."""
     sizes = np.abs(rows) / np.abs(rows).max(axis=1, keepdims=True).clip(min=np.finfo(float).tiny)
     kept = np.flatnonzero(sizes.max(axis=0) > np.finfo(float).eps / 64)

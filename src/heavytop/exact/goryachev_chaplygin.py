@@ -18,8 +18,10 @@ whole motion
     γ1 = −(X(u1) − X(u2))/(c (u1 − u2))     γ2 = −(α1β1 + α2β2)/(c (u1 − u2))     γ3 = −σ (α1β2 − α2β1)/(c (u1 − u2))
 
 so that turning points are points like any other.  σ is found by exclusion at the start.
-Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other;
-motions asymptotic to it, or with a variable at rest on it, are not done here.
+Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other,
+and where one variable tends to it the motion is asymptotic (:mod:`heavytop.exact.asymptotic`); motions where both tend
+to it (G = 0), or with a variable at rest on it, are refused.  So are motions so near to them that the Fourier
+series do not resolve them, with the distance.
 Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); signs and recovery derived here from the integrals.
 """
 
@@ -34,11 +36,12 @@ from typing import Any
 from flint import acb, arb, arb_series, fmpq_poly
 
 from heavytop.errors import NotInClass
-from heavytop.exact.abel import Inversion
+from heavytop.exact.abel import Inversion, Variable
+from heavytop.exact.asymptotic import Approach
 from heavytop.exact.balls import ball, midpoint, working_precision
-from heavytop.exact.closed_form import ClosedForm, series_length
+from heavytop.exact.closed_form import ClosedForm, constant, series_length
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
-from heavytop.exact.gaps import Gap, Roots
+from heavytop.exact.gaps import Gap, Roots, distance_of_others
 from heavytop.exact.motion import kept
 from heavytop.exact.reduced import Reduced, Undecided, polynomial
 from heavytop.precision import shown
@@ -46,6 +49,8 @@ from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
 
 _REMEDY = "The validated enclosure holds for every motion."
+_DISTANCE = 1e-5
+"""cosh β − 1 (:mod:`heavytop.exact.gaps`) where the Fourier series take nearly 2^17 terms for 50 digits."""
 _DECISIONS = (64, 256, 1024, 4096)
 _MINUS, _PLUS = 0, 1
 """The factors au − X and au + X of f."""
@@ -205,7 +210,7 @@ class Motion:
     size: arb
     curve: tuple[Root, ...]
     ends: tuple[tuple[int, int], ...]
-    gaps: tuple[Gap, ...]
+    gaps: tuple[Variable, ...]
     origin: tuple[arb, arb]
     sign: int
 
@@ -217,7 +222,7 @@ class Motion:
         """
         curve, places = roots(level), separated_start(level)
         ends = gap_ends(curve, places)
-        gaps = tuple(_gap(curve, pair) for pair in ends)
+        gaps = tuple(_variable(curve, pair) for pair in ends)
         c, a = ball(level.moment_square).sqrt(), _size(level)
         turned = level.turned()
         speeds = [c * (2 * turned[1] * turned[5] - turned[4] * u) for u in places]
@@ -283,11 +288,13 @@ class Motion:
             value, rest = phase * 0 + 1, phase * 0 + arb(1) / 2
             for number, root in enumerate(self.curve):
                 if root.counts[factor] and number in at_end:
-                    value *= side * at_end[number]
+                    # no power: FLINT takes logarithms for that, of 0 at a turning point
+                    value *= side * at_end[number] * (at_end[number] if root.counts[factor] > 1 else 1)
                 elif root.counts[factor]:
                     rest *= _distance(u, root.value, root.counts[factor], gap.middle)
             found.append(value * rest.sqrt())
-        return u, found[0], found[1]
+        # y_k = ±α_k β_k has the sign of −du/dθ
+        return u, -found[0] if constant(gap.bend(phase)) < 0 else found[0], found[1]
 
 
 def _distance(u: Any, root: acb, many: int, middle: arb) -> Any:
@@ -299,20 +306,21 @@ def _distance(u: Any, root: acb, many: int, middle: arb) -> Any:
     return ((u - root.real) ** 2 + root.imag**2) ** many
 
 
-def _gap(curve: Sequence[Root], ends: tuple[int, int]) -> Gap:
+def _variable(curve: Sequence[Root], ends: tuple[int, int]) -> Variable:
+    """The gap between two simple roots, or the way from a simple one to a double one and back."""
     low, high = (curve[number].value.real for number in ends)
-    others = [(root.value, root.multiplicity) for number, root in enumerate(curve) if number not in ends]
-    return Gap(low, high, Roots.of(arb(1) / 4, others))
+    rest = Roots.of(arb(1) / 4, [(root.value, root.multiplicity) for i, root in enumerate(curve) if i not in ends])
+    if curve[ends[0]].multiplicity > 1:
+        return Approach(high, low, rest)
+    return Approach(low, high, rest) if curve[ends[1]].multiplicity > 1 else Gap(low, high, rest)
 
 
 @whole_evaluation
 def _require_done(level: Level) -> None:
-    """Raises NotInClass on the levels that are not done here."""
+    """Raises NotInClass on the levels that are not done here, and too near to them."""
     sextic = level.sextic()
     multiple = sextic.gcd(sextic.derivative())
-    if multiple.degree() == 0:
-        return
-    if level.separated().gcd(multiple).degree() > 0:
+    if multiple.degree() > 0 and level.separated().gcd(multiple).degree() > 0:
         raise NotInClass("The level is degenerate: a separated variable rests at a double root.", _REMEDY)
     for bits in _DECISIONS:
         with working_precision(bits):
@@ -321,7 +329,10 @@ def _require_done(level: Level) -> None:
                 ends = gap_ends(curve, separated_start(level))
             except Undecided:
                 continue
-        if any(curve[number].multiplicity > 1 for pair in ends for number in pair):
-            raise NotInClass("The level is degenerate: the motion is asymptotic to a double root.", _REMEDY)
+            if any(curve[number].counts == (1, 1) for pair in ends for number in pair):
+                raise NotInClass("The level is degenerate: G = 0, and both separated variables tend to 0.", _REMEDY)
+            apart = min(distance_of_others([root.value for root in curve], pair) for pair in ends)
+        if apart < _DISTANCE:
+            raise NotInClass(f"The level is degenerate but for {apart:.2g}, the distance of a root to a gap.", _REMEDY)
         return
-    raise NotInClass("The level is degenerate, and the start too near to a double root to tell.", _REMEDY)
+    raise NotInClass("The start is too near to a degenerate level to tell on which side.", _REMEDY)

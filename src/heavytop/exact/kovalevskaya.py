@@ -11,7 +11,8 @@ Levels where the quintic has a multiple root, found exactly (Appelrot, Trudy otd
 
     k = 0                            Delone's class, elliptic: :mod:`heavytop.exact.delone`
     double root outside both gaps    as any other level, at any distance from it
-    double root at an end of a gap   asymptotic motions: refused
+    double root at an end of a gap   asymptotic motions (:mod:`heavytop.exact.asymptotic`)
+    common end of both gaps          both variables tend to it: refused
     a variable at rest on it         Appelrot's especially remarkable motions: refused
     double root of the cubic         refused
 
@@ -28,7 +29,7 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import NotInClass, OutOfReach
-from heavytop.exact.balls import working_precision
+from heavytop.exact.balls import to_bits, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.kovalevskaya_abel import AbelMotion, Interval, intervals, pole
@@ -85,6 +86,22 @@ class Kovalevskaya(ClosedForm):
         except Undecided:
             return [arb("nan")] * 6
 
+    def second_state(self, time: Fraction, bits: int) -> list[arb]:
+        """The state at ``time`` by theta functions, to hold against :meth:`state`, which mostly inverts integrals.
+
+        Raises OutOfReach on a degenerate level, where there are no such functions, and where :meth:`state` uses them.
+        """
+
+        def evaluate(working: int) -> list[arb]:
+            if isinstance(_motion(self, working), ThetaMotion) or not _has_thetas(Level.of(self.top, self.start)):
+                raise OutOfReach("There is one closed form of this motion only.", "Certify it by the enclosure.")
+            try:
+                return _thetas(self, working).at(time, 1)
+            except Undecided:
+                return [arb("nan")] * 6
+
+        return to_bits(evaluate, bits, time, 1)
+
 
 @kept
 def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion | ThetaMotion:
@@ -92,10 +109,20 @@ def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion | ThetaMotion:
     try:
         return AbelMotion.of(level, MOST_TERMS)
     except OutOfReach:
-        values = [root.value for root in roots(level)]
-        if len(values) < 5 or separation(values) < SEPARATION:
+        if not _has_thetas(level):
             return AbelMotion.of(level, 8 * MOST_TERMS)
     return ThetaMotion.of(level)
+
+
+@kept
+def _thetas(case: Kovalevskaya, _bits: int) -> ThetaMotion:
+    return ThetaMotion.of(Level.of(case.top, case.start))
+
+
+def _has_thetas(level: Level) -> bool:
+    """Whether the five roots are distinct, and far enough from each other at the working precision."""
+    values = [root.value for root in roots(level)]
+    return len(values) == 5 and separation(values) >= SEPARATION
 
 
 @whole_evaluation
@@ -125,8 +152,9 @@ def _require_done(level: Level) -> None:
 
 def _require_apart(curve: Sequence[Root], ends: Sequence[Interval], name: str) -> None:
     """Raises NotInClass where neither of the two forms evaluates the motion."""
-    if any(curve[number - 1].multiplicity > 1 for interval in ends for number in interval if number):
-        raise NotInClass(f"{name}, and the motion is asymptotic to it.", _REMEDY)
+    limits = [number for interval in ends for number in interval if number and curve[number - 1].multiplicity > 1]
+    if len(limits) > 1:
+        raise NotInClass(f"{name}, and both separated variables tend to e.", _REMEDY)
     nearest = separation([root.value for root in curve])
     if nearest < SEPARATION and pole(curve, ends)[1] < _DISTANCE:
         raise NotInClass(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", _REMEDY)

@@ -37,10 +37,11 @@ from typing import Any
 from flint import acb, acb_series, arb, arb_series
 
 from heavytop.exact.abel import Inversion, Variable
+from heavytop.exact.asymptotic import Approach
 from heavytop.exact.balls import ball, midpoint
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.flint_context import coefficient, current_length
-from heavytop.exact.gaps import Gap, Roots
+from heavytop.exact.gaps import Gap, Roots, distance_of_others
 from heavytop.exact.kovalevskaya_level import ORDERS, Level, Root, Start, linear, real_part, roots, start_of
 from heavytop.exact.reduced import Undecided
 
@@ -96,20 +97,11 @@ def pole(curve: Sequence[Root], occupied: Sequence[Interval]) -> tuple[arb, floa
 
     def distance(mu: arb) -> float:
         points = [acb(0), *(1 / (root.value - mu) for root in curve)]
-        return min(_distance(points, interval) for interval in occupied)
+        return min(distance_of_others(points, interval) for interval in occupied)
 
     distances = [distance(mu.mid()) for mu in candidates]
     best = max(range(len(candidates)), key=distances.__getitem__)
     return candidates[best].mid(), distances[best]
-
-
-def _distance(points: Sequence[acb], interval: Interval) -> float:
-    """cosh β − 1 of the nearest other branch point (:mod:`heavytop.exact.gaps`); 0 for no gap."""
-    low, high = (points[i].real for i in interval)
-    if not low < high:
-        return 0.0
-    scaled = [(2 * b - low - high) / (high - low) for i, b in enumerate(points) if i not in interval]
-    return min(float((abs(z + 1) + abs(z - 1)) / 2 - 1) for z in scaled)
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,10 +278,12 @@ def start_phases(start: Start, mu: arb, variables: Sequence[Variable]) -> list[a
 
 
 def _variable(branch: Sequence[acb], curve: Sequence[Root], interval: Interval, lead: arb, most: int) -> Variable:
-    """The gap between two simple branch points."""
+    """The gap between two simple branch points, or the way from a simple one to a double one and back."""
     low, high = (branch[number].real for number in interval)
     if not low < high:
         raise Undecided
     many = [1, *(root.multiplicity for root in curve)]
-    others = [(b, many[i]) for i, b in enumerate(branch) if i not in interval]
-    return Gap(low, high, Roots.of(lead, others), most=most)
+    rest = Roots.of(lead, [(b, many[i]) for i, b in enumerate(branch) if i not in interval])
+    if many[interval[0]] > 1:
+        return Approach(high, low, rest, most=most)
+    return Approach(low, high, rest, most=most) if many[interval[1]] > 1 else Gap(low, high, rest, most=most)

@@ -28,7 +28,7 @@ from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, relative_bits, working_precision
 from heavytop.exact.enclosure import Node, Step, coefficient_bound, start_node, step
 from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.quadratic import Quadratic, quadratic
+from heavytop.exact.quadratic import Matrix, Quadratic, quadratic
 from heavytop.exact.scales import exponent, require_handy, unit_of_time
 from heavytop.precision import decimal_text
 from heavytop.top.angles import perpendicular
@@ -276,7 +276,7 @@ class Validated:
             run = self._run(direction, precision, scaled)
             found = run.at(span)
             if found is not None:
-                values = _evaluated(*found, precision + 64, unit)
+                values = _evaluated(*found, found[0].radii(found[1]), precision + 64, unit)
                 reached = min(map(relative_bits, values))
                 if reached >= bits:
                     return values
@@ -315,8 +315,9 @@ def _rounded(start: tuple[Fraction, ...], bits: int) -> list[arb]:
 
 
 @whole_evaluation
-def _evaluated(found: Step, tau: Fraction, bits: int, unit: Fraction) -> list[arb]:
+def _evaluated(found: Step, tau: Fraction, radii: Matrix, bits: int, unit: Fraction) -> list[arb]:
     """The state at ``tau`` with Ω in the unit of time given."""
+    # numpy would let other threads in amid the balls: the radii are there already
     with working_precision(bits):
-        values = found.at(tau)
+        values = found.around(tau, radii)
         return [value * ball(unit) for value in values[:3]] + values[3:]

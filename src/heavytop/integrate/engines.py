@@ -17,7 +17,7 @@ import numpy
 from heavytop.errors import InputError
 from heavytop.integrate.selfcheck import check
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import DOUBLE, Precision, number, require
+from heavytop.precision import DOUBLE, Precision, number, require, usable_tolerance
 from heavytop.top.equations import GYROSTAT, VARIABLES, Parameters, System
 
 # A machine-code cache on disk is not protected against corruption: a flipped bit there gives wrong numbers silently.
@@ -129,7 +129,7 @@ def _built(
     size = 9 if attitude else 6
     options: dict[str, Any] = {"compact_mode": compact, "high_accuracy": high_accuracy}
     if tolerance is not None:
-        options["tol"] = number(tolerance, precision)
+        options["tol"] = number(usable_tolerance(tolerance, precision), precision)
     if precision.family == "real":
         options["prec"] = precision.bits
     build, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))

@@ -5,11 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from heavytop.precision import Precision, exact, native, native_text, number, rounded
-from heavytop.top.equations import HEAVY_TOP, Parameters, System
+from heavytop.display import Table
+from heavytop.errors import InputError
+from heavytop.precision import Precision, decimal_text, exact, native, native_text, number, rounded
+from heavytop.top.equations import HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.integrals import Integral, holding
+
+_SHOWN = 15
+"""Digits of a number in a table for people; all of them are in :meth:`Trajectory.texts`."""
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 class Outcome(Enum):
@@ -39,6 +49,7 @@ class Problem:
 
     parameters: inertia, moment of the weight n = P r and rotor λ, each component rounded once.
     start: rounded state; γ is in general off the unit sphere by a rounding.
+    given: the exact top and start, which decide what holds; None where the rounded ones are all there is.
     """
 
     system: System
@@ -46,6 +57,11 @@ class Problem:
     parameters: Parameters
     start: State
     xi: tuple[Fraction, ...] | None
+    given: tuple[HeavyTop, State] | None = field(default=None, compare=False)
+
+    def integrals(self) -> tuple[Integral, ...]:
+        """Every first integral that holds for the exact top and start."""
+        return holding(*(self.given or (self.top, self.start)), self.system)
 
     @property
     def top(self) -> HeavyTop:
@@ -74,6 +90,7 @@ class Problem:
             parameters,
             State(both(start.omega), both(start.gamma)),
             None if xi is None else both(xi),
+            (top, start),
         )
 
     def native(self, values: Any) -> list[Any]:
@@ -120,12 +137,13 @@ class Place:
         return cls(content["samples"], state, (high, low), content["steps"], content["seconds"], content["flags"])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
     """A computed motion at the times that were reached.
 
     times: exact values of the rounded times, shape (n,).
-    states: native numbers, shape (n, 6), order Ω1 Ω2 Ω3 γ1 γ2 γ3; or (n, 9) with the attitude vector ξ behind.
+    states: native numbers, an array of shape (n, 6), order Ω1 Ω2 Ω3 γ1 γ2 γ3; or (n, 9) with the attitude vector ξ
+    behind.  It may be given as rows; it has no row where an observer took the states.
     time_reached: exact time of the last finite step end, or the last time asked for.
     seconds: ``compile`` and ``run`` apart.
     flags: everything that can change bits, as text.
@@ -135,7 +153,7 @@ class Trajectory:
     problem: Problem
     integrator: str
     times: tuple[Fraction, ...]
-    states: tuple[Any, ...]
+    states: Any
     outcome: Outcome
     time_reached: Fraction
     steps: int
@@ -144,9 +162,52 @@ class Trajectory:
     flags: dict[str, str] = field(default_factory=dict)
     evaluations: int | None = None
 
+    def __post_init__(self) -> None:
+        import numpy
+
+        width = 6 if self.problem.xi is None else 9
+        states = numpy.array(self.states) if len(self.states) else numpy.empty((0, width))
+        object.__setattr__(self, "states", states)
+
     def texts(self) -> list[list[str]]:
-        """The states as full-precision decimal strings."""
+        """The states as full-precision decimal strings, ``nan`` and ``inf`` where they are."""
         return [[native_text(value, self.problem.precision) for value in state] for state in self.states]
+
+    def to_numpy(self) -> NDArray[np.float64]:
+        """The states rounded to double, shape (n, 6), or (n, 9) with the attitude vector."""
+        import numpy
+
+        return numpy.array([[float(value) for value in state] for state in self.states]).reshape(self.states.shape)
+
+    def _table(self) -> Table:
+        precision = self.problem.precision
+        digits = min(_SHOWN, precision.digits)
+        rows = [
+            [decimal_text(time, _SHOWN), *(_shown(value, digits) for value in state)]
+            for time, state in zip(self.times, self.states, strict=False)
+        ]
+        steps = f"{self.steps} steps" + (f" of order {self.order}" if self.order else "")
+        title = f"{self.problem.system.name} in {precision.name} by {self.integrator}: {self.outcome.message}, {steps}"
+        names = NAMES if self.problem.xi is None else (*NAMES, "ξ1", "ξ2", "ξ3")
+        notes = []
+        if self.times and not rows:
+            notes.append(f"{len(self.times)} states went to the observer")
+        if self.outcome is not Outcome.SUCCESS:
+            notes.append(f"reached t = {decimal_text(self.time_reached, 6)} only")
+        return Table(title, ("t", *names), rows, notes)
+
+    def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+
+def _shown(value: Any, digits: int) -> str:
+    try:
+        return decimal_text(exact(value), digits)
+    except InputError:
+        return str(value)
 
 
 @dataclass(frozen=True, slots=True)

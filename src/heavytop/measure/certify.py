@@ -31,6 +31,8 @@ from heavytop.top.integrals import holding
 SecondSource = Callable[[Fraction, int], Sequence[arb]]
 """Six balls at (time, bits), computed elsewhere."""
 
+EXACTLY = 10**6
+"""More digits than anyone may ask for: those of two sources without any gap between them."""
 _EARLY = Fraction(4)
 _LAST = Fraction(1)
 # a second source may cost this many seconds of the model of the cost
@@ -42,7 +44,8 @@ _BITS_A_DIGIT = log2(10)
 class Certificate:
     """Two sources and how far they agree.
 
-    method, second_source: in words.  agreed_digits: digits that both give, relative above 1 and absolute below.
+    method, second_source: in words.  agreed_digits: digits that both give, relative above 1 and absolute below;
+    :data:`EXACTLY` where both are the same numbers without a radius, as at t = 0 and at rest.
     kind: ``proven`` if both are balls that hold the motion at the time itself, ``proven at both ends`` if the second is
     one near 0 and over the last unit of time only, ``computed`` if the second is no ball.
     """
@@ -51,6 +54,11 @@ class Certificate:
     second_source: str
     agreed_digits: int
     kind: str
+
+    @property
+    def agreement(self) -> str:
+        """``exactly``, or ``to N digits``."""
+        return "exactly" if self.agreed_digits >= EXACTLY else f"to {self.agreed_digits} digits"
 
 
 def bits_of(digits: int) -> int:
@@ -141,7 +149,15 @@ def _early_and_last(
         "- -", "+ "
     )
     source += "; first integrals at t"
-    return Certificate(solution.method, source, agreed, "proven at both ends")
+    try:
+        other = solution.second_state(time, bits) if hasattr(solution, "second_state") else None
+    except OutOfReach:
+        other = None
+    if other is None:
+        return Certificate(solution.method, source, agreed, "proven at both ends")
+    _require_overlap(solution, time, values, other, "its second closed form")
+    source += "; a second closed form at t"
+    return Certificate(solution.method, source, min(agreed, agreed_digits(values, other)), "proven")
 
 
 @whole_evaluation
@@ -164,22 +180,28 @@ def _parameters(solution: ExactSolution) -> Parameters:
     return own or solution.system.parameters(solution.top, solution.start)
 
 
-def _require_overlap(solution: ExactSolution, time: Fraction, first: Sequence[arb], second: Sequence[arb]) -> None:
+def _require_overlap(
+    solution: ExactSolution,
+    time: Fraction,
+    first: Sequence[arb],
+    second: Sequence[arb],
+    source: str = "validated integration",
+) -> None:
     for component, (one, two) in enumerate(zip(first, second, strict=True), 1):
         apart = abs(midpoint(one) - midpoint(two))
         if apart > radius(one) + radius(two):
             raise Contradiction(
-                f"{solution.method} and validated integration exclude each other at t = {float(time):.6g}: component "
+                f"{solution.method} and {source} exclude each other at t = {float(time):.6g}: component "
                 f"{component} differs at digit {_digits(apart)}.",
                 "One of them is wrong: neither can serve as a reference.",
             )
 
 
 def _digits(gap: Fraction) -> int:
-    """The largest d ≥ 0 with gap ≤ 10^-d; for no gap at all, more digits than anyone may ask for."""
+    """The largest d ≥ 0 with gap ≤ 10^-d; :data:`EXACTLY` for no gap at all."""
     if gap == 0:
-        return 10**6
+        return EXACTLY
     digits = max(0, int((gap.denominator.bit_length() - gap.numerator.bit_length() - 1) / _BITS_A_DIGIT) - 1)
     while gap * 10 ** (digits + 1) <= 1:
         digits += 1
-    return digits if gap * 10**digits <= 1 else 0
+    return digits

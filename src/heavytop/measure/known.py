@@ -39,7 +39,7 @@ class Known:
         """Method, radius and certificate, for the row."""
         c = self.certificate
         limit = radius_text(Fraction(1, 2**self.bits))
-        by = f"certified at t = {shown(self.time)} to {c.agreed_digits} digits by {c.second_source} ({c.kind})"
+        by = f"certified at t = {shown(self.time)} {c.agreement} by {c.second_source} ({c.kind})"
         return f"known: {c.method}, radius below {limit}; {by}"
 
 

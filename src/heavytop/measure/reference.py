@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from heavytop.errors import InputError, OutOfReach
-from heavytop.exact.balls import value_text
+from heavytop.display import Table
+from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.exact.balls import radius_text, value_text
 from heavytop.exact.catalogue import find
 from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
 from heavytop.measure.certify import bits_of
-from heavytop.precision import exact, exact_text, shown
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.precision import decimal_text, exact, exact_text, shown
+from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
 DIGITS = range(1, 20001)
+_SHOWN = 15
+"""Digits of a value in a table; all of them are in :meth:`Reference.texts`."""
 
 Finder = Callable[[HeavyTop, State, System], ExactSolution]
 
@@ -42,6 +50,42 @@ class Reference(msgspec.Struct, frozen=True):
     states: list[list[Ball]]
     system: str
 
+    def texts(self) -> list[list[str]]:
+        """The values as decimal text, shape (n, 6)."""
+        return [[ball.value for ball in state] for state in self.states]
+
+    def to_numpy(self) -> NDArray[np.float64]:
+        """The values rounded to double, shape (n, 6)."""
+        import numpy
+
+        return numpy.array([[float(ball.value) for ball in state] for state in self.states])
+
+    def radii(self) -> NDArray[np.float64]:
+        """The radii rounded up to double, shape (n, 6): they stay upper bounds, and none but 0 becomes 0."""
+        import numpy
+
+        return numpy.array([[_rounded_up(ball.radius) for ball in state] for state in self.states])
+
+    def _table(self) -> Table:
+        worst = max((Fraction(ball.radius) for state in self.states for ball in state), default=Fraction(0))
+        rows = [
+            [time[:_SHOWN], *(decimal_text(Fraction(ball.value), min(_SHOWN, self.digits)) for ball in state)]
+            for time, state in zip(self.times, self.states, strict=True)
+        ]
+        title = f"{self.system}, known to {self.digits} digits: {self.method}"
+        return Table(title, ("t", *NAMES), rows, [f"largest radius {radius_text(worst)}"])
+
+    def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+
+def _rounded_up(text: str) -> float:
+    value = float(text)
+    return value if Fraction(value) >= Fraction(text) else math.nextafter(value, math.inf)
+
 
 def reference(
     top: HeavyTop,
@@ -58,7 +102,7 @@ def reference(
     the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
     if digits not in DIGITS:
-        raise InputError(f"{digits} digits are not available.", "References have 1 to 20000 digits.")
+        raise InputError(f"{quoted(digits)} digits are not available.", "References have 1 to 20000 digits.")
     instants = [exact(time) for time in times]
     require_handy(top, start, instants)
     solution = finder(top, start, system)

@@ -73,14 +73,15 @@ def write(path: Path, rows: Iterable[Row], plan: dict[str, str]) -> None:
 
     about = {"heavytop.schema": SCHEMA} | {f"heavytop.plan.{key}": value for key, value in plan.items()}
     schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in COLUMNS.items()], about)
-    lines = _lines(rows)
+    stream = lines(rows)
     with whole(path) as file, ParquetWriter(file, schema, compression="zstd") as writer:
-        while group := list(islice(lines, _GROUP)):
+        while group := list(islice(stream, _GROUP)):
             columns = [pyarrow.array(c, f.type) for c, f in zip(zip(*group, strict=True), schema, strict=True)]
             writer.write_batch(pyarrow.record_batch(columns, schema=schema))
 
 
-def _lines(rows: Iterable[Row]) -> Iterator[tuple[Any, ...]]:
+def lines(rows: Iterable[Row]) -> Iterator[tuple[Any, ...]]:
+    """One tuple a metric or growth law, in the order of :data:`COLUMNS`."""
     no_metric, no_law = [None] * len(_OF_METRIC), [None] * len(_OF_LAW)
     for row in rows:
         *same, starts = (getattr(row, name) for name in _OF_ROW)

@@ -146,7 +146,8 @@ def load(path: Path) -> Policy:
     try:
         return msgspec.convert(tomllib.loads(path.read_text("utf-8")), Policy)
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"The policy {path} cannot be read: {error}.", "Give a readable TOML file.") from None
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"The policy {str(path)[:200]} cannot be read: {reason}.", "Give a TOML file.") from None
     except InputError as error:
         raise InputError(f"The policy {path} is not valid: {error.cause}", error.remedy) from None
     except (tomllib.TOMLDecodeError, msgspec.ValidationError, RecursionError) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -14,10 +15,11 @@ import msgspec
 from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Bits, Count, Law, Metric, Report, Row, Seconds, Series, Starts
 from heavytop.report.checks import REMEDY, check_consistency, check_keys, check_rows, check_series
-from heavytop.suite.files import replace
+from heavytop.suite.files import replace, without_repeats
 
 FILE = "report.json"
 DIGEST = "report.json.sha256"
+_NAME = 200
 _CHUNK = 100
 """Rows of a brief report that are checked at once: few, so that they are still in the cache when compared."""
 
@@ -62,6 +64,7 @@ class BriefRow(msgspec.Struct, gc=False):
     flags: dict[str, str] = {}
     input_rounding: str | None = None
     series: dict[str, Series] = {}
+    samples: Count = 0
     starts: Starts = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, Seconds] = {}
@@ -151,25 +154,28 @@ def read_brief(path: Path) -> Brief:
 
 
 def _read(path: Path, kind: type[_Kind]) -> tuple[Path, _Kind]:
-    file = path / FILE if path.is_dir() else path
+    file = path
     try:
+        file = path / FILE if path.is_dir() else path
         content = file.read_bytes()
     except OSError as error:
-        raise InputError(f"There is no report at {file}: {error.strerror}.", REMEDY) from None
+        raise InputError(f"There is no report at {str(file)[:_NAME]}: {error.strerror}.", REMEDY) from None
     with ThreadPoolExecutor(1) as beside:
-        digest = beside.submit(_check_digest, file, content)
+        digest = beside.submit(_has_its_digest, file, content)
         try:
             report = msgspec.json.decode(content, type=kind)
             problem = ""
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             problem = str(error)
-        digest.result()
+        as_written = digest.result()
     if problem or report.schema != SCHEMA:
         with suppress(msgspec.DecodeError, UnicodeDecodeError):
             schema = msgspec.json.decode(content, type=_Schema).schema
             if schema != SCHEMA:
                 raise InputError(f"{file} has the schema {schema[:60]!r}, not {SCHEMA!r}.", REMEDY)
         raise InputError(f"{file} is not a whole report: {problem}.", REMEDY)
+    if not as_written:
+        _check_repeats(file, content)
     if not isinstance(report.environment.get("packages", {}), dict):
         raise InputError(f"{file} does not say which packages it was made with.", REMEDY)
     return file, report
@@ -179,10 +185,20 @@ class _Schema(msgspec.Struct):
     schema: str
 
 
-def _check_digest(file: Path, content: bytes) -> None:
+def _check_repeats(file: Path, content: bytes) -> None:
+    """Raises InputError where an object of the file has a key twice, of which the decoder takes the last unsaid."""
+    try:
+        json.loads(content, object_pairs_hook=without_repeats)
+    except InputError as error:
+        raise InputError(f"{file}: {error.cause}", REMEDY) from None
+
+
+def _has_its_digest(file: Path, content: bytes) -> bool:
+    """Whether the file's checksum lies beside it; raises InputError where that of another content does."""
     beside = file.with_name(file.name + ".sha256")
     if not beside.exists():
-        return
+        return False
     expected = beside.read_text("utf-8", errors="replace").split()
     if not expected or expected[0] != hashlib.sha256(content).hexdigest():
         raise InputError(f"{file} was changed since it was written: its checksum differs.", REMEDY)
+    return True

@@ -128,6 +128,7 @@ def require_possible(case: Case) -> Case:
     """The case; raises InputError for data that are too large, a gamma that is no unit vector, and a start that the
     system does not admit.
     """
-    require_physical(case.top, case.start.require_unit_gamma())
+    require_physical(case.top, case.start)
+    case.start.require_unit_gamma(remedy=case.start.unit_gamma_nearby())
     case.system.parameters(case.top, case.start)
     return case

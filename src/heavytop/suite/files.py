@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, quoted
+
+
+def without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The object of a JSON document, for ``object_pairs_hook``; raises InputError where a key stands in it twice.
+
+    JSON readers differ in which of the two they take.
+    """
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        twice = next(key for key, count in Counter(key for key, _ in pairs).items() if count > 1)
+        raise InputError(f"The key {quoted(twice)} stands twice in one object.", "Give each key once.")
+    return found
 
 
 def line(content: bytes) -> bytes:

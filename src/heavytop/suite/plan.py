@@ -8,13 +8,15 @@ import tomllib
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from importlib import resources
 from itertools import accumulate
 from pathlib import Path
+from typing import Any, get_args
 
 import msgspec
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.luck import MOST_SEEDS
 from heavytop.precision import exact, number, parse, require
@@ -53,10 +55,24 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True):
     sweep: list[Sweep] = []
 
 
+def read(name: str, seed: int = 0) -> tuple[Plan, str, Sequence[Task]]:
+    """The plan of that name or file, the hash of its text, and its measurements with the roundings of a seed.
+
+    Raises InputError, which names the file, where :func:`load` or :func:`expand` does.
+    """
+    plan, digest = load(name)
+    try:
+        return plan, digest, expand(plan, seed)
+    except InputError as error:
+        if name in BUILT_IN:
+            raise
+        raise InputError(f"{name}: {error.cause}", error.remedy) from None
+
+
 def load(name: str) -> tuple[Plan, str]:
     """The built-in plan of that name, or the one in that TOML file, and the hash of its text.
 
-    Raises InputError with the place in the file for an unknown key or an impossible value.
+    Raises InputError with the place in the file for an unknown key or kind or an impossible value.
     """
     if name in BUILT_IN:
         text = (resources.files("heavytop.suite") / "plans" / f"{name}.toml").read_text("utf-8")
@@ -68,7 +84,9 @@ def load(name: str) -> tuple[Plan, str]:
     else:
         raise InputError(f"Unknown plan {name[:60]!r}.", f"Use {', '.join(BUILT_IN)} or a file ending in .toml.")
     try:
-        plan = msgspec.convert(tomllib.loads(text), Plan)
+        table = tomllib.loads(text)
+        _require_kinds(table)
+        plan = msgspec.convert(table, Plan)
         if not re.fullmatch(_NAME, plan.name):
             raise msgspec.ValidationError(f"name {plan.name[:40]!r} is not letters, digits, '.', '_' and '-'")
     except RecursionError:
@@ -76,6 +94,21 @@ def load(name: str) -> tuple[Plan, str]:
     except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise InputError(f"The plan {name} is not valid: {error}.", "The plans that ship show every key.") from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
+
+
+def _require_kinds(table: dict[str, Any]) -> None:
+    """Raises ValidationError for a table of a kind that is not there: with those that are, and the nearest."""
+    for section, union in (("measure", Table), ("sweep", Sweep)):
+        known = sorted(str(each.__struct_config__.tag) for each in get_args(union))
+        entries = table.get(section)
+        for place, entry in enumerate(entries if isinstance(entries, list) else []):
+            kind = entry.get("kind") if isinstance(entry, dict) else None
+            if isinstance(kind, str) and kind not in known:
+                near = get_close_matches(kind, known, 1)
+                meant = f"; did you mean {near[0]}" if near else ""
+                raise msgspec.ValidationError(
+                    f"kind = {quoted(kind)} in `$.{section}[{place}]` is none of {', '.join(known)}{meant}"
+                )
 
 
 def expand(plan: Plan, seed: int = 0) -> Sequence[Task]:
@@ -129,10 +162,18 @@ def _own(plan: Plan) -> dict[str, Case]:
             raise InputError(f"The plan {plan.name} has two tops {top.name!r}.", _RENAME)
         if top.name in CASES:
             raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", _RENAME)
-        body = HeavyTop(top.inertia, top.weight, top.centre)
-        case = Case(top.name, "from the plan", system(top.system), body, State(top.omega, top.gamma))
-        own[top.name] = require_possible(case)
+        try:
+            body = HeavyTop(top.inertia, top.weight, top.centre)
+            case = Case(top.name, "from the plan", system(top.system), body, State(top.omega, top.gamma))
+            own[top.name] = require_possible(case)
+        except InputError as error:
+            raise InputError(f"The plan's top {top.name!r}: {error.cause}", error.remedy) from None
     return own
+
+
+def warnings(plan: Plan) -> list[str]:
+    """What no rigid body can have, though the equations do not mind, of each of the plan's own tops."""
+    return [f"top {name}: {text}" for name, case in _own(plan).items() for text in case.top.warnings()]
 
 
 def _swept(plan: Plan) -> dict[str, Sequence[Case]]:

@@ -8,9 +8,7 @@ import msgspec
 
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.digits import digits_kept
-from heavytop.measure.drift import Drift
-from heavytop.measure.known import known_motion
-from heavytop.measure.solution_error import SolutionError
+from heavytop.measure.scorer import Scorer
 from heavytop.precision import round_to
 from heavytop.records import Row
 from heavytop.suite.cases import Case
@@ -19,7 +17,6 @@ from heavytop.suite.measurements.shared import time_text
 from heavytop.suite.tables import log_spaced
 from heavytop.suite.task import Task
 from heavytop.suite.trajectory_file import Given
-from heavytop.top.integrals import holding
 
 __all__ = ["complete", "digits_kept", "score"]
 
@@ -35,20 +32,10 @@ def score(given: Given) -> Row:
     count = next((i for i, state in enumerate(given.states) if state is None), len(given.states))
     times = [round_to(time, precision.bits) for time in given.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
-    drift = Drift(problem, holding(given.top, given.start, given.system), keep)
-    known = known_motion(problem, times[-1])
-    error = None if isinstance(known, str) else SolutionError(problem, known.solution, keep)
+    scorer = Scorer(problem, times[-1], keep)
     for time, state in zip(times[:count], given.states, strict=False):
         assert state is not None
-        drift(time, state)
-        if error is not None:
-            error(time, state)
-    metrics, series = drift.metrics(), drift.series(time_text)
-    if error is None:
-        against = f"its own first integrals; no reference: {known}"
-    else:
-        metrics, series = metrics | error.metrics(), series | error.series(time_text)
-        against = known if isinstance(known, str) else known.text
+        scorer(time, state)
     run = Trajectory(
         problem,
         given.integrator,
@@ -62,7 +49,7 @@ def score(given: Given) -> Row:
     )
     case = Case(given.name, "given", given.system, given.top, given.start)
     task = Task("score", given.name, case, precision.name, "", tuple(times), tuple(keep))
-    row = computed_row(task, run, metrics, series, against)
+    row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
     reached = time_text(run.time_reached)
     return msgspec.structs.replace(row, measured=f"given: {given.integrator}", order=None, time_reached=reached)
 

@@ -9,7 +9,7 @@ import msgspec
 
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
-from heavytop.precision import exact, parse, physical
+from heavytop.precision import exact, parse, physical, usable_tolerance
 from heavytop.suite.cases import Case
 from heavytop.suite.task import Task
 from heavytop.top.equations import GYROSTAT
@@ -66,11 +66,10 @@ def growth_task(case: Case, run: GrowthRun) -> Task:
         if value not in limits:
             raise InputError(f"{name} = {value} in a growth run.", f"Give {limits[0]} to {limits[-1]}.")
     horizon = physical(exact(run.horizon), "horizon")
-    if horizon <= 0 or (run.tolerance is not None and not 0 < exact(run.tolerance) <= 1):
-        raise InputError(
-            f"horizon = {run.horizon}, tolerance = {run.tolerance} in a growth run.",
-            "Give a positive horizon, and a tolerance above 0, up to 1.",
-        )
+    if horizon <= 0:
+        raise InputError(f"horizon = {run.horizon} in a growth run.", "Give a positive number.")
+    if run.tolerance is not None:
+        usable_tolerance(run.tolerance, precision)
     if run.bias is not None and abs(exact(run.bias)) >= 1:
         raise InputError(f"bias = {run.bias} in a growth run.", "Give a relative error between -1 and 1.")
     if run.reference is not None and parse(run.reference).bits <= precision.bits:

@@ -11,7 +11,7 @@ import msgspec
 
 from heavytop.errors import InputError
 from heavytop.integrate import peers
-from heavytop.precision import exact, parse, physical
+from heavytop.precision import exact, parse, physical, usable_tolerance
 from heavytop.suite.cases import Case
 from heavytop.suite.starts import GrowthRun, growth_task
 from heavytop.suite.task import Task
@@ -204,6 +204,10 @@ class WorkPrecision(Strict, tag="work_precision"):
             for text in ladder.tolerances + ladder.steps:
                 if text != "eps" and not 0 < exact(text) <= 1:
                     raise InputError(f"A tolerance or step of {text[:60]!r}.", "Give numbers above 0, up to 1.")
+            if ladder.integrator.partition(":")[0] == "heyoka":
+                for text in ladder.tolerances:
+                    if text != "eps":
+                        usable_tolerance(text, parse(ladder.precision))
         return [
             Task(
                 "work_precision",

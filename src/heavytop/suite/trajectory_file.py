@@ -9,14 +9,18 @@ import math
 import re
 import sys
 from dataclasses import dataclass
+from decimal import Decimal
 from difflib import get_close_matches
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy
+
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, parse, real, round_to, shown
+from heavytop.suite.files import without_repeats
 from heavytop.top.equations import VARIABLES, System, system
 from heavytop.top.heavy_top import HeavyTop, State, dot, require_physical
 from heavytop.top.times import check_times
@@ -103,7 +107,9 @@ def read(path: Path) -> Given:
 def _json(text: str) -> dict[str, Any]:
     """The document, every number as the text it is written as."""
     try:
-        document = json.loads(text, parse_float=str, parse_int=str, parse_constant=str)
+        document = json.loads(
+            text, parse_float=str, parse_int=str, parse_constant=str, object_pairs_hook=without_repeats
+        )
     except (ValueError, RecursionError) as error:
         raise InputError(f"This is not JSON: {error}.", _REMEDY) from None
     if not isinstance(document, dict):
@@ -134,6 +140,8 @@ def _csv(text: str) -> dict[str, Any]:
             # other comments may say what they like
             if value and key not in _KEYS and _nearest(key):
                 raise _unknown(key)
+            if key in _KEYS and key in document:
+                raise InputError(f"The key {key} stands twice.", "Give each key once.")
             document[key] = [part.strip() for part in value.split(",")] if key in _VECTORS else value
     body = [line for line in lines if line.strip() and not line.startswith("#")]
     try:
@@ -157,16 +165,11 @@ def _given(document: dict[str, Any], stem: str, sha256: str) -> Given:
     which.parameters(top, start)
     times = check_times([_finite(value, "a time") for value in _list(document, "times")])
     rows = _list(document, "states")
-    if len(rows) != len(times):
-        raise InputError(f"There are {len(times)} times and {len(rows)} states.", "Give one state for each time.")
-    if len(times) > _MOST:
-        raise InputError(f"{len(times)} states are too many to score.", f"Give at most {_MOST} of them.")
+    _require_states(times, rows)
     texts = [_list({"state": row}, "state", 6) for row in rows]
     precision = _precision(document, texts)
-    off = abs(dot(start.gamma, start.gamma) - 1)
-    if off > 2**_SLACK * precision.eps:
-        raise InputError(f"gamma is not a unit vector: |gamma|^2 is off 1 by {float(off):.3g}.", "Give it in full.")
-    states = [_state(row, precision) for row in texts]
+    start.require_unit_gamma(2**_SLACK * precision.eps, "Give it in full.")
+    states = [_state([_number(value, "a component of a state") for value in row], precision) for row in texts]
     word = _text(document, "outcome", "success")
     if word not in [outcome.value for outcome in Outcome]:
         raise InputError(f"Unknown outcome {word[:60]!r}.", f"Use {', '.join(outcome.value for outcome in Outcome)}.")
@@ -185,6 +188,58 @@ def _given(document: dict[str, Any], stem: str, sha256: str) -> Given:
         {key: _name(_text(document, key), key) for key in _FLAGS if key in document},
         sha256,
     )
+
+
+def of_arrays(
+    top: HeavyTop,
+    start: State,
+    which: System,
+    times: list[Fraction],
+    rows: list[list[Any]],
+    precision: Precision | None,
+    name: str,
+    integrator: str,
+) -> Given:
+    """A trajectory from memory: exact times, and states of six numbers each in any format or as text.
+
+    precision: None for the narrowest format that holds every number as it is given.
+    Raises InputError for what is no number, and as :func:`read` for times, counts and names.
+    """
+    _require_states(times, rows)
+    form = precision or _of_bits(max(_bits_of(value) for row in rows for value in row))
+    states = [_state([_component(value) for value in row], form) for row in rows]
+    outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
+    named = _name(name, "name"), _name(integrator, "integrator")
+    return Given(*named, top, start, which, form, times, states, outcome, 0, {}, "")
+
+
+def _require_states(times: list[Fraction], rows: list[Any]) -> None:
+    """Raises InputError unless there are as many states as times, and not too many."""
+    if len(rows) != len(times):
+        raise InputError(f"There are {len(times)} times and {len(rows)} states.", "Give one state for each time.")
+    if len(times) > _MOST:
+        raise InputError(f"{len(times)} states are too many to score.", f"Give at most {_MOST} of them.")
+
+
+def _component(value: Any) -> Fraction | None:
+    """An exact number out of a number of any format or text; None for NaN and infinities."""
+    if isinstance(value, str):
+        return _number(value, "a component of a state")
+    try:
+        return exact(value)
+    except InputError:
+        if isinstance(value, float | Decimal | numpy.floating) or type(value).__name__ in ("real", "real128", "mpf"):
+            return None
+        raise
+
+
+def _bits_of(value: Any) -> int:
+    """Bits of the format of a number in memory; of exact numbers, those that they are written with."""
+    kind = type(value).__name__
+    if kind in ("real128", "longdouble", "real"):
+        return {"real128": QUAD.bits, "longdouble": EXTENDED.bits}.get(kind) or int(value.prec)
+    exactly = isinstance(value, str | int | Fraction | Decimal) and not isinstance(value, bool)
+    return _bits(str(value)) if exactly else DOUBLE.bits
 
 
 def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:
@@ -246,8 +301,7 @@ def _integer(value: Any, what: str) -> int:
     return int(number)
 
 
-def _state(row: list[Any], precision: Precision) -> tuple[Fraction, ...] | None:
-    values = [_number(value, "a component of a state") for value in row]
+def _state(values: list[Fraction | None], precision: Precision) -> tuple[Fraction, ...] | None:
     return None if None in values else tuple(round_to(value, precision.bits) for value in values if value is not None)
 
 
@@ -255,12 +309,15 @@ def _precision(document: dict[str, Any], rows: list[list[Any]]) -> Precision:
     """The format that the file names, or the narrowest that holds every state as it is written."""
     if "precision" in document:
         return parse(_text(document, "precision"))
-    formats = DOUBLE, EXTENDED, QUAD
     if "bits" in document:
         bits = _integer(document["bits"], "bits")
-        return next((form for form in formats if bits == form.bits), None) or real(bits)
-    wanted = max(_bits(str(value)) for row in rows for value in row)
-    return next((form for form in formats if wanted <= form.bits), None) or real(wanted)
+        return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits == form.bits), None) or real(bits)
+    return _of_bits(max(_bits(str(value)) for row in rows for value in row))
+
+
+def _of_bits(bits: int) -> Precision:
+    """The narrowest format with as many bits."""
+    return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits <= form.bits), None) or real(bits)
 
 
 def _bits(text: str) -> int:

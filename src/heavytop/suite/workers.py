@@ -15,12 +15,13 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import cache
 from importlib import metadata
-from multiprocessing import get_context, parent_process
+from multiprocessing import parent_process
 from operator import itemgetter
 from threading import Lock, Thread
 from typing import Any
 
 from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
+from heavytop.processes import ChildContext
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.task import Task
@@ -218,9 +219,7 @@ def _end_with_the_parent() -> None:
 
 @contextmanager
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    # spawned, not forked: a forked child would share the state of heyoka's compiler and threads
-    context = get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts_to_the_parent) as pool:
+    with ProcessPoolExecutor(workers, mp_context=ChildContext(), initializer=_leave_interrupts_to_the_parent) as pool:
         try:
             yield pool
         except BrokenProcessPool:

@@ -16,6 +16,7 @@ from heavytop.precision import shown
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
 VARIABLES = ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3")
+NAMES = ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3")
 
 
 class Parameters(NamedTuple):

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import islice
 from math import isqrt
 from typing import Any
 
-from heavytop.errors import InputError
-from heavytop.precision import exact, physical, shown
+from heavytop.errors import HeavyTopError, InputError, quoted
+from heavytop.precision import decimal_text, exact, physical, shown
 
 Vector = tuple[Fraction, Fraction, Fraction]
+_NEAR_BITS = 10
+"""Bits of the unit vector that an error suggests: enough to show which one was meant."""
+_NORMALIZE = (
+    "Give rational components such as 3/5,0,4/5, or move gamma onto the sphere: --normalize on the command line, "
+    "State.normalized() in Python."
+)
+_MOST = 10_000_000
+"""Members of a list; a generator may have no end."""
 
 
 def vector(values: Iterable[Any], what: str) -> Vector:
     """Three exact rationals out of anything :func:`heavytop.precision.exact` reads; raises InputError otherwise."""
-    parts = tuple(values)
+    parts = ordered(values, what, "Give three numbers, one for each principal axis: x,y,z.")
     if len(parts) != 3:
         raise InputError(f"{what} has {len(parts)} numbers.", "Give three, one for each principal axis: x,y,z.")
     try:
@@ -24,6 +33,24 @@ def vector(values: Iterable[Any], what: str) -> Vector:
     except InputError as error:
         raise InputError(f"{what}: {error.cause}", error.remedy) from None
     return first, second, third
+
+
+def ordered(values: Any, what: str, remedy: str) -> list[Any]:
+    """The members of a list, a tuple, an array or another iterable with an order of its own.
+
+    Raises InputError for text, whose characters are no list of numbers, for sets and mappings, and for what is none.
+    """
+    if not isinstance(values, str | bytes | bytearray | Set | Mapping):
+        try:
+            found = list(islice(values, _MOST + 1))
+            if len(found) > _MOST:
+                raise InputError(f"{what} has more than {_MOST} members.", remedy)
+            return found
+        except HeavyTopError:
+            raise
+        except Exception:  # what is no iterable, an array without dimensions, a generator that fails
+            pass
+    raise InputError(f"{what}: {quoted(values)} is a {type(values).__name__}, not a list.", remedy)
 
 
 def dot(a: Any, b: Any) -> Any:
@@ -67,6 +94,9 @@ class HeavyTop:
         object.__setattr__(self, "weight", load)
         object.__setattr__(self, "centre", vector(centre, "centre"))
 
+    def __repr__(self) -> str:
+        return f"HeavyTop(inertia={_text(self.inertia)}, weight={_text(self.weight)}, centre={_text(self.centre)})"
+
     @property
     def moment(self) -> Vector:
         """P r, the only way in which weight and centre of mass enter the equations."""
@@ -104,6 +134,8 @@ class State:
     """Angular velocity Ω and γ, the unit vector pointing vertically up, both in body axes, as exact rationals.
 
     Up: the equations are M' = M × Ω + P γ × r, γ' = γ × Ω and the energy is ½ Ω·M + P r·γ, higher with r along γ.
+
+    omega, gamma: three numbers each, read by :func:`heavytop.precision.exact`.
     """
 
     omega: Vector
@@ -113,21 +145,27 @@ class State:
         object.__setattr__(self, "omega", vector(omega, "omega"))
         object.__setattr__(self, "gamma", vector(gamma, "gamma"))
 
+    def __repr__(self) -> str:
+        return f"State(omega={_text(self.omega)}, gamma={_text(self.gamma)})"
+
     @property
     def flat(self) -> tuple[Fraction, ...]:
         """(Ω1, Ω2, Ω3, γ1, γ2, γ3)."""
         return (*self.omega, *self.gamma)
 
-    def require_unit_gamma(self) -> State:
-        """This state; raises InputError unless |γ| = 1 exactly."""
-        square = dot(self.gamma, self.gamma)
-        if square != 1:
-            off = float(abs(square - 1)) if abs(square - 1) < 10**300 else float("inf")
-            raise InputError(
-                f"gamma is not a unit vector: |gamma|^2 - 1 = {'-' if square < 1 else ''}{off:.6g}.",
-                "Give rational components such as 3/5,0,4/5, or --normalize to move gamma onto the sphere.",
-            )
+    def require_unit_gamma(self, slack: Fraction = Fraction(0), remedy: str = _NORMALIZE) -> State:
+        """This state; raises InputError with that remedy unless | |γ|² − 1 | ≤ ``slack``."""
+        off = dot(self.gamma, self.gamma) - 1
+        if abs(off) > slack:
+            raise InputError(f"gamma is not a unit vector: |gamma|^2 - 1 = {decimal_text(off, 6)}.", remedy)
         return self
+
+    def unit_gamma_nearby(self) -> str:
+        """How to repair a γ that is no unit vector, where nothing can do it for the user: one near it in full."""
+        if not any(self.gamma):
+            return "Give the components of a unit vector, such as 3/5, 0, 4/5."
+        near = ", ".join(map(str, self.normalized(_NEAR_BITS).gamma))
+        return f"Give rational components such as 3/5, 0, 4/5; a unit vector near this one is {near}."
 
     def normalized(self, bits: int = 128) -> State:
         """The state with γ at a rational point of the unit sphere within 2^(2-bits) of γ/|γ| (stereographic)."""
@@ -146,3 +184,11 @@ class State:
         norm = 1 + u * u + v * v
         sign = 1 if g3 >= 0 else -1
         return State(self.omega, (2 * u / norm, 2 * v / norm, sign * (2 / norm - 1)))
+
+
+def _text(value: Fraction | Vector) -> str:
+    """A number or three as one would write them in Python; long ones to six digits."""
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_text, value))})"
+    text = shown(value)
+    return text if text.lstrip("-").isdigit() else repr(text)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.precision import exact, physical, shown
+from heavytop.top.heavy_top import ordered
 
 
-def check_times(times: Sequence[Any]) -> list[Fraction]:
+def check_times(times: Iterable[Any]) -> list[Fraction]:
     """Exact times; raises InputError unless they are of one sign and strictly monotone away from 0."""
-    values = [physical(exact(time), "a time") for time in times]
+    values = [physical(exact(time), "a time") for time in ordered(times, "times", "Give a list such as [1, 2, 5].")]
     if not values:
         raise InputError("No times were given.", "Give at least one, such as --times 1,2,5.")
     for earlier, later in zip([Fraction(0), *values], values, strict=False):

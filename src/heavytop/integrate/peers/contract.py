@@ -126,7 +126,8 @@ class Contained:
         diverged = run.outcome is Outcome.NON_FINITE and not self.own
         self._require(not diverged, f"a state that is not finite after {len(states)} of {len(asked)} times")
         reached = asked[-1] if done else exact(run.time_reached)
-        self._require(0 <= reached / asked[-1] <= 1, f"the time {said(run.time_reached)} as reached")
+        within = reached == 0 if asked[-1] == 0 else 0 <= reached / asked[-1] <= 1
+        self._require(within, f"the time {said(run.time_reached)} as reached")
         named = type(run.integrator) is str and 0 < len(run.integrator) <= _MOST_SAID and run.integrator.isprintable()
         self._require(named, "no name of an integrator")
         return Trajectory(

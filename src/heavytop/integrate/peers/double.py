@@ -72,10 +72,7 @@ def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") ->
     def integrate(problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Trajectory:
         given = _given(name, knob, problem, times, setting)
         began = perf_counter()
-        # the times are judged by as they were, whatever is done to those that are given
-        solved = solve(replace(given, times=given.times.copy()))
-        if not isinstance(solved, Solved):
-            raise PeerFailed(f"{name} returned a {type(solved).__name__} instead of Solved")
+        solved = _from_start(name, given, solve)
         seconds = {"compile": solved.compile, "run": perf_counter() - began - solved.compile}
         flags = {knob: repr(given.setting), "field": field_kind()}
         return _judged(problem, name, order, given.times, solved, seconds, flags)
@@ -116,6 +113,22 @@ def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], se
     p = problem.parameters
     numbers = numpy.array(problem.native([*p.inertia, *p.moment, p.rotor]), dtype=float)
     return Given(problem.system, numpy.array(problem.native(problem.start.flat)), grid, numbers, float(setting))
+
+
+def _from_start(name: str, given: Given, solve: Solve) -> Solved:
+    """What ``solve`` gives for the times after 0, which most libraries refuse, behind the start itself."""
+    import numpy
+
+    at_start = int(given.times[0] == 0)
+    # the times are judged by as they were, whatever is done to those that are given
+    later = replace(given, times=given.times[at_start:].copy())
+    solved = solve(later) if len(later.times) else Solved(numpy.empty((0, 6)), 0.0, 0, 0)
+    if not isinstance(solved, Solved):
+        raise PeerFailed(f"{name} returned a {type(solved).__name__} instead of Solved")
+    if not at_start:
+        return solved
+    states = _states(name, solved.states, len(later.times))
+    return replace(solved, states=numpy.concatenate([[given.start], states]))
 
 
 def _judged(

@@ -27,13 +27,13 @@ def odefun(
     """``mpmath.odefun`` at the precision's bits; states are heyoka's numbers of that format.
 
     tolerance: None for mpmath's own choice, the eps of the format.
-    Forwards only: raises InputError for a time that is not positive.
+    Forwards only: raises InputError for a negative time.
     """
     import mpmath
     import numpy
 
     grid = [exact(number(time, precision)) for time in check_times(times)]
-    if grid[0] <= 0:
+    if grid[-1] < 0:
         raise InputError("mpmath.odefun integrates forwards only.", "Give positive times.")
     problem = Problem.of(top, start, precision, system)
     evaluations = 0

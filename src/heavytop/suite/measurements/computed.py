@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -10,9 +10,10 @@ from heavytop.errors import OutOfReach
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
 from heavytop.measure.drift import Drift
-from heavytop.measure.known import certified, known_motion
+from heavytop.measure.known import certified
 from heavytop.measure.local_error import LocalError
 from heavytop.measure.scalar import GUARD_BITS
+from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SolutionError
 from heavytop.precision import Precision, decimal_text, exact, number, parse
 from heavytop.records import Metric, Row, Series
@@ -96,17 +97,10 @@ def drift(task: Task, saved: Saved) -> Row:
     problem = Problem.of(case.top, case.start, precision, case.system)
     # samples are taken at the rounded times, so the series must be asked for by these
     keep = [exact(number(time, precision)) for time in task.keep]
-    drift = Drift(problem, holding(case.top, case.start, case.system), keep)
-    known = known_motion(problem, exact(number(task.times[-1], precision)))
-    if isinstance(known, str):
-        run = streamed(task, precision, {"drift": drift}, saved)
-        against = f"its own first integrals; no reference: {known}"
-        return computed_row(task, run, drift_bands(task, run, drift.metrics()), drift.series(time_text), against)
-    error = SolutionError(problem, known.solution, keep)
-    run = streamed(task, precision, {"drift": drift, "error": error}, saved)
-    series = drift.series(time_text) | error.series(time_text)
-    metrics = drift_bands(task, run, drift.metrics() | error.metrics())
-    return computed_row(task, run, metrics, series, known.text)
+    scorer = Scorer(problem, exact(number(task.times[-1], precision)), keep)
+    run = streamed(task, precision, scorer, saved)
+    metrics = drift_bands(task, run, scorer.metrics())
+    return computed_row(task, run, metrics, scorer.series(time_text), scorer.against)
 
 
 def local_error(task: Task) -> Row:
@@ -126,23 +120,15 @@ def local_error(task: Task) -> Row:
     return computed_row(task, run, error.metrics(), {}, "known: validated enclosure of each step from where it starts")
 
 
-def streamed(
-    task: Task, precision: Precision, measures: Mapping[str, Drift | SolutionError], saved: Saved
-) -> Trajectory:
-    """The run of a task through all measures, from the place that was saved; it saves its own on the way."""
+def streamed(task: Task, precision: Precision, scorer: Scorer, saved: Saved) -> Trajectory:
+    """The run of a task through the scorer, from the place that was saved; it saves its own on the way."""
     case, before = case_of(task), saved.load()
     if before is not None:
-        for name, each in measures.items():
-            each.restore(before["measures"][name])
-
-    def observe(time: Fraction, state: Any) -> None:
-        for each in measures.values():
-            each(time, state)
+        scorer.restore(before["measures"])
 
     def mark(place: Place) -> None:
         if saved.due():
-            content = {name: each.content() for name, each in measures.items()}
-            saved.save({"run": place.content(precision), "measures": content})
+            saved.save({"run": place.content(precision), "measures": scorer.content()})
 
     going_on: dict[str, Any] = {}
     if task.integrator == "heyoka":
@@ -150,7 +136,7 @@ def streamed(
         going_on = {"place": place, "mark": mark}
     integrate = integrator_of(task).propagate
     run: Trajectory = integrate(
-        case.top, case.start, task.times, precision, system=case.system, observer=observe, **going_on
+        case.top, case.start, task.times, precision, system=case.system, observer=scorer, **going_on
     )
     return run
 

@@ -106,9 +106,10 @@ def _certified(forms: Sequence[Any], horizon: Fraction, bits: int) -> Reference:
     done = [proof.certificate for proof in proofs if proof]
     if not done or last is None:
         return Reference("its own first integrals; the closed form is certified to too few digits", motions)
+    least = min(done, key=lambda proof: proof.agreed_digits)
     text = (
-        f"{last.text}, for the first start; {len(done)} of {len(forms)} starts certified at t = {shown(early)} to "
-        f"{min(proof.agreed_digits for proof in done)} digits or more by {done[0].second_source} ({done[0].kind})"
+        f"{last.text}, for the first start; {len(done)} of {len(forms)} starts certified at t = {shown(early)} "
+        f"{least.agreement} or more by {done[0].second_source} ({done[0].kind})"
     )
     return Reference(text, motions, radius=2.0**-bits)
 

@@ -15,10 +15,9 @@ from heavytop.errors import PeerFailed
 from heavytop.exact.solution import ExactSolution
 from heavytop.integrate import peers
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.measure.drift import Drift
 from heavytop.measure.known import Known, known_motion
 from heavytop.measure.scalar import metric, of_fraction
-from heavytop.measure.solution_error import SolutionError
+from heavytop.measure.scorer import Scorer
 from heavytop.precision import exact, number, parse
 from heavytop.records import Metric, Row
 from heavytop.suite.measurements.computed import computed_row
@@ -26,7 +25,6 @@ from heavytop.suite.measurements.shared import case_of, peer_failure, time_text
 from heavytop.suite.task import Task
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import State
-from heavytop.top.integrals import holding
 
 _ENOUGH_SECONDS = 0.3
 _RUNS = range(3, 101)
@@ -98,26 +96,19 @@ def _timed(integrate: Any) -> tuple[dict[str, float], Trajectory]:
 
 
 def _held(task: Task, problem: Problem, run: Trajectory) -> tuple[dict[str, Metric], Any, str]:
-    case = case_of(task)
     keep = [exact(number(time, problem.precision)) for time in task.keep]
-    drift = Drift(problem, holding(case.top, case.start, case.system), keep)
-    known = _known(problem, exact(number(task.times[-1], problem.precision)))
-    error = None if isinstance(known, str) else SolutionError(problem, known.solution, keep)
+    horizon = exact(number(task.times[-1], problem.precision))
+    scorer = Scorer(problem, horizon, keep, _known(problem, horizon))
     for time, state in zip(run.times, run.states, strict=True):
-        drift(time, state)
-        if error is not None:
-            error(time, state)
-    metrics = {key: value for key, value in drift.metrics().items() if key.endswith("_max")}
-    series = drift.series(time_text)
-    if isinstance(known, str) or error is None:
-        return metrics, series, f"its own first integrals; no reference: {known}"
-    both = [error.running[part] for part in ("omega", "gamma")]
-    if run.times:
+        scorer(time, state)
+    metrics = {key: value for key, value in scorer.drift.metrics().items() if key.endswith("_max")}
+    if scorer.error is not None and run.times:
+        both = [scorer.error.running[part] for part in ("omega", "gamma")]
         metrics["error_final"] = metric(both[0].final.max(both[1].final))
         metrics["error_max"] = metric(both[0].maximum.max(both[1].maximum))
-    else:
+    elif scorer.error is not None:
         metrics["error_max"] = MISSING
-    return metrics, series | error.series(time_text), known.text
+    return metrics, scorer.series(time_text), scorer.against
 
 
 def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:

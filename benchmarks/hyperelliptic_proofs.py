@@ -1,0 +1,162 @@
+"""Kovalevskaya and Goryachev-Chaplygin motions from random exact data: proofs, agreement and speed, printed.
+
+    python benchmarks/hyperelliptic_proofs.py [COUNT] [SEED]
+
+For COUNT (50) starts of each class, and COUNT/5 on and beside the degenerate levels: the residual of all six equations
+at 60 digits, the enclosure at |t| = 10 to 50 digits, and seconds of this process for 50 digits at t = 10^6.  Then both
+forms of Kovalevskaya's motion at nine tops and four times to 10^9.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from random import Random
+from statistics import median
+from time import process_time
+from typing import Any
+
+from flint import arb
+
+from heavytop.errors import HeavyTopError
+from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.kovalevskaya import Kovalevskaya
+from heavytop.exact.kovalevskaya_abel import AbelMotion
+from heavytop.exact.kovalevskaya_level import Level
+from heavytop.exact.kovalevskaya_theta import ThetaMotion
+from heavytop.exact.solution import ExactSolution
+from heavytop.exact.validated import Validated
+from heavytop.top.equations import Parameters
+from heavytop.top.heavy_top import HeavyTop, State
+
+F = Fraction
+LATE = F(10**6)
+BITS_50, BITS_60 = 168, 200
+FAMILY = Callable[[Random], ExactSolution]
+
+
+def rational(random: Random, size: int = 4, finest: int = 12) -> Fraction:
+    bottom = random.randint(1, finest)
+    return F(random.randint(-size * bottom, size * bottom), bottom)
+
+
+def positive(random: Random) -> Fraction:
+    return abs(rational(random)) + F(1, 3)
+
+
+def kovalevskaya(random: Random) -> Kovalevskaya:
+    i3 = positive(random)
+    top = HeavyTop((2 * i3, 2 * i3, i3), 1, (positive(random), rational(random), 0))
+    return Kovalevskaya(top, State([rational(random) for _ in range(3)], [rational(random) for _ in range(3)]))
+
+
+def on_a_level(random: Random) -> Kovalevskaya:
+    """γ on axis 3: outside the gaps, or asymptotic; those where both variables tend to the root are refused."""
+    top = HeavyTop((2, 2, 1), 1, (positive(random), rational(random), 0))
+    return Kovalevskaya(top, State([rational(random) for _ in range(3)], (0, 0, rational(random))))
+
+
+def beside(exponent: int) -> FAMILY:
+    def family(random: Random) -> Kovalevskaya:
+        t = F(1, 10**exponent)
+        top = HeavyTop((2, 2, 1), 1, (positive(random), rational(random), 0))
+        gamma = (2 * t / (1 + t * t), 0, (1 - t * t) / (1 + t * t))
+        return Kovalevskaya(top, State([rational(random) for _ in range(3)], gamma))
+
+    return family
+
+
+def goryachev_chaplygin(random: Random) -> GoryachevChaplygin:
+    i3, (g1, g2, g3) = positive(random), (rational(random), rational(random), positive(random))
+    top = HeavyTop((4 * i3, 4 * i3, i3), 1, (positive(random), rational(random), 0))
+    w1, w2 = rational(random), rational(random)
+    return GoryachevChaplygin(top, State((w1, w2, -4 * (w1 * g1 + w2 * g2) / g3), (g1, g2, g3)))
+
+
+def with_a_common_root(random: Random) -> GoryachevChaplygin:
+    """G = 0: p = r = 0."""
+    top = HeavyTop((4, 4, 1), 1, (positive(random), 0, 0))
+    return GoryachevChaplygin(top, State((0, rational(random), 0), (rational(random), 0, positive(random))))
+
+
+def residual(motion: ExactSolution, time: Fraction) -> float:
+    """The largest radius of y' − f(y); raises AssertionError where a ball does not hold 0."""
+    series = motion.series(time, 3, BITS_60)
+    with working_precision(2 * BITS_60):
+        exact = motion.system.parameters(motion.top, motion.start)
+        p = Parameters([ball(i) for i in exact.inertia], [ball(n) for n in exact.moment], arb(0))
+        rates = motion.system.field(p, series)
+        values = [(y.derivative() - rate)[k] for y, rate in zip(series, rates, strict=True) for k in (0, 1)]
+    assert all(value.contains(0) for value in values)
+    return max(float(value.rad()) for value in values)
+
+
+def drawn(family: FAMILY, count: int, seed: int) -> Iterator[Any]:
+    random, refused = Random(f"{family.__qualname__} {seed}"), 0
+    while count:
+        try:
+            yield family(random)
+            count -= 1
+        except HeavyTopError:
+            refused += 1
+    print(f"    ({refused} drawn starts refused)")
+
+
+def survey(name: str, family: FAMILY, count: int, seed: int) -> None:
+    print(f"{name}, {count} starts", flush=True)
+    radii, apart, made, states, compared = [], [], [], [], 0
+    for motion in drawn(family, count, seed):
+        radii.append(residual(motion, F(7, 3)))
+        motion = type(motion)(motion.top, motion.start)
+        began = process_time()
+        motion.state(LATE, BITS_50)
+        made.append(process_time() - began)
+        began = process_time()
+        for step in range(1, 4):
+            motion.state(LATE + step, BITS_50)
+        states.append((process_time() - began) / 3)
+        enclosure = Validated(motion.top, motion.start, effort=60.0)
+        try:
+            for time in (F(10), F(-10)):
+                pairs = list(zip(motion.state(time, BITS_50), enclosure.state(time, BITS_50), strict=True))
+                assert all(one.overlaps(other) for one, other in pairs), (motion.top, motion.start)
+                apart.append(max(float(abs(a - b).upper() / (1 + abs(a))) for a, b in pairs))
+            compared += 1
+        except HeavyTopError as error:
+            print("   ", error.cause)
+    print(f"    residual: all hold 0, largest radius {max(radii):.1e}")
+    print(f"    enclosure at |t| = 10: {compared} compared, all overlap, farthest {max(apart):.1e}")
+    print(f"    first state at t = 10^6: median {median(made):.3f} s, largest {max(made):.3f} s")
+    print(f"    a state at t = 10^6: median {1e3 * median(states):.2f} ms, largest {1e3 * max(states):.1f} ms")
+
+
+def meeting(seed: int) -> None:
+    farthest, count = 0.0, 0
+    for motion in drawn(kovalevskaya, 9, seed):
+        level = Level.of(motion.top, motion.start)
+        with working_precision(256):
+            forms = AbelMotion.of(level, 1 << 17), ThetaMotion.of(level)
+            for time in (F(0), F(100), LATE, F(10**9)):
+                one, two = (form.at(time, 1) for form in forms)
+                assert all(a.overlaps(b) for a, b in zip(one, two, strict=True))
+                farthest = max(farthest, *(float(abs(a - b).upper()) for a, b in zip(one, two, strict=True)))
+                count += 1
+    print(f"both forms of Kovalevskaya's motion meet in {count} of {count} pairs, farthest {farthest:.1e}")
+
+
+def main() -> None:
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 50
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    meeting(seed)
+    survey("Kovalevskaya", kovalevskaya, count, seed)
+    survey("Goryachev-Chaplygin", goryachev_chaplygin, count, seed)
+    survey("Kovalevskaya on a degenerate level", on_a_level, count // 5, seed)
+    survey("Goryachev-Chaplygin with G = 0", with_a_common_root, count // 5, seed)
+    for exponent in (1, 2, 3):
+        survey(f"Kovalevskaya at 1e-{exponent} of a degenerate level", beside(exponent), count // 5, seed)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,61 @@
+"""Audits of claims from Python."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields
+
+from heavytop.api import arguments
+from heavytop.claims.audit import PAPER, only_branch
+from heavytop.claims.audit import audit as audit_named
+from heavytop.claims.judge import AuditReport
+from heavytop.display import Table
+from heavytop.top.equations import HEAVY_TOP, System
+
+_WORDS = {True: "holds", False: "refuted", None: "undecided"}
+
+
+class Audit(AuditReport):
+    """The audit of a claim: ``verdict`` (holds, refuted or undecided), ``rows``, ``to_json()`` and ``exit_code``."""
+
+    __slots__ = ()
+
+    def _table(self) -> Table:
+        lines = [
+            [
+                str(row["equation"]),
+                *(str(row[key] or "") for key in ("component", "branch", "domain")),
+                _WORDS[row["holds"]],
+            ]
+            for row in self.to_json()["equations"]
+        ]
+        title = f"{self.claim} as a motion of {self.system}: {self.verdict}"
+        return Table(title, ("equation", "component", "branch", "domain", "verdict"), lines)
+
+    def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+
+def audit(claim: str | os.PathLike[str], system: System | str = HEAVY_TOP, *, branch: str | None = None) -> Audit:
+    """Prove or refute a claim, equation by equation.
+
+    Arguments:
+        claim: "ershkov-general", "ershkov-partial", or the path of a claim in TOML (docs/claims-in-toml.md).
+        system: "heavy_top" or "gyrostat": the system whose motion it is claimed to be.
+        branch: "smooth" or "printed": the rows of that branch alone.
+
+    Returns:
+        An :class:`Audit`; ``verdict`` is "holds" only where every equation is proven on its whole domain.
+
+    Raises:
+        InputError: for an unknown claim, system or branch, for a file that is no claim, and for one whose audit takes
+            too long.
+    """
+    name = claim if isinstance(claim, str) and claim in PAPER else str(arguments.path(claim, "claim"))
+    found = audit_named(name, arguments.system(system).name)
+    if branch is not None:
+        found = only_branch(found, arguments.text(branch, "branch"))
+    return Audit(**{each.name: getattr(found, each.name) for each in fields(found) if each.init})

@@ -1,0 +1,171 @@
+"""Motions from Python: computed ones, many at once, and known ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from typing import Any, TypeAlias, cast
+
+from heavytop.api import arguments
+from heavytop.api.arguments import Number, Numbers
+from heavytop.errors import InputError
+from heavytop.integrate import registry
+from heavytop.integrate.trajectory import Problem, Trajectory
+from heavytop.measure.reference import Reference
+from heavytop.measure.reference import reference as proven
+from heavytop.precision import DOUBLE, Precision, whole
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+Observer: TypeAlias = Callable[[Fraction, Any], object]
+EnsembleObserver: TypeAlias = Callable[[int, Fraction, Any], object]
+
+
+def propagate(
+    top: HeavyTop,
+    start: State,
+    times: Numbers,
+    precision: Precision | str = DOUBLE,
+    *,
+    integrator: str = "heyoka",
+    system: System | str = HEAVY_TOP,
+    xi: Numbers | None = None,
+    tolerance: Number | None = None,
+    high_accuracy: bool | None = None,
+    compact_mode: bool | None = None,
+    step_limit: int | None = None,
+    observer: Observer | None = None,
+) -> Trajectory:
+    """The motion from ``start`` at t = 0, computed in a number format.
+
+    Arguments:
+        top: the body: principal moments I, weight P, centre of mass r on the principal axes.
+        start: Ω in 1/time unit and γ at t = 0.
+        times: shape (n,), exact numbers of one sign, strictly monotone away from 0; 0 itself may come first.
+        precision: DOUBLE, EXTENDED, QUAD, real(BITS), or the name of one.
+        integrator: "heyoka" or another name that `heavytop list` shows.
+        system: "heavy_top" or "gyrostat".
+        xi: shape (3,), a unit vector ⟂ γ, the space axis x in body components at t = 0, to ride along.
+        tolerance: relative and absolute, from the eps of the format (where None) to 1.
+        high_accuracy: compensated summation of heyoka's Taylor series, off where None.
+        compact_mode: heyoka's, slower but quick to compile; None for off in double and extended, on elsewhere.
+        step_limit: stop after that many steps; the times reached until then are returned.
+        observer: called with (exact time, native state) at each sample, in place of keeping the states.
+
+    Returns:
+        A :class:`Trajectory`: ``outcome``, ``times``, ``states`` as an array (n, 6) of the format's numbers in the
+        order Ω1 Ω2 Ω3 γ1 γ2 γ3, or (n, 9) with ξ; ``to_numpy()`` in double, ``texts()`` in full.  A run that fails is
+        an outcome, not an exception.
+
+    Raises:
+        InputError: for what is no motion, time, format or option.
+
+    Source:
+        (1.1) and (1.2), as in :mod:`heavytop.top.equations`; the Taylor method is heyoka's (Biscani and Izzo, 2021).
+    """
+    form = arguments.precision(precision)
+    body, state = arguments.motion(top, start, form)
+    options = _options(
+        xi=arguments.attitude(xi, state, form),
+        tolerance=arguments.tolerance(tolerance, form),
+        high_accuracy=arguments.flag(high_accuracy, "high_accuracy"),
+        compact_mode=arguments.flag(compact_mode, "compact_mode"),
+        step_limit=arguments.count(step_limit, "step_limit"),
+        observer=arguments.callback(observer, "observer"),
+    )
+    run = registry.propagator(integrator, options)
+    about, instants = arguments.system(system), arguments.times(times)
+    return cast(Trajectory, run(body, state, instants, form, system=about))
+
+
+def ensemble(
+    tops: HeavyTop | Iterable[HeavyTop],
+    starts: State | Iterable[State],
+    times: Numbers,
+    precision: Precision | str = DOUBLE,
+    *,
+    integrator: str = "heyoka",
+    system: System | str = HEAVY_TOP,
+    threads: int | None = None,
+    tolerance: Number | None = None,
+    high_accuracy: bool | None = None,
+    compact_mode: bool | None = None,
+    step_limit: int | None = None,
+    observer: EnsembleObserver | None = None,
+) -> list[Trajectory]:
+    """Many motions at once, over the same times: in SIMD lanes in double, in threads in every format.
+
+    Arguments:
+        tops, starts: as many of one as of the other; a single one serves all of the others.
+        times, precision, integrator, system, tolerance, high_accuracy, compact_mode: as in :func:`propagate`.
+        threads: None for one per processor that this process may use.
+        step_limit: for each motion.
+        observer: called with (index of the motion, exact time, native state) in place of keeping the states, by the
+            thread that calls this; the times of each motion in order, the motions mixed.
+
+    Returns:
+        A list of :class:`Trajectory`, one for each motion in their order, each with an outcome of its own.
+
+    Raises:
+        InputError: as :func:`propagate`, naming the motion; for no motions, and for counts that differ.
+    """
+    form, about = arguments.precision(precision), arguments.system(system)
+    bodies = arguments.listed(tops, HeavyTop, "tops")
+    states = arguments.listed(starts, State, "starts")
+    size = max(len(bodies), len(states))
+    if not bodies or not states or {len(bodies), len(states)} - {1, size}:
+        raise InputError(
+            f"There are {len(bodies)} tops and {len(states)} starts.",
+            "Give as many of each, or one for all the others.",
+        )
+    problems = []
+    for index in range(size):
+        try:
+            body, state = arguments.motion(bodies[index % len(bodies)], states[index % len(states)], form)
+            problems.append(Problem.of(body, state, form, about))
+        except InputError as error:
+            raise InputError(f"Motion {index}: {error.cause}", error.remedy) from None
+    options = _options(
+        threads=arguments.count(threads, "threads"),
+        tolerance=arguments.tolerance(tolerance, form),
+        high_accuracy=arguments.flag(high_accuracy, "high_accuracy"),
+        compact_mode=arguments.flag(compact_mode, "compact_mode"),
+        step_limit=arguments.count(step_limit, "step_limit"),
+        observer=arguments.callback(observer, "observer"),
+    )
+    run = registry.ensemble_propagator(integrator, options)
+    return cast("list[Trajectory]", run(problems, arguments.times(times)))
+
+
+def reference(
+    top: HeavyTop,
+    start: State,
+    times: Numbers,
+    digits: int = 50,
+    *,
+    system: System | str = HEAVY_TOP,
+) -> Reference:
+    """The known motion: proven states, from a closed form where there is one, else from a validated enclosure.
+
+    Arguments:
+        top, start: as in :func:`propagate`; the motion is that of the exact numbers given.
+        times: shape (n,), exact numbers in any order.
+        digits: 1 to 20,000; relative above 1, absolute below.
+        system: "heavy_top" or "gyrostat".
+
+    Returns:
+        A :class:`Reference`: ``method``, ``states[i][j].value`` and ``.radius`` as decimal text (the true number is
+        within the radius of the value), ``texts()``, ``to_numpy()`` and ``radii()``, each of shape (n, 6).
+
+    Raises:
+        InputError: for what is no motion or time, and for other digits.
+        OutOfReach: where the digits cannot be proven.
+    """
+    body, state = arguments.motion(top, start)
+    about, instants = arguments.system(system), arguments.any_times(times)
+    return proven(body, state, instants, whole(digits, "digits"), about)
+
+
+def _options(**given: object) -> dict[str, Any]:
+    """The options that were asked for: an integrator need not know the others."""
+    return {name: value for name, value in given.items() if value is not None}

@@ -1,0 +1,189 @@
+"""Runs of plans, their reports and comparisons, from Python."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+from heavytop import records
+from heavytop.api import arguments
+from heavytop.api.arguments import Number
+from heavytop.display import Table
+from heavytop.errors import InputError, quoted
+from heavytop.measure.digits import digits_kept
+from heavytop.precision import whole
+from heavytop.report import compare as comparing
+from heavytop.report import policy as policies
+from heavytop.report import store
+from heavytop.report.comparison_text import headline, metric_name, row_name, values
+from heavytop.report.parquet import COLUMNS, lines
+from heavytop.report.printable import printable
+from heavytop.report.run_folder import prepare
+from heavytop.report.text import failed, short
+
+if TYPE_CHECKING:
+    import pandas
+
+PathLike = str | os.PathLike[str]
+
+
+class Report(records.Report):
+    """A run of a plan: ``schema``, ``plan``, ``environment`` and ``rows``, in the plan's order."""
+
+    @property
+    def verdict(self) -> str:
+        """``complete``, or ``incomplete`` where a row failed."""
+        return "incomplete" if any(map(failed, self.rows)) else "complete"
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The rows as a table, a line for each metric and growth law, with the columns of `--parquet`.
+
+        Raises InputError where pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise InputError("A table needs pandas.", "Install it with: pip install pandas") from None
+        return pandas.DataFrame(list(lines(self.rows)), columns=list(COLUMNS))
+
+    def _table(self) -> Table:
+        count = sum(map(failed, self.rows))
+        title = f"Report of plan {self.plan.get('name', '')}: {len(self.rows)} rows, {self.verdict}"
+        if count:
+            title += f" ({count} failed)"
+        body = []
+        for row in self.rows:
+            kept = digits_kept(row)
+            drifts = [m for name, m in row.metrics.items() if name.startswith("drift_") and name.endswith("_max")]
+            worst = max(drifts, key=lambda m: m.log10 or -1e9).value if drifts else ""
+            cells = (row_name(row.key), row.outcome, "" if kept is None else f"{max(kept, 0):.1f}", short(worst))
+            body.append(list(map(printable, cells)))
+        return Table(printable(title), ("row", "outcome", "digits kept", "largest drift"), body)
+
+    def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+
+class Comparison(comparing.Comparison):
+    """Two reports compared: ``verdict`` (same, better, worse, incomparable), ``changed``, ``tally``, ``to_json()``."""
+
+    __slots__ = ()
+
+    def _table(self) -> Table:
+        body = [
+            list(map(printable, (row_name(f.key), metric_name(f), f.verdict.value, *values(f), f.reason)))
+            for f in self.changed
+        ]
+        notes = [printable(f"{name}: {old} -> {new}") for name, old, new in self.environment]
+        return Table(headline(self), ("row", "metric", "verdict", "baseline", "candidate", "why"), body, notes)
+
+    def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+
+def run(
+    plan: PathLike = "default",
+    out: PathLike | None = None,
+    *,
+    resume: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    seed: int = 0,
+    parquet: bool = False,
+) -> Report:
+    """Run a plan of measurements, write its report and page, and return the report.
+
+    Arguments:
+        plan: smoke, default, growth, long, peers, or the path of a TOML file (docs/plans.md).
+        out: a new folder; None for a new one under heavytop-results.
+        resume: go on with the rows that ``out`` already holds.
+        workers: local processes; None for as many as there are processors.  No main guard is needed.
+        scheduler: the address of a Dask scheduler to run on instead.
+        seed: measure the same motions with other roundings: 0 to 1000.
+        parquet: write rows.parquet too.
+
+    Returns:
+        A :class:`Report`.  A motion that failed is a row with its outcome, not an exception.
+
+    Raises:
+        InputError: for an impossible plan, a folder that is not fit or not writable, and options that contradict each
+            other.
+    """
+    asked = prepare(
+        str(arguments.path(plan, "plan")),
+        None if out is None else arguments.path(out, "out"),
+        resume=bool(arguments.flag(resume, "resume")),
+        workers=arguments.count(workers, "workers"),
+        scheduler=None if scheduler is None else arguments.text(scheduler, "scheduler"),
+        seed=whole(seed, "seed"),
+        with_parquet=bool(arguments.flag(parquet, "parquet")),
+    )
+    for warning in asked.warnings:
+        warnings.warn(warning, stacklevel=2)
+    if asked.is_finished:
+        asked.finished()
+    else:
+        asked.measure(lambda task: None)
+    return read_report(asked.directory)
+
+
+def read_report(path: PathLike) -> Report:
+    """A report from disk.
+
+    Arguments:
+        path: the folder of a run, or its report.json.
+
+    Returns:
+        A :class:`Report`.
+
+    Raises:
+        InputError: for a file that is missing, cut short, of another program or schema, changed since it was written,
+            or inconsistent in itself.
+    """
+    found = store.read(arguments.path(path, "path"))
+    return Report(found.schema, found.plan, found.environment, found.rows)
+
+
+def compare(
+    baseline: records.Report | PathLike,
+    candidate: records.Report | PathLike,
+    *,
+    policy: PathLike | None = None,
+    floor: Number | None = None,
+    loss: Number | None = None,
+) -> Comparison:
+    """Compare two reports, row by row and metric by metric.
+
+    Arguments:
+        baseline, candidate: reports, or the folders or files of two.
+        policy: a TOML file of what counts as the same (docs/compare.md).
+        floor: errors below ``floor`` eps are all the same.
+        loss: bits that an error may grow by.
+
+    Returns:
+        A :class:`Comparison`; ``verdict`` is "worse" if anything is, else "incomparable" if anything is missing or
+        cannot be compared, else "better" or "same".
+
+    Raises:
+        InputError: for what is no report or policy, and where there is nothing to compare.
+    """
+    rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
+    rules = policies.adjusted(rules, arguments.limit(floor, "floor"), arguments.limit(loss, "loss"))
+    found = comparing.compare(_report(baseline, "baseline"), _report(candidate, "candidate"), rules)
+    return Comparison(**{each.name: getattr(found, each.name) for each in fields(found) if each.init})
+
+
+def _report(given: Any, what: str) -> records.Report:
+    if isinstance(given, records.Report):
+        return given
+    if not isinstance(given, str | os.PathLike):
+        raise InputError(f"{what} = {quoted(given)} is no report.", "Give a Report, or the path of one.")
+    return store.read(arguments.path(given, what))

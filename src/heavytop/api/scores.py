@@ -1,0 +1,163 @@
+"""How good a motion is, from Python: drift of its first integrals, distance from the known motion, digits kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from heavytop.api import arguments
+from heavytop.api.arguments import Numbers
+from heavytop.display import Table
+from heavytop.errors import InputError, quoted
+from heavytop.integrate.trajectory import Trajectory
+from heavytop.measure.digits import digits_kept
+from heavytop.measure.drift import Drift
+from heavytop.precision import Precision
+from heavytop.records import Metric, Row
+from heavytop.suite.score import score as scored
+from heavytop.suite.trajectory_file import of_arrays
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State, ordered
+
+_PARTS = ("omega", "gamma", "along", "across")
+_LABELS = {"omega": "error of Ω", "gamma": "error of γ", "along": "along the flow", "across": "across the flow"}
+_STATES = "Give an array of shape (n, 6), in the order Ω1 Ω2 Ω3 γ1 γ2 γ3."
+
+
+class Summary(NamedTuple):
+    """A measured size over the samples: the largest, the root mean square, and that of the last one.
+
+    Each has ``value`` (decimal text), ``log10``, and compares and converts as a float.
+    """
+
+    max: Metric
+    rms: Metric
+    final: Metric
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What a motion is worth.
+
+    outcome: ``success``, or ``non_finite`` where a state is NaN or infinite: those before it are scored.
+    drift: |I(t) − I(0)| by the name of the first integral, in its units.
+    distance: from the known motion, by ``omega`` (1/time unit), ``gamma``, ``along`` the flow (phase) and ``across``
+    it; empty without a reference.
+    digits_kept: −log10 of the largest |error|/max(1, |value|) of Ω and γ over the samples; None without a reference.
+    against: what it was compared with, and how well that is known.  row: the same as `heavytop score --json`.
+    """
+
+    outcome: str
+    drift: dict[str, Summary]
+    distance: dict[str, Summary]
+    digits_kept: float | None
+    against: str
+    row: Row = field(repr=False)
+
+    def _table(self) -> Table:
+        row = self.row
+        kept = "no reference" if self.digits_kept is None else f"{max(self.digits_kept, 0):.1f} digits kept"
+        sizes = {_LABELS[part]: size for part, size in self.distance.items()}
+        sizes |= {f"drift of {name}": size for name, size in self.drift.items()}
+        lines = [[label, *(_short(metric) for metric in size)] for label, size in sizes.items()]
+        title = f"{row.case} in {row.precision}: {self.outcome}, {kept}"
+        return Table(title, ("", "largest", "rms", "final"), lines, [f"compared with {self.against}"])
+
+    def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+
+def score(
+    times: Numbers,
+    states: Any,
+    *,
+    top: HeavyTop,
+    start: State,
+    precision: Precision | str | None = None,
+    system: System | str = HEAVY_TOP,
+    name: str = "given",
+    integrator: str = "given",
+) -> Score:
+    """A motion that any program computed, scored like our own.
+
+    Arguments:
+        times: shape (n,), exact numbers of one sign, strictly monotone away from 0.
+        states: shape (n, 6), in the order Ω1 Ω2 Ω3 γ1 γ2 γ3: an array of float64 or longdouble, or lists of numbers of
+            any format, or of decimal, fraction or hexadecimal text.  NaN and infinities are an outcome, not an error.
+        top, start: what the program was given; rounded to the format first.
+        precision: the format in which it computed; None for the narrowest that holds every number as it is given.
+        system: "heavy_top" or "gyrostat".
+        name, integrator: what the row is called.
+
+    Returns:
+        A :class:`Score`.
+
+    Raises:
+        InputError: for what is no motion, time or number, and for arrays of another shape.
+        Contradiction: where two proofs of the known motion exclude each other.
+    """
+    form = None if precision is None else arguments.precision(precision)
+    body, state = arguments.motion(top, start)
+    about, instants = arguments.system(system), arguments.times(times)
+    rows = _rows(states)
+    names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
+    row = scored(of_arrays(body, state, about, instants, rows, form, *names))
+    return Score(
+        row.outcome,
+        _summaries(row.metrics, "drift_"),
+        {part: size for part, size in _summaries(row.metrics, "solution_error_").items() if part in _PARTS},
+        digits_kept(row),
+        row.against,
+        row,
+    )
+
+
+def drift(run: Trajectory) -> dict[str, Summary]:
+    """How far the first integrals of a computed motion move from their values at the start.
+
+    Arguments:
+        run: what :func:`heavytop.propagate` returned, with its states.
+
+    Returns:
+        |I(t) − I(0)| by the name of each integral that holds for the exact top and start, in the units of the
+        integral: largest, root mean square and last over the samples.  With an attitude also |ξ|² and ξ·γ.
+
+    Raises:
+        InputError: for what is no trajectory, and for one whose states went to an observer.
+
+    Source:
+        (1.3), and the classical cases of :mod:`heavytop.top.integrals`.
+    """
+    if not isinstance(run, Trajectory):
+        raise InputError(f"run = {quoted(run)} is not a Trajectory.", "Give what heavytop.propagate returned.")
+    if len(run.states) != len(run.times):
+        raise InputError("The states of this run went to its observer.", "Propagate without an observer.")
+    measure = Drift(run.problem, run.problem.integrals())
+    for time, state in zip(run.times, run.states, strict=True):
+        measure(time, state)
+    return _summaries(measure.metrics(), "drift_")
+
+
+def _rows(states: Any) -> list[list[Any]]:
+    """The states as rows of six; raises InputError that says the shape."""
+    shape = getattr(states, "shape", None)
+    if shape is not None and (len(shape) != 2 or shape[1] != 6):
+        raise InputError(f"states has the shape {tuple(shape)}.", _STATES)
+    rows = [ordered(row, f"states[{i}]", _STATES) for i, row in enumerate(ordered(states, "states", _STATES))]
+    for i, row in enumerate(rows):
+        if len(row) != 6:
+            raise InputError(f"states[{i}] has {len(row)} numbers.", _STATES)
+    return rows
+
+
+def _summaries(metrics: dict[str, Metric], prefix: str) -> dict[str, Summary]:
+    """The metrics ``PREFIXNAME_max``, ``_rms`` and ``_final`` by NAME."""
+    names = [key[len(prefix) : -4] for key in metrics if key.startswith(prefix) and key.endswith("_rms")]
+    return {name: Summary(*(metrics[f"{prefix}{name}_{statistic}"] for statistic in Summary._fields)) for name in names}
+
+
+def _short(metric: Metric) -> str:
+    return metric.value if metric.log10 is None else f"{float(metric):.3g}"

@@ -1,0 +1,74 @@
+"""The integrators that have a name, and what each is called with.  A new one is a line in :data:`INTEGRATORS`.
+
+The two functions of an integrator are called as :func:`heavytop.integrate.taylor.propagate` and
+:func:`heavytop.integrate.ensemble.propagate_ensemble`.  An option that one of them does not have is refused where it is
+asked for, so no integrator needs to take options that mean nothing to it.  Peers serve under their own names.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from heavytop.errors import InputError, quoted
+from heavytop.integrate import peers
+
+HERE = "heavytop.integrate"
+
+
+class Integrator(NamedTuple):
+    """Where the functions of an integrator are, as ``module:name``; ensemble: "" where it runs one motion at a time."""
+
+    propagate: str
+    ensemble: str = ""
+
+
+INTEGRATORS = {
+    "heyoka": Integrator(f"{HERE}.taylor:propagate", f"{HERE}.ensemble:propagate_ensemble"),
+}
+
+
+def propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:
+    """What propagates one motion with the integrator of that name; raises InputError for an unknown name or option."""
+    if isinstance(name, str) and name not in INTEGRATORS and name in peers.known():
+        _with(peers.peer(name), name, options)
+        return _with(peers.ready(name), name, options)
+    return _with(_load(_find(name).propagate), name, options)
+
+
+def ensemble_propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:
+    """What propagates many motions; raises InputError also for an integrator that runs one at a time."""
+    place = _find(name).ensemble
+    if not place:
+        raise InputError(f"The integrator {name} runs one motion at a time.", "Call propagate for each.")
+    return _with(_load(place), name, options)
+
+
+def _find(name: str) -> Integrator:
+    found = INTEGRATORS.get(name) if isinstance(name, str) else None
+    if found is None:
+        known = ", ".join([*INTEGRATORS, *(peer for peer in peers.known() if peer not in INTEGRATORS)])
+        raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {known}.")
+    return found
+
+
+def _load(place: str) -> Callable[..., Any]:
+    module, _, function = place.partition(":")
+    found: Callable[..., Any] = getattr(import_module(module), function)
+    return found
+
+
+def _with(function: Callable[..., Any], name: str, options: dict[str, Any]) -> Callable[..., Any]:
+    """``function`` with these options; raises InputError for one that it does not have."""
+    parameters = inspect.signature(function).parameters
+    takes_any = any(each.kind is inspect.Parameter.VAR_KEYWORD for each in parameters.values())
+    for option in options:
+        if option not in parameters and not takes_any:
+            raise InputError(f"The integrator {name} has no {option}.", f"Leave it out, or use another than {name}.")
+
+    def call(*arguments: Any, **more: Any) -> Any:
+        return function(*arguments, **more, **options)
+
+    return call

@@ -1,0 +1,155 @@
+"""A run of a plan into a folder: what it would measure, whether the folder is fit, and the report that it leaves."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
+from itertools import chain
+from pathlib import Path
+
+from msgspec.structs import replace
+from rich.console import RenderableType
+
+from heavytop.errors import InputError
+from heavytop.precision import whole
+from heavytop.records import SCHEMA, Report, Row
+from heavytop.report import html, overview, parquet, store
+from heavytop.report.environment import environment
+from heavytop.suite import checkpoint
+from heavytop.suite.checkpoint import Checkpoint, identity_of
+from heavytop.suite.plan import read, warnings
+from heavytop.suite.run import Progress
+from heavytop.suite.run import run as run_tasks
+from heavytop.suite.task import Task
+
+PAGE = "report.html"
+MOST_ON_A_PAGE = 5000
+"""Beyond so many rows a run makes no page: it would hold them all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """A run that is over: its summary for people, and whether no row failed."""
+
+    summary: RenderableType
+    good: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run of a plan that may begin.
+
+    identity: name, hash and seed of the plan.  warnings: what is odd about the plan's own tops.
+    resume: go on with the rows that ``directory`` holds.  save_every: seconds between two places of a long row.
+    """
+
+    identity: dict[str, str]
+    tasks: Sequence[Task]
+    warnings: list[str]
+    directory: Path
+    resume: bool
+    workers: int
+    scheduler: str | None
+    save_every: float
+    parquet: bool
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether there is nothing to go on with: all rows are there and the report is written."""
+        report, rows = self.directory / store.FILE, self.directory / checkpoint.FILE
+        return self.resume and report.exists() and not rows.exists()
+
+    def finished(self) -> Ended:
+        """The end of a run that was finished already; raises InputError where it was of another plan."""
+        report = store.read(self.directory)
+        checkpoint.require_same(report.plan, self.identity, self.directory)
+        if self.parquet:
+            parquet.write(self.directory / parquet.FILE, report.rows, report.plan)
+        return Ended(overview.overview(report, report.rows), overview.all_good(report.rows))
+
+    def measure(self, progress: Progress) -> Ended:
+        """Measure what is not there yet, write the report and sum it up; ``progress`` hears of each finished task.
+
+        Raises InputError where the folder is not fit or cannot be written; what is finished is kept for --resume.
+        """
+        if self.workers == 1 and self.scheduler is None:
+            import heavytop.suite.measurements  # noqa: F401 - loads heyoka, while Ctrl-C still leaves at once
+        report = Report(SCHEMA, self.identity, environment(), [])
+        fit = partial(require_fit, self.directory, self.resume)
+        try:
+            with Checkpoint(self.directory, identity_of(report), fit, self.save_every) as rows:
+                laws = run_tasks(self.tasks, rows, progress, self.workers, self.scheduler)
+                return self._write(report, lambda: chain(rows.rows(range(len(self.tasks))), laws))
+        except OSError as error:
+            raise InputError(
+                f"{self.directory} cannot be written: {error}.",
+                "Make space, or choose a writable --out; finished rows are kept for --resume.",
+            ) from None
+
+    def _write(self, report: Report, rows: Callable[[], Iterator[Row]]) -> Ended:
+        """Write all that a finished run leaves.  rows: a new stream of all rows at each call."""
+        if self.parquet:
+            parquet.write(self.directory / parquet.FILE, rows(), report.plan)
+        store.write(report, self.directory, rows())
+        if len(self.tasks) <= MOST_ON_A_PAGE:
+            html.write_report(replace(report, rows=list(rows())), self.directory / PAGE)
+        return Ended(overview.overview(report, rows()), overview.all_good(rows()))
+
+
+def prepare(
+    plan: str,
+    out: Path | None,
+    *,
+    resume: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    seed: int = 0,
+    save_every: float = checkpoint.EVERY,
+    with_parquet: bool = False,
+) -> Run:
+    """The run of a plan into the folder ``out``, by default a new one under heavytop-results; nothing is written yet.
+
+    Raises InputError for an impossible plan, a folder that is not fit, and options that contradict each other.
+    """
+    if with_parquet:
+        parquet.require_pyarrow()
+    loaded, digest, tasks = read(plan, seed)
+    if workers is not None and whole(workers, "--workers") < 1:
+        raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers are processes here, --scheduler has its own.", "Give one of them.")
+    if resume and out is None:
+        raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
+    run = Run(
+        {"name": loaded.name, "sha256": digest, "seed": str(seed)},
+        tasks,
+        warnings(loaded),
+        out or Path("heavytop-results") / f"{loaded.name}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}",
+        resume,
+        workers or os.cpu_count() or 1,
+        scheduler,
+        save_every,
+        with_parquet,
+    )
+    if not run.is_finished:
+        require_fit(run.directory, resume)
+    return run
+
+
+def require_fit(directory: Path, resume: bool) -> None:
+    """Raises InputError where the folder holds anything that a run did not put there, or all of it without --resume."""
+    if not directory.exists():
+        return
+    if not directory.is_dir():
+        raise InputError(f"{directory} is a file.", "Give a new folder with --out.")
+    content = {path.name for path in directory.iterdir()}
+    begun = checkpoint.FILE in content
+    content -= {name for name in content if checkpoint.OURS.fullmatch(name) and (resume or name != checkpoint.FILE)}
+    if resume and begun:
+        content -= {store.FILE, store.DIGEST, PAGE, parquet.FILE}  # written, but not yet cleared up after
+    if content:
+        remedy = "Give a new folder with --out." + (" Or go on with --resume." if begun else "")
+        raise InputError(f"{directory} already holds {', '.join(sorted(content)[:5])}.", remedy)

@@ -1,0 +1,253 @@
+"""Every public function with odd arguments: an answer, or an error with cause and remedy, and nothing else."""
+
+import inspect
+import itertools
+import math
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+import heavytop as ht
+
+TOP = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
+REST = ht.HeavyTop((2, 2, 2), 0, (0, 0, 0))
+STILL = ht.State((0, 0, 0), ("3/5", 0, "4/5"))
+START = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+
+
+class Hostile:
+    """Fails at whatever is asked of it."""
+
+    def __iter__(self):
+        raise RuntimeError("no")
+
+    def __index__(self):
+        raise RuntimeError("no")
+
+    def __repr__(self):
+        raise RuntimeError("no")
+
+
+def failing():
+    yield 1
+    raise KeyError("no")
+
+
+ODD: tuple[Any, ...] = (
+    None, True, False, 0, 1, -1, 3, 10**6000, -(10**400), 0.0, -0.0, 53.0, 0.1, 1e-30, 1e308, 5e-324, math.nan,
+    math.inf, -math.inf, 1j, "", " ", "1", "321", "1/0", "nan", "1e99999999", "0x1p3", "double", "heavy_top", "smoke",
+    "x" * 5000,
+    "\0", "٣", b"1", bytearray(b"321"), Fraction(1, 3), Fraction(10) ** 500, Fraction(1, 10**500), Decimal("0.1"),
+    Decimal("NaN"), Decimal("sNaN"), Decimal("-Infinity"), Decimal("1e999999999"), mpmath.mpf(1), mpmath.nan,
+    np.float64(0.5), np.float32("nan"), np.float16(2), np.longdouble(1) / 3, np.longdouble("inf"), np.int8(3),
+    np.uint64(7), np.bool_(True), np.str_("1"), np.complex128(1), np.datetime64("2020-01-01"), np.array(2.0),
+    np.array([]),
+    np.array([1.0, 2.0, 3.0]), np.array([[1.0, 2.0], [3.0, 4.0]]), np.array(["1", "x"]), np.array([None]),
+    np.ma.masked_array([1.0, 2.0], [True, False]), np.zeros((2, 6)), np.zeros((2, 3, 6)), [], [1], [1, 2, 3], [3, 2, 1],
+    [0], [0, 1], [1, 1], [1, -1], ["1", 2.0, None], [[1, 2, 3]], (1, 2, 3, 4), (0, 0, 0), (1, 1, 1), {1, 2, 3},
+    frozenset({1}), {1: 2}, {}, range(1, 4), object, object(), Hostile(), len, lambda *_: None, Path("nowhere"), Path(),
+    ht.DOUBLE, ht.Precision("double", 99), ht.Precision("odd", 3), ht.HEAVY_TOP, ht.GYROSTAT, TOP, START, [TOP],
+    [START], (TOP, None), ht.HeavyTop((1, 1, "1e-200"), "1e140", (0, 0, "1e140")), ht.State((1, 2, 3), (1, 1, 0)),
+    ht.State((0, 0, 0), (0, 0, 0)), ht.State((0, 0, 0), (0, 0, 1)), ht.State((0.1, 0.2, 0.3), (0.6, 0.0, 0.8)),
+)  # fmt: skip
+GENERATORS: tuple[Callable[[], Any], ...] = (failing, lambda: (x for x in (1, 2, 3)), lambda: iter("321"))
+
+GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
+    "HeavyTop": (ht.HeavyTop, {"inertia": (3, 2, 1), "weight": 1, "centre": (1, 0, 0)}),
+    "State": (ht.State, {"omega": (1, 2, 3), "gamma": (0, 0, 1)}),
+    "real": (ht.real, {"bits": 60}),
+    "propagate": (
+        ht.propagate,
+        {
+            "top": TOP,
+            "start": START,
+            "times": [1],
+            "precision": ht.DOUBLE,
+            "integrator": "heyoka",
+            "system": ht.HEAVY_TOP,
+            "xi": None,
+            "tolerance": None,
+            "high_accuracy": False,
+            "compact_mode": False,
+            "step_limit": 5,
+            "observer": None,
+        },
+    ),
+    "ensemble": (
+        ht.ensemble,
+        {
+            "tops": [TOP],
+            "starts": START,
+            "times": [1],
+            "precision": ht.DOUBLE,
+            "integrator": "heyoka",
+            "system": ht.HEAVY_TOP,
+            "threads": 1,
+            "tolerance": None,
+            "high_accuracy": False,
+            "compact_mode": False,
+            "step_limit": 5,
+            "observer": None,
+        },
+    ),
+    "reference": (ht.reference, {"top": REST, "start": STILL, "times": [1], "digits": 20, "system": "heavy_top"}),
+    "score": (
+        ht.score,
+        {
+            "times": [1],
+            "states": [[0.1, 0.4, 0.9, 0.6, 0.0, 0.8]],
+            "top": REST,
+            "start": STILL,
+            "precision": ht.DOUBLE,
+            "system": "heavy_top",
+            "name": "a",
+            "integrator": "b",
+        },
+    ),
+    "drift": (ht.drift, {"run": None}),
+    "audit": (ht.audit, {"claim": "none", "system": "heavy_top", "branch": None}),
+    "run": (
+        ht.run,
+        {
+            "plan": "none",
+            "out": "made",
+            "resume": False,
+            "workers": 1,
+            "scheduler": None,
+            "seed": 0,
+            "parquet": False,
+        },
+    ),
+    "read_report": (ht.read_report, {"path": "nowhere"}),
+    "compare": (
+        ht.compare,
+        {"baseline": "nowhere", "candidate": "nowhere", "policy": None, "floor": None, "loss": None},
+    ),
+}
+
+
+def answered(function: Callable[..., Any], arguments: dict[str, Any]) -> None:
+    try:
+        found = function(**arguments)
+    except ht.HeavyTopError as refused:
+        error = refused
+    else:
+        assert isinstance(repr(found), str)
+        return
+    assert 0 < len(error.cause) < 1500
+    assert error.remedy, error.cause
+
+
+def test_the_table_names_every_argument_of_every_public_function() -> None:
+    functions = {name for name in ht.__all__ if inspect.isfunction(getattr(ht, name))} - {"available", "holding"}
+    assert functions | {"HeavyTop", "State"} == set(GOOD)
+    for function, arguments in GOOD.values():
+        parameters = inspect.signature(function).parameters.values()
+        assert [each.name for each in parameters] == list(arguments)
+        assert all(each.kind is not each.VAR_KEYWORD for each in parameters)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    ("name", "argument"), [(name, argument) for name, (_, arguments) in GOOD.items() for argument in arguments]
+)
+def test_one_odd_argument_is_answered_or_refused_in_words(
+    name: str, argument: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    function, arguments = GOOD[name]
+    for odd in itertools.chain(ODD, (make() for make in GENERATORS)):
+        if name == "run" and isinstance(odd, str) and odd == "smoke":
+            continue  # a plan that is there
+        if argument == "observer" and callable(odd):
+            continue  # what the caller's own function raises is the caller's
+        answered(function, arguments | {argument: odd})
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", ["HeavyTop", "State", "propagate", "ensemble", "reference", "score", "compare"])
+def test_two_odd_arguments_at_once_are_answered_or_refused_in_words(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    random = Random(7)
+    function, arguments = GOOD[name]
+    for _ in range(150):
+        names = [each for each in arguments if each != "observer"]
+        changed = {each: random.choice(ODD) for each in random.sample(names, 2)}
+        answered(function, arguments | changed)
+
+
+NUMBERS = [value for value in ODD if not isinstance(value, list | tuple | dict | set)]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_one_odd_component_is_answered_or_refused_in_words() -> None:
+    for odd in NUMBERS:
+        answered(ht.HeavyTop, {"inertia": (3, odd, 1), "weight": 1, "centre": (0, 0, 1)})
+        answered(ht.State, {"omega": (0, 0, 1), "gamma": (0, odd, 1)})
+        for name, argument, value in (
+            ("propagate", "times", [odd, 2]),
+            ("propagate", "xi", [0, odd, 0]),
+            ("reference", "times", [1, odd]),
+            ("score", "times", [odd]),
+            ("score", "states", [[0.1, odd, 0.9, 0.6, 0.0, 0.8]]),
+            ("ensemble", "tops", [odd, TOP]),
+        ):
+            function, arguments = GOOD[name]
+            answered(function, arguments | {argument: value})
+
+
+@pytest.mark.parametrize(
+    ("call", "cause"),
+    [
+        (lambda: ht.HeavyTop("321", 1, (0, 0, 0)), "inertia: '321' is a str"),
+        (lambda: ht.HeavyTop({3, 2, 1}, 1, (0, 0, 0)), "inertia: {1, 2, 3} is a set"),
+        (lambda: ht.HeavyTop((True, 2, 1), 1, (0, 0, 0)), "inertia: A bool is not a number: True"),
+        (lambda: ht.HeavyTop((np.True_, 2, 1), 1, (0, 0, 0)), "A bool is not a number"),
+        (lambda: ht.real(53.0), "53.0 is not an integer"),
+        (lambda: ht.real(True), "True is not an integer"),
+        (lambda: ht.real(10**5000), "is not a format"),
+        (lambda: ht.propagate(TOP, START, [1], "single"), "Unknown precision 'single'"),
+        (lambda: ht.propagate(TOP, START, [1], ht.Precision("double", 99)), "Unknown precision"),
+        (lambda: ht.propagate(TOP, START, [1], tolerance=0), "The tolerance 0 cannot be kept in double"),
+        (lambda: ht.propagate(TOP, START, [1], tolerance=-1), "The tolerance -1"),
+        (lambda: ht.propagate(TOP, START, [1], tolerance=1e-17), "cannot be kept in double"),
+        (lambda: ht.propagate(TOP, START, [1], tolerance=math.nan), "nan is not a finite number"),
+        (lambda: ht.propagate(TOP, START, [1], tolerance="tight"), "'tight' is not a finite number"),
+        (lambda: ht.propagate(TOP, START, [1], xi=(1, 0)), "xi has 2 numbers"),
+        (lambda: ht.propagate(TOP, START, [1], xi=(0, 2, 0)), "|xi|^2 - 1 = 3"),
+        (lambda: ht.propagate(TOP, START, [1], xi=(1, 0, 0)), "xi·gamma = 0.6"),
+        (lambda: ht.propagate(TOP, START, [1], step_limit=-1), "step_limit = -1"),
+        (lambda: ht.propagate(TOP, START, [1], observer=3), "observer = 3 cannot be called"),
+        (lambda: ht.propagate(TOP, START, [1], integrator="rk4"), "Unknown integrator 'rk4'"),
+        (lambda: ht.propagate(TOP, START, [1], integrator="splitting:4", step_limit=3), "has no step_limit"),
+        (lambda: ht.propagate(TOP, START, [1], system="pendulum"), "Unknown system 'pendulum'"),
+        (lambda: ht.propagate(TOP, ht.State((0, 0, 1), (1, 1, 0)), [1]), "gamma is not a unit vector"),
+        (lambda: ht.propagate(TOP, (0, 0, 1), [1]), "start = (0, 0, 1) is not a State"),
+        (lambda: ht.propagate(TOP, START, "123"), "times: '123' is a str"),
+        (lambda: ht.ensemble([TOP] * 2, [START] * 3, [1]), "2 tops and 3 starts"),
+        (lambda: ht.ensemble([], START, [1]), "0 tops"),
+        (lambda: ht.ensemble(TOP, START, [1], threads=0), "threads = 0"),
+        (lambda: ht.reference(TOP, START, [1], 0), "0 digits are not available"),
+        (lambda: ht.reference(TOP, START, []), "No times"),
+        (lambda: ht.score([1], np.zeros((1, 9)), top=TOP, start=START), "states has the shape (1, 9)"),
+        (lambda: ht.score([1, 2], np.zeros((1, 6)), top=TOP, start=START), "2 times and 1 states"),
+        (lambda: ht.score([1], [[1, 2, 3]], top=TOP, start=START), "states[0] has 3 numbers"),
+        (lambda: ht.compare("nowhere", "nowhere"), "There is no report"),
+        (lambda: ht.run("smok"), "Unknown plan 'smok'"),
+        (lambda: ht.audit("paper"), "Unknown claim 'paper'"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_value(call: Callable[[], object], cause: str) -> None:
+    with pytest.raises(ht.InputError) as caught:
+        call()
+    assert cause in caught.value.cause
+    assert caught.value.remedy

@@ -1,0 +1,98 @@
+"""Signs and balls of the claims' algebra: true where they are told, against plain numbers."""
+
+from __future__ import annotations
+
+import math
+import random
+from fractions import Fraction
+
+import pytest
+import sympy
+
+from heavytop.claims.algebra import Assumptions, Field
+from heavytop.claims.conditions import is_exactly_zero
+from heavytop.claims.evaluate import evaluate
+from heavytop.claims.ideal import forces_zero
+from heavytop.claims.structure import sign_of
+
+T, A, B = sympy.Symbol("t", real=True), sympy.Symbol("a", positive=True), sympy.Symbol("b", positive=True)
+X = sympy.Symbol("x", real=True)
+POSITIVE = [
+    T**2 + T + 1,
+    T**4 - T**2 + 1,
+    2 + sympy.sin(T),
+    5 - 4 * sympy.cos(T) * sympy.sin(X),
+    sympy.exp(2 * T) - sympy.exp(T) + 1,
+    1 - sympy.tanh(T),
+    sympy.sqrt(1 + T**2) - T,
+    sympy.sqrt(T**2 + A) + sympy.sqrt(T**2),
+    2 + sympy.atan(T),
+    sympy.sqrt(2) + sympy.sqrt(3) - sympy.pi,
+    A * T**2 - A * T + A,
+    1 + sympy.sin(T) * sympy.cos(T),
+]
+NOT_POSITIVE = [
+    T**2 + 2 * T + 1 - Fraction(1, 10**30),
+    1 + sympy.sin(T),
+    A - B,
+    sympy.sqrt(1 + T**2) - T - 1,
+    sympy.sqrt(3) + sympy.sqrt(2) - sympy.pi - sympy.Rational(1, 200),
+    1 + 2 * sympy.sin(T) * sympy.cos(T),
+]
+
+
+def _sign(expression, sign=0):
+    field = Field(Assumptions(T, (A, B), (), sign), [expression])
+    return field.tower.sign(field.enter(expression))
+
+
+@pytest.mark.parametrize("expression", POSITIVE)
+def test_what_is_positive_everywhere_is_told(expression):
+    assert _sign(expression) == (1, True)
+
+
+@pytest.mark.parametrize("expression", NOT_POSITIVE)
+def test_what_may_be_0_is_not_called_positive(expression):
+    assert _sign(sympy.sympify(expression)) != (1, True)
+
+
+def test_no_sign_that_is_told_is_false():
+    draw = random.Random(11)
+    atoms = [T, A, X, sympy.sin(T), sympy.cos(T), sympy.exp(T), sympy.sqrt(1 + T**2), sympy.Integer(1), sympy.sqrt(2)]
+    told = 0
+    for _ in range(60):
+        terms = [draw.choice([-1, 1, 1, 3]) * draw.choice(atoms) ** draw.choice([1, 2, 2]) for _ in range(3)]
+        expression = sympy.Add(*terms)
+        for found in (_sign(expression), sign_of(expression)):
+            told += bool(found.value or found.strict)
+            for _ in range(12):
+                place = {T: draw.gauss(0, 2), X: draw.gauss(0, 2), A: abs(draw.gauss(0, 1)) + 1e-3}
+                value = float(expression.subs(place))
+                assert not found.value or value * found.value > -1e-9 * (1 + abs(value)), expression
+    assert told > 10
+
+
+def test_a_power_of_a_ball_around_0_is_finite():
+    for exponent in (2, 3, 7):
+        value = evaluate((sympy.pi - sympy.pi / 3 * 3 + T) ** exponent, {T: Fraction(0)}, 64)
+        assert value.is_finite()
+        assert value.contains(0)
+    assert evaluate(T**2, {T: Fraction(-3)}, 64) == 9
+    assert math.isclose(float(evaluate(T**-3, {T: Fraction(2)}, 64)), 1 / 8)
+
+
+def test_zero_at_a_sample_is_exact():
+    assert is_exactly_zero(T**2 - 4, {T: Fraction(2)})
+    assert is_exactly_zero(T**2 - 4, {T: 2 + Fraction(1, 10**400)}) is False
+    assert is_exactly_zero(sympy.sqrt(T), {T: Fraction(0)})
+    assert is_exactly_zero(sympy.sqrt(T), {T: Fraction(-1)}) is None
+    assert is_exactly_zero(sympy.sqrt(3 + 2 * T) - 1 - T, {T: Fraction(1, 10**300)}) is False
+
+
+def test_the_radical_is_asked_for_by_name():
+    field = Field(Assumptions(T, ()), [T, X])
+    t, x = (field.enter(symbol).numerator for symbol in (T, X))
+    assert forces_zero([t * t], t, radical=True)
+    assert not forces_zero([t * t], t, radical=False)
+    assert not forces_zero([t * t], x, radical=True)
+    assert forces_zero([t * t], t * t * x, radical=False)
