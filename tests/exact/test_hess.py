@@ -148,3 +148,14 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
         Hess(TOP, State(("3/4", 0, -1), (0, 1, 0)))
     with pytest.raises(NotInClass, match="a pendulum's"):
         HessPendulum(TOP, State((0, 3, 0), (1, 0, 1)))
+
+
+@pytest.mark.parametrize("lift", [F(1, 10), F(1, 10**12), F(-1, 10**30)])
+def test_heights_that_all_but_rest_are_levels_like_any_other(lift):
+    # at lift 0 the cubic has a double root at s = −1: the spherical pendulum goes round level
+    top = HeavyTop((1, 1, 1), 1, (0, 0, 1))
+    with pytest.raises(NotInClass, match="rests at a double root"):
+        Hess(top, State((1, 0, 0), (1, 0, -1)))
+    motion = Hess(top, State((F(1) + lift, 0, 0), (F(1), 0, F(-1))))
+    assert_solves(motion, F(7, 3))
+    assert_narrow(motion, F(10**6))

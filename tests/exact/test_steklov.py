@@ -105,3 +105,10 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
         Steklov(top, State(start.omega, (0, 0, 0)))
     with pytest.raises(InputError, match="No Steklov top has moments"):
         steklov_motion(F(1), F(1, 2), F(1), F(1))
+
+
+@pytest.mark.parametrize("distance", [F(1, 10**12), F(1, 10**30), F(1, 10**400)])
+def test_moments_too_nearly_equal_are_left_to_the_enclosure(distance):
+    ratio = F(1, 2)
+    with pytest.raises(NotInClass, match="all but satisfy an equality"):
+        steklov_motion(F(1), (1 + ratio**2 + 2 * distance) / (2 + 2 * ratio**2), ratio, F(2))

@@ -30,12 +30,12 @@ from typing import Any
 
 from flint import acb, arb, arb_mat, arb_series, fmpq_poly
 
-from heavytop.errors import NotInClass
+from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.abel import Inversion
-from heavytop.exact.balls import ball, midpoint
+from heavytop.exact.balls import ball, midpoint, working_precision
 from heavytop.exact.closed_form import ClosedForm
-from heavytop.exact.flint_context import current_length, current_precision
-from heavytop.exact.gaps import Gap, Roots
+from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
+from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
 from heavytop.exact.hess_transfer import System2, Transfer
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import in_units
@@ -45,6 +45,8 @@ from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
+_TRIALS = 256, 1024, 4096
+_MOST_TERMS = 1 << 14
 _REMEDY = "The validated enclosure holds for every motion."
 
 
@@ -90,6 +92,7 @@ class Hess(ClosedForm):
         cubic = level.cubic()
         if cubic.gcd(cubic.derivative()).degree() > 0:
             raise NotInClass("The level is degenerate: P r·gamma rests at a double root.", _REMEDY)
+        _require_reach(level)
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -103,6 +106,21 @@ class Hess(ClosedForm):
 @kept
 def _motion(case: Hess, _bits: int) -> HessMotion:
     return HessMotion.of(Level.of(case.top, case.start))
+
+
+@whole_evaluation
+def _require_reach(level: Level) -> None:
+    """Raises NotInClass where the Fourier series of the elliptic integral is too long."""
+    for bits in _TRIALS:
+        with working_precision(bits):
+            try:
+                level.gap(_MOST_TERMS)
+            except Undecided:
+                continue
+            except OutOfReach as error:
+                raise NotInClass(f"The level is all but degenerate: {error.cause}", _REMEDY) from error
+            return
+    raise NotInClass("The level is all but degenerate: two roots of the cubic are not told apart.", _REMEDY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +185,18 @@ class Level:
         limit = polynomial(square * dot(self.gamma, self.gamma), zero, -one)
         return 2 * polynomial(self.energy, -one) * limit - polynomial(self.area**2 * square)
 
+    def gap(self, most: int = MOST_TERMS) -> Gap:
+        """Where s swings, at the working precision; raises OutOfReach, and Undecided where roots are not told apart."""
+        low, high, top = self.roots()
+        if not low < high < top:
+            raise Undecided
+        return Gap(low, high, Roots.of(arb(2), [(acb(top), 1)]), count=1, most=most)
+
+    def roots(self) -> list[arb]:
+        """The three roots of the cubic, in order."""
+        found: Any = self.cubic().complex_roots()
+        return sorted((root.real for root, _ in found), key=midpoint)
+
     def in_plane(self, vector: tuple[Fraction, ...]) -> tuple[arb, arb]:
         """The components along e_x and e_y."""
         a, _, c = self.moment
@@ -196,9 +226,7 @@ class HessMotion:
 
         Raises Undecided where it does not suffice, OutOfReach where the series need too many terms.
         """
-        found: Any = level.cubic().complex_roots()
-        low, high, top = sorted((root.real for root, _ in found), key=midpoint)
-        gap = Gap(low, high, Roots.of(arb(2), [(acb(top), 1)]), count=1)
+        gap, (_, high, top) = level.gap(), level.roots()
         energy, area, size = ball(level.energy), ball(level.area), ball(level.moment_square).sqrt()
         linear = System2(gap.reach, energy - high, top - high, size * area, ball(level.skew))
         matrix = Transfer.of(linear)

@@ -28,13 +28,14 @@ from flint import acb, arb, arb_series, fmpq, fmpq_poly
 
 from heavytop.errors import NotInClass
 from heavytop.exact.abel import Inversion
-from heavytop.exact.balls import ball, midpoint
-from heavytop.exact.flint_context import current_length
-from heavytop.exact.gaps import Gap, Roots
+from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.flint_context import current_length, whole_evaluation
+from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
 from heavytop.exact.reduced import Undecided
 
 _X = fmpq_poly([0, 1])
 _HALF = fmpq(1, 2)
+_SEARCH_BITS = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +72,9 @@ class Curve:
                     f"Omega2^2 and Omega3^2 are not these polynomials of Omega1: {defect} is not 0.",
                     "The coefficients follow from the moments of inertia.",
                 )
+        product = second * third
+        if product.gcd(product.derivative()).degree() > 0:
+            raise NotInClass("Omega2^2 Omega3^2 has a multiple root.", "Choose other moments of inertia.")
         return cls(inertia, power, second, third, Fraction(int(speed.p), int(speed.q)), (s, t, u))
 
     def squares(self, x: Fraction) -> tuple[Fraction, Fraction]:
@@ -117,17 +121,17 @@ class OneGapMotion:
     signs: tuple[int, int]
 
     @classmethod
-    def of(cls, curve: Curve, x: Fraction, signs: tuple[int, int]) -> OneGapMotion:
+    def of(cls, curve: Curve, x: Fraction, signs: tuple[int, int], most: int = MOST_TERMS) -> OneGapMotion:
         """From x and the signs of √Q and √R there, 0 where they vanish; at the working precision.
 
-        Raises Undecided where it does not suffice, OutOfReach where the Fourier series needs too many terms.
+        Raises Undecided where it does not suffice, OutOfReach where the Fourier series needs more than ``most`` terms.
         """
         roots, leads = _roots(curve), [_lead(part) for part in (curve.second, curve.third)]
         low, high = _gap_ends(roots, leads[0] * leads[1], ball(x))
         others = [root for root in roots if root not in (low, high)]
         of = [[(root.place, 1) for root in others if root.of == which] for which in (0, 1)]
         lead = ball(curve.speed) ** 2 * abs(leads[0] * leads[1])
-        gap = Gap(low.place.real, high.place.real, Roots.of(lead, of[0] + of[1]), count=1)
+        gap = Gap(low.place.real, high.place.real, Roots.of(lead, of[0] + of[1]), count=1, most=most)
         rests = Roots.of(abs(leads[0]), of[0]), Roots.of(abs(leads[1]), of[1])
         q, r = (sign * ball(square).sqrt() for sign, square in zip(signs, curve.squares(x), strict=True))
         slope = ball(curve.speed) * q * r * gap.density(ball(x))
@@ -196,6 +200,14 @@ def in_units(motion: Sequence[Any], rate: Fraction, size: Fraction) -> list[Any]
         arb_series([unit * factor * component[n] for n, factor in enumerate(factors)], prec=len(factors))
         for unit, component in zip(units, motion, strict=True)
     ]
+
+
+@whole_evaluation
+def gaps(curve: Curve) -> list[tuple[float, float]]:
+    """Where Q and R are both positive between two of their roots."""
+    with working_precision(_SEARCH_BITS):
+        real = sorted(float(root.place.real) for root in _roots(curve) if root.place.imag.is_zero())
+        return [ends for ends in pairwise(real) if min(curve.squares(Fraction(sum(ends) / 2))) > 0]
 
 
 def _lead(polynomial: fmpq_poly) -> arb:

@@ -20,10 +20,10 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import InputError, NotInClass
-from heavytop.exact.balls import ball
+from heavytop.errors import InputError, NotInClass, OutOfReach
+from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.closed_form import ClosedForm
-from heavytop.exact.flint_context import current_precision
+from heavytop.exact.flint_context import current_precision, whole_evaluation
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import Curve, OneGapMotion, in_units, value
 from heavytop.exact.reduced import Undecided, polynomial
@@ -32,6 +32,10 @@ from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
+_TRIALS = 256, 1024, 4096
+_TERMS_A_BIT = 64
+"""How long the Fourier series may be at a working precision: 2^14 terms at 256 bits."""
+_LEFT = "The validated enclosure holds for every motion."
 _REMEDY = "`steklov_motion` builds a top with such a motion."
 
 
@@ -63,6 +67,7 @@ class Steklov(ClosedForm):
                 "Steklov needs three different moments of inertia, I1 != 2 I2, I1 != 2 I3.", "Choose other moments."
             )
         _curve(self.top, self.start)
+        _require_reach(self)
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -75,10 +80,26 @@ class Steklov(ClosedForm):
 
 
 @kept
-def _motion(case: Steklov, _bits: int) -> OneGapMotion:
+def _motion(case: Steklov, bits: int) -> OneGapMotion:
     rate, _ = _units(case.top, case.start)
     p, q, r = (w / rate for w in case.start.omega)
-    return OneGapMotion.of(_curve(case.top, case.start), p, ((q > 0) - (q < 0), (r > 0) - (r < 0)))
+    signs = (q > 0) - (q < 0), (r > 0) - (r < 0)
+    return OneGapMotion.of(_curve(case.top, case.start), p, signs, max(bits, _TRIALS[0]) * _TERMS_A_BIT)
+
+
+@whole_evaluation
+def _require_reach(case: Steklov) -> None:
+    """Raises NotInClass where the Fourier series of Abel's integral is too long."""
+    for bits in _TRIALS:
+        with working_precision(bits):
+            try:
+                _motion(case, bits)
+            except Undecided:
+                continue
+            except OutOfReach as error:
+                raise NotInClass(f"Two moments of inertia all but satisfy an equality: {error.cause}", _LEFT) from error
+            return
+    raise NotInClass("The start is too near to a turning point to tell on which side of it.", _LEFT)
 
 
 def _units(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
