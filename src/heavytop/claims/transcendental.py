@@ -96,8 +96,7 @@ class Transcendental:
         return terms if all(self._is_multiple(term) for term in terms) else [argument]
 
     def _is_multiple(self, argument: Quotient) -> bool:
-        ratios = (self._tower.divide(argument, base) for kind, base, _ in self._bases if kind == "exp")
-        return any(not used(ratio.numerator) and ratio.denominator == self._tower.one for ratio in ratios)
+        return any(self._tower.ratio(argument, base) is not None for kind, base, _ in self._bases if kind == "exp")
 
     def _without_logarithms(self, argument: Quotient) -> tuple[Quotient, Quotient]:
         """(argument without multiples of logarithms, their exponentials)."""
@@ -133,15 +132,14 @@ class Transcendental:
         """
         for position, (known_kind, base, index) in enumerate(self._bases):
             if kind == known_kind:
-                ratio = self._tower.divide(argument, base)
-                if not used(ratio.numerator) and ratio.denominator == self._tower.one:
-                    value = ratio.numerator.leading_coefficient()
-                    if value.q > 1:
-                        self._divisors[position] *= int(value.q)
+                value = self._tower.ratio(argument, base)
+                if value is not None:
+                    if value.denominator > 1:
+                        self._divisors[position] *= value.denominator
                         raise Refine
-                    if abs(value.p) > _MAX_MULTIPLE:
-                        raise Unprovable(f"A multiple {value.p} of an argument.")
-                    return index, int(value.p)
+                    if abs(value) > _MAX_MULTIPLE:
+                        raise Unprovable(f"A multiple {value} of an argument.")
+                    return index, int(value)
         if len(self._divisors) <= len(self._bases):
             self._divisors.append(1)
         divisor = self._divisors[len(self._bases)]
@@ -166,6 +164,9 @@ class Transcendental:
         return total
 
     def _circle_of_term(self, value: Quotient) -> Circle:
+        known = self._circle_of_number(value)
+        if known is not None:
+            return known
         inverse = self._inverse_multiple(value)
         if inverse is not None:
             return self._turned(*inverse)
@@ -187,6 +188,17 @@ class Transcendental:
         t = self._tower
         cosine = self._tower.signs.circles[index]
         return self._turned((t.polynomial(t.gens[index]), t.polynomial(t.gens[cosine])), multiple)
+
+    def _circle_of_number(self, value: Quotient) -> Circle | None:
+        """(sin, cos) of a multiple of π/12, in square roots."""
+        turn = self._tower.ratio(value, self._field.enter(sympy.pi)) if self._is_number(value) else None
+        if turn is None or 12 % turn.denominator:
+            return None
+        angle = sympy.pi * sympy.Rational(turn.numerator, turn.denominator)
+        return self._field.enter(sympy.sin(angle)), self._field.enter(sympy.cos(angle))
+
+    def _is_number(self, value: Quotient) -> bool:
+        return used(value.numerator) <= self._tower.signs.numbers.keys()
 
     def _inverse_multiple(self, value: Quotient) -> tuple[Circle, int] | None:
         """((sin, cos) of an inverse function, n) where the value is n times it."""
