@@ -213,7 +213,8 @@ class Tower:
 
     def ratio(self, a: Quotient, b: Quotient) -> Fraction | None:
         """The number c with a = c b, where there is one; nothing is divided for it."""
-        above, below = self.times(a.numerator, b.denominator), self.times(b.numerator, a.denominator)
+        above = self.reduce(self.times(a.numerator, b.denominator))
+        below = self.reduce(self.times(b.numerator, a.denominator))
         if not above or not below:
             return None
         c = above.leading_coefficient() / below.leading_coefficient()

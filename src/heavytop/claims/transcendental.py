@@ -14,6 +14,7 @@ import sympy
 from flint import fmpz
 
 from heavytop.claims.evaluate import evaluate
+from heavytop.claims.inverse import is_below_quarter, same_as
 from heavytop.claims.rational import Quotient
 from heavytop.claims.signs import NUMBER_BITS, Sign, Unprovable, used
 
@@ -182,6 +183,9 @@ class Transcendental:
             self._tower.signs.circles[index] = partner
             unit = (Fraction(-1), Fraction(1))
             self._tower.signs.ranges |= {index: unit, partner: unit}
+            if is_below_quarter(self._field, base):
+                for positive in (self._tower.gens[partner], *(1 + n * self._tower.gens[index] for n in (-1, 1))):
+                    self._tower.signs.declare(positive, Sign(1, True))
             return index
 
         index, multiple = self._multiple("circle", value, make)
@@ -293,8 +297,11 @@ class Transcendental:
 
     def function(self, name: str, arguments: tuple[Quotient, ...]) -> Quotient:
         """A free generator for a function of these arguments: the same arguments, the same generator."""
-        key = (name, *(str((a.numerator, a.denominator)) for a in arguments))
+        key = _key(name, *arguments)
         if key not in self._functions:
+            same = same_as(name, arguments[0], self._field, self._known)
+            if same is not None:
+                return same
             make = getattr(sympy, name)
             meaning = make(*(self._field.expression(argument) for argument in arguments), evaluate=False)
             sign = Sign(0, False)
@@ -308,6 +315,10 @@ class Transcendental:
             self._functions[key] = index
         return self._tower.polynomial(self._tower.gens[self._functions[key]])
 
+    def _known(self, name: str, argument: Quotient) -> Quotient | None:
+        index = self._functions.get(_key(name, argument))
+        return None if index is None else self._tower.polynomial(self._tower.gens[index])
+
     def _new(self, kind: str, meaning: sympy.Expr, arguments: tuple[Quotient, ...], sign: Sign) -> int:
         constant = all(self._field.is_constant(argument) for argument in arguments)
         index = self._tower.add(
@@ -320,6 +331,10 @@ class Transcendental:
     def _set_number(self, index: int, meaning: sympy.Expr) -> None:
         if not meaning.free_symbols:
             self._tower.signs.numbers[index] = evaluate(meaning, {}, NUMBER_BITS)
+
+
+def _key(name: str, *arguments: Quotient) -> tuple[str, ...]:
+    return (name, *(str((argument.numerator, argument.denominator)) for argument in arguments))
 
 
 def _single(monomial: Any) -> int | None:
