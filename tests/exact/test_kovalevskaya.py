@@ -13,6 +13,7 @@ from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.kovalevskaya_abel import AbelMotion
 from heavytop.exact.kovalevskaya_level import Level
 from heavytop.exact.kovalevskaya_theta import ThetaMotion
+from heavytop.exact.resting import Rest
 from heavytop.exact.validated import Validated
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -156,6 +157,26 @@ def test_asymptotic_motions_are_motions_like_any_other(omega, gamma):
     assert all(a.overlaps(b) for a, b in pairs)
 
 
+@pytest.mark.parametrize(
+    ("omega", "gamma", "resting"),
+    [
+        ((F(-7, 6), F(-5, 6), -1), OTHER, 1),
+        ((F(-1, 2), 0, F(-4, 3)), (F(3, 5), 0, F(4, 5)), 1),
+        ((F(-7, 6), F(5, 6), F(-1, 6)), OTHER, 0),
+        ((0, F(-4, 3), 0), UP, 0),
+    ],
+)
+def test_a_variable_may_rest_at_a_double_root(omega, gamma, resting):
+    motion = motion_from((F(1), F(0)), omega, gamma)
+    for time in (F(7, 3), F(-40), F(10**6)):
+        assert_solves(motion, time)
+        assert_narrow(motion, time)
+    for form in motion.made.values():
+        assert isinstance(form.variables[resting], Rest)
+    pairs = zip(motion.state(F(5), 180), Validated(motion.top, motion.start).state(F(5), 180), strict=True)
+    assert all(a.overlaps(b) for a, b in pairs)
+
+
 def test_a_thousand_digits_come_out():
     assert_narrow(motion_from((F(3, 5), F(1, 3)), (F(1, 3), F(4, 5), F(-7, 10)), TILTED), F(10**6), 1000)
 
@@ -179,7 +200,9 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
     [
         ((1, F(1, 2), F(1, 3)), (F(3, 4), 1, F(1, 5)), "Delone"),
         ((F(1, 2), F(1, 3), 0), UP, "e = -13/36.*both separated variables"),
-        ((F(-7, 6), F(-5, 6), -1), OTHER, "e = 23/18.*rests at e"),
+        ((F(-5, 6), F(-1, 6), F(-1, 2)), OTHER, "e = -7/18.*rests at e, and the other passes it"),
+        ((F(-1, 2), F(1, 2), -1), UP, "too near"),
+        ((-1, 0, -1), UP, "cubic .* has a double root"),
     ],
 )
 def test_levels_that_are_not_done_are_named(omega, gamma, name):
