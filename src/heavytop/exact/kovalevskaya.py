@@ -33,7 +33,8 @@ from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.balls import to_bits, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
-from heavytop.exact.kovalevskaya_abel import AbelMotion, Interval, intervals, ordered, pole
+from heavytop.exact.kovalevskaya_abel import AbelMotion
+from heavytop.exact.kovalevskaya_gaps import Interval, intervals, ordered, pole
 from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
 from heavytop.exact.motion import kept
