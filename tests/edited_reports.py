@@ -242,6 +242,14 @@ def starts_fewer(row: Document, _: Random) -> bool:
     return bool(was > 1)
 
 
+def samples_fewer(row: Document, random: Random) -> bool:
+    was = row.get("samples", 0)
+    held = max((len(series["times"]) for series in row["series"].values()), default=0)
+    row["samples"] = random.choice([0, 1, was // 3, was - 1])
+    # what the series hold is known, and samples that are steps may be fewer as these may
+    return row["measure"] != "local_error" and was > max(1, held)
+
+
 def start_failed(row: Document, random: Random) -> bool:
     metric = row["metrics"].get("starts_failed")
     if metric:
@@ -328,7 +336,7 @@ EDITS: dict[str, Edit] = {
         band_where_none_is_measured, unresolved, no_number, kind_flipped, log10_alone, duration_shorter,
         value_changed, verdict_turned, metric_dropped, series_dropped, law_dropped, series_shorter, series_larger,
         series_without_its_end, not_finite_hidden, outcome, not_finite, horizon_shorter, reached_less, no_steps,
-        more_steps, bits, precision, starts_fewer, start_failed, flags, order, rounding, subject,
+        more_steps, bits, precision, starts_fewer, samples_fewer, start_failed, flags, order, rounding, subject,
     )
 } | {
     "reference computed": _reference("known: |[(]proven[^)]*[)]", lambda at: "computed: " if ":" in at[0] else ""),
@@ -337,6 +345,12 @@ EDITS: dict[str, Edit] = {
     "no radius": _reference(r", radius below [^;]+", lambda _: ""),
     "digits fewer": _reference(r"to (\d+) digits", lambda _: "to 5 digits"),
     "no certificate": _reference(r"; certified .*", lambda _: ""),
+    "certified at an earlier time": _reference(
+        r"certified at t = (-?)[\d./]+", lambda at: f"certified at t = {at[1]}1/99"
+    ),
+    "starts certified to fewer digits": _reference(r"\d+ digits or more", lambda _: "5 digits or more"),
+    "computed reference checked on fewer starts": _reference(r"on (\d+) starts up", lambda _: "on 1 starts up"),
+    "computed reference checked up to an earlier time": _reference(r"\|t\| = [^,]+, its", lambda _: "|t| = 0.3, its"),
     "starts not certified": _reference(r"\d+ of (\d+) starts", lambda found: f"3 of {found[1]} starts"),
     "computed reference worse": _reference(r"is \S+ of the error", lambda _: "is 2 of the error"),
     "exponent larger in a wide interval": _law(

@@ -378,3 +378,25 @@ def test_reference_refuses_what_it_cannot_prove(changes, more, code, message) ->
     assert message in done.stderr
     assert done.stdout == ""
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("precision", ["double", "double-double", "quad", "real:300"])
+def test_propagate_by_words_says_what_it_is(precision: str) -> None:
+    common = "--inertia 3,2,1 --weight 1 --centre 1/2,1/3,1/5 --omega 1/10,2/5,9/10 --gamma 3/5,0,4/5 --times -1,-2"
+    done = run("propagate", *common.split(), "--precision", precision, "--integrator", "words", "--attitude", "--json")
+    assert done.returncode == 0
+    document = json.loads(done.stdout)
+    assert document["integrator"] == "words"
+    assert document["precision"] == precision
+    assert document["outcome"] == "success"
+    assert {"words", "bits", "step_rule", "tolerance"} <= set(document["flags"])
+    assert len(document["angles"]) == len(document["states"]) == 2
+
+
+def test_an_integrator_that_is_none_and_a_format_beyond_words_are_refused() -> None:
+    common = "--inertia 3,2,1 --weight 1 --centre 1/2,1/3,1/5 --omega 1/10,2/5,9/10 --gamma 3/5,0,4/5 --times 1"
+    for options in ("--integrator euler", "--integrator words --precision real:2000", "--precision double-double"):
+        done = run("propagate", *common.split(), *options.split())
+        assert done.returncode == 2
+        assert "words" in done.stderr
+        assert "Traceback" not in done.stderr

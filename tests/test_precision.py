@@ -128,7 +128,7 @@ def test_unknown_formats_are_refused(name: str) -> None:
 
 def test_every_family_is_available_or_says_why_not() -> None:
     answer = available()
-    assert set(answer) == {"double", "extended", "quad", "real"}
+    assert set(answer) == {"double", "extended", "double-double", "quad", "real"}
     assert all(reason is None or len(reason) > 10 for reason in answer.values())
     assert answer["double"] is None
 

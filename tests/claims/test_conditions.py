@@ -97,6 +97,8 @@ ON_AXIS_1 = "0 1 2 1 0 0"
     ("table", "named"),
     [
         (free("Omega3", ("Omega1",), state=ON_AXIS_1), "Omega1 = 0 is kept by the flow"),
+        # on Ω1² = 0 every rate is 0, and yet Ω1 does not stay 0
+        (free("Omega3", ("Omega1^2",), state=ON_AXIS_1), "Omega1**2 = 0 is kept"),
         (free("Omega3", ("Omega1*Omega2",), state=ON_AXIS_1), "Omega1*Omega2 = 0 is kept"),
         (free("sqrt(Omega1)", kind="relation", state=ON_AXIS_1), "Omega1"),
         (free("Omega1^2 + 1", kind="relation", state=ON_AXIS_1), "no sample is proven to lie on the relations"),
@@ -117,6 +119,15 @@ def test_the_square_of_what_does_not_stay_0_is_no_invariant_relation():
     assert judged(free("Omega1", kind="relation", state=ON_AXIS_1)).verdict == "refuted"
     area = "2*Omega1*gamma1 + 3*Omega2*gamma2 + 5*Omega3*gamma3"
     assert judged(free(area, kind="relation", state="0 0 2 1 0 0")).verdict == "holds"
+
+
+def test_what_is_not_0_is_not_positive_for_that() -> None:
+    """Ω3 of a symmetric top stays what it is: not 0, of either sign."""
+    top = {"inertia": ["2", "2", "5"], "weight": "1", "centre": ["0", "0", "1"]}
+    table = free("gamma3*(sqrt(Omega3^2) - Omega3)/Omega3", state="1 0 -1 3/5 0 4/5") | {"top": top}
+    assert judged(table).verdict != "holds"
+    table["integral"]["states"] = [["1", "0", "1", "3/5", "0", "4/5"]]
+    assert judged(table).verdict != "holds"
 
 
 def test_a_state_off_its_condition_by_1e_200_refutes_nothing():

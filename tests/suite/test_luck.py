@@ -6,10 +6,11 @@ import msgspec
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.measure.scalar import of_fraction
-from heavytop.precision import exact
-from heavytop.records import SCHEMA, Report, Row
+from heavytop.measure.scalar import UNRESOLVED, of_fraction
+from heavytop.precision import decimal_text, exact
+from heavytop.records import SCHEMA, Report, Row, Series
 from heavytop.report.compare import compare
+from heavytop.report.consistency import contradictions
 from heavytop.report.policy import Policy
 from heavytop.report.verdicts import Verdict
 from heavytop.suite.measurements import measure
@@ -101,19 +102,26 @@ def test_rows_without_a_band_are_the_same_with_other_roundings_too() -> None:
             assert (one.metrics == two.metrics) == (one.measure == "claim_evaluation")
 
 
-def planted(row: Row, factor: str) -> Row:
+def planted(row: Row, factor: int) -> Row:
+    """All errors of a row ``factor`` times as large: those of its metrics, and those that its series hold."""
     metrics = {
-        name: msgspec.structs.replace(of_fraction(exact(m.value) * exact(factor)), band=m.band)
+        name: msgspec.structs.replace(of_fraction(exact(m.value) * factor), band=m.band)
         if m.kind == "error" and m.log10 is not None
         else m
         for name, m in row.metrics.items()
     }
-    return msgspec.structs.replace(row, metrics=metrics)
+    series = {
+        name: Series(each.times, [decimal_text(exact(v) * factor, 8) if v != UNRESOLVED else v for v in each.values])
+        for name, each in row.series.items()
+    }
+    made = msgspec.structs.replace(row, metrics=metrics, series=series)
+    assert not list(contradictions(made))
+    return made
 
 
 def test_errors_a_thousand_times_larger_are_worse_in_every_row(reports: list[Report]) -> None:
     for other in reports[1:]:
-        bad = msgspec.structs.replace(other, rows=[planted(row, "1000") for row in other.rows])
+        bad = msgspec.structs.replace(other, rows=[planted(row, 1000) for row in other.rows])
         result = compare(reports[0], bad, Policy())
         worse = {finding.key for finding in result.findings if finding.verdict is Verdict.WORSE}
         assert worse == {row.key for row in other.rows}

@@ -120,7 +120,11 @@ def is_exactly_zero(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fracti
     if not all(need.is_met(values) for need in conditions_of([expression])):
         return None
     exact = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in values.items()}
-    value = expression.subs(exact, simultaneous=True) if expression.free_symbols else expression
+    try:
+        value = expression.subs(exact, simultaneous=True) if expression.free_symbols else expression
+    except ValueError:
+        # sympy cannot take the root of some numbers of hundreds of digits
+        return None
     if value.is_Rational:
         return bool(value == 0)
     ball: arb = evaluate(expression, values, _BITS)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.precision import exact, log10
@@ -11,9 +14,14 @@ from heavytop.precision import exact, log10
 _NUMBER = r"(-?[\d./]+(?:[eE][-+]?\d+)?)"
 _RADIUS = re.compile(rf"(?:radius below|agree within) {_NUMBER}")
 _CERTIFIED = re.compile(rf"certified at t = {_NUMBER} to (\d+) digits")
-_STARTS = re.compile(r"(\d+) of \d+ starts certified")
+_CERTIFIED_STARTS = re.compile(r"(\d+) of \d+ starts certified")
+_CHECKED = re.compile(rf"on (\d+) starts up to \|t\| = {_NUMBER},")
 _PART = re.compile(rf"its error is {_NUMBER} of the error measured")
-_PROVEN = re.compile(r"\(proven")
+_HOW = re.compile(r"\((proven at both ends|proven|computed)\)")
+_ENCLOSURE = "known: validated"
+"""What is proven where it says no more: an enclosure is its own proof."""
+_NOTHING = "its own first integrals"
+"""A row without a reference: what its text says beyond that is why."""
 
 _RADIUS_DECADES = 1.0
 """A radius may grow by that much: that of a reference for the same bits does not move at all."""
@@ -29,38 +37,52 @@ _PART_DECADES = 2.0
 class Against:
     """A reference: its kind (``known``, ``computed``, ...), and what it is known to.
 
-    radius, time, part: log10 of its radius, of |t| where it is certified, and of its own error in units of the error
-    measured.  digits, starts: certified ones.  None where the text does not say.
+    radius, part: log10 of its radius, and of its own error in units of the error measured.  digits, times: of each
+    certificate, the first start's before that of all starts; log10 of |t|.  starts: certified ones, or those that a
+    computed reference was checked on; then ``times`` holds the |t| up to which it was.  None or empty where the text
+    does not say.
     """
 
     kind: str
     proven: bool
     radius: float | None
-    time: float | None
-    digits: int | None
-    starts: int | None
     part: float | None
+    digits: tuple[int, ...]
+    times: tuple[float, ...]
+    starts: int | None
 
     @classmethod
     def of(cls, text: str) -> Against:
         """The reference that ``against`` of a row describes."""
-        certified, starts = _CERTIFIED.search(text), _STARTS.search(text)
+        kind = re.split("[:,;]", text, maxsplit=1)[0]
+        if kind == _NOTHING:
+            return cls(kind, False, None, None, (), (), None)
+        certificates, checked = _CERTIFIED.findall(text), _CHECKED.search(text)
+        starts = checked or _CERTIFIED_STARTS.search(text)
+        times = [time for time, _ in certificates] + ([checked[2]] if checked else [])
+        how = set(_HOW.findall(text))
         return cls(
-            text.partition(":")[0].partition(",")[0],
-            bool(_PROVEN.search(text)),
-            _log(_RADIUS.search(text)),
-            _log(certified),
-            int(certified[2]) if certified else None,
+            kind,
+            "computed" not in how if how else text.startswith(_ENCLOSURE),
+            _first_log(_RADIUS.search(text)),
+            _first_log(_PART.search(text)),
+            tuple(int(digits) for _, digits in certificates),
+            tuple(map(_log, times)),
             int(starts[1]) if starts else None,
-            _log(_PART.search(text)),
         )
 
 
-def _log(found: re.Match[str] | None) -> float | None:
+def _first_log(found: re.Match[str] | None) -> float | None:
+    return None if found is None else _log(found[1])
+
+
+def _log(text: str) -> float:
+    """log10 |number|, -inf for 0; nan for what is no number, which is within no bound."""
     try:
-        return None if found is None else log10(exact(found[1]))
+        size = log10(exact(text))
     except InputError:
-        return None
+        return math.nan
+    return -math.inf if size is None else size
 
 
 def weaker(old: str, new: str) -> str:
@@ -79,14 +101,23 @@ def weaker(old: str, new: str) -> str:
         return "the radius of the reference is larger, or not said"
     if _grew(a.part, b.part, _PART_DECADES):
         return "the error of the computed reference is larger, or not said"
-    if a.digits is not None and (b.digits is None or b.digits < _DIGITS_KEPT * a.digits):
-        return f"the reference is certified to {b.digits or 'no'} digits, not {a.digits}"
+    if not _kept(a.digits, b.digits, lambda old, new: new >= _DIGITS_KEPT * old):
+        return f"the reference is certified to {_digits_text(b)} digits, not {_digits_text(a)}"
     if a.starts is not None and (b.starts is None or b.starts < _TIME_KEPT * a.starts):
-        return f"the reference is certified for {b.starts or 'no'} starts, not {a.starts}"
-    if a.time is not None and (b.time is None or 10 ** (b.time - a.time) < _TIME_KEPT):
-        return "the reference is certified at an earlier time"
+        return f"the reference is certified or checked for {b.starts or 'no'} starts, not {a.starts}"
+    if not _kept(a.times, b.times, lambda old, new: new >= old + math.log10(_TIME_KEPT)):
+        return "the reference is certified or checked at an earlier time"
     return ""
 
 
 def _grew(old: float | None, new: float | None, decades: float) -> bool:
-    return old is not None and (new is None or new > old + decades)
+    return old is not None and (new is None or not new <= old + decades)
+
+
+def _kept(old: tuple[Any, ...], new: tuple[Any, ...], enough: Callable[[Any, Any], bool]) -> bool:
+    """Whether each number that the baseline says is there, and is enough."""
+    return len(new) >= len(old) and all(map(enough, old, new))
+
+
+def _digits_text(reference: Against) -> str:
+    return " and ".join(map(str, reference.digits)) or "no"

@@ -85,6 +85,8 @@ def _sizes(metrics: Mapping[str, Metric]) -> Iterator[str]:
 
 def _series(row: Row | BriefRow) -> Iterator[str]:
     for name, series in row.series.items():
+        if 0 < row.samples < len(series.times):
+            yield f"samples: {row.samples}, where {name} has {len(series.times)}"
         if len(series.times) != len(series.values):
             yield f"{name}: not one value for each time"
             continue

@@ -21,6 +21,8 @@ from heavytop.report.verdicts import Judged, Verdict, judge, judge_seconds
 
 _STEPS = 2
 """The same method with the same setting takes as many steps: a factor beyond this is another method."""
+_STEPWISE = ("local_error",)
+"""The measures whose samples are the steps: these may be fewer as the steps may."""
 
 
 class Finding(msgspec.Struct, frozen=True, gc=False):
@@ -179,6 +181,10 @@ class RowComparison:
                 yield Finding(key, "", Verdict.INCOMPARABLE, str(old.steps), str(new.steps), "other steps")
         if old.order != new.order and self.policy.flags != "ignore":
             yield Finding(key, "", Verdict.INCOMPARABLE, str(old.order), str(new.order), "another order")
+        needed, found = -(-_samples(old) // (_STEPS if old.measure in _STEPWISE else 1)), _samples(new)
+        if found < needed:
+            why = "fewer samples: the largest of them is smaller"
+            yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{found} samples", why)
         rounded = old.input_rounding
         if rounded is not None and new.input_rounding != rounded:
             eps = exact(2) ** (1 - old.bits)
@@ -217,6 +223,11 @@ class RowComparison:
         if subjects[0] != subjects[1]:
             return f"{subjects[0] or 'nothing'} is measured, and {subjects[1] or 'nothing'}"
         return weaker(old.against, new.against)
+
+
+def _samples(row: AnyRow) -> int:
+    """How many samples the largest values of a row are over; at least those of its series, where it does not say."""
+    return row.samples or max((len(series.times) for series in row.series.values()), default=0)
 
 
 def _eps(name: str, row: AnyRow) -> float:

@@ -64,6 +64,7 @@ class BriefRow(msgspec.Struct, gc=False):
     flags: dict[str, str] = {}
     input_rounding: str | None = None
     series: dict[str, Series] = {}
+    samples: Count = 0
     starts: Starts = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, Seconds] = {}

@@ -11,7 +11,7 @@ from flint import arb
 from heavytop.claims.audit import audit as audit_of
 from heavytop.claims.ershkov import PartialCase
 from heavytop.errors import OutOfReach
-from heavytop.exact.balls import FUNCTIONS, radius_text, working_precision
+from heavytop.exact.balls import FUNCTIONS, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure import claim_error
@@ -111,21 +111,11 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_er
     """
     bits = claim_error.MODEL_BITS
     known = true_solution(claim)
-    if isinstance(known, DeloneHomoclinic):
-        proven = certified(known, max(times, key=abs), bits)
-        if proven is None:
-            raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
-
-        def delone(time: Fraction) -> tuple[list[arb], list[arb]]:
-            phi, theta, psi = known.angles(time, bits)
-            with working_precision(bits):
-                xi = attitude_from_angles(phi, theta, psi - arb.pi() / 2, FUNCTIONS)
-            return known.state(time, bits), list(xi)
-
-        return delone, proven.text
     try:
-        known.state(max(times, key=abs), bits)
+        proven = certified(known, max(times, key=abs), bits)
     except OutOfReach:
+        if isinstance(known, DeloneHomoclinic):
+            raise
         computed = ComputedReference(known.top, known.start, times, xi=CLAIM_XI)
 
         def runs(time: Fraction) -> tuple[list[arb], list[arb]]:
@@ -133,11 +123,18 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[claim_er
             return values[:6], values[6:]
 
         return runs, computed.method
+    if proven is None:
+        raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
+    if not isinstance(known, DeloneHomoclinic):
+        return lambda time: (known.state(time, bits), known.attitude(time, bits)), proven.text
 
-    def validated(time: Fraction) -> tuple[list[arb], list[arb]]:
-        return known.state(time, bits), known.attitude(time, bits)
+    def delone(time: Fraction) -> tuple[list[arb], list[arb]]:
+        phi, theta, psi = known.angles(time, bits)
+        with working_precision(bits):
+            xi = attitude_from_angles(phi, theta, psi - arb.pi() / 2, FUNCTIONS)
+        return known.state(time, bits), list(xi)
 
-    return validated, f"known: {known.method}, radius below {radius_text(Fraction(1, 2**bits))}"
+    return delone, proven.text
 
 
 def claim_evaluation(task: Task) -> Row:

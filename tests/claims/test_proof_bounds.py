@@ -1,0 +1,295 @@
+"""The bounds of a proof, one by one: what a formula needs, the sign of a value, continuity, where halves join."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+import sympy
+
+from heavytop.claims.algebra import Assumptions, Field
+from heavytop.claims.conditions import Kind, Need, condition, conditions_of, is_exactly_zero
+from heavytop.claims.judge import judge
+from heavytop.claims.regularity import Regularity
+from heavytop.claims.signs import Sign
+from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
+
+T, A = sympy.Symbol("t", real=True), sympy.Symbol("a", real=True)
+P = sympy.Symbol("p", positive=True)
+TINY = Fraction(1, 10**200)
+
+
+def words(needs) -> set[str]:
+    return {need.text for need in needs}
+
+
+@pytest.mark.parametrize(
+    ("kind", "met"),
+    [
+        (Kind.NONZERO, {-1: True, -TINY: True, 0: False, TINY: True, 1: True}),
+        (Kind.POSITIVE, {-1: False, -TINY: False, 0: False, TINY: True, 1: True}),
+        (Kind.NONNEGATIVE, {-1: False, -TINY: False, 0: True, TINY: True, 1: True}),
+    ],
+)
+def test_a_need_is_met_up_to_its_edge_and_not_beyond(kind: Kind, met: dict) -> None:
+    for value, expected in met.items():
+        assert Need(kind, T).is_met({T: Fraction(value)}) is expected
+    # what is 0 but only to a ball: nobody knows
+    assert Need(kind, sympy.sqrt(T) - sympy.sqrt(T + 1 - P)).is_met({T: Fraction(2), P: Fraction(1)}) is None
+    assert Need(kind, sympy.log(T)).is_met({T: Fraction(-1)}) is None
+    assert Need(kind, 1 / T).is_met({T: Fraction(0)}) is None
+
+
+@pytest.mark.parametrize(
+    ("sign", "nonzero", "positive", "nonnegative"),
+    [
+        (Sign(1, True), True, True, True),
+        (Sign(1, False), False, False, True),
+        (Sign(0, True), True, False, False),
+        (Sign(0, False), False, False, False),
+        (Sign(-1, True), True, False, False),
+        (Sign(-1, False), False, False, False),
+    ],
+)
+def test_a_sign_meets_what_follows_from_it(sign: Sign, nonzero: bool, positive: bool, nonnegative: bool) -> None:
+    found = [kind.is_met_by(sign) for kind in (Kind.NONZERO, Kind.POSITIVE, Kind.NONNEGATIVE)]
+    assert found == [nonzero, positive, nonnegative]
+
+
+@pytest.mark.parametrize(
+    ("function", "needs"),
+    [
+        ("/", {"t ≠ 0"}),
+        ("sqrt", {"t ≥ 0"}),
+        ("log", {"t > 0"}),
+        ("asin", {"-1 ≤ t ≤ 1"}),
+        ("acos", {"-1 ≤ t ≤ 1"}),
+        ("tan", {"cos(t) ≠ 0"}),
+        ("sec", {"cos(t) ≠ 0"}),
+        ("coth", {"sinh(t) ≠ 0"}),
+        ("csch", {"sinh(t) ≠ 0"}),
+        ("atan2", {"a**2 + t**2 > 0"}),
+        ("atan", set()),
+        ("tanh", set()),
+    ],
+)
+def test_a_function_needs_what_it_needs(function: str, needs: set[str]) -> None:
+    assert words(condition(function, (T, A))) == needs
+
+
+def test_a_number_that_meets_a_need_is_none_and_one_that_does_not_stays() -> None:
+    one, zero = sympy.Integer(1), sympy.Integer(0)
+    assert not condition("/", (-one,))
+    assert not condition("sqrt", (one,))
+    assert not condition("log", (one / 3,))
+    for function, value in (("/", zero), ("log", zero), ("log", -one), ("sqrt", -one), ("asin", 2 * one)):
+        assert condition(function, (value,))
+
+
+@pytest.mark.parametrize(
+    ("expression", "needs"),
+    [
+        (sympy.sqrt(T), {"t ≥ 0"}),
+        (T**-2, {"t ≠ 0"}),
+        (T ** sympy.Rational(-1, 2), {"t ≥ 0", "t ≠ 0"}),
+        (sympy.exp(-T), set()),
+        (sympy.sign(T), {"t ≠ 0"}),
+        (sympy.log(sympy.sqrt(A) + T), {"a ≥ 0", "sqrt(a) + t > 0"}),
+        (sympy.acos(1 / T), {"-1 ≤ 1/t ≤ 1", "t ≠ 0"}),
+    ],
+)
+def test_every_part_of_a_formula_is_asked(expression: sympy.Expr, needs: set[str]) -> None:
+    assert words(conditions_of([expression])) == needs
+
+
+@pytest.mark.parametrize(
+    ("expression", "value", "expected"),
+    [
+        (T**2 - 2 * T + 1, 1, True),
+        (T**2 - 2 * T + 1, 1 + TINY, False),
+        (sympy.sqrt(T) - 2, 4, True),
+        (sympy.sqrt(T) - 2, 4 + TINY, None),
+        (sympy.sqrt(T) - sympy.sqrt(2), 2, True),
+        (sympy.sin(T) ** 2 + sympy.cos(T) ** 2 - 1, 1, True),
+        # nobody knows: undefined, not real, or 0 to no more than a ball
+        (sympy.sqrt(1 - T) * (T - 2), 2, None),
+        (sympy.log(T - 1) * (T - 1), 1, None),
+        (sympy.log(T * 6) - sympy.log(2) - sympy.log(3) + sympy.Rational(1, 10**200), 1, None),
+    ],
+)
+def test_0_is_proven_and_what_is_off_by_1e_200_is_off(expression, value, expected) -> None:
+    found = is_exactly_zero(expression, {T: Fraction(value), P: Fraction(1)})
+    assert found is expected
+
+
+# --- signs and continuity ---------------------------------------------------------------------------------------------
+
+
+def sign_of(expression: sympy.Expr, sign: int = 0, strict: bool = False, **known) -> Sign:
+    field = Field(Assumptions(T, (P,), variable_sign=sign, strict=strict, **known), [expression])
+    return field.tower.sign(field.enter(expression))
+
+
+SIN, COS, ROOT = sympy.sin(T), sympy.cos(T), sympy.sqrt(1 + T**2)
+
+
+@pytest.mark.parametrize(
+    ("expression", "sign", "expected"),
+    [
+        (T**2, 0, (1, False)),
+        (-(T**2), 0, (-1, False)),
+        (T**2 + 1, 0, (1, True)),
+        (T**2 - 1, 0, (0, False)),
+        (T**2 - T + 1, 0, (1, True)),
+        (T**2 - 2 * T + P, 0, (0, False)),
+        (T, 1, (1, False)),
+        (T + 1, 1, (1, True)),
+        (T - 1, 1, (0, False)),
+        (T, -1, (-1, False)),
+        (T - 1, -1, (-1, True)),
+        (T**3 - 3 * T + 1, 1, (0, False)),
+        (T**3 - 3 * T + 3, 1, (1, True)),
+        (T * P, 1, (1, False)),
+        (T * P + P**2, 1, (1, True)),
+        (SIN + 1, 0, (1, False)),
+        (SIN - 1, 0, (-1, False)),
+        (SIN + 2, 0, (1, True)),
+        (2 * SIN + 1, 0, (0, False)),
+        (SIN + COS + 2, 0, (1, True)),
+        (SIN + COS + 1, 0, (0, False)),
+        (COS - COS**2 / 2 + sympy.Rational(3, 2), 0, (1, False)),
+        (T + ROOT, 0, (1, True)),
+        (T - ROOT, 0, (-1, True)),
+        (2 * T - ROOT, 0, (0, False)),
+        (T + sympy.sqrt(T**2), 0, (1, False)),
+        (T - sympy.sqrt(T**2), 0, (-1, False)),
+        (sympy.sqrt(2) - 1, 0, (1, True)),
+        (sympy.sqrt(2) - sympy.Rational(3, 2), 0, (-1, True)),
+        (sympy.exp(T) + sympy.exp(-T) - 2, 0, (1, False)),
+        (sympy.tanh(T) + 1, 0, (1, True)),
+    ],
+)
+def test_a_sign_is_what_it_is_or_unknown_and_strict_only_where_it_is_never_0(expression, sign, expected) -> None:
+    value, strict = sign_of(expression, sign)
+    assert value in (expected[0], 0)
+    assert strict <= expected[1]
+    if expected[1]:
+        assert (value, strict) == expected
+
+
+def test_what_is_known_of_a_fact_turns_with_its_sign() -> None:
+    fact = 1 - A - A**2
+    expected = [(fact, 1), (-fact, -1), (2 * fact, 1), (fact + 2, 1), (-fact - 2, -1)]
+    assert [sign_of(each, facts=(fact,)) for each, _ in expected] == [(value, True) for _, value in expected]
+    assert [sign_of(each, facts=(fact,)).value for each in (2 * fact - 1, 1 - 2 * fact)] == [0, 0]
+    # a product that is > 0 tells nothing of its factors
+    assert sign_of(A - 1, facts=((A - 1) * (A - 2),)).value == 0
+    # a closed interval holds its ends
+    ends = ((A, (Fraction(1), Fraction(2))),)
+    found = {text: sign_of(sympy.sympify(text, {"a": A, "p": P}), ranges=ends) for text in ("a-1", "a-2", "p*(a-1)")}
+    assert found == {"a-1": (1, False), "a-2": (-1, False), "p*(a-1)": (1, False)}
+    assert sign_of(A - sympy.Rational(3, 2), ranges=ends).value == 0
+    assert sign_of(P + A, ranges=ends) == (1, True)
+    assert sign_of(2 * P - A, ranges=ends).value == 0
+
+
+@pytest.mark.parametrize(
+    ("expression", "sign", "strict", "continuous", "analytic"),
+    [
+        (sympy.sqrt(T), 1, False, True, False),
+        (sympy.sqrt(T), 1, True, True, True),
+        (sympy.sqrt(T), 0, False, False, False),
+        (sympy.log(T), 1, False, False, False),
+        (sympy.log(T), 1, True, True, True),
+        (1 / T, 1, False, False, False),
+        (1 / T, 1, True, True, True),
+        (sympy.asin(T), 1, True, False, False),
+        (sympy.asin(sympy.tanh(T)), 0, False, True, True),
+        (sympy.acos(SIN), 0, False, True, False),
+        (sympy.atan(1 / T), 0, False, False, False),
+        (sympy.atan(sympy.sqrt(T)), 0, False, False, False),
+        (sympy.atan2(T, P), 0, False, True, True),
+        (sympy.atan2(P, T), 0, False, True, True),
+        (sympy.atan2(T, T**2), 0, False, False, False),
+        (sympy.atan2(T, -P), 0, False, False, False),
+    ],
+)
+def test_a_formula_is_continuous_only_by_the_rules(expression, sign, strict, continuous, analytic) -> None:
+    field = Field(Assumptions(T, (P,), variable_sign=sign, strict=strict), [expression])
+    rules, value = Regularity(field), field.enter(expression)
+    assert rules.obstacle(value) is not continuous
+    assert rules.obstacle(value, analytic=True) is not analytic
+
+
+# --- verdicts ---------------------------------------------------------------------------------------------------------
+
+HALVES = sympy.tanh(T) * sympy.sqrt(T**2) - T * sympy.sqrt(sympy.tanh(T) ** 2)
+"""0 for either sign of t by algebra, and not for both at once."""
+
+
+def verdict(residual: sympy.Expr, domain: Domain = ALL, flow: Flow | None = None) -> bool | None:
+    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(1, 3)},))
+    (row,) = judge([Statement("1", 1, "smooth", domain, residual, "", flow=flow)], setting)
+    return row.holds
+
+
+def test_halves_join_where_the_variable_is_time_and_nowhere_else() -> None:
+    assert verdict(HALVES) is True
+    noted = Domain("all", 0, ALL.points, "positive roots")
+    assert verdict(HALVES, noted) is None
+    assert verdict(HALVES, flow=Flow(lambda e: sympy.diff(e, T), frozenset((T,)))) is None
+    assert [verdict(HALVES, each) for each in (BEFORE, AFTER)] == [True, True]
+
+
+def test_the_end_of_the_domain_belongs_to_it_where_its_label_says_so() -> None:
+    gap = (T**2 + T) / T - T - 1
+    assert [verdict(gap, each) for each in (BEFORE, AFTER)] == [None, True]
+
+
+def test_a_note_makes_another_domain() -> None:
+    """Two domains of one label: what is known on the first says nothing on the second."""
+    known = Domain("all", 0, ALL.points, "a > 0", facts=(A,))
+    residual = sympy.sqrt(A**2) - A
+    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(1, 3)},))
+    rows = judge([Statement("1", i, "smooth", d, residual, "") for i, d in enumerate((known, ALL))], setting)
+    assert [row.holds for row in rows] == [True, None]
+    assert [row.holds for row in reversed(judge([*_both(known, residual)], setting))] == [True, None]
+
+
+def _both(known: Domain, residual: sympy.Expr) -> list[Statement]:
+    return [Statement("1", i, "smooth", d, residual, "") for i, d in enumerate((ALL, known))]
+
+
+@pytest.mark.parametrize(
+    "residual",
+    [
+        # a ball that is no number, or not real, excludes 0 and is no witness
+        1 + sympy.sqrt(-1 - T**2),
+        1 + sympy.log(-1 - T**2),
+        2 + sympy.acos(2 + T**2),
+    ],
+)
+def test_what_is_not_real_refutes_nothing(residual: sympy.Expr) -> None:
+    assert verdict(residual) is None
+
+
+def test_where_a_derivative_may_have_a_kink_nothing_is_refuted() -> None:
+    kink = sympy.sign(sympy.sqrt(2) - sympy.sqrt(T))
+    assert verdict(3 + kink, Domain("t>0", 1, (Fraction(2),))) is None
+    assert verdict(3 + kink, Domain("t>0", 1, (Fraction(2), Fraction(3)))) is False
+
+
+def test_what_is_off_by_less_than_a_short_ball_shows_is_refuted_all_the_same() -> None:
+    assert verdict(sympy.sqrt(2 + T**2) - sympy.sqrt(2 + T**2 + sympy.Rational(1, 10**100))) is False
+
+
+@pytest.mark.parametrize(
+    "need", [Need(Kind.NONNEGATIVE, -1 - T**2), Need(Kind.NONZERO, T - T), Need(Kind.POSITIVE, -P)]
+)
+def test_a_place_where_a_formula_is_undefined_is_no_witness(need: Need) -> None:
+    setting = Setting(T, (P,), ({P: Fraction(2)},))
+    for needs, holds in ((frozenset({need}), None), (frozenset(), False)):
+        formulas = Formulas(values=(T,), needs=needs)
+        (row,) = judge([Statement("1", 1, "smooth", ALL, 1 + T**2, "", formulas)], setting)
+        assert row.holds is holds
+        assert [c.discharged for c in row.conditions if c.text == need.text] == [False] * len(needs)
