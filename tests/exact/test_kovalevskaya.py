@@ -8,10 +8,10 @@ from flint import arb
 from proofs import assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import working_precision
+from heavytop.exact.balls import ball, midpoint, working_precision
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.kovalevskaya_abel import AbelMotion
-from heavytop.exact.kovalevskaya_level import Level
+from heavytop.exact.kovalevskaya_level import Level, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion
 from heavytop.exact.resting import Rest
 from heavytop.exact.validated import Validated
@@ -26,6 +26,15 @@ TINY = F(1, 10**30)
 
 def motion_from(moment, omega, gamma, i3=F(1)):
     return Kovalevskaya(HeavyTop((2 * i3, 2 * i3, i3), 1, (*moment, 0)), State(omega, gamma))
+
+
+def motion_level(motion):
+    return Level.of(motion.top, motion.start)
+
+
+def scale(motion, level):
+    """What w is multiplied by from the units of one level to those of another: w goes like the square of the rate."""
+    return (motion_level(motion).rate / level.rate) ** 2
 
 
 def random_motion(seed):
@@ -155,6 +164,23 @@ def test_asymptotic_motions_are_motions_like_any_other(omega, gamma):
         assert_narrow(motion, time)
     pairs = zip(motion.state(F(5), 180), Validated(motion.top, motion.start).state(F(5), 180), strict=True)
     assert all(a.overlaps(b) for a, b in pairs)
+
+
+def test_the_exponent_of_an_asymptotic_motion_is_that_of_its_enclosure():
+    motion = motion_from((F(1), F(0)), (-1, F(1, 4), F(1, 4)), UP)
+    exponent, enclosure = float(motion.exponent(60)), Validated(motion.top, motion.start)
+    logarithms = []
+    for time in (F(20), F(60)):
+        state = [midpoint(value) for value in enclosure.state(time, 300)]
+        level = Level.of(motion.top, State(state[:3], state[3:]))
+        with working_precision(300):
+            start = start_of(level)
+            # w - e is as the square of the distance, one of the two variables takes part
+            gaps = [abs(start.above(k, ball(motion_level(motion).double() * scale(motion, level)))) for k in (0, 1)]
+            logarithms.append(float(min(gaps, key=float).log()))
+    assert (logarithms[0] - logarithms[1]) / 80 == pytest.approx(exponent, rel=0.05)
+    with pytest.raises(NotInClass, match="not asymptotic"):
+        random_motion(1).exponent(60)
 
 
 @pytest.mark.parametrize(

@@ -88,6 +88,24 @@ class Kovalevskaya(ClosedForm):
         except Undecided:
             return [arb("nan")] * 6
 
+    def exponent(self, bits: int) -> arb:
+        """The rate λ of an asymptotic motion, > 0: its distance from the motion that it tends to goes like e^(−λ|t|).
+
+        Raises NotInClass for any other motion.
+        """
+
+        def evaluate(working: int) -> list[arb]:
+            try:
+                motion = _motion(self, working)
+            except Undecided:
+                return [arb("nan")]
+            found = motion.exponents() if isinstance(motion, AbelMotion) else []
+            if not found:
+                raise NotInClass("The motion is not asymptotic.", "Only asymptotic ones have an exponent.")
+            return found
+
+        return to_bits(evaluate, bits)[0]
+
     def second_state(self, time: Fraction, bits: int) -> list[arb]:
         """The state at ``time`` by theta functions, to hold against :meth:`state`, which mostly inverts integrals.
 

@@ -105,6 +105,11 @@ class AbelMotion:
             velocity = self._velocity(self._moving(phases), turns)
         return self.level.restored(self.start.state(velocity, length), length)
 
+    def exponents(self) -> list[arb]:
+        """The mean rate of X of a variable that tends to a double root, in a list of its own; else nothing."""
+        open_ones = [k for k, variable in enumerate(self.variables) if isinstance(variable, Approach)]
+        return [abs(self.inversion.mean_rates([arb(-1), arb(0)])[k]) * ball(self.level.rate) for k in open_ones]
+
     def _phases(self, time: arb) -> tuple[list[arb], list[int]]:
         """The phases in the first turns, and whole turns."""
         for k in (0, 1):
