@@ -89,6 +89,20 @@ def test_a_double_root_outside_the_gaps_does_no_harm(omega, gamma):
     assert_narrow(motion, F(10**9))
 
 
+@pytest.mark.parametrize("seed", range(24))
+def test_starts_of_few_small_numbers_are_solved_or_named(seed):
+    # zeros and equal numbers make special levels and turning points of all kinds
+    rng = random.Random(seed)
+    few = (F(0), F(0), F(1), F(-1), F(1, 2), F(-1, 2), F(3, 5), F(4, 5))
+    omega, gamma = triple(rng, lambda random: random.choice(few)), triple(rng, lambda random: random.choice(few))
+    try:
+        motion = motion_from((F(1), rng.choice(few)), omega, gamma)
+    except NotInClass as error:
+        assert any(word in error.cause for word in ("gamma = 0", "Delone", "degenerate", "too near"))
+    else:
+        assert_solves(motion, F(7, 3))
+
+
 def tilted(exponent):
     """γ beside axis 3, where every start is on a degenerate level, at a distance of about 10^-exponent."""
     t = F(1, 10**exponent)
