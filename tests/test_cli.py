@@ -296,11 +296,16 @@ def test_an_interrupted_run_goes_on_where_it_was(tmp_path: Path, finished: Path)
     assert not rows.exists()
 
 
-@pytest.mark.parametrize("after", [0.5, 1.0, 2.0, 6.0])
-def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130(after: float) -> None:
+@pytest.mark.parametrize(
+    ("after", "integrator"), [(0.5, "heyoka"), (1.0, "heyoka"), (2.0, "heyoka"), (6.0, "heyoka"), (5.0, "words")]
+)
+def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130(after: float, integrator: str) -> None:
     """While libraries load, while heyoka compiles, while it integrates."""
     process = subprocess.Popen(
-        [*COMMAND, "propagate", *top_options(times="1e12")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [*COMMAND, "propagate", *top_options(times="1e12", integrator=integrator)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     time.sleep(after)
     assert process.poll() is None

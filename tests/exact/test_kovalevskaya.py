@@ -95,12 +95,15 @@ def test_starts_of_few_small_numbers_are_solved_or_named(seed):
     rng = random.Random(seed)
     few = (F(0), F(0), F(1), F(-1), F(1, 2), F(-1, 2), F(3, 5), F(4, 5))
     omega, gamma = triple(rng, lambda random: random.choice(few)), triple(rng, lambda random: random.choice(few))
+    motion, refused = None, ""
     try:
         motion = motion_from((F(1), rng.choice(few)), omega, gamma)
     except NotInClass as error:
-        assert any(word in error.cause for word in ("gamma = 0", "Delone", "degenerate", "too near"))
-    else:
+        refused = error.cause
+    if motion is not None:
         assert_solves(motion, F(7, 3))
+    else:
+        assert any(word in refused for word in ("gamma = 0", "Delone", "degenerate", "too near"))
 
 
 def tilted(exponent):
@@ -184,15 +187,15 @@ def test_the_exponent_of_an_asymptotic_motion_is_that_of_its_enclosure():
     motion = motion_from((F(1), F(0)), (-1, F(1, 4), F(1, 4)), UP)
     exponent, enclosure = float(motion.exponent(60)), Validated(motion.top, motion.start)
     logarithms = []
-    for time in (F(20), F(60)):
-        state = [midpoint(value) for value in enclosure.state(time, 300)]
+    for time in (F(8), F(24)):
+        state = [midpoint(value) for value in enclosure.state(time, 100)]
         level = Level.of(motion.top, State(state[:3], state[3:]))
-        with working_precision(300):
+        with working_precision(200):
             start = start_of(level)
             # w - e is as the square of the distance, one of the two variables takes part
             gaps = [abs(start.above(k, ball(motion_level(motion).double() * scale(motion, level)))) for k in (0, 1)]
             logarithms.append(float(min(gaps, key=float).log()))
-    assert (logarithms[0] - logarithms[1]) / 80 == pytest.approx(exponent, rel=0.05)
+    assert (logarithms[0] - logarithms[1]) / 32 == pytest.approx(exponent, rel=0.1)
     with pytest.raises(NotInClass, match="not asymptotic"):
         random_motion(1).exponent(60)
 

@@ -281,6 +281,12 @@ def test_the_largest_of_fewer_samples_is_no_better(tmp_path: Path, measure: str,
         assert compare(*briefs, Policy()).verdict == verdict
 
 
+def test_a_run_without_steps_is_another_whatever_the_flags() -> None:
+    assert judged(one(steps=10), one(steps=4), flags="ignore")[0] == "same"
+    assert judged(one(steps=10), one(steps=0), flags="ignore")[0] == "incomparable"
+    assert judged(one(steps=0), one(steps=10), flags="ignore")[0] == "incomparable"
+
+
 TIMES = ["1", "50", "100"]
 
 
@@ -370,6 +376,24 @@ def test_half_of_the_samples_may_grow_by_what_is_allowed_above_the_floor() -> No
         (["9e-14", "1e-13", "4.1e-13"], "worse"),
     ):
         assert judge_series(old, Series(TIMES, values), 0.6055, -16.0, exactly=False)[0].value == verdict, values
+
+
+@pytest.mark.parametrize(
+    ("band", "same", "worse"),
+    # two bits; twice 0.3 √2 decades, where that is more
+    [(0.2, "3.9e-13", "4.1e-13"), (0.3, "7.0e-13", "7.1e-13")],
+)
+def test_a_series_may_grow_by_the_noise_of_its_metrics_or_by_two_bits(band: float, same: str, worse: str) -> None:
+    metrics = {
+        "drift_energy_max": msgspec.structs.replace(error("1e-12"), band=0.05),
+        "drift_energy_final": msgspec.structs.replace(error("1e-12"), band=band),
+    }
+
+    def with_series(value: str) -> Row:
+        return row(metrics=metrics, series={"drift_energy": Series(TIMES, [value, value, "1e-12"])})
+
+    assert judged(with_series("1e-13"), with_series(same))[0] == "same"
+    assert judged(with_series("1e-13"), with_series(worse))[0] == "worse"
 
 
 @pytest.mark.parametrize(("value", "contradicts"), [("1.02e-12", False), ("1.03e-12", True)])

@@ -2,7 +2,11 @@
 
 import ctypes
 import math
+import os
+import subprocess
+import sys
 from fractions import Fraction
+from pathlib import Path
 
 import numpy
 import pytest
@@ -16,6 +20,7 @@ from heavytop.words.pairs import log2, power_of_two, split
 from heavytop.words.run import Status
 from heavytop.words.vector import DOUBLE, function
 
+HERE = str(Path(__file__).parent)
 LADDER = Ladder.of(Fraction(1, 2**105))
 
 
@@ -28,6 +33,21 @@ def test_the_bits_are_those_of_every_processor(processor: Processor, attitude: b
             assert run.advance(Fraction(30), 10**6) is Status.FINE
         own, other = ((run.state, run.time, run.steps, run.place(), run.sample(Fraction(30))) for run in runs)
         assert own == other
+
+
+def test_the_bits_are_those_without_fused_multiply_add_in_hardware() -> None:
+    """glibc masks FMA and AVX2, so that its own fma, which code for x86-64 calls, is computed in software."""
+    script = (
+        "from fractions import Fraction; from words_helpers import problem; "
+        "from heavytop.words.floating import Floating, Ladder; from heavytop.words.machine import Processor; "
+        "run = Floating(problem(), Ladder.of(Fraction(1, 10**20)), True, processor=Processor('x86-64')); "
+        "run.advance(Fraction(5), 100); print(*run.place())"
+    )
+    environment = os.environ | {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F", "PYTHONPATH": HERE}
+    masked = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    run = Floating(problem(), Ladder.of(Fraction(1, 10**20)), True)
+    run.advance(Fraction(5), 100)
+    assert masked.stdout.split() == list(run.place())
 
 
 def test_more_orders_are_kept_in_double_double_where_the_spin_is_fast() -> None:

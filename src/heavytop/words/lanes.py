@@ -70,9 +70,11 @@ class Coefficients:
         """The largest |coefficient|."""
         return max(abs(c) for vector in self.vectors for row in vector for c in row)
 
-    def times(self, factor: Fraction) -> Coefficients:
-        """All of them multiplied."""
-        return Coefficients(tuple(tuple(tuple(c * factor for c in row) for row in vector) for vector in self.vectors))
+    def with_linear(self, factor: Fraction) -> Coefficients:
+        """The same with every B multiplied."""
+        return Coefficients(
+            tuple((rows[0], *(tuple(c * factor for c in row) for row in rows[1:])) for rows in self.vectors)
+        )
 
 
 def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
@@ -86,8 +88,8 @@ def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
 
     half = Fraction(1, 2)
     others = ((1, 2), (2, 0), (0, 1))
-    products = [rates(unit(i, j))[k] - rates(unit(i))[k] - rates(unit(j))[k] for k, (i, j) in enumerate(others)]
     at, against = ([rates([sign * v for v in unit(j)]) for j in range(6)] for sign in (1, -1))
+    products = [rates(unit(i, j))[k] - at[i][k] - at[j][k] for k, (i, j) in enumerate(others)]
     linear = [[(a - b) / 2 for a, b in zip(*pair, strict=True)] for pair in zip(at, against, strict=True)]
     permuted = [[Fraction(0) if j == ZERO else linear[j][k] for k, j in enumerate(row[:6])] for row in turned(system)]
     rows = [_eight(row) for row in ([*products, half, half, half], *permuted)]

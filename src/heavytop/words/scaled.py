@@ -38,24 +38,17 @@ class Scaled:
         rates = list(system.field(p, y[:6]))
         if len(y) == 9:
             rates += system.attitude(p, y[:6], y[6:])
-        given = coefficients(system, p, False)
+        given = coefficients(system, p, len(y) == 9)
         gamma = _power_above(max(map(abs, y[3:6])))
         rate = _bound(system, p, y) / 4 if bounded else _rate(system, given, p, y, gamma)
         sizes = [rate] * 3 + [gamma] * 3 + ([_power_above(max(map(abs, y[6:])))] * 3 if len(y) == 9 else [])
-        scaled = coefficients(system, _in_units(system, p, rate, gamma), len(y) == 9)
+        scaled = given.with_linear(1 / rate if system is GYROSTAT else gamma / rate**2)
         state = tuple(value / size for value, size in zip(y, sizes, strict=True))
         return cls(system, scaled, state, rate, tuple(sizes), not any(rates))
 
     def back(self, state: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
         """A state in the units of the problem."""
         return tuple(value * size for value, size in zip(state, self.sizes, strict=True))
-
-
-def _in_units(system: System, p: Parameters, rate: Fraction, gamma: Fraction) -> Parameters:
-    if system is GYROSTAT:
-        return Parameters(p.inertia, p.moment, p.rotor / rate)
-    factor = gamma / rate**2
-    return Parameters(p.inertia, tuple(n * factor for n in p.moment), p.rotor)
 
 
 def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction) -> Fraction:
