@@ -22,9 +22,9 @@ app = typer.Typer(
 
 def _version(asked: bool) -> None:
     if asked:
-        from heavytop import __version__
+        from importlib.metadata import version
 
-        print(f"heavytop {__version__}")
+        print(f"heavytop {version('heavytop')}")
         raise typer.Exit
 
 

@@ -114,7 +114,11 @@ def motion(case: Case, digits: int) -> Motion:
     times = _TIMES_IN_REACH if isinstance(solution, Validated) else _TIMES
     enclosure = enclosure_of(solution, effort=_EFFORT)
     entries = [
-        Entry(str(time), ball_texts(solution, time, digits), certify(solution, time, digits, enclosure=enclosure))
+        Entry(
+            str(time),
+            ball_texts(solution.state, solution.method, time, digits),
+            certify(solution, time, digits, enclosure=enclosure),
+        )
         for time in times
     ]
     p = case.system.parameters(case.top, case.start)
