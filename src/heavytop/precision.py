@@ -21,7 +21,7 @@ REAL_BITS = range(24, 20001)
 _MAX_TEXT = 100_000
 LARGEST = Fraction(10) ** 150
 """Beyond this, physical data overflow in some float on the way; a change of units brings them back."""
-_DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,6})?")
+_DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 _REMEDY = "Write an integer, a decimal such as 0.25 or 1e-3, or a fraction such as -2/5."
 
 
@@ -210,7 +210,8 @@ def _from_decimal(text: str, given: str) -> Fraction:
     match = _DECIMAL.fullmatch(text)
     if not match or not text.isascii():
         raise InputError(f"{quoted(given)} is not a finite number.", _REMEDY)
-    if match[3] and abs(int(match[3][1:])) > _MAX_TEXT:
+    exponent = match[3].lstrip("eE+-").lstrip("0") if match[3] else ""
+    if len(exponent) > len(str(_MAX_TEXT)) or int(exponent or 0) > _MAX_TEXT:
         raise _too_large(given)
     return Fraction(*Decimal(text).as_integer_ratio())
 

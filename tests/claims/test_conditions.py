@@ -150,6 +150,25 @@ def test_a_witness_lies_in_the_domain():
     assert all(float(eval(row.witness["t"])) > 0 for row in report.rows if row.witness)
 
 
+@pytest.mark.parametrize(
+    ("factor", "power"),
+    [("exp(-10^6)", -434295), ("exp(-10^12)", -434294481904), ("exp(10^9)", 434294481), ("exp(-exp(20))", -210704569)],
+)
+def test_a_witness_of_any_size_refutes(factor: str, power: int) -> None:
+    report = judged(upright(f"t*{factor}"))
+    assert report.verdict == "refuted"
+    witness = next(row for row in report.rows if (row.equation, row.component) == ("1.1", 3)).witness
+    # I3/2 or so times the factor: log10 e^(10^6) = 434294.48, and so on
+    assert abs(int(witness["value"].partition("e")[2]) - power) <= 1
+    assert int(witness["radius"].partition("e")[2]) < power - 15
+
+
+def test_what_is_0_at_the_samples_is_not_said_to_be_smaller():
+    row = judged(upright("t*(a - 1)*(a - 2)")).rows[2]
+    assert row.holds is None
+    assert row.residual == "0 at the sample points"
+
+
 def test_the_witness_of_an_integral_has_no_time_and_its_text_no_equations_of_motion(tmp_path):
     from heavytop.cli import app
 

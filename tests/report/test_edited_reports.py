@@ -231,6 +231,11 @@ def test_a_reference_may_be_another_and_not_a_weaker_one(old: str, new: str, ver
         ({"steps": 5}, "same"),
         ({"steps": 4}, "incomparable"),
         ({"steps": 0}, "incomparable"),
+        ({"evaluations": 200}, "same"),
+        ({"evaluations": 201}, "incomparable"),
+        ({"evaluations": 49}, "incomparable"),
+        ({"evaluations": 0}, "incomparable"),
+        ({"evaluations": None}, "incomparable"),
         ({"starts": 2}, "incomparable"),
         ({"order": 19}, "incomparable"),
         ({"measured": "claimed: by somebody"}, "incomparable"),
@@ -241,10 +246,8 @@ def test_a_reference_may_be_another_and_not_a_weaker_one(old: str, new: str, ver
     ],
 )
 def test_what_a_row_says_of_its_run_stays(change: dict, verdict: str) -> None:
-    assert (
-        judged(one(order=20, input_rounding="1e-17"), one(**({"order": 20, "input_rounding": "1e-17"} | change)))[0]
-        == verdict
-    )
+    known = {"order": 20, "input_rounding": "1e-17", "evaluations": 100}
+    assert judged(one(**known), one(**(known | change)))[0] == verdict
 
 
 @pytest.mark.parametrize(

@@ -25,8 +25,8 @@ def list_() -> int:
         note = notes[name]
         print(f"  {label:10} {note if reason is None else f'not available: {reason}'}")
     print("Integrators")
-    print("  heyoka          every format but double-double")
-    print("  words           every format, up to about 1000 bits")
+    print("  heyoka           every format but double-double")
+    print("  words            every format, up to about 1000 bits")
     for name, reason in peers.available().items():
-        print(f"  {name:15} {'installed' if reason is None else reason}")
+        print(f"  {name:16} {'installed' if reason is None else reason}")
     return 0

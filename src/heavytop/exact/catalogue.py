@@ -18,12 +18,15 @@ from heavytop.exact.euler import Euler
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
 from heavytop.exact.grioli import Grioli
 from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.hess import Hess
+from heavytop.exact.hess_pendulum import HessPendulum
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.lagrange import Lagrange
 from heavytop.exact.pendulum import Pendulum
 from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.staude import Staude
+from heavytop.exact.steklov import Steklov
 from heavytop.exact.validated import Validated
 from heavytop.precision import shown
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
@@ -66,7 +69,10 @@ _HEAVY_TOP: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (Pendulum, _KEEP),
     (Lagrange, CYCLIC),
     (BobylevSteklov, ALL),
+    (HessPendulum, CYCLIC),
     (Delone, CYCLIC),
+    (Steklov, CYCLIC),
+    (Hess, CYCLIC),
     (Kovalevskaya, CYCLIC),
     (GoryachevChaplygin, CYCLIC),
 )

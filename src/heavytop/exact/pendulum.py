@@ -23,7 +23,7 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import ball
+from heavytop.exact.balls import ball, whole
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign
 from heavytop.exact.flint_context import current_precision
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
@@ -93,33 +93,83 @@ class Pendulum(WithAttitude):
 
 
 @dataclass(frozen=True, slots=True)
-class _Lattice:
-    """All that does not depend on the time.
+class Swing:
+    """The angle x(t) at one working precision.
 
-    axis: k.  amplitude: σ√m (libration) or σ.  speed: 2ω times it.  half: (cos, sin) of x(0)/2.
+    amplitude: σ√m (libration) or σ.  speed: 2ω times it.
     """
 
-    axis: int
     functions: Jacobi
     rate: arb
     origin: arb
     amplitude: arb
     speed: arb
     rotating: bool
+
+    def at(self, time: Any) -> tuple[Any, Any, Any]:
+        """(sin(x/2), cos(x/2), x') at a number or series."""
+        sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
+        cosine, speed = (cn, dn) if self.rotating else (dn, cn)
+        return self.amplitude * sn, cosine, self.speed * speed
+
+    def half(self, time: arb) -> arb:
+        """x/2, continuous for all times: it grows by π with every turn of a rotation."""
+        sine, cosine, _ = self.at(time)
+        quarter = self.functions.quarter
+        if not self.rotating or quarter is None:
+            return arb.atan2(sine, cosine)
+        turns = whole((self.rate * time + self.origin) / (2 * quarter))
+        side = -1 if turns % 2 else 1
+        return arb.atan2(side * sine, side * cosine) + self.amplitude * turns * arb.pi()
+
+
+def swing(
+    inertia: Fraction, kinetic: Fraction, height: Fraction, square: Fraction, direction: int, side: int
+) -> tuple[Swing, tuple[arb, arb]]:
+    """The motion of a pendulum, and (cos, sin) of x(0)/2.
+
+    kinetic: ½ I x'².  height: n·γ = −N cos x.  square: N².  direction, side: the signs of x' and sin x at t = 0, +1
+    for 0.  Raises ZeroDivisionError for a pendulum at rest in equilibrium.
+    """
+    energy, torque_square = kinetic + height, square - height**2
+    largest = ball(square).sqrt()
+    rotating = energy > 0 and energy**2 > square
+    side *= direction
+    # 1 - cos x and 1 + cos x, times N; N² - height² = torque²
+    below, above = _sum(square, height, torque_square), _sum(square, -height, torque_square)
+    over, under = _sum(square, energy, square - energy**2), _sum(square, -energy, square - energy**2)
+    sine, cosine = (below / (2 * largest)).sqrt(), (above / (2 * largest)).sqrt()
+    if rotating:
+        functions = jacobi(2 * largest / over, -under / over)
+        origin = legendre_f(below / (2 * largest), above / (2 * largest), ball(kinetic) / over)
+        rate, amplitude = (over / (2 * ball(inertia))).sqrt(), arb(direction)
+    else:
+        parameter = arb(1) if under.is_zero() else over / (2 * largest)
+        functions = jacobi(parameter, under / (2 * largest))
+        origin = legendre_f(below / over, ball(kinetic) / over, above / (2 * largest))
+        rate, amplitude = (largest / ball(inertia)).sqrt(), direction * parameter.sqrt()
+    moving = Swing(functions, rate, side * origin, amplitude, 2 * rate * amplitude, rotating)
+    return moving, (cosine, side * direction * sine)
+
+
+@dataclass(frozen=True, slots=True)
+class _Lattice:
+    """All that does not depend on the time.  axis: k.  half: (cos, sin) of x(0)/2."""
+
+    axis: int
+    swing: Swing
     half: tuple[arb, arb]
     gamma: list[arb]
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
-        sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
-        cosine, speed = (cn, dn) if self.rotating else (dn, cn)
-        sine = self.amplitude * sn
+        sine, cosine, speed = self.swing.at(time)
         cosine0, sine0 = self.half
         c, s = cosine * cosine0 + sine * sine0, sine * cosine0 - cosine * sine0
         cosine, sine = c * c - s * s, 2 * c * s
         k = self.axis
         i, j = (k + 1) % 3, (k + 2) % 3
         omega: list[Any] = [arb(0)] * 3
-        omega[k] = -(self.speed * speed)
+        omega[k] = -speed
 
         def carry(vector: Sequence[Any]) -> list[Any]:
             result = list(vector)
@@ -139,28 +189,10 @@ def _lattice(case: Pendulum, _bits: int) -> _Lattice | None:
     i, j = (k + 1) % 3, (k + 2) % 3
     n, gamma, inertia = case.top.moment, case.start.gamma, case.top.inertia[k]
     kinetic = inertia * case.start.omega[k] ** 2 / 2
-    height, torque = dot(n, gamma), n[i] * gamma[j] - n[j] * gamma[i]
-    energy, square = kinetic + height, dot(n, n) * dot(gamma, gamma)
-    largest = ball(square).sqrt()
-    rotating = energy > 0 and energy**2 > square
-    # 1 - cos x and 1 + cos x, times N; N² - height² = torque²
-    below, above = _sum(square, height, torque**2), _sum(square, -height, torque**2)
-    over, under = _sum(square, energy, square - energy**2), _sum(square, -energy, square - energy**2)
-    direction = sign(-case.start.omega[k])
-    side = sign(-torque) * direction
-    sine, cosine = (below / (2 * largest)).sqrt(), (above / (2 * largest)).sqrt()
-    if rotating:
-        functions = jacobi(2 * largest / over, -under / over)
-        origin = legendre_f(below / (2 * largest), above / (2 * largest), ball(kinetic) / over)
-        rate, amplitude = (over / (2 * ball(inertia))).sqrt(), arb(direction)
-    else:
-        parameter = arb(1) if under.is_zero() else over / (2 * largest)
-        functions = jacobi(parameter, under / (2 * largest))
-        origin = legendre_f(below / over, ball(kinetic) / over, above / (2 * largest))
-        rate, amplitude = (largest / ball(inertia)).sqrt(), direction * parameter.sqrt()
-    half = (cosine, side * direction * sine)
-    speed = 2 * rate * amplitude
-    return _Lattice(k, functions, rate, side * origin, amplitude, speed, rotating, half, balls(gamma))
+    torque = n[i] * gamma[j] - n[j] * gamma[i]
+    square = dot(n, n) * dot(gamma, gamma)
+    moving, half = swing(inertia, kinetic, dot(n, gamma), square, sign(-case.start.omega[k]), sign(-torque))
+    return _Lattice(k, moving, half, balls(gamma))
 
 
 def _sum(square: Fraction, value: Fraction, product: Fraction) -> arb:

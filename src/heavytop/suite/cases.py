@@ -7,8 +7,12 @@ from fractions import Fraction
 
 from heavytop.claims.ershkov import PartialCase
 from heavytop.errors import InputError
+from heavytop.exact.algebraic import AlgebraicMotion
+from heavytop.exact.chaplygin import chaplygin_motion
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.exact.goryachev import goryachev_motion
+from heavytop.exact.kowalewski import kowalewski_motion
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
@@ -64,6 +68,13 @@ def _delone() -> Case:
     )
 
 
+def _near(name: str, known: AlgebraicMotion) -> Case:
+    """Rational data within 2^-253 of a motion whose start is algebraic; their truth is the enclosure."""
+    top, start = known.rounded()
+    about = f"rational data beside {known.method.removeprefix('algebraic: ').partition(',')[0]}"
+    return Case(name, about, HEAVY_TOP, top, start)
+
+
 CASES: dict[str, Case] = {
     case.name: case
     for case in (
@@ -105,6 +116,37 @@ CASES: dict[str, Case] = {
             HeavyTop((3, "5/2", "3/2"), "3/2", (0, "1/2", "1/5")),
             State(("9/7", 0, 0), (0, "3/5", "4/5")),
         ),
+        Case(
+            "goryachev-chaplygin",
+            "I1 = I2 = 4 I3, centre of mass across the axis, M·gamma = 0",
+            HEAVY_TOP,
+            HeavyTop((4, 4, 1), 1, (1, 0, 0)),
+            State(("3/4", "1/2", 0), (0, 0, 1)),
+        ),
+        Case(
+            "hess",
+            "Hess' top, M·gamma = 3: a hyperbolic linear system with the period of an elliptic height",
+            HEAVY_TOP,
+            HeavyTop((8, 6, 3), 1, (1, 0, 2)),
+            State(("3/4", "1/2", -1), (0, 1, 0)),
+        ),
+        Case(
+            "hess-pendulum",
+            "Hess' top, M·gamma = 0: a pendulum that tends to a rotation about axis 2",
+            HEAVY_TOP,
+            HeavyTop((8, 6, 3), 1, (1, 0, 2)),
+            State(("3/4", 0, -1), (0, 1, 0)),
+        ),
+        Case(
+            "steklov",
+            "Steklov's motion, periodic: Omega2^2 and Omega3^2 quadratic in Omega1",
+            HEAVY_TOP,
+            HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)),
+            State((0, 4, 2), (-1, 0, 0)),
+        ),
+        _near("goryachev", goryachev_motion(Fraction(39, 64), Fraction(-1), Fraction(1, 4))),
+        _near("kowalewski", kowalewski_motion(Fraction(5, 8), Fraction(1))),
+        _near("chaplygin", chaplygin_motion(Fraction(49, 32), Fraction(1), Fraction(1, 2))),
         Case(
             "gyrostat",
             "asymmetric gyrostat of (2.1)-(2.4), gamma = M/|M|",

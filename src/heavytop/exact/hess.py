@@ -1,0 +1,285 @@
+"""Hess' tops, M·γ ≠ 0: the height of the centre of mass is elliptic, the rest a linear system with its period.
+
+n = P r = (a, 0, c), N = |n|, with I1 (I2 − I3) a² = I3 (I1 − I2) c²: r stands across a circular section of the
+ellipsoid of inertia of the moments 1/I.  M·n = 0 at the start then holds for ever.  In units with I2 = 1, with
+e_z = n/N, e_x = (c, 0, −a)/N, e_y, β = ac (1/I1 − 1/I3)/N², C0 = M·γ and the energy E,
+
+    M = ρ (cos φ e_x + sin φ e_y),   s = n·γ = Nγ_z,   ρ² = 2 (E − s),   γ_x + iγ_y = ρe^(iφ) (C0 − iγ_z')/ρ²
+    s'² = 2 (E − s)(N²|γ|² − s²) − C0²N²,      φ' = −βρ cos φ − NC0/ρ²
+
+The cubic is rational; s = m + d cos θ swings between its two lower roots (:mod:`heavytop.exact.gaps`), a spherical
+pendulum.  tan(φ/2) = v/u, where with ω = NC0/ρ²
+
+    u' = ½ (ω − βρ) v,   v' = −½ (ω + βρ) u
+
+*What "closed form" means here.*  s is an elliptic function.  The linear system has no solution in known functions for
+general moments (Nekrasov; it is a Floquet problem), but its period is that of s: the matrix over one period is made
+once, and (u, v) at any time is a power of it applied to the start, so that the cost does not grow with the time.  The
+matrix comes from Taylor polynomials with a proven tail (:mod:`heavytop.exact.hess_transfer`).
+
+M·γ = 0 is elementary in the angle of a pendulum: :mod:`heavytop.exact.hess_pendulum`.
+Where the two lower roots coincide, s rests: refused.
+Source: W. Hess, Math. Ann. 37 (1890) 153; P. A. Nekrasov, Mat. sbornik 16 (1892) 508; derived here from the equations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from flint import acb, arb, arb_mat, arb_series, fmpq_poly
+
+from heavytop.errors import NotInClass, OutOfReach
+from heavytop.exact.abel import Inversion
+from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
+from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
+from heavytop.exact.hess_transfer import System2, Transfer
+from heavytop.exact.motion import kept
+from heavytop.exact.one_gap import in_units
+from heavytop.exact.reduced import Undecided, polynomial
+from heavytop.exact.scales import exponent, unit_of_time
+from heavytop.precision import shown
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+
+_TRIALS = 256, 1024, 4096
+_MOST_TERMS = 1 << 14
+_REMEDY = "The validated enclosure holds for every motion."
+
+
+def require_hess(top: HeavyTop, start: State) -> None:
+    """Raises NotInClass unless top and start satisfy Hess' conditions exactly."""
+    (i1, i2, i3), (a, b, c) = top.inertia, top.moment
+    if b != 0 or not (a or c):
+        raise NotInClass(
+            f"Hess needs P b = 0 and P r != 0; P r = ({', '.join(map(shown, (a, b, c)))}).", "Rename the axes."
+        )
+    section = i1 * (i2 - i3) * a * a - i3 * (i1 - i2) * c * c
+    if section != 0:
+        raise NotInClass(
+            f"Hess needs I1 (I2 - I3) a^2 = I3 (I1 - I2) c^2; times P^2 it is off by {shown(section)}.",
+            "Choose another centre of mass.",
+        )
+    along = dot(top.angular_momentum(start.omega), top.moment)
+    if along != 0:
+        raise NotInClass(f"Hess needs M·P r = 0, but M·P r = {shown(along)}.", "Choose Omega3 so that it vanishes.")
+    if not any(start.gamma):
+        raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
+
+
+@dataclass(frozen=True, slots=True)
+class Hess(ClosedForm):
+    """A motion of Hess' top with M·γ ≠ 0 and the centre of mass in the plane of axes 1 and 3.
+
+    Raises NotInClass unless P b = 0, P r ≠ 0, I1 (I2 − I3) a² = I3 (I1 − I2) c², M·P r = 0 and M·γ ≠ 0, all exactly,
+    and where n·γ rests.
+    """
+
+    top: HeavyTop
+    start: State
+    method: str = "closed form: Hess, elliptic height and the matrix of a linear system over its period"
+    system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        require_hess(self.top, self.start)
+        level = Level.of(self.top, self.start)
+        if level.area == 0:
+            raise NotInClass("M·gamma = 0: the motion is elementary.", "Use HessPendulum.")
+        cubic = level.cubic()
+        if cubic.gcd(cubic.derivative()).degree() > 0:
+            raise NotInClass("The level is degenerate: P r·gamma rests at a double root.", _REMEDY)
+        _require_reach(level)
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        try:
+            motion = _motion(self, current_precision())
+            return in_units(motion.at(ball(motion.level.rate * time)), motion.level.rate, motion.level.size)
+        except Undecided:
+            return [arb("nan")] * 6
+
+
+@kept
+def _motion(case: Hess, _bits: int) -> HessMotion:
+    return HessMotion.of(Level.of(case.top, case.start))
+
+
+@whole_evaluation
+def _require_reach(level: Level) -> None:
+    """Raises NotInClass where the Fourier series of the elliptic integral is too long."""
+    for bits in _TRIALS:
+        with working_precision(bits):
+            try:
+                level.gap(_MOST_TERMS)
+            except Undecided:
+                continue
+            except OutOfReach as error:
+                raise NotInClass(f"The level is all but degenerate: {error.cause}", _REMEDY) from error
+            return
+    raise NotInClass("The level is all but degenerate: two roots of the cubic are not told apart.", _REMEDY)
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """The exact data with I2 = 1, Ω and γ in units of ``rate`` and ``size``; moment: n in these units."""
+
+    rate: Fraction
+    size: Fraction
+    inertia: tuple[Fraction, Fraction, Fraction]
+    moment: tuple[Fraction, Fraction, Fraction]
+    omega: tuple[Fraction, Fraction, Fraction]
+    gamma: tuple[Fraction, Fraction, Fraction]
+
+    @classmethod
+    def of(cls, top: HeavyTop, start: State) -> Level:
+        """In units of ordinary size."""
+        rate = Fraction(2) ** unit_of_time(HEAVY_TOP.parameters(top, start), start.flat)
+        size = Fraction(2) ** exponent(max(map(abs, start.gamma)))
+        i1, i2, i3 = top.inertia
+        n1, n2, n3 = (n * size / (i2 * rate**2) for n in top.moment)
+        w1, w2, w3 = (w / rate for w in start.omega)
+        g1, g2, g3 = (g / size for g in start.gamma)
+        return cls(rate, size, (i1 / i2, Fraction(1), i3 / i2), (n1, n2, n3), (w1, w2, w3), (g1, g2, g3))
+
+    @property
+    def angular_momentum(self) -> tuple[Fraction, ...]:
+        """M."""
+        return tuple(i * w for i, w in zip(self.inertia, self.omega, strict=True))
+
+    @property
+    def area(self) -> Fraction:
+        """C0."""
+        found: Fraction = dot(self.angular_momentum, self.gamma)
+        return found
+
+    @property
+    def height(self) -> Fraction:
+        """s."""
+        found: Fraction = dot(self.moment, self.gamma)
+        return found
+
+    @property
+    def energy(self) -> Fraction:
+        """E."""
+        found: Fraction = dot(self.omega, self.angular_momentum) / 2 + self.height
+        return found
+
+    @property
+    def moment_square(self) -> Fraction:
+        """N²."""
+        found: Fraction = dot(self.moment, self.moment)
+        return found
+
+    @property
+    def skew(self) -> Fraction:
+        """β."""
+        return self.moment[0] * self.moment[2] * (1 / self.inertia[0] - 1 / self.inertia[2]) / self.moment_square
+
+    def cubic(self) -> fmpq_poly:
+        """s'² as a polynomial of s."""
+        zero, one, square = Fraction(0), Fraction(1), self.moment_square
+        limit = polynomial(square * dot(self.gamma, self.gamma), zero, -one)
+        return 2 * polynomial(self.energy, -one) * limit - polynomial(self.area**2 * square)
+
+    def gap(self, most: int = MOST_TERMS) -> Gap:
+        """Where s swings, at the working precision; raises OutOfReach, and Undecided where roots are not told apart."""
+        low, high, top = self.roots()
+        if not low < high < top:
+            raise Undecided
+        return Gap(low, high, Roots.of(arb(2), [(acb(top), 1)]), count=1, most=most)
+
+    def roots(self) -> list[arb]:
+        """The three roots of the cubic, in order."""
+        found: Any = self.cubic().complex_roots()
+        return sorted((root.real for root, _ in found), key=midpoint)
+
+    def in_plane(self, vector: tuple[Fraction, ...]) -> tuple[arb, arb]:
+        """The components along e_x and e_y."""
+        a, _, c = self.moment
+        return ball(c * vector[0] - a * vector[2]) / ball(self.moment_square).sqrt(), ball(vector[1])
+
+
+@dataclass(frozen=True, slots=True)
+class HessMotion:
+    """A level at one working precision.
+
+    energy, area, size: E, C0, N.  origin: Abel's integral at t = 0.  spinor: (u, v) at θ = 0.
+    """
+
+    level: Level
+    gap: Gap
+    energy: arb
+    area: arb
+    size: arb
+    origin: arb
+    linear: System2
+    matrix: Transfer
+    spinor: arb_mat
+
+    @classmethod
+    def of(cls, level: Level) -> HessMotion:
+        """At the working precision.
+
+        Raises Undecided where it does not suffice, OutOfReach where the series need too many terms.
+        """
+        gap, (_, high, top) = level.gap(), level.roots()
+        energy, area, size = ball(level.energy), ball(level.area), ball(level.moment_square).sqrt()
+        linear = System2(gap.reach, energy - high, top - high, size * area, ball(level.skew))
+        matrix = Transfer.of(linear)
+        height = ball(level.height)
+        speed = ball(dot(level.moment, cross(level.gamma, level.omega)))
+        phase = gap.phase(height, speed * gap.density(height))
+        x, y = level.in_plane(level.angular_momentum)
+        length = (2 * (energy - height)).sqrt()
+        start = arb_mat([[length + x], [y]]) if x > 0 else arb_mat([[y], [length - x]])
+        spinor = matrix.inverse(phase) * start
+        return cls(level, gap, energy, area, size, gap.integrals(phase)[0], linear, matrix, spinor)
+
+    def at(self, time: arb) -> list[Any]:
+        """Ω and γ at ``time`` in units of the level, numbers or series of the length set by :func:`series_length`.
+
+        Raises Undecided where the working precision does not prove the phase.
+        """
+        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
+        if not phase.is_finite():
+            raise Undecided
+        u, v = (self.matrix.at(phase, turns) * self.spinor).entries()
+        scale = arb(2) ** -_exponent(abs(u) + abs(v))
+        return self._state(*self._moving(phase, u * scale, v * scale))
+
+    def _moving(self, phase: arb, u: arb, v: arb) -> tuple[Any, Any, Any]:
+        """(θ, u, v) as power series in t, from their differential equations."""
+        if current_length() == 1:
+            return phase, u, v
+        now: tuple[Any, ...] = tuple(arb_series([x], prec=current_length()) for x in (phase, u, v))
+        for _ in range(current_length() - 1):
+            rate = 1 / self.gap.density(self.gap.position(now[0]))
+            b, c = self.linear.entries(now[0])
+            slopes = rate, b * rate * now[2], c * rate * now[1]
+            now = tuple(x + slope.integral() for x, slope in zip((phase, u, v), slopes, strict=True))
+        moving, first, second = now
+        return moving, first, second
+
+    def _state(self, phase: Any, u: Any, v: Any) -> list[Any]:
+        s = self.gap.position(phase)
+        square = 2 * (self.energy - s)
+        share = square.sqrt() / (u * u + v * v)
+        x, y = (u * u - v * v) * share, 2 * u * v * share
+        climb = -self.gap.reach * phase.sin() / (self.gap.density(s) * self.size)
+        across = (x * self.area + y * climb) / square, (y * self.area - x * climb) / square
+        a, _, c = (ball(n) / self.size for n in self.level.moment)
+        i1, _, i3 = map(ball, self.level.inertia)
+        z = s / self.size
+        return [c * x / i1, y, -a * x / i3, c * across[0] + a * z, across[1], c * z - a * across[0]]
+
+
+def _exponent(value: arb) -> int:
+    """About log2 of a positive ball; 0 where it is not finite."""
+    if not value.is_finite() or value.is_zero():
+        return 0
+    mantissa, power = value.mid().man_exp()
+    return int(power) + int(mantissa).bit_length()

@@ -1,0 +1,235 @@
+"""Motions of a top with r on axis 1 in which Ω2² and Ω3² are polynomials, all on one variable in one gap.
+
+With I = (A, B, C), n = P r = (N, 0, 0), polynomials Q and R of x, k = 1 or 3 and w = x^((k − 1)/2) put
+
+    Ω1 = x^k,   Ω2 = w √Q,   Ω3 = w √R,   x' = K √Q √R,   K = (B − C)/(kA)
+    Nγ1 = S,   Nγ2 = √Q T,   Nγ3 = √R U
+    T = (A − B) w x^k − C K (w' R + ½ w R'),   U = B K (w' Q + ½ w Q') − (C − A) w x^k
+
+This satisfies the equations for Ω.  Those for γ are three identities between polynomials, tested exactly:
+
+    K S' = w (T − U),   K (T' Q + ½ T Q') = U x^k − w S,   K (U' R + ½ U R') = w S − T x^k
+
+x swings between two simple roots of QR, x = m + d cos θ (:mod:`heavytop.exact.gaps`), θ' = √g > 0 and t is one Abel
+integral of θ.  √Q and √R are products of √(2d) cos(θ/2), √(2d) sin(θ/2) and roots that never vanish: turning points
+are points like any other.
+The four motions of this form: :mod:`heavytop.exact.steklov`, :mod:`heavytop.exact.algebraic`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+from flint import acb, arb, arb_series, fmpq, fmpq_poly
+
+from heavytop.errors import NotInClass
+from heavytop.exact.abel import Inversion
+from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.flint_context import current_length, whole_evaluation
+from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
+from heavytop.exact.reduced import Undecided
+
+_X = fmpq_poly([0, 1])
+_HALF = fmpq(1, 2)
+_SEARCH_BITS = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Q, R and what follows from them; made by :meth:`of`.
+
+    inertia: (A, B, C).  power: k.  speed: K.  heights: S, T, U.
+    """
+
+    inertia: tuple[Fraction, Fraction, Fraction]
+    power: int
+    second: fmpq_poly
+    third: fmpq_poly
+    speed: Fraction
+    heights: tuple[fmpq_poly, fmpq_poly, fmpq_poly]
+
+    @classmethod
+    def of(
+        cls, inertia: tuple[Fraction, Fraction, Fraction], second: fmpq_poly, third: fmpq_poly, power: int = 1
+    ) -> Curve:
+        """The motions with these Q and R; raises NotInClass where an identity fails."""
+        a, b, c = (_rational(moment) for moment in inertia)
+        speed, place, factor = (b - c) / (power * a), _X**power, _X ** (power // 2)
+        turning = factor.derivative()
+        t = (a - b) * factor * place - c * speed * (turning * third + _HALF * factor * third.derivative())
+        u = b * speed * (turning * second + _HALF * factor * second.derivative()) - (c - a) * factor * place
+        second_rate = speed * (t.derivative() * second + _HALF * t * second.derivative())
+        third_rate = speed * (u.derivative() * third + _HALF * u * third.derivative())
+        s, left = divmod(u * place - second_rate, factor)
+        defects = speed * s.derivative() - factor * (t - u), left, third_rate - factor * s + t * place
+        for defect in defects:
+            if defect.degree() >= 0:
+                raise NotInClass(
+                    f"Omega2^2 and Omega3^2 are not these polynomials of Omega1: {defect} is not 0.",
+                    "The coefficients follow from the moments of inertia.",
+                )
+        product = second * third
+        if product.gcd(product.derivative()).degree() > 0:
+            raise NotInClass("Omega2^2 Omega3^2 has a multiple root.", "Choose other moments of inertia.")
+        return cls(inertia, power, second, third, Fraction(int(speed.p), int(speed.q)), (s, t, u))
+
+    def squares(self, x: Fraction) -> tuple[Fraction, Fraction]:
+        """Q and R at x."""
+        return value(self.second, x), value(self.third, x)
+
+    def gamma_square(self) -> Fraction:
+        """N²|γ|², a constant."""
+        s, t, u = self.heights
+        return value(s * s + self.second * t * t + self.third * u * u, Fraction(0))
+
+
+def value(polynomial: fmpq_poly, x: Fraction) -> Fraction:
+    """The polynomial at a rational place."""
+    found = polynomial(_rational(x))
+    return Fraction(int(found.p), int(found.q))
+
+
+def _rational(number: Fraction) -> fmpq:
+    return fmpq(number.numerator, number.denominator)
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """A root of QR: its place, and whether it is one of Q (0) or of R (1)."""
+
+    place: acb
+    of: int
+
+
+@dataclass(frozen=True, slots=True)
+class OneGapMotion:
+    """A motion on a curve at one working precision.
+
+    rests: what is left of Q and of R without the ends of the gap.  ends: which of both vanishes at the lower end, at
+    the upper end.  origin: Abel's integral at t = 0.  signs: of √Q and √R with their half angles.
+    """
+
+    curve: Curve
+    gap: Gap
+    rests: tuple[Roots, Roots]
+    ends: tuple[int, int]
+    origin: arb
+    signs: tuple[int, int]
+
+    @classmethod
+    def of(cls, curve: Curve, x: Fraction, signs: tuple[int, int], most: int = MOST_TERMS) -> OneGapMotion:
+        """From x and the signs of √Q and √R there, 0 where they vanish; at the working precision.
+
+        Raises Undecided where it does not suffice, OutOfReach where the Fourier series needs more than ``most`` terms.
+        """
+        roots, leads = _roots(curve), [_lead(part) for part in (curve.second, curve.third)]
+        low, high = _gap_ends(roots, leads[0] * leads[1], ball(x))
+        others = [root for root in roots if root not in (low, high)]
+        of = [[(root.place, 1) for root in others if root.of == which] for which in (0, 1)]
+        lead = ball(curve.speed) ** 2 * abs(leads[0] * leads[1])
+        gap = Gap(low.place.real, high.place.real, Roots.of(lead, of[0] + of[1]), count=1, most=most)
+        rests = Roots.of(abs(leads[0]), of[0]), Roots.of(abs(leads[1]), of[1])
+        q, r = (sign * ball(square).sqrt() for sign, square in zip(signs, curve.squares(x), strict=True))
+        slope = ball(curve.speed) * q * r * gap.density(ball(x))
+        phase = gap.phase(ball(x), slope)
+        # x' = K √Q √R and dx/dθ < 0 for 0 < θ < π: one sign gives the other
+        both = -1 if curve.speed > 0 else 1
+        motion = cls(curve, gap, rests, (low.of, high.of), gap.integrals(phase)[0], (1, both))
+        there = motion._square_roots(phase, 0)
+        which = next((k for k in (0, 1) if signs[k] and not there[k].contains(0)), None)
+        if which is None:
+            raise Undecided
+        if (there[which] > 0) != (signs[which] > 0):
+            motion = cls(curve, gap, rests, motion.ends, motion.origin, (-1, -both))
+        return motion
+
+    def at(self, time: arb) -> list[Any]:
+        """Ω and Nγ at ``time``, numbers or series of the length set by :func:`series_length`.
+
+        Raises Undecided where the working precision does not prove the phase.
+        """
+        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
+        if not phase.is_finite():
+            raise Undecided
+        return self._state(self._moving(phase), turns)
+
+    def _moving(self, phase: arb) -> Any:
+        """The phase as a power series in t, from its differential equation."""
+        if current_length() == 1:
+            return phase
+        moving: Any = arb_series([phase], prec=current_length())
+        for _ in range(current_length() - 1):
+            moving = phase + (1 / self.gap.density(self.gap.position(moving))).integral()
+        return moving
+
+    def _square_roots(self, phase: Any, turns: int) -> tuple[Any, Any]:
+        """√Q and √R."""
+        x, halves = self.gap.position(phase), self.gap.ends(phase)
+        found = [sign / rest.density(x) for sign, rest in zip(self.signs, self.rests, strict=True)]
+        for which, half in zip(self.ends, halves, strict=True):
+            found[which] *= -half if turns % 2 else half
+        return found[0], found[1]
+
+    def _state(self, phase: Any, turns: int) -> list[Any]:
+        x = self.gap.position(phase)
+        q, r = self._square_roots(phase, turns)
+        s, t, u = (horner(height, x) for height in self.curve.heights)
+        factor = x ** (self.curve.power // 2)
+        return [x**self.curve.power, factor * q, factor * r, s, q * t, r * u]
+
+
+def horner(polynomial: fmpq_poly, x: Any) -> Any:
+    """A rational polynomial at a ball or series."""
+    found = x * 0
+    for coefficient in reversed(polynomial.coeffs()):
+        found = found * x + arb(coefficient)
+    return found
+
+
+def in_units(motion: Sequence[Any], rate: Fraction, size: Fraction) -> list[Any]:
+    """Ω and γ, series in t' or numbers, as those in t = t'/rate of Ω times ``rate`` and γ times ``size``."""
+    units = [ball(rate)] * 3 + [ball(size)] * 3
+    if current_length() == 1:
+        return [unit * component for unit, component in zip(units, motion, strict=True)]
+    factors = [ball(rate**n) for n in range(current_length())]
+    return [
+        arb_series([unit * factor * component[n] for n, factor in enumerate(factors)], prec=len(factors))
+        for unit, component in zip(units, motion, strict=True)
+    ]
+
+
+@whole_evaluation
+def gaps(curve: Curve) -> list[tuple[float, float]]:
+    """Where Q and R are both positive between two of their roots."""
+    with working_precision(_SEARCH_BITS):
+        real = sorted(float(root.place.real) for root in _roots(curve) if root.place.imag.is_zero())
+        return [ends for ends in pairwise(real) if min(curve.squares(Fraction(sum(ends) / 2))) > 0]
+
+
+def _lead(polynomial: fmpq_poly) -> arb:
+    return arb(polynomial[polynomial.degree()])
+
+
+def _roots(curve: Curve) -> list[_End]:
+    found: Any = [part.complex_roots() for part in (curve.second, curve.third)]
+    return [_End(acb(place), which) for which in (0, 1) for place, _ in found[which]]
+
+
+def _gap_ends(roots: Sequence[_End], lead: arb, x: arb) -> tuple[_End, _End]:
+    """Between which two real roots of QR the place x lies; raises Undecided where the balls do not tell."""
+    real = sorted((root for root in roots if root.place.imag.is_zero()), key=lambda root: midpoint(root.place.real))
+    positive = bool(lead > 0) == (len(roots) % 2 == 0)
+    possible = []
+    for low, high in pairwise(real):
+        if low.place.overlaps(high.place):
+            raise Undecided
+        positive = not positive
+        if positive and not (x < low.place.real or x > high.place.real):
+            possible.append((low, high))
+    if len(possible) != 1:
+        raise Undecided
+    return possible[0]

@@ -1,0 +1,124 @@
+"""Goryachev's, N. Kowalewski's and Chaplygin's motions, and the rational data near them."""
+
+import random
+from fractions import Fraction
+
+import pytest
+from flint import arb
+
+from heavytop.errors import InputError, NotInClass, OutOfReach
+from heavytop.exact.algebraic import AlgebraicMotion
+from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.catalogue import find
+from heavytop.exact.chaplygin import chaplygin_curve, chaplygin_motion
+from heavytop.exact.goryachev import goryachev_curve, goryachev_motion
+from heavytop.exact.kowalewski import kowalewski_curve, kowalewski_motion
+from heavytop.exact.one_gap import Curve, gaps
+from heavytop.exact.reduced import polynomial
+from heavytop.exact.steklov import quadratics
+from heavytop.exact.validated import Validated
+from heavytop.top.equations import HEAVY_TOP, Parameters
+
+F = Fraction
+BITS = 200
+# builder, B from and to, sign of the other number
+FAMILIES = {
+    "goryachev": (goryachev_motion, F(601, 1000), F(624, 1000), -1),
+    "kowalewski": (kowalewski_motion, F(589, 1000), F(644, 1000), 1),
+    "chaplygin": (chaplygin_motion, F(1501, 1000), F(1596, 1000), 1),
+}
+
+
+def random_motion(name, seed):
+    """Any B of the range, any unit of time, any place in the gap, any signs."""
+    build, low, high, side = FAMILIES[name]
+    rng = random.Random(f"{name} {seed}")
+    second = low + (high - low) * F(rng.randint(0, 64), 64)
+    other = side * F(rng.randint(1, 40), rng.randint(1, 9))
+    first, last = gaps(build(second, other).curve)[0]
+    place = F(first) + (F(last) - F(first)) * F(rng.randint(1, 31), 32)
+    return build(second, other, place, (rng.choice((1, -1)), rng.choice((1, -1))))
+
+
+def assert_solves(motion: AlgebraicMotion, time):
+    """The residual of all six equations contains 0 with radius below 1e-40 at 60 digits; |γ| = 1."""
+    series, moment = motion.series(time, 3, BITS), motion.moment(2 * BITS)
+    with working_precision(2 * BITS):
+        field = HEAVY_TOP.field(Parameters([ball(i) for i in motion.inertia], moment, arb(0)), series)
+        for y, f in zip(series, field, strict=True):
+            for k in range(2):
+                off = (y.derivative() - f)[k]
+                assert off.contains(0)
+                assert off.rad() < arb("1e-40")
+        assert abs(sum(g[0] * g[0] for g in series[3:]) - 1) < arb("1e-55")
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("seed", range(5))
+def test_every_random_motion_solves_all_six_equations(name, seed):
+    motion = random_motion(name, seed)
+    for time in (F(0), F(7, 3), F(-(10**6))):
+        assert_solves(motion, time)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_the_enclosure_of_rational_data_departs_by_their_rounding(name):
+    motion = random_motion(name, 7)
+    top, start = motion.rounded(220)
+    assert sum(g * g for g in start.gamma) == 1
+    off = [abs(midpoint(a) - b) for a, b in zip(motion.start(300), start.flat, strict=True)]
+    assert max(off) <= F(1, 2**217) * max(1, *map(abs, start.flat))
+    for time in (F(10), F(-10)):
+        assert motion.departure(top, start, time, 170) < arb("1e-50")
+    assert isinstance(find(top, start), Validated)
+
+
+def test_rougher_data_depart_and_the_departure_is_enclosed():
+    motion = goryachev_motion(F(61, 100), F(-1))
+    top, start = motion.rounded(30)
+    early, late = (motion.departure(top, start, F(time), 120) for time in (1, 40))
+    assert arb("1e-12") < early < arb("1e-8")
+    assert early < late < arb("1e-5")
+    assert radius(late) < F(1, 10**30)
+    with pytest.raises(OutOfReach):
+        motion.departure(top, start, F(10**9), 120)
+
+
+@pytest.mark.parametrize("second", [F(61, 100), F(3, 7), F(11, 5), F(5, 8) + F(1, 10**20)])
+def test_the_identities_hold_exactly_for_all_moments(second):
+    """Curve.of raises NotInClass where one of the six equations fails as an identity between polynomials."""
+    for make in (goryachev_curve, kowalewski_curve, chaplygin_curve):
+        curve = make(second, F(-3, 7))
+        s, t, u = curve.heights
+        norm = s * s + curve.second * t * t + curve.third * u * u
+        assert norm.degree() == 0
+        assert curve.gamma_square() == F(str(norm[0]))
+    b2, b0, c2, c0 = quadratics(F(1), second, F(13, 10))
+    assert Curve.of((F(1), second, F(13, 10)), polynomial(b0, F(0), b2), polynomial(c0, F(0), c2)).power == 1
+
+
+@pytest.mark.parametrize("term", range(3))
+def test_a_planted_fault_breaks_an_identity(term):
+    right = goryachev_curve(F(61, 100), F(-1))
+    for which in (0, 1):
+        parts = [right.second, right.third]
+        parts[which] = parts[which] + polynomial(*[F(0)] * term, F(1, 10**30))
+        with pytest.raises(NotInClass, match="is not 0"):
+            Curve.of(right.inertia, *parts)
+
+
+def test_chaplygins_motion_starts_from_rest():
+    start = chaplygin_motion(F(31, 20), F(1)).start(200)
+    assert all(abs(w) < arb("1e-60") for w in start[:3])
+    assert abs(start[3]) < arb("1e-60")
+
+
+def test_what_is_not_real_is_refused_with_where_it_is():
+    with pytest.raises(InputError, match="Real motions have it in"):
+        goryachev_motion(F(61, 100), F(-1), F(2))
+    with pytest.raises(InputError, match="No top has Goryachev's motion"):
+        goryachev_motion(F(9, 16), F(-1))
+    with pytest.raises(InputError, match="No top has Goryachev's motion"):
+        goryachev_motion(F(1, 2), F(-1))
+    with pytest.raises(InputError, match=r"is not real|No top"):
+        kowalewski_motion(F(9, 10), F(1))

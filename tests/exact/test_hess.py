@@ -1,0 +1,161 @@
+"""Hess' tops: random motions, small M·γ, pendulums, attitude, and what is refused."""
+
+import random
+from fractions import Fraction
+
+import pytest
+from flint import arb, arb_mat
+from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
+
+from heavytop.errors import NotInClass
+from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.catalogue import find
+from heavytop.exact.hess import Hess
+from heavytop.exact.hess_pendulum import HessPendulum
+from heavytop.exact.hess_transfer import Segment, System2, Transfer
+from heavytop.exact.validated import Validated
+from heavytop.top.heavy_top import HeavyTop, State
+
+F = Fraction
+TOP = HeavyTop((8, 6, 3), 1, (1, 0, 2))
+SYSTEM = F(1, 3), F(1, 5), F(1, 2), F(3, 4), F(-1, 4)
+
+
+def random_data(seed):
+    """A top of the class with its centre anywhere, and a start; γ of any length."""
+    rng = random.Random(seed)
+    i1, i3, a, c = (positive(rng) for _ in range(4))
+    a *= rng.choice((1, -1))
+    share = (a / c) ** 2
+    top = HeavyTop((i1, i1 * i3 * (1 + share) / (i1 * share + i3), i3), rng.choice((1, -2)), (a, 0, c))
+    w1 = rational(rng) or F(1)
+    gamma = rational(rng), rational(rng) or F(1), rational(rng)
+    return top, [w1, rational(rng), -i1 * a * w1 / (i3 * c)], gamma
+
+
+def random_hess(seed):
+    top, omega, gamma = random_data(seed)
+    return Hess(top, State(omega, gamma))
+
+
+def random_pendulum(seed):
+    top, omega, gamma = random_data(seed)
+    (i1, i2, i3), (w1, _, w3) = top.inertia, omega
+    omega[1] = -(i1 * w1 * gamma[0] + i3 * w3 * gamma[2]) / (i2 * gamma[1])
+    return HessPendulum(top, State(omega, gamma))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_every_random_motion_solves_all_six_equations(seed):
+    motion = random_hess(seed)
+    assert_solves(motion, rational(random.Random(seed), size=30))
+    assert_narrow(motion, F(10**6))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_every_random_pendulum_solves_all_six_equations(seed):
+    motion = random_pendulum(seed)
+    time = rational(random.Random(seed), size=30)
+    assert_solves(motion, time)
+    assert_narrow(motion, F(10**6))
+    assert_attitude(motion, time)
+
+
+@pytest.mark.parametrize("motion", [random_hess(1), random_hess(2), random_pendulum(3)], ids=["1", "2", "pendulum"])
+def test_the_enclosure_holds_the_closed_form(motion):
+    enclosure = Validated(motion.top, motion.start)
+    for time in (F(3, 2), F(-2)):
+        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
+        assert all(a.overlaps(b) for a, b in pairs)
+
+
+@pytest.mark.parametrize("spin", [F(1, 10), F(1, 1000), F(1, 10**6)])
+def test_small_area_integrals_do_no_harm(spin):
+    # at spin 0 the pendulum swings to and fro, and M vanishes at its turning points
+    motion = Hess(TOP, State(("1/4", spin, "-1/3"), (0, 1, 0)))
+    assert_solves(motion, F(7, 3))
+    limit = HessPendulum(TOP, State(("1/4", 0, "-1/3"), (0, 1, 0)))
+    for near, there in zip(motion.state(F(1), 170), limit.state(F(1), 170), strict=True):
+        assert abs(near - there) < 20 * float(spin)
+
+
+@pytest.mark.parametrize(
+    ("omega", "gamma", "turning"),
+    [
+        (("3/4", 0, -1), (0, 1, 0), 1),
+        (("-3/4", 0, 1), (0, 1, 0), -1),
+        (("1/4", 0, "-1/3"), (0, 1, 0), 0),
+        ((0, 0, 0), (0, 1, 0), 0),
+        ((0, 0, 0), ("1/3", "-1/2", "1/5"), 0),
+        (("3/4", 0, -1), (0, "1/16", 0), 1),
+    ],
+)
+def test_pendulums_swing_turn_over_and_start_from_rest(omega, gamma, turning):
+    motion = HessPendulum(TOP, State(omega, gamma))
+    assert_solves(motion, F(-7, 3))
+    assert_attitude(motion, F(37))
+    late = motion.state(F(10**5), 100)
+    # one that turns over tends to a rotation about axis 2: away from it nothing is left
+    assert (abs(late[0]) < arb("1e-100")) == (turning != 0)
+
+
+def test_the_first_terms_left_out_lie_within_the_tail():
+    with working_precision(200):
+        system = System2(*map(ball, SYSTEM))
+        segment = Segment.of(system, 0.0, 0.4)
+    with working_precision(600):
+        longer = Segment.of(system, 0.0, 0.4)
+        for short, long in zip(segment.parts, longer.parts, strict=True):
+            for order, coefficient in enumerate(long.coeffs()):
+                assert abs(coefficient).upper() <= segment.growth.upper()
+                if order < len(short):
+                    assert short[order].overlaps(coefficient)
+
+
+def test_the_matrix_over_a_period_keeps_areas_and_undoes_itself():
+    with working_precision(200):
+        system = System2(*map(ball, SYSTEM))
+        transfer = Transfer.of(system)
+        for phase in (F(-3), F(0), F(1, 7), F(2), F(22, 7), F(5)):
+            number = ball(phase)
+            there = transfer.at(number, 3)
+            assert abs(there.det() - 1) < arb("1e-50")
+            shifted = transfer.at(number + 2 * arb.pi(), 2)
+            assert all(abs(x) < arb("1e-50") for x in (there - shifted).entries())
+            back = transfer.inverse(number) * transfer.at(number, 0) - arb_mat([[1, 0], [0, 1]])
+            assert all(abs(x) < arb("1e-50") for x in back.entries())
+
+
+def test_the_cases_of_the_plans_are_of_the_class():
+    assert isinstance(find(TOP, State(("3/4", "1/2", -1), (0, 1, 0))), Hess)
+    assert isinstance(find(TOP, State(("3/4", 0, -1), (0, 1, 0))), HessPendulum)
+
+
+def test_what_is_outside_is_refused_with_the_test_that_failed():
+    start = State(("3/4", "1/2", -1), (0, 1, 0))
+    for case in (Hess, HessPendulum):
+        with pytest.raises(NotInClass, match=r"P r = \(1, 1, 2\)"):
+            case(HeavyTop((8, 6, 3), 1, (1, 1, 2)), start)
+        with pytest.raises(NotInClass, match="off by -20/3"):
+            case(HeavyTop((8, "17/3", 3), 1, (1, 0, 2)), start)
+        with pytest.raises(NotInClass, match="M·P r = 3"):
+            case(TOP, State(("9/8", "1/2", -1), (0, 1, 0)))
+        with pytest.raises(NotInClass, match="gamma = 0"):
+            case(TOP, State(start.omega, (0, 0, 0)))
+    with pytest.raises(NotInClass, match="M·gamma = 3"):
+        HessPendulum(TOP, start)
+    with pytest.raises(NotInClass, match="M·gamma = 0"):
+        Hess(TOP, State(("3/4", 0, -1), (0, 1, 0)))
+    with pytest.raises(NotInClass, match="a pendulum's"):
+        HessPendulum(TOP, State((0, 3, 0), (1, 0, 1)))
+
+
+@pytest.mark.parametrize("lift", [F(1, 10), F(1, 10**12), F(-1, 10**30)])
+def test_heights_that_all_but_rest_are_levels_like_any_other(lift):
+    # at lift 0 the cubic has a double root at s = −1: the spherical pendulum goes round level
+    top = HeavyTop((1, 1, 1), 1, (0, 0, 1))
+    with pytest.raises(NotInClass, match="rests at a double root"):
+        Hess(top, State((1, 0, 0), (1, 0, -1)))
+    motion = Hess(top, State((F(1) + lift, 0, 0), (F(1), 0, F(-1))))
+    assert_solves(motion, F(7, 3))
+    assert_narrow(motion, F(10**6))

@@ -1,0 +1,114 @@
+"""Steklov's motions: random ones, turning points, nearly equal moments, odd sizes, and what is refused."""
+
+import random
+from fractions import Fraction
+
+import pytest
+from proofs import assert_narrow, assert_solves, positive, rational
+
+from heavytop.errors import InputError, NotInClass
+from heavytop.exact.balls import midpoint, radius
+from heavytop.exact.catalogue import find
+from heavytop.exact.steklov import Steklov, quadratics, steklov_motion
+from heavytop.exact.validated import Validated
+from heavytop.top.heavy_top import HeavyTop, State
+
+F = Fraction
+
+
+def random_motion(seed):
+    """Moments of any order and a start of any signs, γ upwards or downwards."""
+    rng = random.Random(seed)
+    while True:
+        data = positive(rng), positive(rng, 2), positive(rng, 2), positive(rng) * rng.choice((1, -1))
+        try:
+            return steklov_motion(*data, rng.choice((1, -1)), positive(rng))
+        except InputError:
+            continue
+
+
+def turning(second, ratio, rate):
+    """A start with Ω2 = 0: A Ω1² = (A − 2C) Ω3², A = 1, C = (1 − s²)/2."""
+    third = (1 - ratio**2) / 2
+    b2, b0, c2, c0 = quadratics(F(1), second, third)
+    p, r = ratio * rate, rate
+    height = -b2 * p * p / b0
+    kappa = (second - third) / 2
+    up = height - (p * p + second * (b2 * p * p) + third * (c2 * p * p)) / 2
+    side = r * ((1 - third) * p + kappa * second * 2 * b2 * p)
+    assert c0 * height + c2 * p * p == r * r
+    return HeavyTop((1, second, third), 1, (1, 0, 0)), State((p, 0, r), (up, 0, side))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_every_random_motion_solves_all_six_equations(seed):
+    motion = random_motion(seed)
+    assert_solves(motion, rational(random.Random(seed), size=30))
+    assert_narrow(motion, F(10**6))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_enclosure_holds_the_closed_form(seed):
+    motion = random_motion(seed)
+    enclosure = Validated(motion.top, motion.start)
+    for time in (F(3, 2), F(-2)):
+        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
+        assert all(a.overlaps(b) for a, b in pairs)
+
+
+@pytest.mark.parametrize("data", [(F(1, 5), F(1, 3), F(2)), (F(2, 3), F(1, 2), F(-1)), (F(3, 10), F(2, 3), F(1, 2))])
+def test_turning_points_are_starts_like_any_other(data):
+    top, start = turning(*data)
+    motion = Steklov(top, start)
+    assert_solves(motion, F(7, 3))
+    assert_solves(motion, F(-1000))
+
+
+@pytest.mark.parametrize("distance", [F(1, 10), F(1, 1000)])
+def test_nearly_equal_moments_do_no_harm(distance):
+    # I3 = ½ (I1 + s² (I1 − 2 I2)) with I2 = I3 + distance
+    ratio = F(1, 2)
+    second = (1 + ratio**2 + 2 * distance) / (2 + 2 * ratio**2)
+    motion = steklov_motion(F(1), second, ratio, F(2))
+    assert motion.top.inertia[1] - motion.top.inertia[2] == distance
+    assert_solves(motion, F(7, 3))
+    assert_narrow(motion, F(10**6))
+
+
+@pytest.mark.parametrize("power", [300, -300])
+def test_the_unit_of_time_does_not_matter(power):
+    plain, unit = steklov_motion(F(1), F(1, 5), F(6, 5), F(2)), F(10) ** power
+    other = steklov_motion(F(1), F(1, 5), F(6, 5), 2 * unit)
+    pairs = zip(plain.state(F(7, 3), 170), other.state(F(7, 3) / unit, 1200), strict=True)
+    units = [unit] * 3 + [F(1)] * 3
+    for (one, same), factor in zip(pairs, units, strict=True):
+        assert abs(midpoint(one) - midpoint(same) / factor) <= 2 * radius(one)
+
+
+def test_the_case_of_the_plans_is_one():
+    motion = find(HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)), State((0, 4, 2), (-1, 0, 0)))
+    assert isinstance(motion, Steklov)
+    assert_solves(motion, F(10**6))
+
+
+def test_what_is_outside_is_refused_with_the_test_that_failed():
+    top, start = HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)), State((0, 4, 2), (-1, 0, 0))
+    with pytest.raises(NotInClass, match=r"P r = \(1, 0, 1\)"):
+        Steklov(HeavyTop(top.inertia, 1, (1, 0, 1)), start)
+    with pytest.raises(NotInClass, match="three different moments"):
+        Steklov(HeavyTop((1, "1/2", "3/4"), 1, (1, 0, 0)), start)
+    with pytest.raises(NotInClass, match=r"Omega3\^2 is off .* by 9/4"):
+        Steklov(top, State((0, 4, "5/2"), start.gamma))
+    with pytest.raises(NotInClass, match=r"gamma is off Steklov's by \(2, 0, 0\)"):
+        Steklov(top, State(start.omega, (1, 0, 0)))
+    with pytest.raises(NotInClass, match="gamma = 0"):
+        Steklov(top, State(start.omega, (0, 0, 0)))
+    with pytest.raises(InputError, match="No Steklov top has moments"):
+        steklov_motion(F(1), F(1, 2), F(1), F(1))
+
+
+@pytest.mark.parametrize("distance", [F(1, 10**12), F(1, 10**30), F(1, 10**400)])
+def test_moments_too_nearly_equal_are_left_to_the_enclosure(distance):
+    ratio = F(1, 2)
+    with pytest.raises(NotInClass, match="all but satisfy an equality"):
+        steklov_motion(F(1), (1 + ratio**2 + 2 * distance) / (2 + 2 * ratio**2), ratio, F(2))
