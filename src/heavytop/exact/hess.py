@@ -32,12 +32,13 @@ from flint import acb, arb, arb_mat, arb_series, fmpq_poly
 
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.abel import Inversion
-from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.azimuth import Azimuth, Bearing
+from heavytop.exact.balls import ball, midpoint, to_bits, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
 from heavytop.exact.hess_transfer import System2, Transfer
-from heavytop.exact.motion import kept
+from heavytop.exact.motion import initial_xi, kept
 from heavytop.exact.one_gap import in_units
 from heavytop.exact.reduced import Undecided, polynomial
 from heavytop.exact.scales import exponent, unit_of_time
@@ -101,6 +102,27 @@ class Hess(ClosedForm):
             return in_units(motion.at(ball(motion.level.rate * time)), motion.level.rate, motion.level.size)
         except Undecided:
             return [arb("nan")] * 6
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 :func:`initial_xi` of γ."""
+
+        def evaluate(_working: int) -> list[arb]:
+            try:
+                azimuth, began = _azimuth(self, current_precision())
+                motion = _motion(self, current_precision())
+                here = motion.bearing(azimuth, ball(motion.level.rate * time))
+            except Undecided:
+                return [arb("nan")] * 3
+            return here.carried(began, initial_xi(self.start.gamma))
+
+        return to_bits(evaluate, bits, time)
+
+
+@kept
+def _azimuth(case: Hess, bits: int) -> tuple[Azimuth, Bearing]:
+    motion = _motion(case, bits)
+    azimuth = motion.azimuth()
+    return azimuth, motion.bearing(azimuth, arb(0))
 
 
 @kept
@@ -244,12 +266,29 @@ class HessMotion:
 
         Raises Undecided where the working precision does not prove the phase.
         """
-        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
-        if not phase.is_finite():
-            raise Undecided
+        phase, turns = self._phase(time)
         u, v = (self.matrix.at(phase, turns) * self.spinor).entries()
         scale = arb(2) ** -_exponent(abs(u) + abs(v))
         return self._state(*self._moving(phase, u * scale, v * scale))
+
+    def _phase(self, time: arb) -> tuple[arb, int]:
+        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
+        if not phase.is_finite():
+            raise Undecided
+        return phase, turns
+
+    def azimuth(self) -> Azimuth:
+        """That of n about γ: Λ' = C0 |γ| N²/(N²|γ|² − s²)."""
+        low, high, top = self.level.roots()
+        gamma = ball(dot(self.level.gamma, self.level.gamma)).sqrt()
+        pole = self.size * gamma
+        gap = Gap(low, high, Roots.of(arb(2), [(acb(top), 1), (acb(pole), 2), (acb(-pole), 2)]), count=1)
+        return Azimuth(gap, (self.area * gamma * self.size**2,))
+
+    def bearing(self, azimuth: Azimuth, time: arb) -> Bearing:
+        """n, level, and its azimuth at ``time``."""
+        phase, turns = self._phase(time)
+        return Bearing.of(self.at(time)[3:], [ball(n) for n in self.level.moment], azimuth.at(phase, turns))
 
     def _moving(self, phase: arb, u: arb, v: arb) -> tuple[Any, Any, Any]:
         """(θ, u, v) as power series in t, from their differential equations."""
