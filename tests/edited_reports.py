@@ -227,6 +227,11 @@ def more_steps(row: Document, random: Random) -> bool:
     return bool(row["steps"])
 
 
+def more_evaluations(row: Document, random: Random) -> bool:
+    was, row["evaluations"] = row["evaluations"], random.choice([None, (row["evaluations"] or 0) * 100])
+    return bool(was)
+
+
 def bits(row: Document, random: Random) -> bool:
     row["bits"] = random.choice([each for each in (24, 53, 64, 113) if each != row["bits"]])
     return True
@@ -336,7 +341,8 @@ EDITS: dict[str, Edit] = {
         band_where_none_is_measured, unresolved, no_number, kind_flipped, log10_alone, duration_shorter,
         value_changed, verdict_turned, metric_dropped, series_dropped, law_dropped, series_shorter, series_larger,
         series_without_its_end, not_finite_hidden, outcome, not_finite, horizon_shorter, reached_less, no_steps,
-        more_steps, bits, precision, starts_fewer, samples_fewer, start_failed, flags, order, rounding, subject,
+        more_steps, more_evaluations, bits, precision, starts_fewer, samples_fewer, start_failed, flags, order,
+        rounding, subject,
     )
 } | {
     "reference computed": _reference("known: |[(]proven[^)]*[)]", lambda at: "computed: " if ":" in at[0] else ""),

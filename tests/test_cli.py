@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from fractions import Fraction
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -88,11 +89,11 @@ def test_a_run_that_stops_early_is_incomplete_and_keeps_what_it_reached() -> Non
     answer = json.loads(done.stdout)
     assert answer["outcome"] == "step_limit"
     assert len(answer["states"]) == len(answer["times"]) == 2
-    done = run("propagate", *top_options(omega="1e140,1e140,1"), "--json")
+    done = run("propagate", *top_options(omega="1e140,1e140,1", times="8e-140"), "--json")
     assert done.returncode == 3
     assert json.loads(done.stdout)["outcome"] == "non_finite"
     assert json.loads(done.stdout)["states"] == []
-    assert "stopped" in run("propagate", *top_options(omega="1e140,1e140,1")).stdout
+    assert "stopped" in run("propagate", *top_options(omega="1e140,1e140,1", times="8e-140")).stdout
 
 
 @pytest.mark.parametrize(
@@ -296,11 +297,16 @@ def test_an_interrupted_run_goes_on_where_it_was(tmp_path: Path, finished: Path)
     assert not rows.exists()
 
 
-@pytest.mark.parametrize("after", [0.5, 1.0, 2.0, 6.0])
-def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130(after: float) -> None:
+@pytest.mark.parametrize(
+    ("after", "integrator"), [(0.5, "heyoka"), (1.0, "heyoka"), (2.0, "heyoka"), (6.0, "heyoka"), (5.0, "words")]
+)
+def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130(after: float, integrator: str) -> None:
     """While libraries load, while heyoka compiles, while it integrates."""
     process = subprocess.Popen(
-        [*COMMAND, "propagate", *top_options(times="1e12")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [*COMMAND, "propagate", *top_options(times="1e12", integrator=integrator)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     time.sleep(after)
     assert process.poll() is None
@@ -310,6 +316,11 @@ def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130(after: float
     assert time.monotonic() - before < 20  # 0.3 s when nothing else runs
     assert process.returncode == 130
     assert "Traceback" not in errors
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    done = run("--version")
+    assert (done.returncode, done.stdout) == (0, f"heavytop {version('heavytop')}\n")
 
 
 def test_help_lists_the_commands_and_loads_nothing_heavy() -> None:
@@ -378,3 +389,25 @@ def test_reference_refuses_what_it_cannot_prove(changes, more, code, message) ->
     assert message in done.stderr
     assert done.stdout == ""
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("precision", ["double", "double-double", "quad", "real:300"])
+def test_propagate_by_words_says_what_it_is(precision: str) -> None:
+    common = "--inertia 3,2,1 --weight 1 --centre 1/2,1/3,1/5 --omega 1/10,2/5,9/10 --gamma 3/5,0,4/5 --times -1,-2"
+    done = run("propagate", *common.split(), "--precision", precision, "--integrator", "words", "--attitude", "--json")
+    assert done.returncode == 0
+    document = json.loads(done.stdout)
+    assert document["integrator"] == "words"
+    assert document["precision"] == precision
+    assert document["outcome"] == "success"
+    assert {"words", "bits", "step_rule", "tolerance"} <= set(document["flags"])
+    assert len(document["angles"]) == len(document["states"]) == 2
+
+
+def test_an_integrator_that_is_none_and_a_format_beyond_words_are_refused() -> None:
+    common = "--inertia 3,2,1 --weight 1 --centre 1/2,1/3,1/5 --omega 1/10,2/5,9/10 --gamma 3/5,0,4/5 --times 1"
+    for options in ("--integrator euler", "--integrator words --precision real:2000", "--precision double-double"):
+        done = run("propagate", *common.split(), *options.split())
+        assert done.returncode == 2
+        assert "words" in done.stderr
+        assert "Traceback" not in done.stderr

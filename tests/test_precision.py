@@ -128,7 +128,7 @@ def test_unknown_formats_are_refused(name: str) -> None:
 
 def test_every_family_is_available_or_says_why_not() -> None:
     answer = available()
-    assert set(answer) == {"double", "extended", "quad", "real"}
+    assert set(answer) == {"double", "extended", "double-double", "quad", "real"}
     assert all(reason is None or len(reason) > 10 for reason in answer.values())
     assert answer["double"] is None
 
@@ -167,3 +167,10 @@ def test_any_text_is_a_number_or_a_clear_error(text: str) -> None:
     except InputError as error:
         value, refused = None, error
     assert isinstance(value, Fraction) or (refused is not None and refused.remedy)
+
+
+@pytest.mark.parametrize("text", ["1e1234567", "-1e99999999", "1E+100001", f"1e{'9' * 5000}", "1e-99999999"])
+def test_a_number_with_too_large_an_exponent_is_called_that(text: str) -> None:
+    with pytest.raises(InputError, match=r"exponent of .* is too large"):
+        exact(text)
+    assert exact("1e0000000002") == 100

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
     from heavytop.integrate.trajectory import Outcome, Trajectory
     from heavytop.measure.reference import Reference
-    from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, available, real
+    from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, available, real
     from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
     from heavytop.top.heavy_top import HeavyTop, State
     from heavytop.top.integrals import holding
@@ -29,7 +29,7 @@ _PLACES = {
     "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
     "integrate.trajectory": ("Outcome", "Trajectory"),
     "measure.reference": ("Reference",),
-    "precision": ("DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),
+    "precision": ("DOUBLE", "DOUBLE_DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),
     "top.equations": ("GYROSTAT", "HEAVY_TOP", "System"),
     "top.heavy_top": ("HeavyTop", "State"),
     "top.integrals": ("holding",),
@@ -38,6 +38,7 @@ _ROOM = {name: room for room, names in _PLACES.items() for name in names}
 
 __all__ = [
     "DOUBLE",
+    "DOUBLE_DOUBLE",
     "EXTENDED",
     "GYROSTAT",
     "HEAVY_TOP",

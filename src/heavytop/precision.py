@@ -21,7 +21,7 @@ REAL_BITS = range(24, 20001)
 _MAX_TEXT = 100_000
 LARGEST = Fraction(10) ** 150
 """Beyond this, physical data overflow in some float on the way; a change of units brings them back."""
-_DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,6})?")
+_DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 _REMEDY = "Write an integer, a decimal such as 0.25 or 1e-3, or a fraction such as -2/5."
 
 
@@ -44,13 +44,16 @@ class Precision:
 
     @property
     def family(self) -> str:
-        """``double``, ``extended``, ``quad`` or ``real``."""
+        """``double``, ``extended``, ``double-double``, ``quad`` or ``real``."""
         return self.name.partition(":")[0]
 
 
 DOUBLE = Precision("double", 53)
 EXTENDED = Precision("extended", 64)
+DOUBLE_DOUBLE = Precision("double-double", 106)
+"""The sum of two doubles; its numbers are handed over as heyoka's real of 106 bits.  Only ``words`` computes in it."""
 QUAD = Precision("quad", 113)
+FORMATS = DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD
 
 
 def real(bits: int) -> Precision:
@@ -62,14 +65,16 @@ def real(bits: int) -> Precision:
 
 
 def parse(name: str) -> Precision:
-    """The format of that name (``double``, ``extended``, ``quad``, ``real:BITS``); raises InputError for any other."""
+    """The format of that name; raises InputError unless it is that of one of FORMATS or ``real:BITS``."""
     if isinstance(name, str):
-        for precision in (DOUBLE, EXTENDED, QUAD):
+        for precision in FORMATS:
             if name == precision.name:
                 return precision
         if re.fullmatch(r"real:[1-9][0-9]{0,8}", name):
             return real(int(name[5:]))
-    raise InputError(f"Unknown precision {quoted(name)}.", "Use double, extended, quad or real:BITS, such as real:237.")
+    raise InputError(
+        f"Unknown precision {quoted(name)}.", "Use double, extended, double-double, quad or real:BITS such as real:237."
+    )
 
 
 def whole(value: Any, what: str) -> int:
@@ -88,11 +93,13 @@ def available() -> dict[str, str | None]:
     import numpy
 
     mantissa = int(numpy.finfo(numpy.longdouble).nmant) + 1
+    mpfr = None if hasattr(heyoka, "real") else "this build of heyoka has no arbitrary precision (MPFR)"
     return {
         "double": None,
         "extended": None if mantissa == EXTENDED.bits else f"long double has {mantissa} bits here, not 64",
+        "double-double": mpfr,
         "quad": None if hasattr(heyoka, "real128") else "this build of heyoka has no quadruple precision (real128)",
-        "real": None if hasattr(heyoka, "real") else "this build of heyoka has no arbitrary precision (MPFR)",
+        "real": mpfr,
     }
 
 
@@ -203,7 +210,8 @@ def _from_decimal(text: str, given: str) -> Fraction:
     match = _DECIMAL.fullmatch(text)
     if not match or not text.isascii():
         raise InputError(f"{quoted(given)} is not a finite number.", _REMEDY)
-    if match[3] and abs(int(match[3][1:])) > _MAX_TEXT:
+    exponent = match[3].lstrip("eE+-").lstrip("0") if match[3] else ""
+    if len(exponent) > len(str(_MAX_TEXT)) or int(exponent or 0) > _MAX_TEXT:
         raise _too_large(given)
     return Fraction(*Decimal(text).as_integer_ratio())
 
@@ -229,7 +237,7 @@ def _significand(value: Fraction, bits: int) -> tuple[int, int]:
 def number(value: Fraction, precision: Precision) -> Any:
     """``value`` rounded to nearest in ``precision``, as that format's own number type.
 
-    double: numpy.float64; extended: numpy.longdouble; quad: heyoka.real128; real: heyoka.real.
+    double: numpy.float64; extended: numpy.longdouble; quad: heyoka.real128; real, double-double: heyoka.real.
     Raises InputError where the value lies outside the format's exponent range.
     """
     import numpy

@@ -89,7 +89,7 @@ def test_an_ensemble_is_its_motions_and_every_integrator_has_the_same_call() -> 
     tops = [TOP, ht.HeavyTop((3, 2, 1), 1, (0, 1, 0))]
     runs = ht.ensemble(tops, START, TIMES, threads=2)
     for top, run in zip(tops, runs, strict=True):
-        for integrator in ("heyoka", "scipy:DOP853"):
+        for integrator in ("heyoka", "words", "scipy:DOP853"):
             alone = ht.propagate(top, START, TIMES, integrator=integrator)
             np.testing.assert_allclose(run.to_numpy(), alone.to_numpy(), rtol=0, atol=1e-9)
     seen = []
@@ -222,3 +222,24 @@ def test_a_finished_run_is_read_again_and_a_plan_of_odd_moments_warns(tmp_path: 
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0
     assert done.stderr.startswith(f"heavytop: warning: {warned}")
+
+
+def test_an_error_below_what_a_float_holds_is_not_printed_as_0() -> None:
+    form = ht.real(1400)
+    top = ht.HeavyTop(("5/2", "5/2", "3/2"), 2, (0, 0, "3/4"))
+    start = ht.State(("1/4", "-3/8", "7/4"), ("3/5", 0, "4/5"))
+    run = ht.propagate(top, start, ["1/8"], form)
+    lines = {
+        line[:24].strip(): line.split()[-3:]
+        for line in str(ht.score(["1/8"], run.states, top=top, start=start, precision=form)).splitlines()
+    }
+    for label in ("error of Ω", "error of γ", "drift of energy"):
+        assert all(re.fullmatch(r"\d\.\d\de-42\d", value) for value in lines[label]), lines
+
+
+def test_an_ensemble_of_a_peer_is_refused_as_one_motion_at_a_time() -> None:
+    top, start = ht.HeavyTop((3, 2, 1), 1, (0, 0, 1)), ht.State((1, 0, 0), (0, 0, 1))
+    with pytest.raises(ht.InputError, match="splitting:4 runs one motion at a time"):
+        ht.ensemble(top, start, [1], integrator="splitting:4")
+    with pytest.raises(ht.InputError, match="Unknown integrator"):
+        ht.ensemble(top, start, [1], integrator="splitting:5")

@@ -97,6 +97,8 @@ ON_AXIS_1 = "0 1 2 1 0 0"
     ("table", "named"),
     [
         (free("Omega3", ("Omega1",), state=ON_AXIS_1), "Omega1 = 0 is kept by the flow"),
+        # on Ω1² = 0 every rate is 0, and yet Ω1 does not stay 0
+        (free("Omega3", ("Omega1^2",), state=ON_AXIS_1), "Omega1**2 = 0 is kept"),
         (free("Omega3", ("Omega1*Omega2",), state=ON_AXIS_1), "Omega1*Omega2 = 0 is kept"),
         (free("sqrt(Omega1)", kind="relation", state=ON_AXIS_1), "Omega1"),
         (free("Omega1^2 + 1", kind="relation", state=ON_AXIS_1), "no sample is proven to lie on the relations"),
@@ -119,6 +121,15 @@ def test_the_square_of_what_does_not_stay_0_is_no_invariant_relation():
     assert judged(free(area, kind="relation", state="0 0 2 1 0 0")).verdict == "holds"
 
 
+def test_what_is_not_0_is_not_positive_for_that() -> None:
+    """Ω3 of a symmetric top stays what it is: not 0, of either sign."""
+    top = {"inertia": ["2", "2", "5"], "weight": "1", "centre": ["0", "0", "1"]}
+    table = free("gamma3*(sqrt(Omega3^2) - Omega3)/Omega3", state="1 0 -1 3/5 0 4/5") | {"top": top}
+    assert judged(table).verdict != "holds"
+    table["integral"]["states"] = [["1", "0", "1", "3/5", "0", "4/5"]]
+    assert judged(table).verdict != "holds"
+
+
 def test_a_state_off_its_condition_by_1e_200_refutes_nothing():
     table = free("Omega3", ("Omega1", "Omega2"))
     table["integral"]["states"] = [["0", "0", "2", "1", "0", "0"], ["1e-200", "1", "2", "1", "0", "0"]]
@@ -137,6 +148,25 @@ def test_a_witness_lies_in_the_domain():
     report = judged(upright("sqrt(t)", "t>0"))
     assert report.verdict == "refuted"
     assert all(float(eval(row.witness["t"])) > 0 for row in report.rows if row.witness)
+
+
+@pytest.mark.parametrize(
+    ("factor", "power"),
+    [("exp(-10^6)", -434295), ("exp(-10^12)", -434294481904), ("exp(10^9)", 434294481), ("exp(-exp(20))", -210704569)],
+)
+def test_a_witness_of_any_size_refutes(factor: str, power: int) -> None:
+    report = judged(upright(f"t*{factor}"))
+    assert report.verdict == "refuted"
+    witness = next(row for row in report.rows if (row.equation, row.component) == ("1.1", 3)).witness
+    # I3/2 or so times the factor: log10 e^(10^6) = 434294.48, and so on
+    assert abs(int(witness["value"].partition("e")[2]) - power) <= 1
+    assert int(witness["radius"].partition("e")[2]) < power - 15
+
+
+def test_what_is_0_at_the_samples_is_not_said_to_be_smaller():
+    row = judged(upright("t*(a - 1)*(a - 2)")).rows[2]
+    assert row.holds is None
+    assert row.residual == "0 at the sample points"
 
 
 def test_the_witness_of_an_integral_has_no_time_and_its_text_no_equations_of_motion(tmp_path):

@@ -12,7 +12,7 @@ from heavytop.claims.conditions import Kind, Need, condition, conditions_of, is_
 from heavytop.claims.judge import judge
 from heavytop.claims.regularity import Regularity
 from heavytop.claims.signs import Sign
-from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Flow, Setting, Statement
+from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
 
 T, A = sympy.Symbol("t", real=True), sympy.Symbol("a", real=True)
 P = sympy.Symbol("p", positive=True)
@@ -165,6 +165,8 @@ SIN, COS, ROOT = sympy.sin(T), sympy.cos(T), sympy.sqrt(1 + T**2)
         (T - sympy.sqrt(T**2), 0, (-1, False)),
         (sympy.sqrt(2) - 1, 0, (1, True)),
         (sympy.sqrt(2) - sympy.Rational(3, 2), 0, (-1, True)),
+        # 0, which no ball can tell
+        (sympy.sqrt(3 + 2 * sympy.sqrt(2)) - 1 - sympy.sqrt(2), 0, (0, False)),
         (sympy.exp(T) + sympy.exp(-T) - 2, 0, (1, False)),
         (sympy.tanh(T) + 1, 0, (1, True)),
     ],
@@ -217,8 +219,8 @@ def test_what_is_known_of_a_fact_turns_with_its_sign() -> None:
 def test_a_formula_is_continuous_only_by_the_rules(expression, sign, strict, continuous, analytic) -> None:
     field = Field(Assumptions(T, (P,), variable_sign=sign, strict=strict), [expression])
     rules, value = Regularity(field), field.enter(expression)
-    assert rules.obstacle(value) is not continuous
-    assert rules.obstacle(value, analytic=True) is not analytic
+    assert (not rules.obstacle(value)) == continuous
+    assert (not rules.obstacle(value, analytic=True)) == analytic
 
 
 # --- verdicts ---------------------------------------------------------------------------------------------------------
@@ -227,11 +229,8 @@ HALVES = sympy.tanh(T) * sympy.sqrt(T**2) - T * sympy.sqrt(sympy.tanh(T) ** 2)
 """0 for either sign of t by algebra, and not for both at once."""
 
 
-def verdict(residual: sympy.Expr, domain: Domain = ALL, **parts) -> bool | None:
-    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(1, 3)},), **parts)
-    flow = None
-    if parts.get("relations") is None and domain.note == "flow":
-        flow = Flow(lambda e: sympy.diff(e, T), frozenset((T,)))
+def verdict(residual: sympy.Expr, domain: Domain = ALL, flow: Flow | None = None) -> bool | None:
+    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(1, 3)},))
     (row,) = judge([Statement("1", 1, "smooth", domain, residual, "", flow=flow)], setting)
     return row.holds
 
@@ -240,8 +239,13 @@ def test_halves_join_where_the_variable_is_time_and_nowhere_else() -> None:
     assert verdict(HALVES) is True
     noted = Domain("all", 0, ALL.points, "positive roots")
     assert verdict(HALVES, noted) is None
-    assert verdict(HALVES, Domain("all", 0, ALL.points, "flow")) is None
+    assert verdict(HALVES, flow=Flow(lambda e: sympy.diff(e, T), frozenset((T,)))) is None
     assert [verdict(HALVES, each) for each in (BEFORE, AFTER)] == [True, True]
+
+
+def test_the_end_of_the_domain_belongs_to_it_where_its_label_says_so() -> None:
+    gap = (T**2 + T) / T - T - 1
+    assert [verdict(gap, each) for each in (BEFORE, AFTER)] == [None, True]
 
 
 def test_a_note_makes_another_domain() -> None:
@@ -271,5 +275,23 @@ def test_what_is_not_real_refutes_nothing(residual: sympy.Expr) -> None:
     assert verdict(residual) is None
 
 
+def test_where_a_derivative_may_have_a_kink_nothing_is_refuted() -> None:
+    kink = sympy.sign(sympy.sqrt(2) - sympy.sqrt(T))
+    assert verdict(3 + kink, Domain("t>0", 1, (Fraction(2),))) is None
+    assert verdict(3 + kink, Domain("t>0", 1, (Fraction(2), Fraction(3)))) is False
+
+
 def test_what_is_off_by_less_than_a_short_ball_shows_is_refuted_all_the_same() -> None:
     assert verdict(sympy.sqrt(2 + T**2) - sympy.sqrt(2 + T**2 + sympy.Rational(1, 10**100))) is False
+
+
+@pytest.mark.parametrize(
+    "need", [Need(Kind.NONNEGATIVE, -1 - T**2), Need(Kind.NONZERO, T - T), Need(Kind.POSITIVE, -P)]
+)
+def test_a_place_where_a_formula_is_undefined_is_no_witness(need: Need) -> None:
+    setting = Setting(T, (P,), ({P: Fraction(2)},))
+    for needs, holds in ((frozenset({need}), None), (frozenset(), False)):
+        formulas = Formulas(values=(T,), needs=needs)
+        (row,) = judge([Statement("1", 1, "smooth", ALL, 1 + T**2, "", formulas)], setting)
+        assert row.holds is holds
+        assert [c.discharged for c in row.conditions if c.text == need.text] == [False] * len(needs)

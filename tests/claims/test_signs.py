@@ -13,6 +13,7 @@ from heavytop.claims.algebra import Assumptions, Field
 from heavytop.claims.conditions import is_exactly_zero
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.ideal import forces_zero
+from heavytop.claims.signs import PLUS, UNKNOWN, Sign, sum_of
 from heavytop.claims.structure import sign_of
 
 T, A, B = sympy.Symbol("t", real=True), sympy.Symbol("a", positive=True), sympy.Symbol("b", positive=True)
@@ -54,6 +55,14 @@ def test_what_is_positive_everywhere_is_told(expression):
 @pytest.mark.parametrize("expression", NOT_POSITIVE)
 def test_what_may_be_0_is_not_called_positive(expression):
     assert _sign(sympy.sympify(expression)) != (1, True)
+
+
+def test_a_sum_of_numbers_of_unknown_sign_may_be_0_though_none_of_them_is():
+    never_zero = Sign(0, True)
+    for parts in ([never_zero], [never_zero, never_zero], [never_zero, PLUS], [PLUS, Sign(-1, False)]):
+        assert sum_of(parts) == UNKNOWN
+    assert sum_of([PLUS, Sign(1, False)]) == PLUS
+    assert sum_of([Sign(-1, False), Sign(-1, True)]) == Sign(-1, True)
 
 
 def test_no_sign_that_is_told_is_false():

@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import signal
 import subprocess
 import sys
 import threading
@@ -129,6 +130,17 @@ def chatty(top, start, times, precision, *, system, tolerance=None):
     return honest(top, start, times, precision, system=system)
 
 
+def rude_to_the_process(top, start, times, precision, *, system, tolerance=None):
+    import signal, tempfile
+    os.write(1, b"from C")
+    os.write(2, b"from C")
+    os.chdir(tempfile.gettempdir())
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    return honest(top, start, times, precision, system=system)
+
+
 def vandal(top, start, times, precision, *, system, tolerance=None):
     run = honest(top, start, times, precision, system=system)
     object.__setattr__(top, "weight", Fraction(17))
@@ -157,7 +169,7 @@ FAILURES = {
     "leaves": "called sys.exit(goodbye)",
     "nothing": "returned a NoneType instead of a Trajectory",
     "words": "returned a str instead of a Trajectory",
-    "states_alone": "returned a tuple instead of a Trajectory",
+    "states_alone": "returned a ndarray instead of a Trajectory",
     "few": "1 of 2 states, and the outcome success",
     "fewer_times": "returned other times",
     "many": "returned 3 states for 2 times",
@@ -166,8 +178,8 @@ FAILURES = {
     "flat": "float64' object is not iterable",
     "imaginary": "a complex128 in a state",
     "objects": "an array of objects",
-    "texts": "a str in a state",
-    "one_text": "a str as a state",
+    "texts": "a str_ in a state",
+    "one_text": "a str_ as a state",
     "truths": "a bool in a state",
     "nan": "a state that is not finite",
     "inf": "a state that is not finite",
@@ -190,7 +202,7 @@ FAILURES = {
     "double_many": "of the shape (3, 6) for 2 times",
     "double_dict": "returned a dict instead of Solved",
 }
-HARMLESS = ("honest", "chatty", "vandal", "double_vandal")
+HARMLESS = ("honest", "chatty", "rude_to_the_process", "vandal", "double_vandal")
 
 
 @pytest.fixture
@@ -236,9 +248,13 @@ NOISY = pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptio
 @NOISY
 @pytest.mark.parametrize("name", HARMLESS)
 def test_a_peer_that_is_only_rude_is_measured_like_a_polite_one(package: Path, name: str, capfd) -> None:
-    before = np.geterr(), sys.stdout, (CASE.top, CASE.start), DOUBLE.bits
+    def state() -> tuple[object, ...]:
+        handlers = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+        return np.geterr(), sys.stdout, (CASE.top, CASE.start), DOUBLE.bits, Path.cwd(), handlers
+
+    before = state()
     found = peers.ready(f"mine:{name}")(CASE.top, CASE.start, TIMES, DOUBLE)
-    assert (np.geterr(), sys.stdout, (CASE.top, CASE.start), DOUBLE.bits) == before
+    assert state() == before
     ours = peers.run("heyoka", CASE.top, CASE.start, TIMES, DOUBLE)
     assert found.times == ours.times
     np.testing.assert_allclose(found.states, ours.states, rtol=0, atol=1e-11)

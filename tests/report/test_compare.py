@@ -1,5 +1,6 @@
 """Comparison: planted changes are found, and nothing that failed counts as the same."""
 
+import math
 from pathlib import Path
 
 import msgspec
@@ -11,9 +12,9 @@ from heavytop.precision import exact
 from heavytop.records import Law, Metric, Row, Series
 from heavytop.report import store
 from heavytop.report.compare import compare
-from heavytop.report.policy import Policy
+from heavytop.report.policy import Policy, Timings
 from heavytop.report.text import short
-from heavytop.report.verdicts import Verdict
+from heavytop.report.verdicts import Verdict, judge_seconds
 from small_reports import error, report, row
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -114,10 +115,21 @@ def test_durations_are_better_when_longer_and_never_is_longest() -> None:
     name = "break_away_time"
     assert verdicts(row(), at("58"))[name] is Verdict.SAME
     assert verdicts(row(), at("50"))[name] is Verdict.WORSE
-    assert verdicts(row(), at("70"))[name] is Verdict.BETTER
+    assert verdicts(row(), at("62.9"))[name] is Verdict.SAME
+    assert verdicts(row(), at("63.1"))[name] is Verdict.BETTER
     assert verdicts(row(), at("never"))[name] is Verdict.BETTER
     assert verdicts(at("never"), row())[name] is Verdict.WORSE
     assert verdicts(at("never"), at("never"))[name] is Verdict.SAME
+
+
+def test_seconds_may_change_by_their_ratio_and_below_their_floor() -> None:
+    def judged(old: float, new: float) -> Verdict:
+        return judge_seconds(old, new, Timings())[0]
+
+    assert [judged(1, new) for new in (1.49, 1.51)] == [Verdict.SAME, Verdict.WORSE]
+    assert [judged(1.5, new) for new in (1.01, 0.99)] == [Verdict.SAME, Verdict.BETTER]
+    assert [judged(0.001, new) for new in (0.149, 0.151)] == [Verdict.SAME, Verdict.WORSE]
+    assert [judged(*pair) for pair in ((1, math.inf), (math.nan, 1))] == [Verdict.INCOMPARABLE] * 2
 
 
 def test_a_value_that_must_agree_is_worse_in_either_direction() -> None:

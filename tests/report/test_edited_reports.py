@@ -11,7 +11,9 @@ from heavytop.records import Law, Metric, Row, Series
 from heavytop.report import store
 from heavytop.report.compare import compare
 from heavytop.report.consistency import contradictions
+from heavytop.report.laws import judge_law
 from heavytop.report.policy import Policy
+from heavytop.report.series import judge_series
 from small_reports import error, report, row
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -156,6 +158,11 @@ LAW = Law("t^0.5", 64, 0.5, 0.47, 0.53, "100", "1e5", "1e-19", "1e30")
         ({"exponent": 5.5, "low": -50.0, "high": 50.0}, "incomparable"),
         ({"exponent": 0.76, "low": 0.45, "high": 0.8}, "incomparable"),
         ({"low": 0.51}, "incomparable"),
+        # the class may be 0.12 outside of the interval
+        ({"exponent": 0.7, "low": 0.619, "high": 0.74}, "worse"),
+        ({"exponent": 0.7, "low": 0.621, "high": 0.74}, "incomparable"),
+        ({"growth": "exponential", "exponent": 0.1, "low": 0.05, "high": 0.2}, "worse"),
+        ({"growth": "exponential", "exponent": -0.1, "low": -0.2, "high": -0.05}, "incomparable"),
         ({"high": 1.0}, "incomparable"),
         ({"growth": "t"}, "incomparable"),
         ({"growth": "unresolved"}, "incomparable"),
@@ -171,6 +178,23 @@ def test_a_law_may_change_within_its_noise(change: dict, verdict: str) -> None:
     noisy = [row(metrics={"drift_area_final": metric}, laws=each.laws) for each in two]
     if change in ({"lost_at": "4.9e29"},):
         assert judged(*noisy)[0] == "same"
+
+
+@pytest.mark.parametrize(
+    ("change", "noise", "verdict"),
+    [
+        # 0.3 decades, and the noise of the error divided by the power of t
+        ({"lost_at": "2.05e29"}, 0.2, "same"),
+        ({"lost_at": "1.95e29"}, 0.2, "worse"),
+        # a factor of 8, or the noise where that is more
+        ({"detects": "7.9e-19"}, 0.5, "same"),
+        ({"detects": "8.1e-19"}, 0.5, "worse"),
+        ({"detects": "9.9e-19"}, 1.0, "same"),
+        ({"detects": "1.01e-18"}, 1.0, "worse"),
+    ],
+)
+def test_what_a_law_says_follows_the_noise_of_its_error(change: dict, noise: float, verdict: str) -> None:
+    assert judge_law(LAW, msgspec.structs.replace(LAW, **change), noise)[0].value == verdict
 
 
 KNOWN = "known: closed form: Euler, radius below 6.02E-36; certified at t = 100 to 50 digits by validated (proven)"
@@ -207,6 +231,11 @@ def test_a_reference_may_be_another_and_not_a_weaker_one(old: str, new: str, ver
         ({"steps": 5}, "same"),
         ({"steps": 4}, "incomparable"),
         ({"steps": 0}, "incomparable"),
+        ({"evaluations": 200}, "same"),
+        ({"evaluations": 201}, "incomparable"),
+        ({"evaluations": 49}, "incomparable"),
+        ({"evaluations": 0}, "incomparable"),
+        ({"evaluations": None}, "incomparable"),
         ({"starts": 2}, "incomparable"),
         ({"order": 19}, "incomparable"),
         ({"measured": "claimed: by somebody"}, "incomparable"),
@@ -217,10 +246,8 @@ def test_a_reference_may_be_another_and_not_a_weaker_one(old: str, new: str, ver
     ],
 )
 def test_what_a_row_says_of_its_run_stays(change: dict, verdict: str) -> None:
-    assert (
-        judged(one(order=20, input_rounding="1e-17"), one(**({"order": 20, "input_rounding": "1e-17"} | change)))[0]
-        == verdict
-    )
+    known = {"order": 20, "input_rounding": "1e-17", "evaluations": 100}
+    assert judged(one(**known), one(**(known | change)))[0] == verdict
 
 
 @pytest.mark.parametrize(
@@ -255,6 +282,12 @@ def test_the_largest_of_fewer_samples_is_no_better(tmp_path: Path, measure: str,
             compare(*briefs, Policy())
     else:
         assert compare(*briefs, Policy()).verdict == verdict
+
+
+def test_a_run_without_steps_is_another_whatever_the_flags() -> None:
+    assert judged(one(steps=10), one(steps=4), flags="ignore")[0] == "same"
+    assert judged(one(steps=10), one(steps=0), flags="ignore")[0] == "incomparable"
+    assert judged(one(steps=0), one(steps=10), flags="ignore")[0] == "incomparable"
 
 
 TIMES = ["1", "50", "100"]
@@ -320,3 +353,100 @@ def test_numbers_that_agree_to_their_digits_are_no_contradiction() -> None:
     assert not list(contradictions(law))
     law.metrics["break_away_slope_off_by"] = error("0.0131")
     assert list(contradictions(law))
+
+
+@pytest.mark.parametrize(("lost", "verdict"), [(4, "same"), (5, "incomparable")])
+def test_so_many_samples_may_no_longer_be_resolved(lost: int, verdict: str) -> None:
+    times = [str(time) for time in range(1, 21)]
+    two = [Series(times, ["unresolved"] * none + ["1e-13"] * (20 - none)) for none in (0, lost)]
+    assert judge_series(*two, 0.6, -16.0, exactly=False)[0].value == verdict
+    # those that the baseline did not resolve either are not lost
+    assert judge_series(two[1], two[1], 0.6, -16.0, exactly=False)[0].value == "same"
+
+
+@pytest.mark.parametrize(("value", "verdict"), [("3.0003", "same"), ("2.9997", "same"), ("3.0005", "worse")])
+def test_a_series_that_must_agree_is_off_by_a_part_of_its_largest(value: str, verdict: str) -> None:
+    old, new = (Series(["1", "2"], [each, "-4"]) for each in ("3", value))
+    assert judge_series(old, new, 1e-4, -16.0, exactly=True)[0].value == verdict
+
+
+def test_half_of_the_samples_may_grow_by_what_is_allowed_above_the_floor() -> None:
+    old = Series(TIMES, ["1e-30", "1e-13", "1e-13"])
+    for values, verdict in (
+        (["9e-17", "3.9e-13", "3.9e-13"], "same"),
+        (["9e-17", "4.1e-13", "4.1e-13"], "worse"),
+        (["9e-17", "1e-17", "4.1e-13"], "same"),
+        (["9e-14", "1e-13", "4.1e-13"], "worse"),
+    ):
+        assert judge_series(old, Series(TIMES, values), 0.6055, -16.0, exactly=False)[0].value == verdict, values
+
+
+@pytest.mark.parametrize(
+    ("band", "same", "worse"),
+    # two bits; twice 0.3 √2 decades, where that is more
+    [(0.2, "3.9e-13", "4.1e-13"), (0.3, "7.0e-13", "7.1e-13")],
+)
+def test_a_series_may_grow_by_the_noise_of_its_metrics_or_by_two_bits(band: float, same: str, worse: str) -> None:
+    metrics = {
+        "drift_energy_max": msgspec.structs.replace(error("1e-12"), band=0.05),
+        "drift_energy_final": msgspec.structs.replace(error("1e-12"), band=band),
+    }
+
+    def with_series(value: str) -> Row:
+        return row(metrics=metrics, series={"drift_energy": Series(TIMES, [value, value, "1e-12"])})
+
+    assert judged(with_series("1e-13"), with_series(same))[0] == "same"
+    assert judged(with_series("1e-13"), with_series(worse))[0] == "worse"
+
+
+@pytest.mark.parametrize(("value", "contradicts"), [("1.02e-12", False), ("1.03e-12", True)])
+def test_a_series_is_within_the_bound_of_what_is_unresolved(value: str, contradicts: bool) -> None:
+    """A bound has three digits."""
+    metrics = {"drift_energy_max": Metric("unresolved", None, "error", "1e-12")}
+    made = row(metrics=metrics, series={"drift_energy": Series(TIMES, ["1e-13", value, "unresolved"])})
+    assert bool(list(contradictions(made))) is contradicts
+
+
+PSI = "claim_evaluation_error_psi"
+FORMULA = {
+    f"{PSI}_max_finite": error("1e-12"),
+    "claim_evaluation_psi_samples_not_finite": Metric("1", 0.0, "value"),
+    "claim_evaluation_psi_not_finite_from": Metric("100", 2.0, "duration"),
+}
+WORK = {"error_max": error("2e-12"), "error_final": error("1e-12")}
+
+
+@pytest.mark.parametrize(
+    ("measure", "metrics", "field"),
+    [
+        ("claim_evaluation", {}, ""),
+        ("claim_evaluation", {f"{PSI}_max_finite": error("1.001e-12")}, f"{PSI}_max_finite"),
+        ("claim_evaluation", {f"{PSI}_max_finite": error("0.999e-12")}, f"{PSI}_max_finite"),
+        (
+            "claim_evaluation",
+            {"claim_evaluation_psi_samples_not_finite": Metric("0", None, "value")},
+            "claim_evaluation_psi_samples_not_finite",
+        ),
+        (
+            "claim_evaluation",
+            {"claim_evaluation_psi_not_finite_from": Metric("never", None, "duration")},
+            "claim_evaluation_psi_not_finite_from",
+        ),
+        ("work_precision", {}, ""),
+        ("work_precision", {"error_final": error("1.001e-12")}, "error_final"),
+        ("work_precision", {"error_final": error("0.999e-12")}, "error_final"),
+        ("work_precision", {"error_max": error("1.99e-12")}, "error_max"),
+    ],
+)
+def test_the_numbers_of_formulas_and_of_runs_are_those_of_their_series(measure, metrics, field) -> None:
+    ends = {
+        "claim_evaluation": {PSI: ["1e-13", "1e-12", "nan"]},
+        "work_precision": {
+            "solution_error_omega": ["1e-13", "2e-12", "1e-13"],
+            "solution_error_gamma": ["1e-13", "1e-13", "1e-12"],
+        },
+    }[measure]
+    known = FORMULA if measure == "claim_evaluation" else WORK
+    series = {name: Series(TIMES, values) for name, values in ends.items()}
+    made = row(measure=measure, finite=measure == "work_precision", metrics=known | metrics, series=series)
+    assert [problem.partition(":")[0] for problem in contradictions(made)] == ([field] if field else [])

@@ -1,6 +1,7 @@
 """Motions computed elsewhere: scored like our own, read with suspicion."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -149,6 +150,7 @@ def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
         ({"precision": "single"}, "Unknown precision"),
         ({"precision": 53}, "Unknown precision"),
         ({"precision": None, "bits": "1.5"}, "is not a count"),
+        ({"precision": "double", "bits": 113}, "bits = 113, but double has 53"),
         ({"precision": None, "bits": 10**6}, "not a format"),
         ({"outcome": "fine"}, "Unknown outcome"),
         ({"steps": -1}, "not a count"),
@@ -269,3 +271,23 @@ def test_the_examples_of_the_documentation_can_be_scored(kind: str, tmp_path: Pa
     truth = propagate(given.top, given.start, given.times, DOUBLE, system=HEAVY_TOP)
     off = max(abs(exact(a) - b) for a, b in zip(truth.states[-1][:3], given.states[-1][:3], strict=True))
     np.testing.assert_allclose(float(off), float(row.metrics["solution_error_omega_final"].value), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("precision", "size"), [("double", "1e309"), ("extended", "-1e4933"), ("quad", "1e4933")])
+def test_a_state_too_large_for_its_format_is_not_finite(precision: str, size: str, tmp_path: Path) -> None:
+    given = document() | {"precision": precision}
+    given["states"][1] = [size, *given["states"][1][1:]]
+    row = score(read(written(tmp_path, given)))
+    assert (row.outcome, row.samples) == ("non_finite", 1)
+    given["states"][1] = ["1e308", *given["states"][1][1:]]
+    assert score(read(written(tmp_path, given))).outcome == "success"
+
+
+def test_what_has_no_end_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    (tmp_path / "endless.json").symlink_to("/dev/zero")
+    os.mkfifo(tmp_path / "pipe.csv")
+    for file in (tmp_path / "endless.json", tmp_path / "pipe.csv"):
+        with pytest.raises(InputError, match="a device or a pipe"):
+            read(file)
+    with pytest.raises(InputError, match=r"neither \.json nor \.csv"):
+        read(Path("/dev/zero"))

@@ -10,10 +10,11 @@ from heavytop.api.arguments import Numbers
 from heavytop.display import Table
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Trajectory
-from heavytop.measure.digits import digits_kept
+from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.measure.drift import Drift
 from heavytop.precision import Precision
 from heavytop.records import Metric, Row
+from heavytop.report.text import short
 from heavytop.suite.score import score as scored
 from heavytop.suite.trajectory_file import of_arrays
 from heavytop.top.equations import HEAVY_TOP, System
@@ -56,10 +57,10 @@ class Score:
 
     def _table(self) -> Table:
         row = self.row
-        kept = "no reference" if self.digits_kept is None else f"{max(self.digits_kept, 0):.1f} digits kept"
+        kept = "no reference" if self.digits_kept is None else f"{digits_text(self.digits_kept)} digits kept"
         sizes = {_LABELS[part]: size for part, size in self.distance.items()}
         sizes |= {f"drift of {name}": size for name, size in self.drift.items()}
-        lines = [[label, *(_short(metric) for metric in size)] for label, size in sizes.items()]
+        lines = [[label, *(short(metric.value) for metric in size)] for label, size in sizes.items()]
         title = f"{row.case} in {row.precision}: {self.outcome}, {kept}"
         return Table(title, ("", "largest", "rms", "final"), lines, [f"compared with {self.against}"])
 
@@ -157,7 +158,3 @@ def _summaries(metrics: dict[str, Metric], prefix: str) -> dict[str, Summary]:
     """The metrics ``PREFIXNAME_max``, ``_rms`` and ``_final`` by NAME."""
     names = [key[len(prefix) : -4] for key in metrics if key.startswith(prefix) and key.endswith("_rms")]
     return {name: Summary(*(metrics[f"{prefix}{name}_{statistic}"] for statistic in Summary._fields)) for name in names}
-
-
-def _short(metric: Metric) -> str:
-    return metric.value if metric.log10 is None else f"{float(metric):.3g}"

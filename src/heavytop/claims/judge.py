@@ -28,6 +28,8 @@ from heavytop.exact.balls import radius as radius_of
 from heavytop.exact.balls import radius_text, value_text
 
 _BITS = (192, 1024)
+_MOST_BITS = 300_000
+"""Of the exponent of a residual that is written as exact text: those of decimal text go up to 10^100000."""
 _LONGEST = 160
 
 
@@ -165,11 +167,25 @@ def _witnesses(statement: Statement, setting: Setting, prover: Prover) -> Iterat
         for values in prover.places(statement):
             ball = _ball(statement.residual, values, bits)
             if ball is not None and not ball.contains(0) and prover.is_defined(statement, values):
-                value, radius = value_text(ball, 20)
+                value, radius = _texts(ball)
                 place = {str(symbol): str(number) for symbol, number in values.items()}
                 time = place.pop(str(setting.variable))
                 moving = {} if statement.flow is not None else {str(setting.variable): time}
                 yield {"parameters": place, **moving, "value": value, "radius": radius}
+
+
+def _texts(ball: arb) -> tuple[str, str]:
+    """(value, radius) to 20 digits, whatever the exponent: no exact number is made of one such as exp(-10^9)."""
+    if max(abs(_power_of_2(part)) for part in (ball.mid(), ball.rad())) < _MOST_BITS:
+        return value_text(ball, 20)
+    value, _, radius = ball.str(20).strip("[]").partition(" +/- ")
+    return value, radius or "0"
+
+
+def _power_of_2(number: arb) -> int:
+    """The exponent of an exact number; 0 for 0."""
+    mantissa, exponent = number.man_exp()
+    return int(exponent) + int(mantissa).bit_length() if mantissa else 0
 
 
 def _ball(residual: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bits: int) -> arb | None:
@@ -187,7 +203,13 @@ def _bound(statement: Statement, prover: Prover) -> str:
     bounds = [abs(ball).upper() for ball in balls if ball is not None]
     if not bounds:
         return "undefined at every sample point"
-    return f"|residual| < {radius_text(max(radius_of(arb(0, bound)) for bound in bounds))} at the sample points"
+    largest = max(bounds)
+    if largest == 0:
+        return "0 at the sample points"
+    if _power_of_2(largest) > _MOST_BITS:
+        return f"|residual| < 2^{_power_of_2(largest)} at the sample points"
+    largest = max(largest, arb((1, -_MOST_BITS)))
+    return f"|residual| < {radius_text(radius_of(arb(0, largest)))} at the sample points"
 
 
 def _closed_form(statement: Statement, setting: Setting, field_: Field) -> str | None:

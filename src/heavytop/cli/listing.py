@@ -9,7 +9,7 @@ from heavytop.cli.app import command
 def list_() -> int:
     """List the cases, plans, systems, number formats and integrators that are there."""
     from heavytop.integrate import peers
-    from heavytop.precision import available
+    from heavytop.precision import FORMATS, available
     from heavytop.suite.cases import CASES
     from heavytop.suite.plan import BUILT_IN
 
@@ -19,11 +19,14 @@ def list_() -> int:
     print(f"Plans\n  {', '.join(BUILT_IN)}, or a TOML file")
     print("Systems\n  heavy_top, gyrostat")
     print("Number formats")
+    notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
     for name, reason in available().items():
         label = "real:BITS" if name == "real" else name
-        note = {"real": "24 to 20000 bits", "double": "53 bits", "extended": "64 bits", "quad": "113 bits"}[name]
+        note = notes[name]
         print(f"  {label:10} {note if reason is None else f'not available: {reason}'}")
     print("Integrators")
+    print("  heyoka           every format but double-double")
+    print("  words            every format, up to about 1000 bits")
     for name, reason in peers.available().items():
-        print(f"  {name:15} {'installed' if reason is None else reason}")
+        print(f"  {name:16} {'installed' if reason is None else reason}")
     return 0

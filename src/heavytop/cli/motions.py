@@ -31,7 +31,8 @@ def propagate(
     omega: Omega,
     gamma: Gamma,
     times: Times,
-    precision: Annotated[str, typer.Option(help="double, extended, quad or real:BITS.")] = "double",
+    precision: Annotated[str, typer.Option(help="double, extended, double-double, quad or real:BITS.")] = "double",
+    integrator: Annotated[str, typer.Option(help="heyoka or words.")] = "heyoka",
     system: SystemName = "heavy_top",
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     normalize: Normalize = False,
@@ -51,7 +52,7 @@ def propagate(
     if max_steps is not None and max_steps < 1:
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top, start)
-    if form.bits >= _SLOW_BITS:
+    if form.bits >= _SLOW_BITS and integrator == "heyoka":
         print(
             f"heavytop: warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
             f"seconds at real:{_SLOW_BITS}, 20 times as long with twice the bits; Ctrl-C waits for it.\n"
@@ -61,7 +62,7 @@ def propagate(
 
     from heavytop.measure.motion import compute
 
-    motion = compute(top, start, instants, form, which, attitude, max_steps)
+    motion = compute(top, start, instants, form, which, attitude, max_steps, integrator)
     if json:
         print_json(motion.to_json())
     else:

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, isqrt, log, pi
+from math import ceil, isfinite, isqrt, log, pi
 from typing import Any
 
 import numpy as np
@@ -191,8 +191,9 @@ class FourierBound:
     def terms(self, most: int) -> int:
         """N, 2^k or 3·2^k, with an error of the sums below the working precision."""
         if not self.wanted <= most:
+            many = f"{self.wanted:.3g}" if isfinite(self.wanted) else "countless"
             raise OutOfReach(
-                f"Abel's integrals need {self.wanted:.3g} Fourier terms, more than {most}: two roots all but coincide.",
+                f"Abel's integrals need {many} Fourier terms, more than {most}: two roots all but coincide.",
                 "Ask for fewer digits, or take a start farther from the degenerate motion.",
             )
         power = max(32, 1 << ceil(self.wanted).bit_length())

@@ -303,7 +303,7 @@ class Validated:
 
     def _refusal(self, time: Fraction, bits: int, reachable: float) -> OutOfReach:
         return OutOfReach(
-            f"{bits * log10(2):.0f} digits at t = {decimal_text(time, 6)} are out of reach of a validated integration.",
+            f"So many digits at t = {decimal_text(time, 6)} are out of reach of a validated integration.",
             f"About {int(reachable * log10(2))} digits could be proven there: ask for fewer, or for an earlier time.",
         )
 

@@ -17,7 +17,7 @@ import numpy
 from heavytop.errors import InputError
 from heavytop.integrate.selfcheck import check
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import DOUBLE, Precision, number, require, usable_tolerance
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, number, require, usable_tolerance
 from heavytop.top.equations import GYROSTAT, VARIABLES, Parameters, System
 
 # A machine-code cache on disk is not protected against corruption: a flipped bit there gives wrong numbers silently.
@@ -102,6 +102,8 @@ def compiled(
     Raises Contradiction where its first step, which is known, is wrong.
     """
     require(precision)
+    if precision == DOUBLE_DOUBLE:
+        raise InputError("heyoka has no double-double.", "Use --integrator words for it, or quad.")
     compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
     if constants is not None and precision != DOUBLE:
         raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")

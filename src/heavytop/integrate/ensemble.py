@@ -54,10 +54,10 @@ def propagate_ensemble(
     Raises InputError for no problems, for problems of several kinds, for times out of order, for a format that the
     platform lacks, and for fewer than 1 thread or 2 lanes.
     """
-    first = _one_kind(problems)
+    first = one_kind(problems)
     exact_times = check_times(times)
     targets = [number(time, first.precision) for time in exact_times]
-    threads = _processors() if threads is None else threads
+    threads = processors() if threads is None else threads
     if threads < 1 or lanes < 2:
         raise InputError(f"{threads} threads and {lanes} lanes make no ensemble.", "Use 1 thread and 2 lanes or more.")
     moves = targets[-1] != 0 and (step_limit is None or step_limit > 0)
@@ -66,12 +66,22 @@ def propagate_ensemble(
     tool = compiled(first.system, first.precision, attitude=first.xi is not None, lanes=width, **options)
     pending = deque(enumerate(problems))
     work = Work(tool, targets, [exact(target) for target in targets], step_limit, observer is not None, pending)
+    run = partial(_in_lanes if batch else _one_by_one, work)
+    return in_threads(run, work, min(threads, -(-len(problems) // (lanes if batch else 1))), observer, finished)
+
+
+def in_threads(
+    run: Callable[[], None], work: Work, threads: int, observer: Observer | None, finished: Finished | None
+) -> list[Trajectory]:
+    """The motions of ``work`` in the order of its problems, by so many threads that each do ``run``.
+
+    observer, finished: as in :func:`propagate_ensemble`; called by this thread.
+    """
     done: dict[int, Trajectory] = {}
-    threads = min(threads, -(-len(problems) // (lanes if batch else 1)))
     with ThreadPoolExecutor(threads) as pool:
         try:
             for _ in range(threads):
-                pool.submit(_in_lanes if batch else _one_by_one, work).add_done_callback(work.inbox.put)
+                pool.submit(run).add_done_callback(work.inbox.put)
             while threads:
                 item = work.inbox.get()
                 if isinstance(item, Future):
@@ -86,10 +96,10 @@ def propagate_ensemble(
                     observer(*item)
         finally:
             work.stop.set()
-    return [done[index] for index in range(len(problems))]
+    return [done[index] for index in sorted(done)]
 
 
-def _processors() -> int:
+def processors() -> int:
     """How many processors this process may use, where the platform tells; else how many there are."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
@@ -110,7 +120,7 @@ def _one_by_one(work: Work) -> None:
             work.finish(index, run)
 
 
-def _one_kind(problems: Sequence[Problem]) -> Problem:
+def one_kind(problems: Sequence[Problem]) -> Problem:
     """The first problem; raises InputError unless all are of its kind."""
     if not problems:
         raise InputError("An ensemble of no problems.", "Give one or more.")

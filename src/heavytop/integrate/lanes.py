@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import heyoka
 import numpy
 
-from heavytop.integrate.engines import Compiled, arrays
+from heavytop.integrate.engines import arrays
 from heavytop.integrate.stepper import CHUNK_SECONDS, at_rest
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import exact
@@ -41,11 +41,12 @@ class StoppedError(Exception):
 class Work:
     """What the threads of an ensemble share.
 
-    targets: native times in order; times: their exact values.  pending: problems that no thread has taken yet.
-    inbox: samples on their way to the observer, at most as many as there is room for, motions and threads that ended.
+    tool: of the integrator.  targets: native times in order; times: their exact values.  pending: problems that no
+    thread has taken yet.  inbox: samples on their way to the observer, at most as many as there is room for, motions
+    and threads that ended.
     """
 
-    tool: Compiled
+    tool: Any
     targets: list[Any]
     times: list[Fraction]
     step_limit: int | None

@@ -27,6 +27,7 @@ class Integrator(NamedTuple):
 
 INTEGRATORS = {
     "heyoka": Integrator(f"{HERE}.taylor:propagate", f"{HERE}.ensemble:propagate_ensemble"),
+    "words": Integrator(f"{HERE}.words:propagate_words", f"{HERE}.words_ensemble:propagate_words_ensemble"),
 }
 
 
@@ -40,7 +41,8 @@ def propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:
 
 def ensemble_propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:
     """What propagates many motions; raises InputError also for an integrator that runs one at a time."""
-    place = _find(name).ensemble
+    one_at_a_time = isinstance(name, str) and name not in INTEGRATORS and name in peers.known()
+    place = "" if one_at_a_time else _find(name).ensemble
     if not place:
         raise InputError(f"The integrator {name} runs one motion at a time.", "Call propagate for each.")
     return _with(_load(place), name, options)

@@ -21,7 +21,7 @@ from heavytop.top.equations import GYROSTAT, Parameters, System
 PARAMETERS = Parameters((3, 2, 1), (2, -1, 3), 6)
 OMEGA = (6, -12, 6)
 GAMMA = (36, 72, -36)
-_XI = (1, 2, -5)
+XI = (1, 2, -5)
 _MOST_DERIVATIVES = 100
 _COEFFICIENT_EPS = 8
 _COEFFICIENT_EPS_AN_ORDER = Fraction(1, 4)
@@ -64,7 +64,7 @@ class Derivatives:
 
 def derivatives(system: System, attitude: bool, count: int, p: Parameters = PARAMETERS) -> Iterator[list[Exact]]:
     """y, y', y'', ... at the known start, from the field: ``count`` lists of six exact numbers, or nine with ξ."""
-    values: list[list[Exact]] = [[first] for first in (*OMEGA, *GAMMA, *(_XI if attitude else ()))]
+    values: list[list[Exact]] = [[first] for first in (*OMEGA, *GAMMA, *(XI if attitude else ()))]
     y = [Derivatives(column.__getitem__) for column in values]
     rates = system.field(p, y[:6])
     if attitude:
@@ -94,7 +94,7 @@ def check(engine: Any, system: System, precision: Precision, constants: Paramete
     _reset(engine, precision)
     if constants is None:
         set_to((*p.inertia, p.rotor) if system is GYROSTAT else (*p.inertia, *p.moment), engine.pars)
-    set_to((*OMEGA, *GAMMA, *_XI)[:size], engine.state)
+    set_to((*OMEGA, *GAMMA, *XI)[:size], engine.state)
     engine.step(write_tc=True)
     eps, order = precision.eps, engine.order
     known = list(derivatives(system, size == 9, min(order + 1, _MOST_DERIVATIVES), p))

@@ -29,6 +29,7 @@ class Outcome(Enum):
     STEP_LIMIT = "step_limit"
     NON_FINITE = "non_finite"
     STEP_TOO_SMALL = "step_too_small"
+    CAPACITY = "capacity"
     INCOMPLETE = "incomplete"
 
     @property
@@ -39,6 +40,7 @@ class Outcome(Enum):
             Outcome.STEP_LIMIT: "stopped at the step limit before the last time",
             Outcome.NON_FINITE: "stopped: the state was no longer finite",
             Outcome.STEP_TOO_SMALL: "stopped: the step no longer moves the time",
+            Outcome.CAPACITY: "stopped: the numbers outgrew the words that were chosen for them",
             Outcome.INCOMPLETE: "said to have succeeded, but gave fewer times than were asked for",
         }[self]
 
@@ -104,14 +106,16 @@ class Place:
 
     samples: how many of the times are done.  state: before the step that covers the last of them; time: both words of
     its time; steps: taken until then.  seconds: run so far.  flags: everything else that can change bits.
+    words: in place of state and time, all that an integrator in many words knows there, as text.
     """
 
     samples: int
     state: tuple[Any, ...]
-    time: tuple[Any, Any]
+    time: tuple[Any, ...]
     steps: int
     seconds: float
     flags: dict[str, str]
+    words: tuple[str, ...] = ()
 
     def content(self, precision: Precision) -> dict[str, Any]:
         """As plain text and integers, exact."""
@@ -127,14 +131,15 @@ class Place:
             "steps": self.steps,
             "seconds": self.seconds,
             "flags": self.flags,
+            "words": list(self.words),
         }
 
     @classmethod
     def of(cls, content: dict[str, Any], precision: Precision) -> Place:
         """The place with that :meth:`content`."""
-        state = tuple(native(text, precision) for text in content["state"])
-        high, low = (native(text, precision) for text in content["time"])
-        return cls(content["samples"], state, (high, low), content["steps"], content["seconds"], content["flags"])
+        state, time = (tuple(native(text, precision) for text in content[name]) for name in ("state", "time"))
+        samples, steps, seconds, flags = (content[name] for name in ("samples", "steps", "seconds", "flags"))
+        return cls(samples, state, time, steps, seconds, flags, tuple(content.get("words", ())))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

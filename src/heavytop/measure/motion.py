@@ -14,7 +14,7 @@ from heavytop.errors import OutOfReach
 from heavytop.exact.balls import FUNCTIONS, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.scales import least_rate
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate import registry
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
 from heavytop.measure.scalar import GUARD_BITS, text, to_ball
@@ -105,12 +105,15 @@ def compute(
     system: System,
     attitude: bool = False,
     step_limit: int | None = None,
+    integrator: str = "heyoka",
 ) -> Motion:
     """The motion at ``times`` (exact, checked), with the drift of every integral that holds.
 
     attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
-    Raises OutOfReach where that would take more steps than anyone waits for.
+    integrator: a name that `heavytop list` shows.
+
+    Raises InputError for another integrator, OutOfReach where the run would take more steps than anyone waits for.
     """
     xi = perpendicular(start.gamma) if attitude else None
     problem = Problem.of(top, start, precision, system, xi)
@@ -118,7 +121,9 @@ def compute(
     wanted = frozenset(exact(number(time, precision)) for time in times)
     watcher = _Watcher(problem, holding(top, start, system), wanted)
     samples = _dense(problem, times) if attitude else times
-    run = propagate(top, start, samples, precision, system=system, xi=xi, step_limit=step_limit, observer=watcher)
+    asked = {"xi": xi, "step_limit": step_limit, "observer": watcher}
+    options = {name: value for name, value in asked.items() if value is not None}
+    run = registry.propagator(integrator, options)(top, start, samples, precision, system=system)
     run = replace(
         run, times=tuple(time for time, *_ in watcher.kept), states=tuple(state for _, state, _ in watcher.kept)
     )

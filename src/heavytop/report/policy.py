@@ -13,6 +13,7 @@ import msgspec
 
 from heavytop.errors import InputError
 from heavytop.precision import exact, log10, physical
+from heavytop.suite.files import read_whole
 
 BITS = math.log10(2)
 """Decades in one bit."""
@@ -144,7 +145,7 @@ class Lookup:
 def load(path: Path) -> Policy:
     """The policy in a TOML file; raises InputError for a key that is unknown, a negative number, an empty pattern."""
     try:
-        return msgspec.convert(tomllib.loads(path.read_text("utf-8")), Policy)
+        return msgspec.convert(tomllib.loads(read_whole(path).decode("utf-8")), Policy)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"The policy {str(path)[:200]} cannot be read: {reason}.", "Give a TOML file.") from None

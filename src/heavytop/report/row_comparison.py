@@ -20,7 +20,8 @@ from heavytop.report.store import AnyRow
 from heavytop.report.verdicts import Judged, Verdict, judge, judge_seconds
 
 _STEPS = 2
-"""The same method with the same setting takes as many steps: a factor beyond this is another method."""
+"""The same method with the same setting takes as many steps, and evaluates the field as often: a factor beyond this is
+another method."""
 _STEPWISE = ("local_error",)
 """The measures whose samples are the steps: these may be fewer as the steps may."""
 
@@ -179,6 +180,11 @@ class RowComparison:
             few, many = sorted((old.steps, new.steps))
             if few * _STEPS < many:
                 yield Finding(key, "", Verdict.INCOMPARABLE, str(old.steps), str(new.steps), "other steps")
+        if old.evaluations is not None and self.policy.flags != "ignore":
+            counts = [row.evaluations or 0 for row in (old, new)]
+            if min(counts) * _STEPS < max(counts):
+                before, after = (str(row.evaluations) for row in (old, new))
+                yield Finding(key, "", Verdict.INCOMPARABLE, before, after, "other evaluations of the field")
         if old.order != new.order and self.policy.flags != "ignore":
             yield Finding(key, "", Verdict.INCOMPARABLE, str(old.order), str(new.order), "another order")
         needed, found = -(-_samples(old) // (_STEPS if old.measure in _STEPWISE else 1)), _samples(new)

@@ -15,7 +15,7 @@ import msgspec
 from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Bits, Count, Law, Metric, Report, Row, Seconds, Series, Starts
 from heavytop.report.checks import REMEDY, check_consistency, check_keys, check_rows, check_series
-from heavytop.suite.files import replace, without_repeats
+from heavytop.suite.files import read_whole, replace, without_repeats
 
 FILE = "report.json"
 DIGEST = "report.json.sha256"
@@ -68,6 +68,7 @@ class BriefRow(msgspec.Struct, gc=False):
     starts: Starts = 1
     laws: dict[str, Law] = {}
     seconds: dict[str, Seconds] = {}
+    evaluations: Count | None = None
 
     @property
     def key(self) -> tuple[str, ...]:
@@ -157,9 +158,9 @@ def _read(path: Path, kind: type[_Kind]) -> tuple[Path, _Kind]:
     file = path
     try:
         file = path / FILE if path.is_dir() else path
-        content = file.read_bytes()
+        content = read_whole(file)
     except OSError as error:
-        raise InputError(f"There is no report at {str(file)[:_NAME]}: {error.strerror}.", REMEDY) from None
+        raise InputError(f"There is no report at {str(file)[:_NAME]}: {error.strerror or error}.", REMEDY) from None
     with ThreadPoolExecutor(1) as beside:
         digest = beside.submit(_has_its_digest, file, content)
         try:

@@ -25,6 +25,16 @@ def without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
+def read_whole(path: Path) -> bytes:
+    """The content of a file.
+
+    Raises OSError, also for a device such as /dev/zero, which has no end, and for a pipe that nobody may write to.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise OSError("it is a device or a pipe, not a file")
+    return path.read_bytes()
+
+
 def line(content: bytes) -> bytes:
     """``content``, which holds no line break, behind its SHA-256."""
     return hashlib.sha256(content).hexdigest().encode() + b" " + content + b"\n"

@@ -21,6 +21,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.measure.luck import MOST_SEEDS
 from heavytop.precision import exact, number, parse, require
 from heavytop.suite.cases import CASES, Case, case, require_possible
+from heavytop.suite.files import read_whole
 from heavytop.suite.sweeps import Lazy, Sweep
 from heavytop.suite.tables import Table
 from heavytop.suite.task import Task
@@ -78,7 +79,7 @@ def load(name: str) -> tuple[Plan, str]:
         text = (resources.files("heavytop.suite") / "plans" / f"{name}.toml").read_text("utf-8")
     elif Path(name).suffix == ".toml":
         try:
-            text = Path(name).read_text("utf-8")
+            text = read_whole(Path(name)).decode("utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"The plan {name} cannot be read: {error}.", "Give a readable TOML file.") from None
     else:

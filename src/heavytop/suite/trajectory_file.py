@@ -19,8 +19,20 @@ import numpy
 
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, parse, real, round_to, shown
-from heavytop.suite.files import without_repeats
+from heavytop.precision import (
+    DOUBLE,
+    EXTENDED,
+    QUAD,
+    Precision,
+    decimal_text,
+    exact,
+    number,
+    parse,
+    real,
+    round_to,
+    shown,
+)
+from heavytop.suite.files import read_whole, without_repeats
 from heavytop.top.equations import VARIABLES, System, system
 from heavytop.top.heavy_top import HeavyTop, State, dot, require_physical
 from heavytop.top.times import check_times
@@ -43,6 +55,8 @@ _NAME = 200
 _MOST = 100_000
 _WIDEST = 20_000
 """Exponents of 2 in a file, up to that: quad has 16,384, and powers of what is larger take minutes."""
+_FITS_ANYWHERE = 1 << 1023
+"""Every format holds numbers below that."""
 _SLACK = 8
 """γ may be off the unit sphere by so many bits of rounding."""
 
@@ -89,14 +103,14 @@ def read(path: Path) -> Given:
     """
     shown_path = str(path)[:_NAME]
     piped = str(path) == "-"
+    if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in (".json", ".csv"):
+        raise InputError(f"{shown_path} is neither .json nor .csv.", _REMEDY)
     try:
-        content = sys.stdin.buffer.read() if piped else path.read_bytes()
+        content = sys.stdin.buffer.read() if piped else read_whole(path)
         text = content.decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"The trajectory {shown_path} cannot be read: {error}.", _REMEDY) from None
     suffix = (".json" if text.lstrip().startswith("{") else ".csv") if piped else path.suffix.lower()
-    if suffix not in (".json", ".csv"):
-        raise InputError(f"{shown_path} is neither .json nor .csv.", _REMEDY)
     try:
         document = _json(text) if suffix == ".json" else _csv(text)
         return _given(document, "given" if piped else path.stem, hashlib.sha256(content).hexdigest())
@@ -302,13 +316,32 @@ def _integer(value: Any, what: str) -> int:
 
 
 def _state(values: list[Fraction | None], precision: Precision) -> tuple[Fraction, ...] | None:
-    return None if None in values else tuple(round_to(value, precision.bits) for value in values if value is not None)
+    """The numbers rounded to the format; None where one is not finite there, as 1e400 in double."""
+    found = tuple(round_to(value, precision.bits) for value in values if value is not None)
+    finite = len(found) == len(values) and all(_fits(value, precision) for value in found)
+    return found if finite else None
+
+
+def _fits(value: Fraction, precision: Precision) -> bool:
+    if abs(value) < _FITS_ANYWHERE:
+        return True
+    try:
+        number(value, precision)
+    except InputError:
+        return False
+    return True
 
 
 def _precision(document: dict[str, Any], rows: list[list[Any]]) -> Precision:
     """The format that the file names, or the narrowest that holds every state as it is written."""
     if "precision" in document:
-        return parse(_text(document, "precision"))
+        precision = parse(_text(document, "precision"))
+        bits = _integer(document["bits"], "bits") if "bits" in document else precision.bits
+        if bits != precision.bits:
+            raise InputError(
+                f"bits = {bits}, but {precision.name} has {precision.bits}.", "Give either of precision and bits."
+            )
+        return precision
     if "bits" in document:
         bits = _integer(document["bits"], "bits")
         return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits == form.bits), None) or real(bits)

@@ -7,9 +7,12 @@ PeerFailed, which says in a sentence what it did.
 from __future__ import annotations
 
 import io
+import os
+import signal
+import threading
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from copy import deepcopy
 from fractions import Fraction
 from math import isfinite
@@ -31,11 +34,16 @@ _ALONE = RLock()
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Drops what code of others prints and warns of, and leaves NumPy's error state as it was."""
+    """Drops what code of others prints and warns of, from C too, and leaves what is the process's as it was.
+
+    That is NumPy's error state, the working directory, and who hears of Ctrl-C and SIGTERM.
+    """
     import numpy
 
     with (
         _ALONE,
+        _process_as_it_was(),
+        _descriptors_silenced(),
         redirect_stdout(io.StringIO()),
         redirect_stderr(io.StringIO()),
         warnings.catch_warnings(),
@@ -43,6 +51,45 @@ def quiet() -> Iterator[None]:
     ):
         warnings.simplefilter("ignore")
         yield
+
+
+@contextmanager
+def _process_as_it_was() -> Iterator[None]:
+    """Puts back the working directory and, in the main thread, the handlers of SIGINT and SIGTERM."""
+    listening = threading.current_thread() is threading.main_thread()
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)} if listening else {}
+    directory = None
+    with suppress(OSError):  # it may have been removed
+        directory = os.getcwd()
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            if handler is not None and signal.getsignal(number) is not handler:
+                signal.signal(number, handler)
+        if directory is not None:
+            with suppress(OSError):
+                os.chdir(directory)
+
+
+@contextmanager
+def _descriptors_silenced() -> Iterator[None]:
+    """Sends what is written to the descriptors of standard output and error nowhere, as code in C does."""
+    kept: dict[int, int] = {}
+    try:
+        with suppress(OSError):  # one that is closed needs no silence
+            for descriptor in (1, 2):
+                kept[descriptor] = os.dup(descriptor)
+        if kept:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            for descriptor in kept:
+                os.dup2(nowhere, descriptor)
+            os.close(nowhere)
+        yield
+    finally:
+        for descriptor, original in kept.items():
+            os.dup2(original, descriptor)
+            os.close(original)
 
 
 @contextmanager

@@ -1,0 +1,212 @@
+"""Motions computed in many words: the same call as heyoka's, on the project's own Taylor integrator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
+from heavytop.integrate.words_engines import choose, compiled
+from heavytop.precision import Precision, exact, number, require
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.times import check_times
+from heavytop.words.run import Run, Status
+from heavytop.words.scaled import Scaled
+
+Observer = Callable[[Fraction, Any], None]
+
+CHUNK_SECONDS = 0.25
+_FIRST_CHUNK = 16
+OUTCOMES = {
+    Status.FINE: Outcome.SUCCESS,
+    Status.NON_FINITE: Outcome.NON_FINITE,
+    Status.TOO_SMALL: Outcome.STEP_TOO_SMALL,
+    Status.CAPACITY: Outcome.CAPACITY,
+}
+
+
+def propagate_words(
+    top: HeavyTop,
+    start: State,
+    times: Sequence[Any],
+    precision: Precision,
+    *,
+    system: System = HEAVY_TOP,
+    xi: tuple[Fraction, ...] | None = None,
+    tolerance: Fraction | None = None,
+    step_limit: int | None = None,
+    observer: Observer | None = None,
+    place: Place | None = None,
+    mark: Callable[[Place], None] | None = None,
+) -> Trajectory:
+    """The motion from ``start`` at t = 0, at ``times``, computed in many words and rounded to ``precision`` once.
+
+    tolerance: the local error aimed at, relative to the state; None for what the format can show.
+    The other arguments and what is raised: as in :func:`heavytop.integrate.taylor.propagate`.
+
+    Raises InputError for a tolerance that is not positive and below 1, and for formats and data that need more words
+    than there are.  A failed run is an outcome, not an exception.
+    """
+    problem = Problem.of(top, start, require(precision), system, xi)
+    targets = [number(time, precision) for time in check_times(times)]
+    return follow(problem, targets, tolerance, step_limit, observer, place=place, mark=mark)
+
+
+def follow(
+    problem: Problem,
+    targets: Sequence[Any],
+    tolerance: Fraction | None = None,
+    step_limit: int | None = None,
+    observer: Observer | None = None,
+    between: Callable[[], None] | None = None,
+    *,
+    place: Place | None = None,
+    mark: Callable[[Place], None] | None = None,
+) -> Trajectory:
+    """The motion of ``problem`` at ``targets``, native numbers in order.
+
+    between: called between chunks of a quarter of a second; it may raise to give the run up.
+    """
+    arithmetic, scaled = choose(problem, tolerance)
+    compiling = compiled(arithmetic, problem.system, problem.xi is not None)
+    flags = arithmetic.flags
+    forwards = bool(targets[-1] >= 0)
+    began = perf_counter()
+    pace = _Pace(arithmetic.begin(scaled, forwards), scaled, step_limit, between)
+    kept_times: list[Fraction] = []
+    kept_states: list[Any] = []
+    outcome, done = Outcome.SUCCESS, 0
+    if place is not None:
+        _require_same(place.flags, flags)
+        done, began = place.samples, began - place.seconds
+        kept_times = [exact(target) for target in targets[:done]]
+        pace.take_up(place, kept_times[-1])
+    for target in map(exact, targets[done:]):
+        outcome = pace.reach(target)
+        if outcome is not Outcome.SUCCESS:
+            break
+        sample = pace.sample(target)
+        state = None if sample is None else native_state(sample, problem.precision)
+        if state is None:
+            outcome = Outcome.CAPACITY if sample is None else Outcome.NON_FINITE
+            break
+        done += 1
+        kept_times.append(target)
+        if observer is None:
+            kept_states.append(state)
+        else:
+            observer(target, state)
+        if mark is not None and target != 0:
+            mark(pace.place(done, perf_counter() - began, flags))
+    seconds = {"compile": compiling, "run": perf_counter() - began}
+    return _trajectory(problem, pace, flags, kept_times, kept_states, outcome, seconds)
+
+
+def _trajectory(
+    problem: Problem,
+    pace: _Pace,
+    flags: dict[str, str],
+    times: list[Fraction],
+    states: list[Any],
+    outcome: Outcome,
+    seconds: dict[str, float],
+) -> Trajectory:
+    reached = times[-1] if outcome is Outcome.SUCCESS and times else pace.time
+    return Trajectory(
+        problem,
+        "words",
+        tuple(times),
+        tuple(states),
+        outcome,
+        reached,
+        pace.run.steps,
+        pace.run.order,
+        seconds,
+        flags,
+    )
+
+
+def native_state(state: tuple[Fraction, ...], precision: Precision) -> Any:
+    """A state rounded to numbers of a format, an array of shape (6,) or (9,); None where one is too large for it.
+
+    What is too small for the format becomes 0, as in the format's own arithmetic.
+    """
+    import numpy
+
+    values = []
+    for value in state:
+        try:
+            values.append(number(value, precision))
+        except InputError:
+            if abs(value) > 1:
+                return None
+            values.append(number(Fraction(0), precision))
+    return numpy.array(values)
+
+
+@dataclass(slots=True)
+class _Pace:
+    """A run advanced in chunks, in the units of the problem."""
+
+    run: Run
+    scaled: Scaled
+    step_limit: int | None
+    between: Callable[[], None] | None
+    _chunk: int = _FIRST_CHUNK
+
+    @property
+    def time(self) -> Fraction:
+        """Where the last step ended."""
+        return self.run.time / self.scaled.rate * (1 if self.run.forwards else -1)
+
+    def reach(self, target: Fraction) -> Outcome:
+        """Step until the last step covers ``target``; there are no steps at an equilibrium."""
+        goal = abs(target) * self.scaled.rate
+        while not self.scaled.rest and self.run.time < goal:
+            most = self._chunk
+            if self.step_limit is not None:
+                most = min(most, self.step_limit - self.run.steps)
+            if most <= 0:
+                return Outcome.STEP_LIMIT
+            if self.between is not None:
+                self.between()
+            began, before = perf_counter(), self.run.steps
+            status = self.run.advance(goal, most)
+            if status is not Status.FINE:
+                return OUTCOMES[status]
+            a_step = (perf_counter() - began) / max(1, self.run.steps - before)
+            self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
+        return Outcome.SUCCESS
+
+    def sample(self, target: Fraction) -> tuple[Fraction, ...] | None:
+        """The state at ``target``, inside the last step; None where the numbers outgrow their words there."""
+        at_start = self.scaled.rest or target == 0
+        state = self.scaled.state if at_start else self.run.sample(abs(target) * self.scaled.rate)
+        return None if state is None else self.scaled.back(state)
+
+    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
+        """Where the last step began; at rest, the beginning."""
+        words, steps = ((), 0) if self.scaled.rest else (self.run.place(), self.run.steps - 1)
+        return Place(samples, (), (), steps, seconds, flags, words)
+
+    def take_up(self, place: Place, covered: Fraction) -> None:
+        """Go on from there; takes the step again that covers the last sample."""
+        if place.words:
+            self.run.restore(place.words, place.steps)
+            self.reach(covered)
+
+
+def _require_same(there: dict[str, str], here: dict[str, str]) -> None:
+    different = [name for name in sorted(there.keys() | here.keys()) if there.get(name) != here.get(name)]
+    if different:
+        raise InputError(
+            "The run that is to go on was integrated with "
+            + ", ".join(f"{name} = {there.get(name)} (now {here.get(name)})" for name in different)
+            + ".",
+            "Go on with the program that began it, or start anew in another folder.",
+        )

@@ -1,0 +1,176 @@
+"""Which arithmetic serves a format and a tolerance, and its machine code, checked before it is used."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from fractions import Fraction
+from threading import Lock
+
+from heavytop.errors import InputError
+from heavytop.integrate.trajectory import Problem
+from heavytop.integrate.words_check import check
+from heavytop.precision import decimal_text
+from heavytop.top.equations import System
+from heavytop.words import eight, fixed, floating
+from heavytop.words.digits import MOST_WORDS, grid_for, grid_of
+from heavytop.words.fixed import Fixed
+from heavytop.words.floating import FALL_IN_LANES, Floating, Ladder
+from heavytop.words.kernels import Grid
+from heavytop.words.run import Run
+from heavytop.words.scaled import Scaled
+
+LOOSEST = Fraction(1, 10**6)
+_MOST_SPARE_BITS = 8
+"""Of the formats that double-double exceeds: a long run adds its local errors up, and the sum shall stay below eps."""
+_GUARD_BITS = 8
+
+
+class Arithmetic(ABC):
+    """A way of computing, chosen for a format and a tolerance.
+
+    tolerance: the local error aimed at, relative to the state.
+    """
+
+    tolerance: Fraction
+
+    @property
+    @abstractmethod
+    def flags(self) -> dict[str, str]:
+        """Everything that can change bits; they are those of every processor."""
+
+    @abstractmethod
+    def begin(self, scaled: Scaled, forwards: bool) -> Run:
+        """A motion at its beginning."""
+
+    @abstractmethod
+    def make(self, system: System, attitude: bool) -> float:
+        """Compile and check the machine code for this system; gives the seconds of compiling.
+
+        Raises Contradiction where its first step, which is known, is wrong.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class DoubleDouble(Arithmetic):
+    """106 bits that float, with plain doubles above an order n0.
+
+    ladder: of one motion.  in_lanes: of eight.
+    """
+
+    tolerance: Fraction
+    ladder: Ladder
+    in_lanes: Ladder
+
+    @property
+    def flags(self) -> dict[str, str]:
+        return {
+            "arithmetic": "double-double",
+            "words": "2",
+            "bits": str(floating.BITS),
+            "tolerance": decimal_text(self.tolerance, 6),
+            "order": str(self.ladder.order),
+            "step_rule": f"radius of convergence times 2^{self.ladder.reach:.3f}, ten bits",
+            "plain_orders": f"where rounding is below 2^{self.ladder.room - 53:.1f}",
+        }
+
+    def begin(self, scaled: Scaled, forwards: bool) -> Run:
+        return Floating(scaled, self.ladder, forwards)
+
+    def make(self, system: System, attitude: bool) -> float:
+        made, _ = floating.machine(system, attitude)
+        check(system, attitude, lambda scaled: Floating(scaled, _FULL, True), floating.BITS)
+        check(system, attitude, lambda scaled: Floating(scaled, _PLAIN, True, low_order=3), _PLAIN_BITS)
+        return made.seconds
+
+
+_REACH = -2.9
+# the same machine code with every order in double-double, and with nearly all in plain doubles
+_FULL = Ladder(38, _REACH, -1000.0)
+_PLAIN = Ladder(24, _REACH, 1000.0)
+_ALLOWED = Ladder(38, _REACH, 1000.0)
+_PLAIN_BITS = 53
+
+
+@dataclass(frozen=True, slots=True)
+class Words(Arithmetic):
+    """K words on fixed grids."""
+
+    tolerance: Fraction
+    grid: Grid
+
+    @property
+    def flags(self) -> dict[str, str]:
+        return {
+            "arithmetic": "fixed grids",
+            "words": str(self.grid.words),
+            "bits": str(self.grid.total),
+            "tolerance": decimal_text(self.tolerance, 6),
+            "step_rule": "powers of two, by the number of orders",
+        }
+
+    def begin(self, scaled: Scaled, forwards: bool) -> Run:
+        return Fixed(scaled, self.grid, forwards)
+
+    def make(self, system: System, attitude: bool) -> float:
+        made, _ = fixed.machine(self.grid, system, attitude)
+        check(system, attitude, lambda scaled: Fixed(scaled, self.grid, True), self.grid.total, bounded=True)
+        return made.seconds
+
+
+def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Scaled]:
+    """The arithmetic for a format, or for the tolerance where one is given, and the problem in its units.
+
+    A grid is as fine as the smallest component of the start needs it: what an unstable axis amplifies must be there.
+
+    Raises InputError for a tolerance outside 1e-6 to the format's own, and where more words are needed than there are.
+    """
+    precision = problem.precision
+    spare = max(0, min(_MOST_SPARE_BITS, floating.BITS - precision.bits))
+    finest = precision.eps / 2**spare
+    wanted = finest if tolerance is None else tolerance
+    if not finest <= wanted <= LOOSEST:
+        raise InputError(
+            f"The integrator words has no tolerance {decimal_text(wanted, 6)} in {precision.name}.",
+            f"Give one from {decimal_text(finest, 6)} to 1e-6, or none.",
+        )
+    start = (*problem.start.flat, *(problem.xi or ()))
+    if wanted >= Fraction(1, 2 ** (floating.BITS - 1)):
+        scaled = Scaled.of(problem.system, problem.parameters, start)
+        return DoubleDouble(wanted, Ladder.of(wanted), Ladder.of(wanted, FALL_IN_LANES)), scaled
+    scaled = Scaled.of(problem.system, problem.parameters, start, bounded=True)
+    asked = wanted.denominator.bit_length() - wanted.numerator.bit_length()
+    bits = asked + _GUARD_BITS + fixed.spread(scaled) + fixed.excess(scaled)
+    grid = grid_for(bits)
+    if grid is None:
+        raise InputError(
+            f"{precision.name} from this start needs {bits} bits, more than the {grid_of(MOST_WORDS).total} that "
+            "the integrator words has.",
+            "Use fewer bits, or --integrator heyoka.",
+        )
+    return Words(wanted, grid), scaled
+
+
+_made: dict[tuple[type, Grid | None, str, bool], float] = {}
+_making = Lock()
+
+
+def compiled(arithmetic: Arithmetic, system: System, attitude: bool) -> float:
+    """The seconds that compiling took, once for each arithmetic and system; it is checked then."""
+    key = (type(arithmetic), getattr(arithmetic, "grid", None), system.name, attitude)
+    with _making:
+        if key not in _made:
+            _made[key] = arithmetic.make(system, attitude)
+        return _made[key]
+
+
+def compiled_lanes(system: System) -> float:
+    """The seconds that compiling the code of eight lanes took; it is checked then as :meth:`Arithmetic.make` does."""
+    key = (eight.Eight, None, system.name, False)
+    with _making:
+        if key not in _made:
+            seconds = eight.machine(system).seconds
+            check(system, False, lambda scaled: eight.OneOfEight(scaled, _ALLOWED, _ALLOWED.order - 1), floating.BITS)
+            check(system, False, lambda scaled: eight.OneOfEight(scaled, _PLAIN, 3), _PLAIN_BITS)
+            _made[key] = seconds
+        return _made[key]

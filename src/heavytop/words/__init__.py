@@ -1,0 +1,1 @@
+"""Arithmetic in many words: machine code for the Taylor recurrence of both systems, in eight lanes."""

@@ -1,0 +1,40 @@
+"""Exact numbers as words on fixed grids, and which grid serves a number of bits."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import ldexp
+
+from heavytop.words.kernels import Grid
+from heavytop.words.machine import Doubles
+
+# words up to which so many bits are safe in each: products of a few hundred orders stay inside the sums
+_BITS_OF_A_WORD = ((2, 48), (4, 46), (6, 45), (12, 44), (24, 43))
+MOST_WORDS = 24
+
+
+def grid_of(words: int) -> Grid:
+    """The grid of so many words, 2 to 24."""
+    return Grid(words, next(bits for most, bits in _BITS_OF_A_WORD if words <= most))
+
+
+def grid_for(bits: int) -> Grid | None:
+    """The smallest grid of at least so many bits and three words; None where there is none."""
+    return next((grid for grid in map(grid_of, range(3, MOST_WORDS + 1)) if grid.total >= bits), None)
+
+
+def digits(value: Fraction, grid: Grid) -> list[float]:
+    """``value`` rounded to a multiple of the last unit, as words."""
+    whole = round(value * 2**grid.total)
+    found = []
+    for k in range(grid.words):
+        shift = grid.bits * (grid.words - 1 - k)
+        digit = (whole + (1 << shift >> 1)) >> shift if k < grid.words - 1 else whole
+        whole -= digit << shift
+        found.append(ldexp(float(digit), -grid.bits * (k + 1)))
+    return found
+
+
+def exact(words: Doubles) -> Fraction:
+    """The number that words add to."""
+    return sum((Fraction(float(word)) for word in words), Fraction(0))

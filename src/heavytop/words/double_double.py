@@ -1,0 +1,232 @@
+"""Taylor steps in double-double arithmetic (106 bits), with plain doubles above an order n0.
+
+The coefficients y_n of a motion fall with n, and the low words of all above some n0 < N are too small to matter: there
+the recurrence goes on in plain doubles.  n0 follows the motion: a step is done again with a larger one where
+2^-53 |y_(n0+1)| h^(n0+1) comes out above what is allowed, and n0 falls where a smaller one would do.
+
+The step is h = ρ exp(reach), with the radius ρ from the last two coefficients as Jorba and Zou have it (Exp. Math. 14
+(2005) 99); its significand is cut to ten bits, so that h^4 is a double and h adds to the time exactly.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+from llvmlite import ir
+
+from heavytop.top.equations import System
+from heavytop.words.lanes import turned
+from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
+from heavytop.words.pairs import add, log2, multiply, power_of_two, times
+from heavytop.words.recurrence import Layout, Recurrence
+from heavytop.words.vector import DOUBLE, INT, INT_POINTER, POINTER, Index, Pair, function
+
+TIME, TIME_LOW, TARGET, TARGET_LOW, BEGAN, BEGAN_LOW, SIGN, ROOM, REACH, CLOCK = range(10)
+"""Places of the clock, doubles: |time| and its target and the beginning of the last step, in two words each; the
+direction; log2 of the rounding allowed above n0, in units of 2^-53; log2 of h/ρ."""
+ORDER, LOW_ORDER, LEAST, MOST, STATUS, USED, COUNTS = range(7)
+"""Places of the counts: N, n0 of the next step, bounds of n0, how the last step ended, its n0."""
+FINE, NON_FINITE, TOO_SMALL = range(3)
+STEP_BITS = 10
+LARGEST_STEP = 6
+_HYSTERESIS = 3.0
+_TOLERATED = 1.0
+
+
+def build(system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, Layout]:
+    """``advance`` and ``sample`` for this system.
+
+    advance(state, clock, counts, table, scratch, steps): at most so many steps, until the time covers the target; gives
+    their number.  The scratch holds the coefficients of the last one.
+    sample(scratch, order, time, low, result): the polynomial of the last step at a time after its beginning.
+    """
+    module = ir.Module("double_double")
+    layout = Layout(2 if attitude else 1, len(turned(system)))
+    _Step(module, layout, system).write()
+    _write_sample(module, layout, system)
+    integer, double = ctypes.c_int64, ctypes.c_double
+    machine = compiled(
+        module,
+        {
+            "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, DOUBLES, DOUBLES, integer]),
+            "sample": (None, [DOUBLES, integer, double, double, DOUBLES]),
+        },
+        processor,
+    )
+    return machine, layout
+
+
+def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:
+    made, code = function(module, "sample", ir.VoidType(), [POINTER, INT, DOUBLE, DOUBLE, POINTER])
+    scratch, order, time, low, result = made.args
+    rows = Recurrence(code, layout, system, None, scratch)
+    at = code.spread(time), code.spread(low)
+
+    def term(k: Any, words: list[Any]) -> list[Any]:
+        row = rows.row(code.builder.sub(order, k))
+        found: list[Any] = []
+        for v in rows.vectors:
+            total = multiply(code, (words[2 * v], words[2 * v + 1]), at)
+            found += code.quick_two_sum(*add(code, total, rows.pair(row, layout.value(v))))
+        return found
+
+    count = code.builder.add(order, code.integer(1))
+    words = code.loop(0, count, term, [code.zero] * (2 * layout.vectors))
+    for index, word in enumerate(words):
+        code.store(word, result, 8 * index)
+    code.builder.ret_void()
+
+
+class _Step:
+    """Writes ``advance``."""
+
+    def __init__(self, module: ir.Module, layout: Layout, system: System) -> None:
+        arguments = [POINTER, POINTER, INT_POINTER, POINTER, POINTER, INT]
+        made, self.code = function(module, "advance", INT, arguments)
+        self.state, self.clock, self.counts, table, scratch, self.most = made.args
+        self.layout = layout
+        self.series = Recurrence(self.code, layout, system, table, scratch)
+
+    def _time(self, place: int) -> Any:
+        return self.code.builder.load(self.code.address(self.clock, place))
+
+    def _count(self, place: int) -> Any:
+        return self.code.builder.load(self.code.address(self.counts, place))
+
+    def _set_count(self, value: Index, place: int) -> None:
+        self.code.builder.store(self.code.integer(value), self.code.address(self.counts, place))
+
+    def write(self) -> None:
+        """The loop of steps."""
+        code, b = self.code, self.code.builder
+        head, body, out = (b.append_basic_block(name) for name in ("steps", "step", "out"))
+        entry = b.block
+        b.branch(head)
+        b.position_at_end(head)
+        taken = b.phi(INT)
+        taken.add_incoming(code.integer(0), entry)
+        running = b.icmp_signed("==", self._count(STATUS), code.integer(FINE))
+        wanted = b.and_(b.icmp_signed("<", taken, self.most), b.not_(self._covered()))
+        b.cbranch(b.and_(running, wanted), body, out)
+        b.position_at_end(body)
+        good = self._write_step()
+        taken.add_incoming(b.add(taken, b.zext(good, INT)), b.block)
+        b.branch(head)
+        b.position_at_end(out)
+        b.ret(taken)
+
+    def _covered(self) -> Any:
+        b = self.code.builder
+        time, low, target, target_low = (self._time(k) for k in (TIME, TIME_LOW, TARGET, TARGET_LOW))
+        level = b.and_(b.fcmp_ordered("==", time, target), b.fcmp_ordered(">=", low, target_low))
+        return b.or_(b.fcmp_ordered(">", time, target), level)
+
+    def _write_step(self) -> Any:
+        """One step; whether it stands."""
+        series, vectors = self.series, self.series.vectors
+        order, low_order = self._count(ORDER), self._count(LOW_ORDER)
+        first = [series.pair(self.state, 16 * v) for v in vectors]
+        series.put(0, first)
+        words = series.orders_in_pairs(first, low_order)
+        series.plain_orders(low_order, order, [words[2 * v] for v in vectors])
+        start = log2(self.code, self._norm(0))
+        length = self._length(order, start)
+        result = self._sum(order, low_order, self.code.builder.fmul(length, self._time(SIGN)))
+        good = self._judge(length, low_order, start, result)
+        self._accept(good, length, low_order, result)
+        return good
+
+    def _norm(self, n: Index) -> Any:
+        row, found = self.series.row(n), self.code.zero
+        for v in self.series.vectors:
+            found = self.code.larger(self.code.absolute(self.code.load(row, self.layout.value(v))), found)
+        return self.code.largest(found)
+
+    def _length(self, order: Any, start: Any) -> Any:
+        """h > 0, from log2 |y_0| and the last two coefficients."""
+        b = self.code.builder
+
+        def radius(n: Any) -> Any:
+            return b.fdiv(b.fsub(start, log2(self.code, self._norm(n))), b.sitofp(n, DOUBLE))
+
+        one, two = radius(order), radius(b.sub(order, self.code.integer(1)))
+        least = b.select(b.fcmp_ordered("<", one, two), one, two)
+        return power_of_two(self.code, b.fadd(least, self._time(REACH)), LARGEST_STEP, STEP_BITS)
+
+    def _sum(self, order: Any, low_order: Any, step: Any) -> list[Pair]:
+        """Σ y_n h^n: four sums in h^4 side by side, each from its highest order, then those of h^2 and h."""
+        code, b, series, two = self.code, self.code.builder, self.series, self.code.integer(2)
+        square = b.fmul(step, step)
+        h, h2, h4 = code.spread(step), code.spread(square), code.spread(b.fmul(square, square))
+        top, low_top = b.lshr(order, two), b.lshr(low_order, two)
+        places = [(i, v) for i in range(4) for v in series.vectors]
+
+        def row(k: Any, i: int) -> Any:
+            return series.row(b.add(b.shl(k, two), code.integer(i)))
+
+        def plain(k: Any, sums: list[Any]) -> list[Any]:
+            at = b.sub(top, k)
+            return [
+                code.fma(total, h4, code.load(row(at, i), self.layout.value(v)))
+                for total, (i, v) in zip(sums, places, strict=True)
+            ]
+
+        def pairs(k: Any, words: list[Any]) -> list[Any]:
+            at = b.sub(low_top, k)
+            found: list[Any] = []
+            for index, (i, v) in enumerate(places):
+                total = times(code, (words[2 * index], words[2 * index + 1]), h4)
+                found += add(code, total, series.pair(row(at, i), self.layout.value(v)))
+            return found
+
+        sums = code.loop(0, b.sub(top, low_top), plain, [code.zero] * len(places))
+        words = code.loop(0, b.add(low_top, code.integer(1)), pairs, [w for s in sums for w in (s, code.zero)])
+        quarter = {place: (words[2 * k], words[2 * k + 1]) for k, place in enumerate(places)}
+        found = []
+        for v in series.vectors:
+            even = add(code, times(code, quarter[2, v], h2), quarter[0, v])
+            odd = add(code, times(code, quarter[3, v], h2), quarter[1, v])
+            found.append(code.quick_two_sum(*add(code, times(code, odd, h), even)))
+        return found
+
+    def _judge(self, length: Any, low_order: Any, start: Any, result: list[Pair]) -> Any:
+        """Whether the step stands; sets the status, and the n0 of what comes next."""
+        code, b, one = self.code, self.code.builder, self.code.integer(1)
+        time, room = self._time(TIME), self._time(ROOM)
+        finite = ir.Constant(ir.IntType(1), 1)
+        for pair in result:
+            finite = b.and_(finite, b.and_(code.finite(pair[0]), code.finite(pair[1])))
+        moves = b.fcmp_ordered(">", b.fadd(time, length), time)
+        status = b.select(moves, code.integer(FINE), code.integer(TOO_SMALL))
+        status = b.select(finite, status, code.integer(NON_FINITE))
+        self._set_count(status, STATUS)
+        above = self._rounding(b.add(low_order, one), length, start)
+        below = self._rounding(low_order, length, start)
+        can_rise = b.icmp_signed("<", low_order, self._count(MOST))
+        can_fall = b.icmp_signed(">", low_order, self._count(LEAST))
+        rise = b.and_(b.fcmp_ordered(">", above, room), can_rise)
+        fall = b.and_(b.fcmp_ordered("<", below, b.fsub(room, ir.Constant(DOUBLE, _HYSTERESIS))), can_fall)
+        following = b.select(rise, b.add(low_order, one), b.select(fall, b.sub(low_order, one), low_order))
+        self._set_count(following, LOW_ORDER)
+        again = b.and_(b.fcmp_ordered(">", above, b.fadd(room, ir.Constant(DOUBLE, _TOLERATED))), can_rise)
+        return b.and_(b.not_(again), b.icmp_signed("==", status, code.integer(FINE)))
+
+    def _rounding(self, n: Any, length: Any, start: Any) -> Any:
+        """log2 of |y_n| h^n / |y_0|."""
+        b = self.code.builder
+        power = b.fmul(b.sitofp(n, DOUBLE), log2(self.code, length))
+        return b.fsub(b.fadd(log2(self.code, self._norm(n)), power), start)
+
+    def _accept(self, good: Any, length: Any, low_order: Any, result: list[Pair]) -> None:
+        code, b = self.code, self.code.builder
+        time, low = self._time(TIME), self._time(TIME_LOW)
+        with b.if_then(good):
+            for vector, pair in enumerate(result):
+                for word in range(2):
+                    code.store(pair[word], self.state, 16 * vector + 8 * word)
+            total, error = code.two_sum(time, length)
+            total, rest = code.quick_two_sum(total, code.add(error, low))
+            for value, place in ((time, BEGAN), (low, BEGAN_LOW), (total, TIME), (rest, TIME_LOW)):
+                b.store(value, code.address(self.clock, place))
+            self._set_count(low_order, USED)

@@ -1,0 +1,172 @@
+"""Eight motions in double-double: what the machine code of :mod:`heavytop.words.lane_steps` works on."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from threading import Lock
+from typing import Any
+
+import numpy
+
+from heavytop.top.equations import System
+from heavytop.words import lane_steps as steps
+from heavytop.words.floating import LARGEST_TIME, Ladder
+from heavytop.words.machine import Doubles, Machine, Processor, doubles, pointer
+from heavytop.words.pairs import split
+from heavytop.words.run import Run, Status
+from heavytop.words.scaled import Scaled
+from heavytop.words.vector import LANES
+
+_machines: dict[tuple[str, Processor | None], Machine] = {}
+_making = Lock()
+_NO_LIMIT = 2.0**53
+
+
+def machine(system: System, processor: Processor | None = None) -> Machine:
+    """The machine code for this system, compiled at its first use."""
+    with _making:
+        if (system.name, processor) not in _machines:
+            _machines[system.name, processor] = steps.build(system, processor)
+        return _machines[system.name, processor]
+
+
+class Eight:
+    """Eight lanes of motions of one system, each idle or with a motion in it.
+
+    low_order: n0, the same for all; a motion that needs a larger one stops.
+    """
+
+    def __init__(self, system: System, ladder: Ladder, low_order: int, processor: Processor | None = None) -> None:
+        self.functions = machine(system, processor).functions
+        self.ladder, self.low_order = ladder, min(low_order, ladder.order - 1)
+        self.terms = steps.terms(system)
+        self.words, self.clock = doubles(12 * LANES), doubles(steps.CLOCK * LANES)
+        self.flags = numpy.zeros(LANES, numpy.int64)
+        self.constants = doubles(16 * (3 + len(self.terms)))
+        self.quotients = doubles(2 * ladder.order)
+        self.quotients[:] = [word for n in range(1, ladder.order + 1) for word in split(Fraction(1, n))]
+        self.scratch = doubles((ladder.order + 1) * steps.ROW)
+        self.signs = [1] * LANES
+        self._set(steps.ROOM, [ladder.room] * LANES)
+        self._set(steps.REACH, [ladder.reach] * LANES)
+
+    def _set(self, vector: int, values: Any) -> None:
+        self.clock[LANES * vector : LANES * (vector + 1)] = values
+
+    def put(self, lane: int, problem: Scaled, forwards: bool, most: int | None) -> None:
+        """A motion at its beginning; most: the steps that it may take."""
+        for i, value in enumerate(problem.state):
+            self.words[16 * i + lane], self.words[16 * i + 8 + lane] = split(value)
+        rows = problem.coefficients.vectors[0]
+        given = [rows[0][i] for i in range(3)] + [rows[row][component] for row, component, _ in self.terms]
+        for k, value in enumerate(given):
+            self.constants[16 * k + lane], self.constants[16 * k + 8 + lane] = split(value)
+        self.flags[lane] = steps.FINE
+        self.signs[lane] = 1 if forwards else -1
+        values = {steps.TIME: 0.0, steps.TIME + 1: 0.0, steps.SIGN: float(self.signs[lane])}
+        for vector, word in (values | {steps.LEFT: _NO_LIMIT if most is None else float(most)}).items():
+            self.clock[LANES * vector + lane] = word
+
+    def taken_out(self, lane: int) -> tuple[Doubles, Doubles]:
+        """All that a motion needs to go on in another eight: its state, and its part of the clock."""
+        return self.words[lane::LANES].copy(), self.clock[lane::LANES].copy()
+
+    def put_back(self, lane: int, problem: Scaled, forwards: bool, moved: tuple[Doubles, Doubles]) -> None:
+        """A motion that was taken out of another eight."""
+        self.put(lane, problem, forwards, None)
+        self.words[lane::LANES], self.clock[lane::LANES] = moved
+
+    def empty(self, lane: int) -> None:
+        """Nothing in this lane: it takes no steps."""
+        self.clock[LANES * steps.LEFT + lane] = 0.0
+
+    def aim(self, lane: int, target: Fraction) -> None:
+        """Where this lane is to stop, |τ|."""
+        words = split(min(target, LARGEST_TIME))
+        for k in range(2):
+            self.clock[LANES * (steps.TARGET + k) + lane] = words[k]
+
+    def advance(self, rounds: int) -> int:
+        """Steps of all lanes that can go, at most so many; gives the rounds after which none could."""
+        arrays = [pointer(array) for array in (self.words, self.clock, self.flags)]
+        tables = [pointer(array) for array in (self.constants, self.quotients, self.scratch)]
+        taken: int = self.functions["advance"](*arrays, self.ladder.order, self.low_order, *tables, rounds)
+        return taken
+
+    def time(self, lane: int) -> Fraction:
+        """|τ| of the last step end of a lane."""
+        return sum((Fraction(float(self.clock[LANES * (steps.TIME + k) + lane])) for k in range(2)), Fraction(0))
+
+    def taken(self, lane: int, most: int | None) -> int:
+        """Steps of the motion in a lane, which might take ``most``."""
+        return int((_NO_LIMIT if most is None else most) - self.clock[LANES * steps.LEFT + lane])
+
+    def status(self, lane: int) -> Status | None:
+        """Whether the motion in a lane can go on; None where it needs a larger n0."""
+        flags = int(self.flags[lane])
+        if flags & steps.NON_FINITE:
+            return Status.NON_FINITE
+        if flags & steps.TOO_SMALL:
+            return Status.TOO_SMALL
+        return None if flags & steps.LARGER_N0 else Status.FINE
+
+    def coefficients(self, lane: int, n: int) -> tuple[Fraction, ...]:
+        """y_n of a lane's last series."""
+        return _exact_lane(self.scratch[steps.ROW * n : steps.ROW * (n + 1)], lane)
+
+    def state(self, lane: int) -> tuple[Fraction, ...]:
+        """Where a lane's motion is."""
+        return _exact_lane(self.words, lane)
+
+    def samples(self, times: dict[int, Fraction]) -> dict[int, tuple[Fraction, ...]]:
+        """The states of some lanes, each at a time |τ| inside its next step."""
+        behind, found = doubles(2 * LANES), doubles(12 * LANES)
+        for lane, time in times.items():
+            behind[lane], behind[LANES + lane] = split(self.signs[lane] * (time - self.time(lane)))
+        self.functions["sample"](pointer(self.scratch), self.ladder.order, pointer(behind), pointer(found))
+        return {lane: _exact_lane(found, lane) for lane in times}
+
+
+def _exact_lane(words: Doubles, lane: int) -> tuple[Fraction, ...]:
+    return tuple(Fraction(float(words[16 * i + lane])) + Fraction(float(words[16 * i + 8 + lane])) for i in range(6))
+
+
+class OneOfEight(Run):
+    """One step of a motion that is in all eight lanes, for the check of their machine code."""
+
+    def __init__(self, problem: Scaled, ladder: Ladder, low_order: int) -> None:
+        self.eight = Eight(problem.system, ladder, low_order)
+        self.steps, self.forwards = 0, True
+        for lane in range(LANES):
+            self.eight.put(lane, problem, True, 1)
+            self.eight.aim(lane, LARGEST_TIME)
+
+    @property
+    def order(self) -> int:
+        return self.eight.ladder.order
+
+    @property
+    def time(self) -> Fraction:
+        return self.eight.time(0)
+
+    @property
+    def state(self) -> tuple[Fraction, ...]:
+        return self.eight.state(0)
+
+    def advance(self, target: Fraction, steps: int) -> Status:
+        self.steps += self.eight.advance(1)
+        same = all(self.eight.state(lane) == self.state and self.eight.time(lane) == self.time for lane in range(LANES))
+        return Status.FINE if same and self.time > 0 else Status.NON_FINITE
+
+    def sample(self, time: Fraction) -> tuple[Fraction, ...]:
+        # the scratch holds the series at the beginning of the step, time 0
+        return self.eight.samples({0: self.time + time})[0]
+
+    def coefficients(self, n: int) -> tuple[Fraction, ...]:
+        return tuple(value * self.time**n for value in self.eight.coefficients(0, n))
+
+    def place(self) -> tuple[str, ...]:
+        raise NotImplementedError("one step is not taken up again")
+
+    def restore(self, place: tuple[str, ...], steps: int) -> None:
+        raise NotImplementedError("one step is not taken up again")

@@ -1,0 +1,175 @@
+"""One motion in K words: what the machine code of :mod:`heavytop.words.grid` works on."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from threading import Lock
+from typing import Any
+
+import numpy
+
+from heavytop.top.equations import System
+from heavytop.words import grid as steps
+from heavytop.words.digits import digits, exact
+from heavytop.words.grid_series import most_orders
+from heavytop.words.kernels import Grid
+from heavytop.words.machine import Doubles, Machine, Processor, doubles, pointer
+from heavytop.words.run import Run, Status
+from heavytop.words.scaled import Scaled
+
+_FIRST_HALVINGS = 3
+_FEWEST_HALVINGS = -4
+_MOST_HALVINGS = 40
+_HALVED_SAMPLES = 4
+_LARGEST_TIME = Fraction(2) ** 1000
+
+_machines: dict[tuple[Grid, str, bool, Processor | None], tuple[Machine, int]] = {}
+_making = Lock()
+
+
+def machine(grid: Grid, system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, int]:
+    """The machine code for this grid and system, compiled at its first use."""
+    key = (grid, system.name, attitude, processor)
+    with _making:
+        if key not in _machines:
+            _machines[key] = steps.build(grid, system, attitude, processor)
+        return _machines[key]
+
+
+def excess(problem: Scaled) -> int:
+    """e, so that the coefficients over 2^e are at most 1: as many bits are lost in products with them."""
+    largest, found = problem.coefficients.largest, 0
+    while largest > 2**found:
+        found += 1
+    return found
+
+
+def spread(problem: Scaled) -> int:
+    """How many bits the smallest component that is not 0 lies below 1."""
+    least = min((abs(value) for value in problem.state if value), default=Fraction(1))
+    return max(0, least.denominator.bit_length() - least.numerator.bit_length() + 1)
+
+
+class Fixed(Run):
+    """A motion that advances on a grid of K words; the problem is scaled so that |ω| <= 4."""
+
+    def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:
+        self.vectors = 1 if len(problem.state) == 6 else 2
+        self.machine, row = machine(grid, problem.system, self.vectors == 2, processor)
+        self.problem, self.grid, self.forwards = problem, grid, forwards
+        self.steps = 0
+        size, orders = 8 * grid.words * self.vectors, most_orders(grid)
+        self.excess = excess(problem)
+        self.words, self.result = doubles(size), doubles(2 * size)
+        for place, value in zip(self._places, problem.state, strict=True):
+            self.words[place : place + 8 * grid.words : 8] = digits(value, grid)
+        self.inverses = doubles(orders + 1)
+        self.inverses[:] = 1 / numpy.arange(1, orders + 2)
+        self.rows, self.sums, self.seen = doubles(row * (orders + 2)), doubles(8 * grid.words), doubles(8)
+        self.places = numpy.zeros(grid.words + 2, numpy.int64)
+        self.clock, self.counts = doubles(steps.CLOCK), numpy.zeros(steps.COUNTS, numpy.int64)
+        self.clock[steps.SIGN] = 1.0 if forwards else -1.0
+        self.counts[steps.EXCESS] = self.excess
+        self.counts[[steps.HALVINGS, steps.FEWEST, steps.MOST]] = _FIRST_HALVINGS, _FEWEST_HALVINGS, _MOST_HALVINGS
+        self.constants = self._constants(Fraction(1))
+        self._row = row
+
+    @property
+    def _places(self) -> list[int]:
+        """Where the first word of each component is."""
+        second = 8 * self.grid.words
+        return [*range(6), *(second + lane for lane in range(3, 6))][: len(self.problem.state)]
+
+    def _constants(self, factor: Fraction) -> Doubles:
+        """The words of the coefficients times ``factor``, over 2^excess."""
+        flat = [row for vector in self.problem.coefficients.vectors for row in vector]
+        found = doubles(8 * self.grid.words * len(flat))
+        table = found.reshape(len(flat), self.grid.words, 8)
+        for index, row in enumerate(flat):
+            for lane, c in enumerate(row):
+                if c:
+                    table[index, :, lane] = digits(c * factor / 2**self.excess, self.grid)
+        return found
+
+    @property
+    def order(self) -> int:
+        return int(self.counts[steps.ORDERS])
+
+    @property
+    def redone(self) -> int:
+        """Steps that were done again with half their length."""
+        return int(self.counts[steps.REDONE])
+
+    @property
+    def time(self) -> Fraction:
+        return Fraction(float(self.clock[steps.TIME]))
+
+    @property
+    def state(self) -> tuple[Fraction, ...]:
+        return self._exact(self.words)
+
+    def _exact(self, words: Doubles) -> tuple[Fraction, ...]:
+        return tuple(exact(words[place : place + 8 * self.grid.words : 8]) for place in self._places)
+
+    def advance(self, target: Fraction, steps_at_most: int) -> Status:
+        self.clock[steps.TARGET] = _not_before(min(target, _LARGEST_TIME))
+        arrays = [self.words, *self._scratch(self.constants, self.rows), self.result, self.clock, self.counts]
+        taken = self.machine.functions["advance"](*[pointer(array) for array in arrays], steps_at_most)
+        self.steps += taken
+        return Status(int(self.counts[steps.STATUS]))
+
+    def _scratch(self, constants: Doubles, rows: Doubles) -> list[Any]:
+        return [constants, self.inverses, rows, self.sums, self.places, self.seen]
+
+    def sample(self, time: Fraction) -> tuple[Fraction, ...] | None:
+        behind = time - Fraction(float(self.clock[steps.BEGAN]))
+        found = self._moved(self._before(), behind, _HALVED_SAMPLES)
+        return None if found is None else self._exact(found)
+
+    def _moved(self, words: Doubles, span: Fraction, halvings: int) -> Doubles | None:
+        """The words after a time ``span``: one series; where a sum leaves its range, two of half the length."""
+        found, rows = doubles(len(words)), doubles(len(self.rows))
+        arrays = [words, *self._scratch(self._constants(span), rows)]
+        factor, raises = steps.raises_of(self.excess)
+        call = [*[pointer(array) for array in arrays], factor * float(self.clock[steps.SIGN]), raises, pointer(found)]
+        orders = self.machine.functions["series"](*call)
+        if orders >= 0:
+            return found
+        half = None if halvings == 0 else self._moved(words, span / 2, halvings - 1)
+        return None if half is None else self._moved(half, span / 2, halvings - 1)
+
+    def _before(self) -> Doubles:
+        """The words of the state before the last step."""
+        words = doubles(len(self.words))
+        words[:] = self.result[len(self.words) :]
+        return words
+
+    def coefficients(self, n: int) -> tuple[Fraction, ...]:
+        # L holds Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2
+        found: list[Fraction] = []
+        for vector in range(self.vectors):
+            start = n * self._row + 8 * self.grid.words * (1 + vector)
+            block = self.rows[start : start + 8 * self.grid.words]
+            left = [exact(block[lane::8]) for lane in range(8)]
+            middle = left[5] / 2
+            found += [*(left[2], left[0], left[1])[: 3 * (1 - vector)], left[4] - middle, middle, left[3] - middle]
+        return tuple(found)
+
+    def place(self) -> tuple[str, ...]:
+        length = Fraction(float(self.clock[steps.TIME])) - Fraction(float(self.clock[steps.BEGAN]))
+        halvings = length.denominator.bit_length() - length.numerator.bit_length()
+        words = (self.clock[steps.BEGAN], *self._before())
+        return (str(halvings), *(float(word).hex() for word in words))
+
+    def restore(self, place: tuple[str, ...], steps_before: int) -> None:
+        self.counts[steps.HALVINGS] = int(place[0])
+        words = [float.fromhex(text) for text in place[1:]]
+        self.clock[steps.TIME] = words[0]
+        self.words[:] = words[1:]
+        self.steps = steps_before
+
+
+def _not_before(target: Fraction) -> float:
+    """The least double that is not less."""
+    near = float(target)
+    return near if Fraction(near) >= target else float(numpy.nextafter(near, numpy.inf))

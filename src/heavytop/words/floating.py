@@ -1,0 +1,185 @@
+"""One motion in double-double: what the machine code of :mod:`heavytop.words.double_double` works on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from threading import Lock
+
+import numpy
+
+from heavytop.top.equations import System
+from heavytop.words import double_double as dd
+from heavytop.words.machine import Doubles, Machine, Processor, doubles, pointer
+from heavytop.words.pairs import split
+from heavytop.words.recurrence import LEAST_LOW_ORDER, Layout
+from heavytop.words.run import Run, Status
+from heavytop.words.scaled import Scaled
+
+BITS = 106
+FALL_ALONE, FALL_IN_LANES = 1.45, 2.0
+_MARGIN = 6.0
+_DEEPEST = 75.0
+_DOUBLE_BITS = 53
+_ROUNDING_BITS = 10
+_LEAST_ROOM = -58.0
+_QUOTIENT_BITS = 140
+LARGEST_TIME = Fraction(2) ** 1000
+
+_machines: dict[tuple[str, bool, Processor | None], tuple[Machine, Layout]] = {}
+_making = Lock()
+
+
+@dataclass(frozen=True, slots=True)
+class Ladder:
+    """How far the series goes, how long a step is, and what is kept in double-double.
+
+    order: N.  reach: log2 of h/ρ.  room: log2 of the largest |y_n| h^n / |y_0| whose rounding to a double is allowed,
+    at n0 + 1.
+    """
+
+    order: int
+    reach: float
+    room: float
+
+    @classmethod
+    def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> Ladder:
+        """For a local error of ``tolerance`` relative to the state.
+
+        fall: of the logarithm of y_n h^n from one order to the next.  2 is best where the time goes into N² products
+        (Jorba and Zou); a single motion waits for the last product of each order, so that many orders and long steps
+        are faster.
+        """
+        log_tolerance = math.log(tolerance.numerator) - math.log(tolerance.denominator)
+        depth = min(_MARGIN - log_tolerance, _DEEPEST)
+        order = math.ceil(depth / fall)
+        reach = -(depth / order + 0.7 / (order - 1)) / math.log(2)
+        return cls(order, reach, max(_DOUBLE_BITS - depth / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM))
+
+
+def machine(system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, Layout]:
+    """The machine code for this system, compiled at its first use."""
+    key = (system.name, attitude, processor)
+    with _making:
+        if key not in _machines:
+            _machines[key] = dd.build(system, attitude, processor)
+        return _machines[key]
+
+
+class Floating(Run):
+    """A motion that advances in double-double steps.
+
+    low_order: n0 of the first step; None for the largest, from which it falls to what the motion needs.
+    """
+
+    def __init__(
+        self,
+        problem: Scaled,
+        ladder: Ladder,
+        forwards: bool,
+        low_order: int | None = None,
+        processor: Processor | None = None,
+    ) -> None:
+        self.machine, self.layout = machine(problem.system, len(problem.state) == 9, processor)
+        self.problem, self.forwards = problem, forwards
+        self.steps = 0
+        self.words = _state_words(problem.state)
+        self.clock, self.counts = doubles(dd.CLOCK), numpy.zeros(dd.COUNTS, numpy.int64)
+        self.clock[dd.SIGN] = 1.0 if forwards else -1.0
+        self.clock[dd.ROOM] = ladder.room
+        self.clock[dd.REACH] = ladder.reach
+        most = ladder.order - 1
+        self.counts[[dd.ORDER, dd.LOW_ORDER]] = ladder.order, low_order or most
+        self.counts[[dd.LEAST, dd.MOST]] = LEAST_LOW_ORDER, most
+        self.table = _table(problem, ladder.order, self.layout)
+        self.scratch = doubles((ladder.order + 5) * self.layout.row)
+
+    @property
+    def order(self) -> int:
+        return int(self.counts[dd.ORDER])
+
+    @property
+    def time(self) -> Fraction:
+        return self._time(dd.TIME)
+
+    def _time(self, place: int) -> Fraction:
+        return Fraction(self.clock[place]) + Fraction(self.clock[place + 1])
+
+    @property
+    def state(self) -> tuple[Fraction, ...]:
+        return _exact_state(self.words, len(self.problem.state))
+
+    def advance(self, target: Fraction, steps: int) -> Status:
+        self.clock[dd.TARGET : dd.TARGET_LOW + 1] = split(min(target, LARGEST_TIME))
+        arrays = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
+        taken = self.machine.functions["advance"](*arrays, steps)
+        self.steps += taken
+        return Status(int(self.counts[dd.STATUS]))
+
+    def sample(self, time: Fraction) -> tuple[Fraction, ...]:
+        found = doubles(16 * self.layout.vectors)
+        behind = time - self._time(dd.BEGAN)
+        high, low = split(behind if self.forwards else -behind)
+        self.machine.functions["sample"](pointer(self.scratch), self.order, high, low, pointer(found))
+        return _exact_state(found, len(self.problem.state))
+
+    def coefficients(self, n: int) -> tuple[Fraction, ...]:
+        step = self.time - self._time(dd.BEGAN)
+        power = (step if self.forwards else -step) ** n
+        return tuple(value * power for value in _exact_state(self._row(n), len(self.problem.state)))
+
+    def _row(self, n: int) -> Doubles:
+        """Both words of y_n, vector by vector."""
+        vectors = range(self.layout.vectors)
+        starts = [n * self.layout.row + self.layout.value(v) for v in vectors]
+        return numpy.concatenate([self.scratch[start : start + 16] for start in starts])
+
+    def place(self) -> tuple[str, ...]:
+        clock = self.clock[[dd.BEGAN, dd.BEGAN_LOW]]
+        return (str(self.counts[dd.USED]), *(float(word).hex() for word in (*clock, *self._row(0))))
+
+    def restore(self, place: tuple[str, ...], steps: int) -> None:
+        self.counts[dd.LOW_ORDER] = int(place[0])
+        words = [float.fromhex(text) for text in place[1:]]
+        self.clock[[dd.TIME, dd.TIME_LOW]] = words[:2]
+        self.words[:] = words[2:]
+        self.steps = steps
+
+
+def _state_words(state: tuple[Fraction, ...]) -> Doubles:
+    words = doubles(16 * (1 if len(state) == 6 else 2))
+    for index, value in enumerate(state):
+        place = index if index < 6 else 16 + index - 3
+        words[place], words[place + 8] = split(value)
+    return words
+
+
+def _exact_state(words: Doubles, size: int) -> tuple[Fraction, ...]:
+    places = [*range(6), *range(19, 22)][:size]
+    return tuple(Fraction(words[place]) + Fraction(words[place + 8]) for place in places)
+
+
+def _table(problem: Scaled, order: int, layout: Layout) -> Doubles:
+    """A/(n + 1) and B/(n + 1) in two words each, for n = 0, 1, ..., N - 1."""
+    table = doubles(order * layout.table_row)
+    rows = table.reshape(order, layout.table_row // 16, 2, 8)
+    flat = [row for vector in problem.coefficients.vectors for row in vector]
+    for index, row in enumerate(flat):
+        for lane, c in enumerate(row):
+            if c:
+                rows[:, index, :, lane] = _quotients(c, order)
+    return table
+
+
+def _quotients(c: Fraction, count: int) -> list[tuple[float, float]]:
+    """c/1, c/2, ... in two words each."""
+    exponent = c.numerator.bit_length() - c.denominator.bit_length()
+    shift = _QUOTIENT_BITS - exponent
+    numerator, denominator = c.numerator << max(shift, 0), c.denominator << max(-shift, 0)
+    found = []
+    for n in range(1, count + 1):
+        whole = numerator // (denominator * n)
+        high = float(whole)
+        found.append((math.ldexp(high, -shift), math.ldexp(float(whole - int(high)), -shift)))
+    return found

@@ -1,0 +1,152 @@
+"""Numbers of K words on fixed grids, and sums of their products in machine code.
+
+Word k is a multiple of its unit g_k = 2^(-b (k + 1)), about b bits wide, so that K words are a number in fixed point
+with K b bits (after J. van der Hoeven, "Multiple precision floating-point arithmetic on SIMD processors", ARITH 24,
+2017).  A sum for level k begins at C_k = 1.5 × 2^52 g_k, where the last bit of a double is worth g_k.  For a product
+with i + j = k:
+
+    S' = fma(a_i, b_j, S_k),   d = S' − S_k,   l = fma(a_i, b_j, −d),   S_(k+1) += l.
+
+d and l are exact, and l is a multiple of g_(k+1): nothing is lost but the last level's own roundings, as long as each
+S_k stays between 2^52 g_k and 2^53 g_k wherever a low part is added to it.  That is checked there, by the exponent: the
+bits of S ^ C are gathered, and a set exponent bit says that the step must not stand.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy
+from llvmlite import ir
+
+from heavytop.words.vector import INT, INT_VECTOR, POINTER, VECTOR, Code, function
+
+EXPONENT_BITS = 0x7FF << 52
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """words: K.  bits: b, of each."""
+
+    words: int
+    bits: int
+
+    @property
+    def total(self) -> int:
+        """Bits of a number behind the binary point."""
+        return self.words * self.bits
+
+    def unit(self, k: int) -> float:
+        """g_k."""
+        return float(2.0 ** (-self.bits * (k + 1)))
+
+    def centre(self, k: int) -> float:
+        """C_k, to which a sum for level k is added."""
+        return 1.5 * 2.0**52 * self.unit(k)
+
+
+@dataclass(slots=True)
+class Accumulator:
+    """Sums for the levels ``base`` to K − 1, and the bits in which they left their range.
+
+    sums: S_k.  seen: gathered bits of S ^ C, eight integers.
+    """
+
+    code: Code
+    grid: Grid
+    base: int
+    sums: list[Any]
+    seen: Any
+
+    def add_product(self, a: list[Any], b: list[Any]) -> None:
+        """Add a b, of words numbered from 0 that count from level ``base`` on."""
+        code, count = self.code, len(self.sums)
+        for k in range(count):
+            lows = []
+            for i in range(k + 1):
+                total = code.fma(a[i], b[k - i], self.sums[k])
+                if k < count - 1:
+                    part = code.subtract(total, self.sums[k])
+                    lows.append(code.fma(a[i], b[k - i], code.negative(part)))
+                self.sums[k] = total
+            if self.base == k == 0:
+                self.look(0)
+            if lows:
+                self.look(k + 1)
+                self.sums[k + 1] = code.add(self.sums[k + 1], _total(code, lows))
+                self.look(k + 1)
+
+    def look(self, k: int) -> None:
+        """Gather the bits of a sum; those of the last level are of no account."""
+        level = self.base + k
+        if level < self.grid.words - 1:
+            b = self.code.builder
+            centre = int(numpy.float64(self.grid.centre(level)).view(numpy.int64))
+            centres = ir.Constant(INT_VECTOR, [ir.Constant(INT, centre)] * 8)
+            self.seen = b.or_(self.seen, b.xor(b.bitcast(self.sums[k], INT_VECTOR), centres))
+
+    def look_at_all(self) -> None:
+        """Gather the bits of every sum."""
+        for k in range(len(self.sums)):
+            self.look(k)
+
+
+def _total(code: Code, values: list[Any]) -> Any:
+    """Their sum, exact for multiples of one unit; in pairs."""
+    while len(values) > 1:
+        pairs = zip(values[::2], values[1::2], strict=False)
+        values = [code.add(a, b) for a, b in pairs] + values[len(values) - len(values) % 2 :]
+    return values[0]
+
+
+def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Any]:
+    """Functions (left, right, count, sums, seen): S += Σ_m left[m] right[-m] in the levels from the q-th last on.
+
+    left goes up by a row for each product and right goes down; both point to their first word that is not zero.
+    The list begins with q = 1.
+    """
+    return [_write_kernel(module, grid, count, row) for count in range(1, grid.words + 1)]
+
+
+def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Any:
+    arguments = [POINTER, POINTER, INT, POINTER, POINTER]
+    made, code = function(module, f"products_{count}", ir.VoidType(), arguments)
+    made.linkage = "internal"
+    made.attributes.add("noinline")
+    left, right, terms, sums, seen = made.args
+    base, b = grid.words - count, code.builder
+
+    def term(m: Any, values: list[Any]) -> list[Any]:
+        total = Accumulator(code, grid, base, list(values[:-1]), values[-1])
+        at = code.address(left, b.mul(m, code.integer(row)))
+        against = code.address(right, b.mul(m, code.integer(-row)))
+        a, c = ([code.load(place, 8 * i) for i in range(count)] for place in (at, against))
+        total.add_product(a, c)
+        return [*total.sums, total.seen]
+
+    begin = [code.load(sums, 8 * k) for k in range(count)] + [b.bitcast(code.load(seen, 0), INT_VECTOR)]
+    values = code.loop(0, terms, term, begin)
+    for k in range(count):
+        code.store(values[k], sums, 8 * k)
+    code.store(b.bitcast(values[-1], VECTOR), seen, 0)
+    b.ret_void()
+    return made
+
+
+def centred(code: Code, grid: Grid, count: int) -> list[Any]:
+    """The beginning of all sums."""
+    return [code.constant(grid.centre(k)) for k in range(count)]
+
+
+def carried(code: Code, grid: Grid, words: list[Any]) -> list[Any]:
+    """The same number with each word but the first near b bits wide again."""
+    carries = [None]
+    for k in range(1, grid.words):
+        big = code.constant(grid.centre(k - 1))
+        carries.append(code.subtract(code.add(words[k], big), big))
+    found = []
+    for k, word in enumerate(words):
+        value = word if k == 0 else code.subtract(word, carries[k])
+        found.append(code.add(value, carries[k + 1]) if k + 1 < grid.words else value)
+    return found

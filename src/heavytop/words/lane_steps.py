@@ -1,0 +1,279 @@
+"""Eight motions side by side, a lane each, in double-double with plain doubles above an order n0.
+
+Each lane has its own time, step and target, and its bits do not depend on the others: N and n0 are the same for all and
+do not change.  A lane whose next step would cover its target waits; the scratch then holds the polynomial of that step.
+A lane that would need a larger n0 stops and says so.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from llvmlite import ir
+
+from heavytop.top.equations import System
+from heavytop.words.double_double import LARGEST_STEP, STEP_BITS
+from heavytop.words.lanes import ZERO, turned
+from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
+from heavytop.words.pairs import add, log2, multiply, power_of_two, times
+from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER, Pair, function
+
+FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
+"""Flags of a lane."""
+TIME, TARGET, SIGN, LEFT, ROOM, REACH, CLOCK = 0, 2, 4, 5, 6, 7, 8
+"""Vectors of the clock: |time| and its target, two words each; direction, steps left, room and reach."""
+_TOLERATED = 1.0
+ROW = 96
+"""Doubles of one order: two words of six components."""
+
+# (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
+_PRODUCTS = (
+    (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1),
+    (4, 2, 3, 1), (5, 1, 3, -1), (5, 0, 4, 1), (3, 2, 4, -1), (3, 1, 5, 1), (4, 0, 5, -1),
+)  # fmt: skip
+
+
+def terms(system: System) -> list[tuple[int, int, int]]:
+    """(row of the coefficients, component, component that it multiplies) of the linear part."""
+    return [
+        (row, lane, source)
+        for row, lanes in enumerate(turned(system), 1)
+        for lane, source in enumerate(lanes[:6])
+        if source != ZERO
+    ]
+
+
+def build(system: System, processor: Processor | None = None) -> Machine:
+    """``advance`` and ``sample`` of eight motions.
+
+    advance(state, clock, flags, order, low_order, coefficients, quotients, scratch, steps): as many rounds of steps at
+    most, until no lane can go; gives the number of rounds.
+    sample(scratch, order, times, result): each lane's polynomial at its own time, in two words, behind its beginning.
+    """
+    module = ir.Module("lanes")
+    _Round(module, system).write()
+    _write_sample(module)
+    integer = ctypes.c_int64
+    signatures: dict[str, tuple[Any, Sequence[Any]]] = {
+        "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, integer, integer, DOUBLES, DOUBLES, DOUBLES, integer]),
+        "sample": (None, [DOUBLES, integer, DOUBLES, DOUBLES]),
+    }
+    return compiled(module, signatures, processor)
+
+
+def _write_sample(module: ir.Module) -> None:
+    made, code = function(module, "sample", ir.VoidType(), [POINTER, INT, POINTER, POINTER])
+    scratch, order, times_, result = made.args
+    b = code.builder
+    at = code.load(times_, 0), code.load(times_, 8)
+
+    def term(k: Any, words: list[Any]) -> list[Any]:
+        row = code.address(scratch, b.mul(b.sub(order, k), code.integer(ROW)))
+        found: list[Any] = []
+        for i in range(6):
+            total = multiply(code, (words[2 * i], words[2 * i + 1]), at)
+            found += code.quick_two_sum(*add(code, total, (code.load(row, 16 * i), code.load(row, 16 * i + 8))))
+        return found
+
+    words = code.loop(0, b.add(order, code.integer(1)), term, [code.zero] * 12)
+    for index, word in enumerate(words):
+        code.store(word, result, 8 * index)
+    b.ret_void()
+
+
+class _Round:
+    """Writes ``advance``."""
+
+    def __init__(self, module: ir.Module, system: System) -> None:
+        arguments = [POINTER, POINTER, INT_POINTER, INT, INT, POINTER, POINTER, POINTER, INT]
+        made, self.code = function(module, "advance", INT, arguments)
+        self.state, self.clock, self.flags, self.order, self.low_order = made.args[:5]
+        self.coefficients, self.quotients, self.scratch, self.most = made.args[5:]
+        self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
+
+    def _row(self, n: Any) -> Any:
+        return self.code.address(self.scratch, self.code.builder.mul(self.code.integer(n), self.code.integer(ROW)))
+
+    def _pair(self, row: Any, i: int) -> Pair:
+        return self.code.load(row, 16 * i), self.code.load(row, 16 * i + 8)
+
+    def _coefficient(self, k: int) -> Pair:
+        return self._pair(self.coefficients, k)
+
+    def _quotient(self, n: Any) -> Pair:
+        """1/(n + 1) in every lane."""
+        place = self.code.address(self.quotients, self.code.builder.shl(n, self.code.integer(1)))
+        words = [self.code.builder.load(self.code.address(place, i)) for i in range(2)]
+        return self.code.spread(words[0]), self.code.spread(words[1])
+
+    def write(self) -> None:
+        """The loop of rounds."""
+        code, b = self.code, self.code.builder
+        head, body, out = (b.append_basic_block(name) for name in ("rounds", "round", "out"))
+        entry = b.block
+        b.branch(head)
+        b.position_at_end(head)
+        taken = b.phi(INT)
+        taken.add_incoming(code.integer(0), entry)
+        b.cbranch(b.icmp_signed("<", taken, self.most), body, out)
+        b.position_at_end(body)
+        first = self._row(0)
+        for i in range(12):
+            code.store(code.load(self.state, 8 * i), first, 8 * i)
+        code.loop(0, self.low_order, self._pair_order, [])
+        code.loop(self.low_order, self.order, self._plain_order, [])
+        some = self._finish()
+        taken.add_incoming(b.add(taken, code.integer(1)), b.block)
+        b.cbranch(some, head, out)
+        b.position_at_end(out)
+        b.ret(taken)
+
+    def _pair_order(self, n: Any, _: list[Any]) -> None:
+        """y_(n+1) in double-double."""
+        code, b = self.code, self.code.builder
+        sums: list[Pair] = []
+        for rows in ((0, 1, 2), (3, 4, 5)):
+            group = [product for product in _PRODUCTS if product[2] in rows]
+            words = code.loop(0, b.add(n, code.integer(1)), partial(self._pair_products, n, group), [code.zero] * 6)
+            sums += [(words[2 * i], words[2 * i + 1]) for i in range(3)]
+        y, following, quotient = self._row(n), self._row(b.add(n, code.integer(1))), self._quotient(n)
+        for i in range(6):
+            total = code.quick_two_sum(*sums[i])
+            if i < 3:
+                total = multiply(code, self._coefficient(i), total)
+            for k, component, source in self.terms:
+                if component == i:
+                    total = add(code, total, multiply(code, self._coefficient(k), self._pair(y, source)))
+            high, low = code.quick_two_sum(*multiply(code, total, quotient))
+            code.store(high, following, 16 * i)
+            code.store(low, following, 16 * i + 8)
+
+    def _pair_products(self, n: Any, group: list[Any], m: Any, words: list[Any]) -> list[Any]:
+        code, b = self.code, self.code.builder
+        left, right = self._row(m), self._row(b.sub(n, m))
+        found = list(words)
+        for first, second, component, sign in group:
+            (a, a_low), (c, c_low) = self._pair(left, first), self._pair(right, second)
+            if sign < 0:
+                c, c_low = code.negative(c), code.negative(c_low)
+            product, error = code.two_product(a, c)
+            at = 2 * (component % 3)
+            found[at], rounding = code.two_sum(found[at], product)
+            low = code.fma(a, c_low, code.fma(a_low, c, error))
+            found[at + 1] = code.add(code.add(found[at + 1], rounding), low)
+        return found
+
+    def _plain_order(self, n: Any, _: list[Any]) -> None:
+        """y_(n+1) in plain doubles."""
+        code, b = self.code, self.code.builder
+
+        def products(m: Any, sums: list[Any]) -> list[Any]:
+            left, right = self._row(m), self._row(b.sub(n, m))
+            a = [code.load(left, 16 * i) for i in range(6)]
+            c = [code.load(right, 16 * i) for i in range(3)]
+            found = list(sums)
+            for first, second, component, sign in _PRODUCTS:
+                factor = a[first] if sign > 0 else code.negative(a[first])
+                found[component] = code.fma(factor, c[second], found[component])
+            return found
+
+        sums = code.loop(0, b.add(n, code.integer(1)), products, [code.zero] * 6)
+        y, following = self._row(n), self._row(b.add(n, code.integer(1)))
+        quotient = self._quotient(n)[0]
+        for i in range(6):
+            total = code.multiply(self._coefficient(i)[0], sums[i]) if i < 3 else sums[i]
+            for k, component, source in self.terms:
+                if component == i:
+                    total = code.fma(self._coefficient(k)[0], code.load(y, 16 * source), total)
+            code.store(code.multiply(total, quotient), following, 16 * i)
+            code.store(code.zero, following, 16 * i + 8)
+
+    def _norm(self, n: Any) -> Any:
+        row, found = self._row(n), self.code.zero
+        for i in range(6):
+            found = self.code.larger(self.code.absolute(self.code.load(row, 16 * i)), found)
+        return log2(self.code, found)
+
+    def _length(self, start: Any) -> Any:
+        """Each lane's h > 0, as in :mod:`heavytop.words.double_double`."""
+        code, b = self.code, self.code.builder
+
+        def radius(n: Any) -> Any:
+            return b.fdiv(b.fsub(start, self._norm(n)), code.spread(b.sitofp(n, DOUBLE)))
+
+        one, two = radius(self.order), radius(b.sub(self.order, code.integer(1)))
+        least = b.select(b.fcmp_ordered("<", one, two), one, two)
+        return power_of_two(code, b.fadd(least, code.load(self.clock, 8 * REACH)), LARGEST_STEP, STEP_BITS)
+
+    def _sum(self, i: int, h: Any) -> Pair:
+        """Σ y_n h^n of one component, from the highest order."""
+        code, b = self.code, self.code.builder
+
+        def plain(k: Any, total: list[Any]) -> list[Any]:
+            return [code.fma(total[0], h, code.load(self._row(b.sub(self.order, k)), 16 * i))]
+
+        def pairs(k: Any, words: list[Any]) -> list[Any]:
+            total = times(code, (words[0], words[1]), h)
+            return [*add(code, total, self._pair(self._row(b.sub(self.low_order, k)), i))]
+
+        total = code.loop(0, b.sub(self.order, self.low_order), plain, [code.zero])
+        words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, [total[0], code.zero])
+        return code.quick_two_sum(words[0], words[1])
+
+    def _finish(self) -> Any:
+        """Move the lanes that can go; whether any did."""
+        code, b = self.code, self.code.builder
+        start = self._norm(code.integer(0))
+        length = self._length(start)
+        step = b.fmul(length, code.load(self.clock, 8 * SIGN))
+        results = [self._sum(i, step) for i in range(6)]
+        time, low = (code.load(self.clock, 8 * (TIME + k)) for k in range(2))
+        total, error = code.two_sum(time, length)
+        total, rest = code.quick_two_sum(total, code.add(error, low))
+        covered = self._reached(total, rest)
+        flags = self._judged(start, length, results, b.fcmp_ordered(">", total, time))
+        fine = b.icmp_signed("==", flags, ir.Constant(INT_VECTOR, [0] * 8))
+        left = code.load(self.clock, 8 * LEFT)
+        going = b.and_(b.and_(fine, b.not_(covered)), b.fcmp_ordered(">", left, code.zero))
+        old = [(self.state, 16 * i + 8 * word, results[i][word]) for i in range(6) for word in range(2)]
+        old += [(self.clock, 8 * TIME, total), (self.clock, 8 * (TIME + 1), rest)]
+        old += [(self.clock, 8 * LEFT, b.fsub(left, code.constant(1.0)))]
+        for base, place, value in old:
+            code.store(b.select(going, value, code.load(base, place)), base, place)
+        return b.icmp_unsigned("!=", b.bitcast(going, ir.IntType(8)), ir.Constant(ir.IntType(8), 0))
+
+    def _reached(self, time: Any, low: Any) -> Any:
+        code, b = self.code, self.code.builder
+        target, target_low = (code.load(self.clock, 8 * (TARGET + k)) for k in range(2))
+        level = b.and_(b.fcmp_ordered("==", time, target), b.fcmp_ordered(">=", low, target_low))
+        return b.or_(b.fcmp_ordered(">", time, target), level)
+
+    def _judged(self, start: Any, length: Any, results: list[Pair], moves: Any) -> Any:
+        """The flags of all lanes, with those that this step sets; a lane without steps left gets none."""
+        code, b = self.code, self.code.builder
+        above = b.add(self.low_order, code.integer(1))
+        power = b.fmul(code.spread(b.sitofp(above, DOUBLE)), log2(code, length))
+        rounding = b.fsub(b.fadd(self._norm(above), power), start)
+        limit = b.fadd(code.load(self.clock, 8 * ROOM), code.constant(_TOLERATED))
+        infinity, finite = code.constant(math.inf), None
+        for word in (word for pair in results for word in pair):
+            one = b.fcmp_ordered("<", code.absolute(word), infinity)
+            finite = one if finite is None else b.and_(finite, one)
+
+        def flag(condition: Any, value: int) -> Any:
+            chosen = ir.Constant(INT_VECTOR, [value] * 8)
+            return b.select(condition, chosen, ir.Constant(INT_VECTOR, [0] * 8))
+
+        place = b.bitcast(self.flags, INT_VECTOR.as_pointer())
+        known = b.load(place)
+        known.align = 8
+        found = b.or_(flag(b.not_(finite), NON_FINITE), flag(b.not_(moves), TOO_SMALL))
+        found = b.or_(found, flag(b.fcmp_ordered(">", rounding, limit), LARGER_N0))
+        alive = b.fcmp_ordered(">", code.load(self.clock, 8 * LEFT), code.zero)
+        found = b.or_(known, b.select(alive, found, ir.Constant(INT_VECTOR, [0] * 8)))
+        b.store(found, place).align = 8
+        return found

@@ -1,0 +1,106 @@
+"""Where in eight lanes the products of the two fields are.
+
+A state vector holds Ω1 Ω2 Ω3 γ1 γ2 γ3 in lanes 0 to 5; an attitude vector ξ lies in lanes 3 to 5 of a second one, whose
+other lanes are 0.  Lanes 6 and 7 are 0.  The products of Taylor series that the fields need are then, lane by lane,
+
+    S_n = Σ_m L_m ∘ R_(n−m),   L, R: sums of two lanes of y,
+
+three lanes for Ω × Ω and five for γ × Ω: the determinant is a sum of five products, so that no sum runs across lanes.
+For ξ × Ω the left sides come from the second vector and the right sides are the same.  The derivative is
+
+    y' = A ∘ (S permuted and added) + Σ_l B_l ∘ (y permuted),
+
+with A = 1/2 in lanes 3 to 5.  A and B are not written down here: they are read off the field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+from heavytop.top.equations import Parameters, System
+
+ZERO = 6
+"""A lane that is 0 in every state vector."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """Lane by lane y[first] + sign y[second]; where the second is ZERO, y[first] alone."""
+
+    first: tuple[int, ...]
+    second: tuple[int, ...]
+    sign: tuple[int, ...]
+
+
+LEFT = Sum((1, 2, 0, 4, 3, 4, 5, 3), (6, 6, 6, 5, 4, 4, 4, 4), (0, 0, 0, 1, 1, 1, -1, -1))
+RIGHT = Sum((2, 0, 1, 0, 1, 2, 0, 1), (6, 6, 6, 1, 2, 0, 1, 2), (0, 0, 0, -1, -1, -1, 1, 1))
+
+# lanes 3 to 7 of S are T1 to T5: γ × Ω = (T1 + T3 − T4, T1 + T2 + T4 − T5, T2 + T3 + T5) / 2
+GATHERED: tuple[tuple[tuple[int, int], ...], ...] = (
+    ((0, 1), (1, 1), (2, 1), (3, 1), (3, 1), (4, 1)),
+    ((0, 0), (0, 0), (0, 0), (5, 1), (4, 1), (5, 1)),
+    ((0, 0), (0, 0), (0, 0), (6, -1), (6, 1), (7, 1)),
+    ((0, 0), (0, 0), (0, 0), (0, 0), (7, -1), (0, 0)),
+)
+"""Four lists of (lane of S, sign), one for each lane 0 to 5 of the derivative; they are added."""
+
+# γ × n for the heavy top; λ terms for the gyrostat
+_TURNED: dict[str, tuple[tuple[int, ...], ...]] = {
+    "heavy_top": ((4, 5, 3, ZERO, ZERO, ZERO, ZERO, ZERO), (5, 3, 4, ZERO, ZERO, ZERO, ZERO, ZERO)),
+    "gyrostat": ((2, ZERO, 0, 5, ZERO, 3, ZERO, ZERO),),
+}
+
+
+def turned(system: System) -> tuple[tuple[int, ...], ...]:
+    """The permutations of y in the linear part, one or two."""
+    return _TURNED[system.name]
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficients:
+    """A and B_l of each state vector, eight exact numbers each: shape (vectors, 1 + number of permutations, 8)."""
+
+    vectors: tuple[tuple[tuple[Fraction, ...], ...], ...]
+
+    @property
+    def largest(self) -> Fraction:
+        """The largest |coefficient|."""
+        return max(abs(c) for vector in self.vectors for row in vector for c in row)
+
+    def with_linear(self, factor: Fraction) -> Coefficients:
+        """The same with every B multiplied."""
+        return Coefficients(
+            tuple((rows[0], *(tuple(c * factor for c in row) for row in rows[1:])) for rows in self.vectors)
+        )
+
+
+@lru_cache(maxsize=256)
+def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
+    """Those of the field, exactly, for exact parameters."""
+
+    def unit(*axes: int) -> list[Fraction]:
+        return [Fraction(int(axis in axes)) for axis in range(6)]
+
+    def rates(y: Sequence[Any]) -> Sequence[Any]:
+        return system.field(p, y)
+
+    half = Fraction(1, 2)
+    others = ((1, 2), (2, 0), (0, 1))
+    at, against = ([rates([sign * v for v in unit(j)]) for j in range(6)] for sign in (1, -1))
+    products = [rates(unit(i, j))[k] - at[i][k] - at[j][k] for k, (i, j) in enumerate(others)]
+    linear = [[(a - b) / 2 for a, b in zip(*pair, strict=True)] for pair in zip(at, against, strict=True)]
+    permuted = [[Fraction(0) if j == ZERO else linear[j][k] for k, j in enumerate(row[:6])] for row in turned(system)]
+    rows = [_eight(row) for row in ([*products, half, half, half], *permuted)]
+    if not attitude:
+        return Coefficients((tuple(rows),))
+    # ξ' = ξ × ω turns as γ does
+    third = [[Fraction(0)] * 3 + list(row[3:6]) for row in rows]
+    return Coefficients((tuple(rows), tuple(_eight(row) for row in third)))
+
+
+def _eight(row: Sequence[Any]) -> tuple[Fraction, ...]:
+    return tuple(Fraction(c) for c in row) + (Fraction(0),) * (8 - len(row))

@@ -1,0 +1,97 @@
+"""Double-double arithmetic in machine code: a number is the exact sum of two doubles, high and low, 106 bits.
+
+Sums and products leave the low word a few units of the high one wide; ``quick_two_sum`` brings a result to order.
+Logarithms are taken from the bits of the exponent and a cubic: + - × only, the same on every processor.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+from llvmlite import ir
+
+from heavytop.words.vector import DOUBLE, INT, INT_VECTOR, LANES, VECTOR, Code, Pair
+
+_FRACTION_BITS = 52
+_BIAS = 1023
+# log2(1 + f) = f + f (1 - f) (a + b f + c f²) to 2e-4 and 2^f likewise, exact at both ends (least squares)
+_LOG = (0.43807325, -0.23669342, 0.0803073)
+_POWER = (-0.30407153, -0.07912522)
+_LEAST_EXPONENT = -900.0
+
+
+def add(code: Code, a: Pair, b: Pair) -> Pair:
+    """a + b."""
+    high, error = code.two_sum(a[0], b[0])
+    return high, code.add(code.add(a[1], b[1]), error)
+
+
+def multiply(code: Code, a: Pair, b: Pair) -> Pair:
+    """a b."""
+    product, error = code.two_product(a[0], b[0])
+    return product, code.fma(a[0], b[1], code.fma(a[1], b[0], error))
+
+
+def times(code: Code, a: Pair, factor: Any) -> Pair:
+    """a times a double."""
+    product, error = code.two_product(a[0], factor)
+    return product, code.fma(a[1], factor, error)
+
+
+def split(value: Fraction) -> tuple[float, float]:
+    """The two doubles nearest to ``value``; exact for numbers of 106 bits."""
+    high = float(value)
+    return high, float(value - Fraction(high))
+
+
+def log2(code: Code, value: Any) -> Any:
+    """log2 of a double that is not negative, to 1e-3, or of each of eight; about -1023 for 0."""
+    b, of = code.builder, _Like(value)
+    bits = b.bitcast(value, of.integers)
+    exponent = b.sub(b.lshr(bits, of.integer(_FRACTION_BITS)), of.integer(_BIAS))
+    one = of.integer(_BIAS << _FRACTION_BITS)
+    significand = b.or_(b.and_(bits, of.integer((1 << _FRACTION_BITS) - 1)), one)
+    fraction = b.fsub(b.bitcast(significand, value.type), of.double(1.0))
+    return b.fadd(b.sitofp(exponent, value.type), _bent(code, fraction, _LOG))
+
+
+def power_of_two(code: Code, exponent: Any, most: int, bits: int) -> Any:
+    """2^exponent to 1e-3, at most 2^most, its significand cut to that many bits; of a double, or of each of eight."""
+    b, of = code.builder, _Like(exponent)
+    low, high = of.double(_LEAST_EXPONENT), of.double(float(most))
+    bounded = b.select(b.fcmp_ordered("<", exponent, high), exponent, high)
+    bounded = b.select(b.fcmp_ordered(">", bounded, low), bounded, low)
+    whole = b.fptosi(b.fsub(bounded, low), of.integers)
+    fraction = b.fsub(b.fsub(bounded, low), b.sitofp(whole, exponent.type))
+    significand = b.bitcast(b.fadd(of.double(1.0), _bent(code, fraction, _POWER)), of.integers)
+    kept = ((1 << _FRACTION_BITS) - 1) ^ ((1 << (_FRACTION_BITS + 1 - bits)) - 1)
+    biased = b.add(whole, of.integer(_BIAS + int(_LEAST_EXPONENT)))
+    shifted = b.shl(biased, of.integer(_FRACTION_BITS))
+    return b.bitcast(b.add(b.and_(significand, of.integer(kept)), shifted), exponent.type)
+
+
+def _bent(code: Code, fraction: Any, bend: tuple[float, ...]) -> Any:
+    """f + f (1 - f) times a polynomial in f."""
+    b, of = code.builder, _Like(fraction)
+    total = of.double(bend[-1])
+    for coefficient in reversed(bend[:-1]):
+        total = b.fadd(b.fmul(total, fraction), of.double(coefficient))
+    return b.fadd(fraction, b.fmul(b.fmul(fraction, b.fsub(of.double(1.0), fraction)), total))
+
+
+class _Like:
+    """Constants of the shape of a value: one, or eight."""
+
+    def __init__(self, value: Any) -> None:
+        self.eight = value.type == VECTOR
+        self.integers = INT_VECTOR if self.eight else INT
+        self.doubles = value.type
+
+    def integer(self, value: int) -> Any:
+        one = ir.Constant(INT, value)
+        return ir.Constant(INT_VECTOR, [one] * LANES) if self.eight else one
+
+    def double(self, value: float) -> Any:
+        one = ir.Constant(DOUBLE, value)
+        return ir.Constant(VECTOR, [one] * LANES) if self.eight else one

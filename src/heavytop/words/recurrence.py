@@ -1,0 +1,230 @@
+"""The Taylor recurrence of both systems in eight lanes: products of series in double-double below an order n0, in plain
+doubles above it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from heavytop.top.equations import System
+from heavytop.words.lanes import GATHERED, LEFT, RIGHT, Sum, turned
+from heavytop.words.pairs import add, multiply
+from heavytop.words.vector import Code, Index, Pair
+
+LEAST_LOW_ORDER = 2
+MOST_ORDER = 56
+"""n0 is at least the one, N at most the other."""
+_NONE = 8
+"""A lane of the second operand of a shuffle, which is 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where numbers lie: each vector of a row is eight doubles.
+
+    vectors: 1, or 2 with an attitude.  linear: permutations in the linear part.
+    """
+
+    vectors: int
+    linear: int
+
+    @property
+    def row(self) -> int:
+        """Doubles of one order: the two words of R, then of L and of y for each vector."""
+        return 8 * (2 + 4 * self.vectors)
+
+    @property
+    def table_row(self) -> int:
+        """Doubles of one order of the table: both words of A/(n + 1) and each B/(n + 1), for each vector."""
+        return 16 * (1 + self.linear) * self.vectors
+
+    def left(self, vector: int) -> int:
+        """Where L of a vector is in a row; its low word is 8 behind, as all low words are."""
+        return 16 + 32 * vector
+
+    def value(self, vector: int) -> int:
+        """Where y of a vector is in a row."""
+        return 32 + 32 * vector
+
+
+@dataclass(frozen=True, slots=True)
+class Recurrence:
+    """Writes the recurrence y_(n+1) = (A ∘ gathered S_n + Σ B_l ∘ permuted y_n)/(n + 1).
+
+    table: A/(n + 1) and B_l/(n + 1) as pairs.  scratch: a row of R, L and y for each order.
+    """
+
+    code: Code
+    layout: Layout
+    system: System
+    table: Any
+    scratch: Any
+
+    @property
+    def vectors(self) -> range:
+        """The state vectors."""
+        return range(self.layout.vectors)
+
+    def row(self, n: Index) -> Any:
+        """Where the row of order n begins."""
+        offset = self.code.builder.mul(self.code.integer(n), self.code.integer(self.layout.row))
+        return self.code.address(self.scratch, offset)
+
+    def pair(self, row: Any, place: int) -> Pair:
+        """Both words of what lies there."""
+        return self.code.load(row, place), self.code.load(row, place + 8)
+
+    def _side_pair(self, y: Pair, which: Sum) -> Pair:
+        first = [self.code.shuffle(word, self.code.zero, which.first) for word in y]
+        signs = self.code.constant(which.sign)
+        second = [self.code.multiply(self.code.shuffle(word, self.code.zero, which.second), signs) for word in y]
+        return add(self.code, (first[0], first[1]), (second[0], second[1]))
+
+    def _side(self, y: Any, which: Sum) -> Any:
+        first, second = (self.code.shuffle(y, self.code.zero, lanes) for lanes in (which.first, which.second))
+        return self.code.fma(second, self.code.constant(which.sign), first)
+
+    def put(self, n: Index, y: list[Pair]) -> None:
+        row = self.row(n)
+        places = [(self._side_pair(y[0], RIGHT), 0)]
+        for vector in self.vectors:
+            places.append((self._side_pair(y[vector], LEFT), self.layout.left(vector)))
+            places.append((y[vector], self.layout.value(vector)))
+        for pair, place in places:
+            for word in range(2):
+                self.code.store(pair[word], row, place + 8 * word)
+
+    def _put_plain(self, n: Index, y: list[Any]) -> None:
+        row = self.row(n)
+        self.code.store(self._side(y[0], RIGHT), row, 0)
+        for vector in self.vectors:
+            self.code.store(self._side(y[vector], LEFT), row, self.layout.left(vector))
+            self.code.store(y[vector], row, self.layout.value(vector))
+            self.code.store(self.code.zero, row, self.layout.value(vector) + 8)
+
+    def _accumulate_pairs(self, m: Index, other: Index, sums: list[Any]) -> list[Any]:
+        """Σ L_m R_other in words (s, c), c unordered."""
+        code, left, right = self.code, self.row(m), self.row(other)
+        high, low = self.pair(right, 0)
+        found: list[Any] = []
+        for vector in self.vectors:
+            s, c = sums[2 * vector : 2 * vector + 2]
+            a, a_low = self.pair(left, self.layout.left(vector))
+            product, error = code.two_product(a, high)
+            s, rounding = code.two_sum(s, product)
+            c = code.add(code.add(c, rounding), code.fma(a, low, code.fma(a_low, high, error)))
+            found += [s, c]
+        return found
+
+    def _accumulate(self, m: Index, other: Index, sums: list[Any]) -> list[Any]:
+        left, right = self.row(m), self.row(other)
+        high = self.code.load(right, 0)
+        return [
+            self.code.fma(self.code.load(left, self.layout.left(vector)), high, sums[vector]) for vector in self.vectors
+        ]
+
+    def _gather(self, word: Any, part: int) -> Any:
+        """One of the four summands of the products, without its signs; 0 where there is none."""
+        lanes = [lane if sign else _NONE for lane, sign in GATHERED[part]]
+        return self.code.shuffle(word, self.code.zero, [*lanes, _NONE, _NONE])
+
+    def _signed(self, value: Any, part: int) -> Any:
+        signs = [sign for _, sign in GATHERED[part]]
+        return value if min(signs) >= 0 else self.code.multiply(value, self.code.constant([*signs, 0, 0]))
+
+    def _table_place(self, n: Index, vector: int, row: int) -> tuple[Any, int]:
+        offset = self.code.builder.mul(self.code.integer(n), self.code.integer(self.layout.table_row))
+        return self.code.address(self.table, offset), 16 * ((1 + self.layout.linear) * vector + row)
+
+    def _next_pair(self, n: Index, vector: int, total: Pair, y: Pair) -> Pair:
+        """y_(n+1) = A/(n + 1) ∘ gathered S_n + Σ B/(n + 1) ∘ permuted y_n."""
+        code = self.code
+        parts = []
+        for k in range(4):
+            high, low = (self._signed(self._gather(word, k), k) for word in total)
+            parts.append((high, low))
+        result = add(code, add(code, parts[0], parts[1]), add(code, parts[2], parts[3]))
+        base, place = self._table_place(n, vector, 0)
+        result = multiply(code, self.pair(base, place), result)
+        linear: Pair | None = None
+        for k, lanes in enumerate(turned(self.system), 1):
+            base, place = self._table_place(n, vector, k)
+            moved = tuple(code.shuffle(word, code.zero, lanes) for word in y)
+            term = multiply(code, self.pair(base, place), (moved[0], moved[1]))
+            linear = term if linear is None else add(code, linear, term)
+        if linear is not None:
+            result = add(code, result, linear)
+        return code.quick_two_sum(*result)
+
+    def _next(self, n: Index, vector: int, total: Any, y: Any) -> Any:
+        code = self.code
+        linear = code.zero
+        for k, lanes in enumerate(turned(self.system), 1):
+            base, place = self._table_place(n, vector, k)
+            linear = code.fma(code.load(base, place), code.shuffle(y, code.zero, lanes), linear)
+        base, place = self._table_place(n, vector, 0)
+        a = code.load(base, place)
+        # two sums side by side, the signs in the factors
+        first, second, third, fourth = ((self._gather(total, k), self._signed(a, k)) for k in range(4))
+        one = code.fma(*second, code.fma(*first, linear))
+        return code.add(one, code.fma(*fourth, code.multiply(*third)))
+
+    def orders_in_pairs(self, first: list[Pair], low_order: Any) -> list[Any]:
+        """y_1 to y_n0, the last returned; the products of y_n come last, so that the others need not wait for it."""
+        code, zeros = self.code, [self.code.zero] * (2 * len(self.vectors))
+
+        def order(n: Any, words: list[Any]) -> list[Any]:
+            y = [(words[2 * v], words[2 * v + 1]) for v in self.vectors]
+            sums = code.loop(1, n, partial(self._inner_pairs, n), zeros)
+            sums = self._accumulate_pairs(n, 0, self._accumulate_pairs(0, n, sums))
+            return self._stored_pairs(n, sums, y)
+
+        words = self._stored_pairs(0, self._accumulate_pairs(0, 0, zeros), first)
+        return code.loop(1, low_order, order, words)
+
+    def _inner_pairs(self, n: Any, m: Any, sums: list[Any]) -> list[Any]:
+        return self._accumulate_pairs(m, self.code.builder.sub(n, m), sums)
+
+    def _stored_pairs(self, n: Index, sums: list[Any], y: list[Pair]) -> list[Any]:
+        following = [self._next_pair(n, v, (sums[2 * v], sums[2 * v + 1]), y[v]) for v in self.vectors]
+        self.put(self.code.builder.add(self.code.integer(n), self.code.integer(1)), following)
+        return [word for pair in following for word in pair]
+
+    def plain_orders(self, low_order: Any, order: Any, last: list[Any]) -> None:
+        """y_(n0+1) to y_N in plain doubles; each order has its own code, entered at n0 and left at N."""
+        b = self.code.builder
+        after = b.append_basic_block("summed")
+        switch, before = b.switch(low_order, after), b.block
+        entry, incoming = before, None
+        blocks = {n: b.append_basic_block(f"order_{n}") for n in range(LEAST_LOW_ORDER, MOST_ORDER)}
+        for n, block in blocks.items():
+            switch.add_case(self.code.integer(n), block)
+            b.position_at_end(block)
+            y = [b.phi(value.type) for value in last]
+            for phi, value in zip(y, last, strict=True):
+                phi.add_incoming(value, entry)
+            if incoming is not None:
+                for phi, value in zip(y, incoming, strict=True):
+                    phi.add_incoming(value, before)
+            incoming, before = self._plain_order(n, y), block
+            following = blocks.get(n + 1, after)
+            b.cbranch(b.icmp_signed("==", order, self.code.integer(n + 1)), after, following)
+        b.position_at_end(after)
+
+    def _plain_order(self, n: int, y: list[Any]) -> list[Any]:
+        """y_(n+1), with four sums side by side; the products of y_n come last."""
+        code, width = self.code, len(self.vectors)
+        sums = [code.zero] * (4 * width)
+        for m in range(1, n):
+            at = width * (m % 4)
+            sums[at : at + width] = self._accumulate(m, n - m, sums[at : at + width])
+        totals = [
+            code.add(code.add(sums[v], sums[width + v]), code.add(sums[2 * width + v], sums[3 * width + v]))
+            for v in self.vectors
+        ]
+        totals = self._accumulate(n, 0, self._accumulate(0, n, totals))
+        following = [self._next(n, v, totals[v], y[v]) for v in self.vectors]
+        self._put_plain(n + 1, following)
+        return following

@@ -1,0 +1,164 @@
+"""Vectors of eight doubles in LLVM's intermediate representation, and loops over them.
+
+Every operation is one IEEE operation, rounded to nearest: no fast-math flag is ever set and nothing is contracted, so
+the bits are those of any processor.  Only ``fma`` fuses, and where there is no such instruction it is computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from llvmlite import ir
+
+LANES = 8
+DOUBLE = ir.DoubleType()
+INT = ir.IntType(64)
+VECTOR = ir.VectorType(DOUBLE, LANES)
+INT_VECTOR = ir.VectorType(INT, LANES)
+POINTER = DOUBLE.as_pointer()
+INT_POINTER = INT.as_pointer()
+_INDEX = ir.IntType(32)
+_INFINITY = float("inf")
+
+Pair = tuple[Any, Any]
+Index = Any
+"""An int, known when the code is made, or an integer value of the code."""
+
+
+class Code:
+    """Writes the body of one function; a value is a vector of eight doubles where nothing else is said."""
+
+    def __init__(self, builder: ir.IRBuilder) -> None:
+        self.builder = builder
+        self.module = builder.module
+        self.zero = self.constant(0.0)
+
+    def _call(self, name: str, result: Any, arguments: Sequence[Any]) -> Any:
+        known = self.module.globals.get(name)
+        function = known or ir.Function(self.module, ir.FunctionType(result, [a.type for a in arguments]), name)
+        return self.builder.call(function, arguments)
+
+    def constant(self, value: float | Sequence[float]) -> Any:
+        """The same double in every lane, or eight."""
+        values = [value] * LANES if isinstance(value, (int, float)) else list(value)
+        return ir.Constant(VECTOR, [ir.Constant(DOUBLE, float(v)) for v in values])
+
+    def integer(self, value: Index) -> Any:
+        """An integer value."""
+        return ir.Constant(INT, value) if isinstance(value, int) else value
+
+    def add(self, a: Any, b: Any) -> Any:
+        """a + b."""
+        return self.builder.fadd(a, b)
+
+    def subtract(self, a: Any, b: Any) -> Any:
+        """a - b."""
+        return self.builder.fsub(a, b)
+
+    def multiply(self, a: Any, b: Any) -> Any:
+        """a b."""
+        return self.builder.fmul(a, b)
+
+    def negative(self, a: Any) -> Any:
+        """-a."""
+        return self.builder.fneg(a)
+
+    def fma(self, a: Any, b: Any, c: Any) -> Any:
+        """a b + c, rounded once."""
+        name = "llvm.fma.v8f64" if a.type == VECTOR else "llvm.fma.f64"
+        return self._call(name, a.type, (a, b, c))
+
+    def absolute(self, a: Any) -> Any:
+        """|a|."""
+        return self._call("llvm.fabs.v8f64", VECTOR, (a,))
+
+    def larger(self, a: Any, b: Any) -> Any:
+        """max(a, b) lane by lane, for numbers that are not NaN."""
+        return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
+
+    def largest(self, a: Any) -> Any:
+        """The largest |lane|, a double; NaN lanes are passed over."""
+        return self._call("llvm.vector.reduce.fmax.v8f64", DOUBLE, (self.absolute(a),))
+
+    def finite(self, a: Any) -> Any:
+        """Whether every lane is a finite number, a bit."""
+        below = self.builder.fcmp_ordered("<", self.absolute(a), self.constant(_INFINITY))
+        mask = self.builder.bitcast(below, ir.IntType(LANES))
+        return self.builder.icmp_unsigned("==", mask, ir.Constant(ir.IntType(LANES), (1 << LANES) - 1))
+
+    def any_bit(self, a: Any) -> Any:
+        """The bits that are set in any lane of eight integers, an integer."""
+        return self._call("llvm.vector.reduce.or.v8i64", INT, (a,))
+
+    def shuffle(self, a: Any, b: Any, lanes: Sequence[int]) -> Any:
+        """Lanes 0 to 7 of ``a`` and 8 to 15 of ``b``, in that order."""
+        return self.builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_INDEX, LANES), list(lanes)))
+
+    def spread(self, scalar: Any) -> Any:
+        """A double in every lane."""
+        undefined = ir.Constant(VECTOR, ir.Undefined)
+        first = self.builder.insert_element(undefined, scalar, ir.Constant(_INDEX, 0))
+        return self.builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(_INDEX, LANES), [0] * LANES))
+
+    def two_sum(self, a: Any, b: Any) -> Pair:
+        """(s, e) with s + e = a + b exactly and s rounded (Knuth); vectors or doubles."""
+        total = self.add(a, b)
+        part = self.subtract(total, a)
+        return total, self.add(self.subtract(a, self.subtract(total, part)), self.subtract(b, part))
+
+    def quick_two_sum(self, a: Any, b: Any) -> Pair:
+        """The same where |a| >= |b| or a = 0 (Dekker)."""
+        total = self.add(a, b)
+        return total, self.subtract(b, self.subtract(total, a))
+
+    def two_product(self, a: Any, b: Any) -> Pair:
+        """(p, e) with p + e = a b exactly and p rounded."""
+        product = self.multiply(a, b)
+        return product, self.fma(a, b, self.negative(product))
+
+    def address(self, base: Any, offset: Index) -> Any:
+        """Where ``base[offset]`` is."""
+        return self.builder.gep(base, [self.integer(offset)])
+
+    def load(self, base: Any, offset: Index) -> Any:
+        """The eight doubles from ``base[offset]`` on, aligned to 64 bytes."""
+        value = self.builder.load(self.builder.bitcast(self.address(base, offset), VECTOR.as_pointer()))
+        value.align = 64
+        return value
+
+    def store(self, value: Any, base: Any, offset: Index) -> None:
+        """Put eight doubles to ``base[offset]`` and on, aligned to 64 bytes."""
+        self.builder.store(value, self.builder.bitcast(self.address(base, offset), VECTOR.as_pointer())).align = 64
+
+    def loop(
+        self, start: Index, stop: Index, body: Callable[[Any, list[Any]], Sequence[Any] | None], values: Sequence[Any]
+    ) -> list[Any]:
+        """``values`` after ``values = body(i, values)`` for i from ``start`` to before ``stop``."""
+        b = self.builder
+        before, head = b.block, b.append_basic_block("head")
+        b.branch(head)
+        b.position_at_end(head)
+        index, carried = b.phi(INT), [b.phi(value.type) for value in values]
+        index.add_incoming(self.integer(start), before)
+        for phi, value in zip(carried, values, strict=True):
+            phi.add_incoming(value, before)
+        inside, after = b.append_basic_block("body"), b.append_basic_block("after")
+        b.cbranch(b.icmp_signed("<", index, self.integer(stop)), inside, after)
+        b.position_at_end(inside)
+        results = body(index, carried) or []
+        for phi, value in zip(carried, results, strict=True):
+            phi.add_incoming(value, b.block)
+        index.add_incoming(b.add(index, self.integer(1)), b.block)
+        b.branch(head)
+        b.position_at_end(after)
+        return carried
+
+
+def function(module: ir.Module, name: str, result: Any, arguments: Sequence[Any]) -> tuple[Any, Code]:
+    """A new function of ``module`` whose pointers point to different places, and the writer of its body."""
+    made = ir.Function(module, ir.FunctionType(result, list(arguments)), name)
+    for argument in made.args:
+        if isinstance(argument.type, ir.PointerType):
+            argument.add_attribute("noalias")
+    return made, Code(ir.IRBuilder(made.append_basic_block("entry")))

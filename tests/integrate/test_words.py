@@ -1,0 +1,294 @@
+"""The integrator words behind the same call as heyoka's: proven accuracy, the same bits however it is cut, outcomes."""
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from random import Random
+
+import pytest
+
+from heavytop.errors import Contradiction, InputError
+from heavytop.exact.catalogue import find
+from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.solution import ExactSolution
+from heavytop.integrate import words as words_module
+from heavytop.integrate import words_engines
+from heavytop.integrate.taylor import propagate
+from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
+from heavytop.integrate.words import propagate_words
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, exact, number, real
+from heavytop.top.angles import perpendicular
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.words import floating, recurrence
+from helpers import VECTORS, start_of, top_of, unit_vector
+
+TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
+START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
+GENERIC = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
+EULER = HeavyTop((3, 2, 1), 0, (0, 0, 0))
+LAGRANGE = HeavyTop((1, 1, "1/2"), 1, (0, 0, 1))
+PAPER = HeavyTop((3, 5, 7), "1/3", (0, "1/7", 0))
+PAPER_START = State([Fraction(2, 7) * 11 / 3, Fraction(3, 7) * 11 / 5, Fraction(6, 7) * 11 / 7], ("2/7", "3/7", "6/7"))
+FORMATS = [DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD, real(237)]
+
+
+def bits(run: Trajectory) -> list[list[Fraction]]:
+    return [[exact(value) for value in state] for state in run.states]
+
+
+def truth(problem: Problem) -> ExactSolution:
+    """The proven motion from the rounded data."""
+    if problem.system is GYROSTAT:
+        return Gyrostat(problem.top, problem.start, problem.parameters.rotor)
+    return find(problem.top, problem.start, problem.system)
+
+
+def worst(run: Trajectory) -> Fraction:
+    """The largest |error| / max(1, |value|) over all samples, in eps of the format; the truth is proven."""
+    proven, precision = truth(run.problem), run.problem.precision
+    found = Fraction(0)
+    for time, state in zip(run.times, bits(run), strict=True):
+        for ball, value in zip(proven.state(time, precision.bits + 24), state, strict=True):
+            centre = _middle(ball)
+            found = max(found, abs(value - centre) / max(1, abs(centre)) / precision.eps)
+    return found
+
+
+def _middle(ball) -> Fraction:
+    mantissa, exponent = ball.mid().man_exp()
+    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+
+
+@pytest.mark.parametrize(
+    ("precision", "limit"),
+    [(DOUBLE, "1e-14"), (EXTENDED, "1e-17"), (DOUBLE_DOUBLE, "1e-29"), (QUAD, "1e-31"), (real(237), "1e-58")],
+    ids=lambda value: getattr(value, "name", value),
+)
+@pytest.mark.parametrize("given", VECTORS, ids=lambda given: given["name"])
+def test_every_reference_state_is_met_in_every_format(given, precision: Precision, limit: str) -> None:
+    run = propagate_words(top_of(given), start_of(given), [given["time"]], precision)
+    assert run.outcome is Outcome.SUCCESS
+    off = max(abs(a - Fraction(b)) for a, b in zip(bits(run)[0], given["state"], strict=True))
+    assert off <= Fraction(limit)
+
+
+@pytest.mark.parametrize(
+    ("precision", "horizon", "limit"),
+    [(DOUBLE, 2000, 1), (EXTENDED, 1000, 1), (DOUBLE_DOUBLE, 20, 400), (QUAD, 500, 1), (real(500), 10, 1)],
+    ids=lambda value: getattr(value, "name", value),
+)
+@pytest.mark.parametrize(
+    ("top", "start", "system"),
+    [
+        (EULER, START, HEAVY_TOP),
+        (LAGRANGE, START, HEAVY_TOP),
+        (LAGRANGE, State((1, 2, 10), ("3/5", 0, "4/5")), HEAVY_TOP),
+        (PAPER, PAPER_START, GYROSTAT),
+    ],
+    ids=["euler", "lagrange", "fast lagrange", "gyrostat"],
+)
+def test_what_is_returned_is_the_true_motion_rounded(precision, horizon, limit, top, start, system) -> None:
+    """Within an eps of the proven motion from the same rounded data; double-double has no bits to spare."""
+    times = [Fraction(horizon * i, 5) for i in range(1, 6)]
+    run = propagate_words(top, start, times, precision, system=system)
+    assert worst(run) <= limit
+
+
+@pytest.mark.parametrize(("top", "horizon"), [(TOP, 8), (GENERIC, 8)], ids=["kovalevskaya", "generic"])
+@pytest.mark.parametrize("sign", [1, -1], ids=["forwards", "backwards"])
+def test_motions_without_a_closed_form_lie_in_their_enclosure(top: HeavyTop, horizon: int, sign: int) -> None:
+    times = [sign * Fraction(horizon * i, 3) for i in range(1, 4)]
+    for precision, limit in ((DOUBLE, 1), (EXTENDED, 1), (DOUBLE_DOUBLE, 40), (QUAD, 1), (real(237), 1)):
+        assert worst(propagate_words(top, START, times, precision)) <= limit
+
+
+@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
+def test_samples_and_chunks_change_no_bit(precision, monkeypatch: pytest.MonkeyPatch) -> None:
+    few = propagate_words(TOP, START, [10, 20], precision)
+    many = propagate_words(TOP, START, [Fraction(i, 8) for i in range(1, 161)], precision)
+    assert bits(many)[79] == bits(few)[0]
+    assert bits(many)[-1] == bits(few)[1]
+    assert many.steps == few.steps
+    monkeypatch.setattr(words_module, "_FIRST_CHUNK", 1)
+    monkeypatch.setattr(words_module, "CHUNK_SECONDS", 0.0)
+    assert bits(propagate_words(TOP, START, [10, 20], precision)) == bits(few)
+
+
+def test_there_and_back_again() -> None:
+    there = propagate_words(TOP, START, [6], DOUBLE_DOUBLE)
+    end = bits(there)[0]
+    back = propagate_words(TOP, State(end[:3], end[3:]), [-6], DOUBLE_DOUBLE)
+    assert max(abs(v - s) for v, s in zip(bits(back)[0], START.flat, strict=True)) < Fraction(1, 10**29)
+
+
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+def test_the_attitude_rides_along_and_stays_orthonormal(system) -> None:
+    top, start = (TOP, START) if system is HEAVY_TOP else (PAPER, PAPER_START)
+    xi = perpendicular(start.gamma)
+    run = propagate_words(top, start, [3], DOUBLE_DOUBLE, xi=xi, system=system)
+    values = bits(run)[0]
+    assert abs(dot(values[6:9], values[6:9]) - 1) < Fraction(1, 10**29)
+    assert abs(dot(values[6:9], values[3:6])) < Fraction(1, 10**29)
+    wide = propagate(top, start, [3], real(200), xi=xi, system=system)
+    assert max(abs(a - exact(b)) for a, b in zip(values, wide.states[0], strict=True)) < Fraction(1, 10**28)
+
+
+@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
+@pytest.mark.parametrize("exponent", [-30, 6, 60])
+def test_units_of_time_and_weight_change_nothing_but_the_units(precision, exponent: int) -> None:
+    """The same motion with Ω in other units: the same error relative to Ω, a step less or more at the end."""
+    unit = Fraction(10) ** exponent
+    start = State([w * unit for w in START.omega], START.gamma)
+    top = HeavyTop(GENERIC.inertia, unit**2, GENERIC.centre)
+    run = propagate_words(top, start, [5 / unit], precision)
+    same = Problem.of(HeavyTop(run.problem.top.inertia, 1, run.problem.top.moment), run.problem.start, real(300))
+    wide = propagate(same.top, same.start, run.times, real(300))
+    for low, size in ((0, unit), (3, 1)):
+        off = max(abs(a - exact(b)) for a, b in zip(bits(run)[0][low : low + 3], wide.states[0][low:], strict=False))
+        assert off <= 60 * size * precision.eps
+
+
+def test_random_tops_at_odd_scales_with_renamed_axes_stay_near_the_wide_run() -> None:
+    random = Random(150)
+    for _ in range(12):
+        axes = random.sample(range(3), 3)
+        unit = Fraction(10) ** random.randint(-120, 120)
+        moments = [Fraction(random.randint(1, 30), random.randint(1, 4)) for _ in range(3)]
+        centre = [Fraction(random.randint(-9, 9), 7) * (random.random() < 0.6) for _ in range(3)]
+        omega = [Fraction(random.randint(-30, 30), 7) * unit * (random.random() < 0.7) for _ in range(3)]
+        top = HeavyTop([moments[a] for a in axes], unit**2, [centre[a] for a in axes])
+        start = State([omega[a] for a in axes], unit_vector(random))
+        time = random.choice((1, -1)) * Fraction(random.randint(1, 40), 9) / unit
+        run = propagate_words(top, start, [time], DOUBLE_DOUBLE)
+        wide = propagate(run.problem.top, run.problem.start, run.times, real(160))
+        assert run.outcome is wide.outcome is Outcome.SUCCESS
+        for low in (0, 3):
+            found, known = bits(run)[0][low : low + 3], [exact(v) for v in wide.states[0][low : low + 3]]
+            size = max(map(abs, known)) if low else max(*map(abs, known), unit / 10)
+            assert max(abs(a - b) for a, b in zip(found, known, strict=True)) <= size * Fraction(1, 10**27)
+
+
+@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    ("top", "start"),
+    [
+        (HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))),
+        (HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 0), (0, 0, -1))),
+        (HeavyTop((3, 2, 1), 1, (0, "1/3", 0)), State((0, "14/9", 0), (0, 1, 0))),
+    ],
+    ids=["sleeping", "hanging", "permanent rotation"],
+)
+def test_an_equilibrium_stays_where_it_is(precision, top: HeavyTop, start: State) -> None:
+    run = propagate_words(top, start, [1, 2000], precision)
+    assert run.outcome is Outcome.SUCCESS
+    assert bits(run) == [[exact(number(v, precision)) for v in start.flat]] * 2
+    assert run.steps == 0
+
+
+def test_a_step_limit_is_an_outcome_and_keeps_the_times_reached() -> None:
+    run = propagate_words(TOP, START, [1, 2, 100], DOUBLE, step_limit=30)
+    assert run.outcome is Outcome.STEP_LIMIT
+    assert run.times == (1, 2)
+    assert run.steps == 30
+    assert 2 < run.time_reached < 100
+
+
+def test_what_is_too_large_for_the_format_is_an_outcome_and_what_is_too_small_is_zero() -> None:
+    state = words_module.native_state((Fraction(1), Fraction(10) ** 400), DOUBLE)
+    assert state is None
+    assert list(words_module.native_state((Fraction(1), Fraction(1, 10**400)), DOUBLE)) == [1, 0]
+
+
+def test_a_derivative_that_no_double_holds_is_an_outcome() -> None:
+    """Moments so far apart that the second derivative overflows in every unit of time."""
+    top = HeavyTop((Fraction(1, 10**150), Fraction(10**150), Fraction(2 * 10**150)), 0, (0, 0, 0))
+    run = propagate_words(top, State((1, 1, 1), (0, 0, 1)), [1], DOUBLE, step_limit=100)
+    assert run.outcome in (Outcome.NON_FINITE, Outcome.STEP_TOO_SMALL)
+    assert len(run.states) == 0
+
+
+@pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
+@pytest.mark.parametrize("case", ["forward", "backward", "attitude", "resting"])
+def test_a_run_taken_up_at_any_sample_goes_on_to_the_same_bits(precision, case: str) -> None:
+    top, start, sign, options = TOP, START, 1, {}
+    if case == "backward":
+        sign = -1
+    elif case == "attitude":
+        options = {"xi": perpendicular(START.gamma)}
+    elif case == "resting":
+        top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 3), (0, 0, 1))
+    times = [sign * Fraction(t) for t in ("1/64", "1/32", "1", "3", "193/64", "4")]
+
+    def run(place: Place | None = None):
+        states, places = [], []
+        found = propagate_words(
+            top, start, times, precision, place=place, mark=lambda at: places.append(at.content(precision)),
+            observer=lambda time, state: states.append((time, [str(v) for v in state])), **options,
+        )  # fmt: skip
+        for each in places:
+            each["seconds"] = 0.0
+        return (found.outcome, found.steps, found.time_reached), states, places
+
+    summary, states, places = run()
+    assert len(places) == len(times)
+    for index, content in enumerate(places):
+        again, rest, later = run(Place.of(json.loads(json.dumps(content)), precision))
+        assert again == summary
+        assert rest == states[index + 1 :]
+        assert later == places[index + 1 :]
+
+
+def test_a_run_cannot_go_on_with_other_flags() -> None:
+    places: list[Place] = []
+    propagate_words(TOP, START, [1, 2], DOUBLE, mark=places.append)
+    with pytest.raises(InputError, match="tolerance"):
+        propagate_words(TOP, START, [1, 2], DOUBLE, tolerance=Fraction(1, 10**9), place=places[0])
+
+
+def test_threads_do_not_disturb_each_other() -> None:
+    starts = [State((Fraction(i, 7), Fraction(1, 5), Fraction(9, 10)), ("3/5", 0, "4/5")) for i in range(1, 9)]
+    alone = [bits(propagate_words(TOP, start, [50], DOUBLE_DOUBLE)) for start in starts]
+    with ThreadPoolExecutor(4) as pool:
+        runs = pool.map(lambda start: propagate_words(TOP, start, [50], DOUBLE_DOUBLE), starts)
+    assert [bits(run) for run in runs] == alone
+
+
+def test_the_error_falls_with_the_tolerance() -> None:
+    rounded = propagate_words(TOP, START, [20], DOUBLE_DOUBLE).problem
+    known = propagate(rounded.top, rounded.start, [20], real(160)).states[0]
+    last = Fraction(1)
+    for exponent in range(6, 31, 4):
+        tolerance = Fraction(1, 10**exponent)
+        run = propagate_words(TOP, START, [20], DOUBLE_DOUBLE, tolerance=tolerance)
+        error = max(abs(a - exact(b)) for a, b in zip(bits(run)[0], known, strict=True))
+        assert error < 200 * tolerance
+        assert error < last / 50
+        last = error
+
+
+@pytest.mark.parametrize("tolerance", [0, -1, 1, Fraction(1, 10**5), Fraction(1, 10**40)])
+def test_a_tolerance_it_cannot_do_is_refused(tolerance) -> None:
+    with pytest.raises(InputError, match="tolerance"):
+        propagate_words(TOP, START, [1], DOUBLE, tolerance=Fraction(tolerance))
+
+
+def test_heyoka_refuses_double_double() -> None:
+    with pytest.raises(InputError, match="words"):
+        propagate(TOP, START, [1], DOUBLE_DOUBLE)
+
+
+def test_wrong_machine_code_is_caught_by_the_step_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wrong sign in one lane, in one of the two recurrences or in both."""
+    monkeypatch.setattr(floating, "_machines", {})
+    monkeypatch.setattr(words_engines, "_made", {})
+    damaged = [list(part) for part in recurrence.GATHERED]
+    damaged[2][4] = (6, -1)
+    monkeypatch.setattr(recurrence, "GATHERED", tuple(map(tuple, damaged)))
+    with pytest.raises(Contradiction):
+        propagate_words(TOP, START, [1], DOUBLE)
+
+
+def test_everything_that_changes_bits_is_in_the_flags() -> None:
+    flags = propagate_words(TOP, START, [1], DOUBLE).flags
+    assert {"arithmetic", "words", "bits", "order", "tolerance", "step_rule"} <= set(flags)

@@ -1,0 +1,146 @@
+"""Many motions in many words: each is the true one, and none of its bits depends on the others, on threads or order."""
+
+from fractions import Fraction
+from random import Random
+
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.integrate import words_lanes
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.integrate.words import propagate_words
+from heavytop.integrate.words_ensemble import propagate_words_ensemble
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, QUAD, exact
+from heavytop.top.angles import perpendicular
+from heavytop.top.equations import GYROSTAT
+from heavytop.top.heavy_top import HeavyTop, State
+
+TOP = HeavyTop((2, 2, 1), 1, (0, 1, 0))
+SLEEPING = HeavyTop((2, 2, 1), 1, (0, 0, 1))
+FAST = HeavyTop((1, 1, "1/2"), 1, (0, 0, 1))
+TIMES = [0, 1, "5/2", 10]
+
+
+def problems(precision=DOUBLE, count: int = 19) -> list[Problem]:
+    """Starts of one top, among them a motion at rest and one of fast spin."""
+    random = Random(8)
+    found = [
+        Problem.of(TOP, State([Fraction(random.randint(-1000, 1000), 1024) for _ in range(3)], (1, 0, 0)), precision)
+        for _ in range(count)
+    ]
+    found[3] = Problem.of(SLEEPING, State((0, 0, 3), (0, 0, 1)), precision)
+    found[5] = Problem.of(FAST, State((1, 2, 30), ("3/5", 0, "4/5")), precision)
+    return found
+
+
+def bits(run: Trajectory) -> list[list[Fraction]]:
+    return [[exact(value) for value in state] for state in run.states]
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, DOUBLE_DOUBLE], ids=lambda p: p.name)
+@pytest.mark.parametrize("sign", [1, -1], ids=["forwards", "backwards"])
+def test_each_motion_is_that_of_a_run_by_itself(precision, sign: int) -> None:
+    times = [sign * Fraction(t) for t in TIMES]
+    given = problems(precision)
+    for problem, run in zip(given, propagate_words_ensemble(given, times), strict=True):
+        alone = propagate_words(problem.top, problem.start, times, precision)
+        assert run.outcome is Outcome.SUCCESS
+        assert run.problem == problem
+        assert run.times == alone.times
+        off = max(abs(a - b) for p, q in zip(bits(run), bits(alone), strict=True) for a, b in zip(p, q, strict=True))
+        assert off <= (precision.eps if precision is DOUBLE else 3000 * precision.eps)
+        assert (run.steps == 0) == (alone.steps == 0)
+
+
+def test_no_bit_depends_on_order_threads_chunks_or_company(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = problems()
+    runs = propagate_words_ensemble(given, TIMES, threads=1)
+    monkeypatch.setattr(words_lanes, "_FIRST_CHUNK", 3)
+    monkeypatch.setattr(words_lanes, "CHUNK_SECONDS", 0.0)
+    turned = propagate_words_ensemble(given[::-1], TIMES, threads=3)[::-1]
+    alone = [propagate_words_ensemble([problem], TIMES)[0] for problem in given[:7]]
+    few = propagate_words_ensemble(given, TIMES[-1:])
+    for first, second in [*zip(runs, turned, strict=True), *zip(runs, alone, strict=False)]:
+        assert bits(first) == bits(second)
+        assert first.steps == second.steps
+        assert first.time_reached == second.time_reached
+    assert [bits(run)[-1] for run in few] == [bits(run)[-1] for run in runs]
+
+
+def test_motions_that_outgrow_n0_go_on_where_they_were_and_are_right(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = problems()
+    runs = propagate_words_ensemble(given, TIMES)
+    monkeypatch.setattr(words_lanes, "first_low_order", lambda arithmetic: 2)
+    raised = propagate_words_ensemble(given, TIMES, threads=2)
+    for a, b in zip(runs, raised, strict=True):
+        assert a.times == b.times
+        off = max(abs(x - y) for p, q in zip(bits(a), bits(b), strict=True) for x, y in zip(p, q, strict=True))
+        assert off <= DOUBLE.eps
+
+
+def test_each_motion_has_the_outcome_it_has() -> None:
+    given = problems()
+    whole = propagate_words_ensemble(given, TIMES)
+    runs = propagate_words_ensemble(given, TIMES, step_limit=38)
+    assert {run.outcome for run in runs} == {Outcome.SUCCESS, Outcome.STEP_LIMIT}
+    for run, long in zip(runs, whole, strict=True):
+        assert (run.outcome is Outcome.SUCCESS) == (long.steps <= 38)
+        assert bits(run) == bits(long)[: len(run.times)]
+        if run.outcome is Outcome.STEP_LIMIT:
+            assert run.steps == 38
+            assert run.times[-1] < run.time_reached < 10
+
+
+def test_observer_and_finished_are_called_in_order() -> None:
+    given = problems(count=9)
+    seen: dict[int, list[Fraction]] = {}
+    over: list[int] = []
+
+    def observer(index: int, time: Fraction, state: object) -> None:
+        assert index not in over
+        seen.setdefault(index, []).append(time)
+
+    runs = propagate_words_ensemble(
+        given, TIMES, observer=observer, finished=lambda index, run: over.append(index), threads=2
+    )
+    assert sorted(over) == list(range(9))
+    assert all(times == [Fraction(t) for t in TIMES] for times in seen.values())
+    assert all(len(run.states) == 0 and len(run.times) == 4 for run in runs)
+
+
+def test_an_observer_that_raises_ends_the_ensemble() -> None:
+    def observer(index: int, time: Fraction, state: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        propagate_words_ensemble(problems(), TIMES, observer=observer, threads=2)
+
+
+def test_other_formats_and_attitudes_have_the_bits_of_single_runs() -> None:
+    start = State((1, "1/2", "1/3"), ("3/5", 0, "4/5"))
+    xi = perpendicular(start.gamma)
+    for precision, vector in ((QUAD, None), (DOUBLE, xi)):
+        given = [Problem.of(TOP, start, precision, xi=vector)] * 3
+        alone = propagate_words(TOP, start, TIMES, precision, xi=vector)
+        for run in propagate_words_ensemble(given, TIMES, threads=2):
+            assert bits(run) == bits(alone)
+
+
+def test_the_gyrostat_goes_in_lanes_too() -> None:
+    top = HeavyTop((3, 5, 7), "1/3", (0, "1/7", 0))
+    omega = [Fraction(n, 7) * 11 / i for n, i in zip((2, 3, 6), (3, 5, 7), strict=True)]
+    start = State(omega, ("2/7", "3/7", "6/7"))
+    given = [Problem.of(top, start, DOUBLE_DOUBLE, GYROSTAT)] * 2
+    alone = propagate_words(top, start, TIMES, DOUBLE_DOUBLE, system=GYROSTAT)
+    for run in propagate_words_ensemble(given, TIMES):
+        off = max(abs(a - b) for p, q in zip(bits(run), bits(alone), strict=True) for a, b in zip(p, q, strict=True))
+        assert off < Fraction(1, 10**29)
+
+
+def test_what_is_no_ensemble_is_refused() -> None:
+    with pytest.raises(InputError):
+        propagate_words_ensemble([], TIMES)
+    with pytest.raises(InputError):
+        propagate_words_ensemble(problems(), TIMES, threads=0)
+    with pytest.raises(InputError):
+        propagate_words_ensemble([*problems(), Problem.of(TOP, State((1, 0, 0), (0, 0, 1)), QUAD)], TIMES)

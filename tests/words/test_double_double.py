@@ -1,0 +1,118 @@
+"""Double-double steps: the same bits on every processor, n0 that follows the motion, elementary functions by bits."""
+
+import ctypes
+import math
+import os
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy
+import pytest
+from llvmlite import ir
+from words_helpers import LEVELS, problem
+
+from heavytop.words import double_double as dd
+from heavytop.words.floating import Floating, Ladder
+from heavytop.words.machine import Processor, compiled
+from heavytop.words.pairs import log2, power_of_two, split
+from heavytop.words.run import Status
+from heavytop.words.vector import DOUBLE, function
+
+HERE = str(Path(__file__).parent)
+LADDER = Ladder.of(Fraction(1, 2**105))
+
+
+@pytest.mark.parametrize("processor", LEVELS)
+@pytest.mark.parametrize("attitude", [False, True], ids=["motion", "attitude"])
+def test_the_bits_are_those_of_every_processor(processor: Processor, attitude: bool) -> None:
+    for ladder in (LADDER, Ladder.of(Fraction(1, 10**16))):
+        runs = [Floating(problem(1, attitude), ladder, True, processor=each) for each in (None, processor)]
+        for run in runs:
+            assert run.advance(Fraction(30), 10**6) is Status.FINE
+        own, other = ((run.state, run.time, run.steps, run.place(), run.sample(Fraction(30))) for run in runs)
+        assert own == other
+
+
+def test_the_bits_are_those_without_fused_multiply_add_in_hardware() -> None:
+    """glibc masks FMA and AVX2, so that its own fma, which code for x86-64 calls, is computed in software."""
+    script = (
+        "from fractions import Fraction; from words_helpers import problem; "
+        "from heavytop.words.floating import Floating, Ladder; from heavytop.words.machine import Processor; "
+        "run = Floating(problem(), Ladder.of(Fraction(1, 10**20)), True, processor=Processor('x86-64')); "
+        "run.advance(Fraction(5), 100); print(*run.place())"
+    )
+    environment = os.environ | {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F", "PYTHONPATH": HERE}
+    masked = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    run = Floating(problem(), Ladder.of(Fraction(1, 10**20)), True)
+    run.advance(Fraction(5), 100)
+    assert masked.stdout.split() == list(run.place())
+
+
+def test_more_orders_are_kept_in_double_double_where_the_spin_is_fast() -> None:
+    ladder = Ladder.of(Fraction(1, 10**20))
+    slow, fast = Floating(problem(), ladder, True), Floating(problem(20), ladder, True)
+    for run in (slow, fast):
+        run.advance(Fraction(20), 10**6)
+    assert slow.counts[dd.USED] < fast.counts[dd.USED]
+
+
+def test_n0_rises_within_one_step_to_what_the_motion_needs() -> None:
+    """Begun with nearly every order in plain doubles, the first step that stands is as good as any."""
+    ladder = Ladder.of(Fraction(1, 10**25))
+    careful, careless = (Floating(problem(), ladder, True, low_order=n) for n in (None, 2))
+    for run in (careful, careless):
+        run.advance(Fraction(1, 2**30), 1)
+        assert run.steps == 1
+    assert careless.time == careful.time
+    off = max(abs(a - b) for a, b in zip(careful.state, careless.state, strict=True))
+    assert off < Fraction(1, 10**27)
+
+
+def test_steps_add_to_the_time_exactly() -> None:
+    run, total = Floating(problem(), LADDER, True), Fraction(0)
+    for _ in range(50):
+        before = run.time
+        run.advance(Fraction(10**6), 1)
+        step = run.time - before
+        assert step.numerator.bit_length() <= dd.STEP_BITS
+        total += step
+    assert run.time == total
+
+
+def test_a_state_that_is_not_finite_stops_the_run() -> None:
+    run = Floating(problem(), LADDER, True)
+    run.words[1] = math.nan
+    assert run.advance(Fraction(10), 100) is Status.NON_FINITE
+    assert run.steps == 0
+    assert run.time == 0
+
+
+def elementary(name: str):
+    """log2 or power_of_two as a function of Python."""
+    module = ir.Module(name)
+    made, code = function(module, "f", DOUBLE, [DOUBLE])
+    code.builder.ret(log2(code, made.args[0]) if name == "log2" else power_of_two(code, made.args[0], 6, 10))
+    machine = compiled(module, {"f": (ctypes.c_double, [ctypes.c_double])})
+    return machine, machine.functions["f"]
+
+
+def test_logarithm_and_power_are_good_to_a_thousandth() -> None:
+    keep, log = elementary("log2")
+    also, power = elementary("power")
+    assert keep.seconds > 0 < also.seconds
+    for x in numpy.geomspace(1e-300, 1e300, 4001):
+        assert abs(log(x) - math.log2(x)) < 1e-3
+    for y in numpy.linspace(-890, 5.99, 4001):
+        value = power(y)
+        assert abs(value / 2**y - 1) < 3e-3
+        assert Fraction(value).numerator.bit_length() <= 10
+    assert power(1e9) == power(math.inf) == 64.0
+    assert power(-1e9) == 2.0**-900
+    assert log(0.0) == -1023
+
+
+def test_numbers_of_106_bits_are_split_exactly() -> None:
+    for value in (Fraction(2**106 - 1, 2**50), Fraction(-(2**105) - 1), Fraction(3, 2**200)):
+        assert sum(map(Fraction, split(value))) == value

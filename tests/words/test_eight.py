@@ -1,0 +1,78 @@
+"""Eight motions in lanes: each is right, and none of its bits depends on its neighbours."""
+
+from fractions import Fraction
+
+import pytest
+from words_helpers import LEVELS
+
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.words.eight import Eight
+from heavytop.words.floating import FALL_IN_LANES, Floating, Ladder
+from heavytop.words.run import Status
+from heavytop.words.scaled import Scaled
+
+FINE = Ladder.of(Fraction(1, 2**105), FALL_IN_LANES)
+SPAN = Fraction(20)
+
+
+def problems(system) -> list[Scaled]:
+    p = Parameters(tuple(map(Fraction, (3, 2, 1))), tuple(Fraction(1, n) for n in (2, 3, 5)), Fraction(1, 7))
+    rest = (Fraction(3, 5), Fraction(0), Fraction(4, 5))
+    return [Scaled.of(system, p, (Fraction(k, 8), Fraction(1, 5), Fraction(k, 3) - 1, *rest)) for k in range(1, 9)]
+
+
+def in_lanes(system, lanes: list[Scaled | None], ladder=FINE, low_order=22, processor=None, forwards=True) -> Eight:
+    eight = Eight(system, ladder, low_order, processor)
+    for lane, problem in enumerate(lanes):
+        if problem is not None:
+            eight.put(lane, problem, forwards, None)
+            eight.aim(lane, SPAN)
+    eight.advance(10**6)
+    return eight
+
+
+@pytest.mark.parametrize("forwards", [True, False], ids=["forwards", "backwards"])
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+def test_each_lane_is_the_motion_of_a_run_by_itself(system, forwards: bool) -> None:
+    given = problems(system)
+    found = in_lanes(system, given, forwards=forwards).samples(dict.fromkeys(range(8), SPAN))
+    for lane, problem in enumerate(given):
+        run = Floating(problem, Ladder.of(Fraction(1, 2**105)), forwards)
+        assert run.advance(SPAN, 10**6) is Status.FINE
+        off = max(abs(a - b) for a, b in zip(found[lane], run.sample(SPAN), strict=True))
+        assert off < Fraction(1, 2**94)
+
+
+def test_no_bit_depends_on_the_neighbours_or_on_the_lane() -> None:
+    given = problems(HEAVY_TOP)
+    together = in_lanes(HEAVY_TOP, list(given)).samples(dict.fromkeys(range(8), SPAN))
+    for lane in (0, 5):
+        alone: list[Scaled | None] = [None] * 8
+        alone[7 - lane] = given[lane]
+        assert in_lanes(HEAVY_TOP, alone).samples({7 - lane: SPAN})[7 - lane] == together[lane]
+
+
+def test_a_lane_that_waits_for_the_others_keeps_its_polynomial() -> None:
+    given = problems(HEAVY_TOP)
+    eight = in_lanes(HEAVY_TOP, list(given))
+    times = {lane: eight.time(lane) for lane in range(8)}
+    assert all(time < SPAN for time in times.values())
+    assert eight.advance(100) == 0
+    assert {lane: eight.time(lane) for lane in range(8)} == times
+
+
+def test_a_lane_that_needs_a_larger_n0_says_so_and_stops() -> None:
+    given = problems(HEAVY_TOP)
+    eight = in_lanes(HEAVY_TOP, list(given), low_order=4)
+    assert [eight.status(lane) for lane in range(8)] == [None] * 8
+    assert [eight.taken(lane, None) for lane in range(8)] == [0] * 8
+
+
+@pytest.mark.parametrize("processor", LEVELS)
+def test_the_bits_are_those_of_every_processor(processor) -> None:
+    given, ladder = list(problems(HEAVY_TOP)), Ladder.of(Fraction(1, 10**20), FALL_IN_LANES)
+    own, other = (
+        in_lanes(HEAVY_TOP, given, ladder, 12, each).samples(dict.fromkeys(range(8), SPAN))
+        for each in (None, processor)
+    )
+    assert own == other

@@ -1,0 +1,206 @@
+"""Fixed grids: products against exact numbers, every overflow caught, the same bits on every processor."""
+
+import ctypes
+from fractions import Fraction
+from random import Random
+
+import numpy
+import pytest
+from llvmlite import ir
+from words_helpers import LEVELS, problem
+
+from heavytop.top.equations import HEAVY_TOP, Parameters
+from heavytop.words import fixed, kernels
+from heavytop.words.digits import digits, exact, grid_for, grid_of
+from heavytop.words.fixed import Fixed
+from heavytop.words.kernels import EXPONENT_BITS, Grid
+from heavytop.words.machine import DOUBLES, Machine, compiled, doubles, pointer
+from heavytop.words.run import Status
+from heavytop.words.scaled import Scaled
+from heavytop.words.vector import INT, POINTER, function
+
+HORIZON = 2
+WRONG_ULP = 1e6
+
+
+def random_problem(random: Random) -> Scaled:
+    """A top that a rigid body can have, |P r| up to 2 and |Ω| up to 3."""
+    while True:
+        moments = [Fraction(random.randint(32, 288), 96) for _ in range(3)]
+        if 2 * max(moments) <= sum(moments):
+            break
+    weights = tuple(Fraction(random.randint(-4096, 4096), 4096) for _ in range(3))
+    omega = [Fraction(random.randint(-7000, 7000), 4096) for _ in range(3)]
+    gamma = [Fraction(random.randint(-2300, 2300), 4096) for _ in range(3)]
+    p = Parameters(tuple(moments), weights, Fraction(0))
+    return Scaled.of(HEAVY_TOP, p, (*omega, *gamma), bounded=True)
+
+
+def error_in_ulp(run: Fixed, known: tuple[Fraction, ...], span: Fraction) -> float:
+    found = run.sample(span)
+    assert found is not None
+    return float(max(abs(a - b) for a, b in zip(found, known, strict=True)) * 2**run.grid.total)
+
+
+def test_words_hold_numbers_to_half_a_unit_and_add_up_exactly() -> None:
+    random = Random(1)
+    for grid in (grid_of(3), grid_of(12), Grid(4, 50)):
+        for _ in range(100):
+            value = Fraction(random.randint(-(10**30), 10**30), random.randint(1, 10**30)) % 8 - 4
+            words = digits(value, grid)
+            assert abs(exact(numpy.array(words)) - value) <= Fraction(1, 2 ** (grid.total + 1))
+            for k, word in enumerate(words):
+                assert (Fraction(word) * 2 ** (grid.bits * (k + 1))).denominator == 1
+                assert k == 0 or abs(word) <= grid.unit(k - 1) / 2
+
+
+@pytest.mark.parametrize(("bits", "words"), [(100, 3), (138, 3), (139, 4), (276, 7), (528, 12), (1000, 24), (1032, 24)])
+def test_the_smallest_grid_that_has_the_bits_is_taken(bits: int, words: int) -> None:
+    assert grid_for(bits) == grid_of(words)
+    assert grid_for(1033) is None
+
+
+def product_code(grid: Grid) -> Machine:
+    """products(left, right, count, sums, seen) in all K levels, callable from here."""
+    module = ir.Module("products")
+    written = kernels.write_kernels(module, grid, 8 * grid.words)[-1]
+    made, code = function(module, "products", ir.VoidType(), [POINTER, POINTER, INT, POINTER, POINTER])
+    code.builder.call(written, made.args)
+    code.builder.ret_void()
+    return compiled(module, {"products": (None, [DOUBLES, DOUBLES, ctypes.c_int64, DOUBLES, DOUBLES])})
+
+
+@pytest.mark.parametrize("grid", [grid_of(3), grid_of(6), Grid(3, 51)], ids=lambda grid: f"{grid.words}x{grid.bits}")
+@pytest.mark.parametrize("kind", ["random", "largest", "alternating"])
+def test_sums_of_products_are_exact_but_for_the_last_level_or_are_caught(grid: Grid, kind: str) -> None:
+    """|Σ a b − S| <= n (K + 1) units of the last word, whatever the words; or an exponent bit says that it may not be.
+
+    Proven: every S_k but the last is exact where no bit is set; the products left out have i + j >= K, and each of the
+    K of one sum is below (2^(b−1) g)² or half a unit; the K roundings of the last level are half a unit each.
+    """
+    machine, random = product_code(grid), Random(f"{grid.words} {kind}")
+    caught = 0
+    for _ in range(40):
+        count = random.randint(1, 60)
+        bound = Fraction(1) if grid.bits == 51 else Fraction(1, 2)
+        rows = [doubles(8 * grid.words * count) for _ in range(2)]
+        for row in rows:
+            for n in range(count):
+                for lane in range(8):
+                    if kind == "random":
+                        value = bound * random.randint(-(2**200), 2**200) / 2**200 / (n + 1)
+                        words = digits(value, grid)
+                    else:
+                        sign = -1 if kind == "alternating" and (n + lane) % 2 else 1
+                        words = [sign * grid.unit(k) * (2.0 ** (grid.bits - 1)) for k in range(grid.words)]
+                    start = 8 * grid.words * n + lane
+                    row[start : start + 8 * grid.words : 8] = words
+        sums, seen = doubles(8 * grid.words), doubles(8)
+        for k in range(grid.words):
+            sums[8 * k : 8 * k + 8] = grid.centre(k)
+        last = 8 * grid.words * (count - 1)
+        machine.functions["products"](pointer(rows[0]), pointer(rows[1][last:]), count, pointer(sums), pointer(seen))
+        if numpy.bitwise_or.reduce(seen.view(numpy.int64)) & EXPONENT_BITS:
+            caught += 1
+            continue
+        for lane in range(8):
+            known = Fraction(0)
+            for n in range(count):
+                low, high = (8 * grid.words * m + lane for m in (n, count - 1 - n))
+                a, b = (exact(r[at : at + 8 * grid.words : 8]) for r, at in zip(rows, (low, high), strict=True))
+                known += a * b
+            total = exact(sums[lane::8]) - sum(Fraction(grid.centre(k)) for k in range(grid.words))
+            assert abs(total - known) * 2**grid.total <= count * (grid.words + 1)
+    assert caught < 40 or grid.bits == 51 or kind == "largest"
+
+
+@pytest.mark.parametrize("words", [3, 6])
+def test_at_the_sizes_in_use_no_check_fires_and_all_is_right(words: int) -> None:
+    random, grid, span = Random(words), grid_of(words), Fraction(HORIZON)
+    for _ in range(40):
+        scaled = random_problem(random)
+        known = Fixed(scaled, grid_of(12 if words == 6 else 6), True)
+        run = Fixed(scaled, grid, True)
+        for each in (known, run):
+            assert each.advance(span, 10**4) is Status.FINE
+        truth = known.sample(span)
+        assert truth is not None
+        assert run.redone == 0
+        assert error_in_ulp(run, truth, span) < 1e4
+
+
+@pytest.mark.parametrize("bits", [48, 49, 50, 51, 52])
+def test_words_that_are_too_wide_give_no_wrong_number(bits: int) -> None:
+    """Each run is right, if need be with shorter steps, or its outcome says that it is not."""
+    random, grid, span = Random(bits), Grid(3, bits), Fraction(HORIZON)
+    redone = 0
+    for _ in range(30):
+        scaled = random_problem(random)
+        known, run = Fixed(scaled, grid_of(6), True), Fixed(scaled, grid, True)
+        assert known.advance(span, 10**4) is Status.FINE
+        truth = known.sample(span)
+        assert truth is not None
+        status = run.advance(span, 10**4)
+        redone += run.redone
+        if status is Status.FINE and run.sample(span) is not None:
+            assert error_in_ulp(run, truth, span) < WRONG_ULP
+        else:
+            assert status in (Status.CAPACITY, Status.FINE)
+    assert redone > 0 or bits < 50
+
+
+def test_without_the_check_some_would_be_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The check is what makes them right: with the sums unwatched, words of 51 bits give wrong numbers."""
+    monkeypatch.setattr(kernels.Accumulator, "look", lambda self, k: None)
+    monkeypatch.setattr(fixed, "_machines", {})
+    random, grid, span, wrong = Random(51), Grid(3, 51), Fraction(HORIZON), 0
+    for _ in range(15):
+        scaled = random_problem(random)
+        known, run = Fixed(scaled, grid_of(6), True), Fixed(scaled, grid, True)
+        for each in (known, run):
+            each.advance(span, 10**4)
+        truth = known.sample(span)
+        found = run.sample(span)
+        wrong += truth is None or found is None or error_in_ulp(run, truth, span) > WRONG_ULP
+    assert wrong
+
+
+@pytest.mark.parametrize("processor", LEVELS)
+def test_the_bits_are_those_of_every_processor(processor) -> None:
+    scaled = problem(1, attitude=True)
+    runs = [Fixed(scaled, grid_of(3), True, processor=each) for each in (None, processor)]
+    for run in runs:
+        assert run.advance(Fraction(8), 10**6) is Status.FINE
+    own, other = ((run.state, run.steps, run.place(), run.sample(Fraction(8))) for run in runs)
+    assert own == other
+
+
+def test_steps_grow_and_shrink_with_the_motion() -> None:
+    """A body that hangs nearly still and then falls: the step is halved and doubled on the way."""
+    p = Parameters((Fraction(2), Fraction(2), Fraction(1)), (Fraction(0), Fraction(1), Fraction(0)), Fraction(0))
+    y = tuple(Fraction(n, 1024) for n in (1, 0, 512, 0, 1024, 0))
+    run, lengths = Fixed(Scaled.of(HEAVY_TOP, p, y, bounded=True), grid_of(3), True), set()
+    for _ in range(300):
+        before = run.time
+        assert run.advance(Fraction(10**6), 1) is Status.FINE
+        lengths.add(run.time - before)
+    assert len(lengths) > 1
+    assert all(length.numerator == 1 or length.denominator == 1 for length in lengths)
+
+
+def test_what_an_unstable_axis_amplifies_is_on_the_grid() -> None:
+    """Rotation about the middle axis with 2^-140 of another: seen with the bits that the spread asks for."""
+    p = Parameters((Fraction(3), Fraction(2), Fraction(1)), (Fraction(0),) * 3, Fraction(0))
+    y = (Fraction(1, 2**140), Fraction(1), Fraction(0), Fraction(5, 8), Fraction(-3, 8), Fraction(11, 16))
+    scaled = Scaled.of(HEAVY_TOP, p, y, bounded=True)
+    assert fixed.spread(scaled) >= 140
+    grid, finer = grid_for(120 + fixed.spread(scaled)), grid_of(12)
+    assert grid is not None
+    runs, span = [Fixed(scaled, each, True) for each in (grid, finer)], 160 * scaled.rate
+    for run in runs:
+        assert run.advance(span, 10**5) is Status.FINE
+    coarse, fine = (run.sample(span) for run in runs)
+    assert coarse is not None
+    assert fine is not None
+    assert abs(fine[0]) > Fraction(1, 2**30)
+    assert max(abs(a - b) for a, b in zip(coarse, fine, strict=True)) < Fraction(1, 2**100)
