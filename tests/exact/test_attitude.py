@@ -14,7 +14,20 @@ from heavytop.measure.reference import Ball
 from heavytop.suite.cases import CASES
 from heavytop.top.angles import perpendicular
 
-NAMES = ("euler", "lagrange", "pendulum", "gyrostat", "delone", "ershkov-partial-2", "kovalevskaya", "generic")
+NAMES = (
+    "euler",
+    "lagrange",
+    "pendulum",
+    "gyrostat",
+    "delone",
+    "ershkov-partial-2",
+    "kovalevskaya",
+    "generic",
+    "hess",
+    "hess-pendulum",
+    "steklov",
+    "goryachev",
+)
 
 
 def _holds(value: Fraction, ball: Ball) -> bool:
