@@ -380,7 +380,7 @@ def test_reference_of_the_gyrostat_uses_its_closed_form() -> None:
         ({"gamma": "1,1,1"}, [], 2, "--normalize"),
         ({"times": "1e6"}, [], 3, "digit"),
         ({"times": "1e400"}, [], 2, "too large"),
-        ({"weight": "1" * 5000}, [], 3, "No digit at t = 1"),
+        ({"weight": "1" * 5000}, [], 3, "No digit at t"),
     ],
 )
 def test_reference_refuses_what_it_cannot_prove(changes, more, code, message) -> None:
