@@ -1,6 +1,6 @@
 """Kovalevskaya and Goryachev-Chaplygin motions from random exact data: proofs, agreement and speed, printed.
 
-    python benchmarks/hyperelliptic_proofs.py [COUNT] [SEED]
+    python benchmarks/hyperelliptic_proofs.py [COUNT] [SEED] [PART OF A NAME]
 
 For COUNT (50) starts of each class, and COUNT/5 on and beside the degenerate levels: the residual of all six equations
 at 60 digits, the enclosure at |t| = 10 to 50 digits, and seconds of this process for 50 digits at t = 10^6.  Then both
@@ -69,9 +69,10 @@ def beside(exponent: int) -> FAMILY:
 
 
 def goryachev_chaplygin(random: Random) -> GoryachevChaplygin:
-    i3, (g1, g2, g3) = positive(random), (rational(random), rational(random), positive(random))
+    # no fast spin, which M·γ = 0 makes of a small γ3: the enclosure would take minutes
+    i3, (g1, g2, g3) = positive(random), (rational(random, 1), rational(random, 1), 1 + positive(random))
     top = HeavyTop((4 * i3, 4 * i3, i3), 1, (positive(random), rational(random), 0))
-    w1, w2 = rational(random), rational(random)
+    w1, w2 = rational(random, 2), rational(random, 2)
     return GoryachevChaplygin(top, State((w1, w2, -4 * (w1 * g1 + w2 * g2) / g3), (g1, g2, g3)))
 
 
@@ -117,7 +118,7 @@ def survey(name: str, family: FAMILY, count: int, seed: int) -> None:
         for step in range(1, 4):
             motion.state(LATE + step, BITS_50)
         states.append((process_time() - began) / 3)
-        enclosure = Validated(motion.top, motion.start, effort=60.0)
+        enclosure = Validated(motion.top, motion.start, effort=10.0)
         try:
             for time in (F(10), F(-10)):
                 pairs = list(zip(motion.state(time, BITS_50), enclosure.state(time, BITS_50), strict=True))
@@ -149,13 +150,19 @@ def meeting(seed: int) -> None:
 def main() -> None:
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 50
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    meeting(seed)
-    survey("Kovalevskaya", kovalevskaya, count, seed)
-    survey("Goryachev-Chaplygin", goryachev_chaplygin, count, seed)
-    survey("Kovalevskaya on a degenerate level", on_a_level, count // 5, seed)
-    survey("Goryachev-Chaplygin with G = 0", with_a_common_root, count // 5, seed)
-    for exponent in (1, 2, 3):
-        survey(f"Kovalevskaya at 1e-{exponent} of a degenerate level", beside(exponent), count // 5, seed)
+    only = sys.argv[3] if len(sys.argv) > 3 else ""
+    surveys: list[tuple[str, FAMILY, int]] = [
+        ("Kovalevskaya", kovalevskaya, count),
+        ("Goryachev-Chaplygin", goryachev_chaplygin, count),
+        ("Kovalevskaya on a degenerate level", on_a_level, count // 5),
+        ("Goryachev-Chaplygin with G = 0", with_a_common_root, count // 5),
+        *((f"Kovalevskaya at 1e-{k} of a degenerate level", beside(k), count // 5) for k in (1, 2, 3)),
+    ]
+    if not only:
+        meeting(seed)
+    for name, family, number in surveys:
+        if only in name:
+            survey(name, family, number, seed)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
+from proofs import assert_attitude
 
 from heavytop.errors import InputError, NotInClass, OutOfReach
 from heavytop.exact.algebraic import AlgebraicMotion
@@ -53,12 +54,24 @@ def assert_solves(motion: AlgebraicMotion, time):
         assert abs(sum(g[0] * g[0] for g in series[3:]) - 1) < arb("1e-55")
 
 
+class Rounded:
+    """The motion as if it were that of a top whose data agree with it to 280 bits."""
+
+    system = HEAVY_TOP
+
+    def __init__(self, motion):
+        self.top, self.start = motion.rounded(280)
+        self.state, self.attitude = motion.state, motion.attitude
+
+
 @pytest.mark.parametrize("name", FAMILIES)
 @pytest.mark.parametrize("seed", range(5))
 def test_every_random_motion_solves_all_six_equations(name, seed):
     motion = random_motion(name, seed)
     for time in (F(0), F(7, 3), F(-(10**6))):
         assert_solves(motion, time)
+    assert_attitude(Rounded(motion), F(7, 3))
+    assert all(x.rad() < arb("1e-50") for x in motion.attitude(F(10**6), 180))
 
 
 @pytest.mark.parametrize("name", FAMILIES)

@@ -8,6 +8,7 @@ from proofs import assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import NotInClass
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.resting import Rest
 from heavytop.exact.validated import Validated
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
@@ -85,6 +86,16 @@ def test_asymptotic_motions_are_motions_like_any_other(omega, gamma):
         assert_narrow(motion, time)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_variable_may_rest_at_a_double_root(sign):
+    motion = motion_from((F(1), F(0)), (F(-18, 13) * sign, 0, F(-30, 13) * sign), (F(-5, 13), 0, F(12, 13)))
+    for time in (F(7, 3), F(-40), F(10**6)):
+        assert_solves(motion, time)
+        assert_narrow(motion, time)
+    for form in motion.made.values():
+        assert isinstance(form.gaps[0 if sign > 0 else 1], Rest)
+
+
 def test_a_thousand_digits_come_out():
     assert_narrow(motion_from((F(1), F(0)), ("3/4", "1/2", 0), UP), F(10**6), 1000)
 
@@ -114,7 +125,7 @@ def test_levels_too_near_to_one_that_is_not_done_are_left_to_the_enclosure(power
 
 
 def test_levels_that_are_not_done_are_named():
-    with pytest.raises(NotInClass, match="rests at a double root"):
+    with pytest.raises(NotInClass, match="both separated variables rest"):
         motion_from((F(1), F(1, 3)), (0, 0, 0), (F(3, 5), 0, F(4, 5)))
     with pytest.raises(NotInClass, match="both separated variables"):
         motion_from((F(1), F(0)), (0, F(1, 4), 0), (F(3, 5), 0, F(4, 5)))

@@ -8,7 +8,7 @@ from flint import arb, arb_mat
 from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.catalogue import find
 from heavytop.exact.hess import Hess
 from heavytop.exact.hess_pendulum import HessPendulum
@@ -50,6 +50,7 @@ def test_every_random_motion_solves_all_six_equations(seed):
     motion = random_hess(seed)
     assert_solves(motion, rational(random.Random(seed), size=30))
     assert_narrow(motion, F(10**6))
+    assert_attitude(motion, rational(random.Random(seed + 50), size=30))
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -124,6 +125,24 @@ def test_the_matrix_over_a_period_keeps_areas_and_undoes_itself():
             assert all(abs(x) < arb("1e-50") for x in (there - shifted).entries())
             back = transfer.inverse(number) * transfer.at(number, 0) - arb_mat([[1, 0], [0, 1]])
             assert all(abs(x) < arb("1e-50") for x in back.entries())
+
+
+@pytest.mark.parametrize(("unit", "mass", "size"), [(100, 0, 0), (-100, 0, 50), (0, -100, -100), (0, 100, 0)])
+@pytest.mark.parametrize("spin", ["1/2", 0])
+def test_units_do_not_matter(unit, mass, size, spin):
+    plain = find(TOP, State(("3/4", spin, -1), (0, 1, 0)))
+    rate, heavy, long = (F(10) ** power for power in (unit, mass, size))
+    top = HeavyTop([i * heavy for i in TOP.inertia], heavy * rate**2 / long, TOP.centre)
+    other = find(top, State([F(w) * rate for w in ("3/4", spin, -1)], [g * long for g in (0, 1, 0)]))
+    pairs = zip(plain.state(F(7, 3), 170), other.state(F(7, 3) / rate, 600), strict=True)
+    for (one, same), factor in zip(pairs, [rate] * 3 + [long] * 3, strict=True):
+        assert abs(midpoint(one) - midpoint(same) / factor) <= 2 * radius(one)
+
+
+def test_more_turns_than_a_word_counts():
+    top = HeavyTop((1, F(2, 10**20 + 1), F(1, 10**20)), 1, (1, 0, 1))
+    motion = Hess(top, State((1, 1, -(10**20)), (1, 1, 1)))
+    assert_narrow(motion, F(7, 3))
 
 
 def test_the_cases_of_the_plans_are_of_the_class():

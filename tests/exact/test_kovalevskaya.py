@@ -8,11 +8,12 @@ from flint import arb
 from proofs import assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import working_precision
+from heavytop.exact.balls import ball, midpoint, working_precision
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.kovalevskaya_abel import AbelMotion
-from heavytop.exact.kovalevskaya_level import Level
+from heavytop.exact.kovalevskaya_level import Level, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion
+from heavytop.exact.resting import Rest
 from heavytop.exact.validated import Validated
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -25,6 +26,15 @@ TINY = F(1, 10**30)
 
 def motion_from(moment, omega, gamma, i3=F(1)):
     return Kovalevskaya(HeavyTop((2 * i3, 2 * i3, i3), 1, (*moment, 0)), State(omega, gamma))
+
+
+def motion_level(motion):
+    return Level.of(motion.top, motion.start)
+
+
+def scale(motion, level):
+    """What w is multiplied by from the units of one level to those of another: w goes like the square of the rate."""
+    return (motion_level(motion).rate / level.rate) ** 2
 
 
 def random_motion(seed):
@@ -77,6 +87,23 @@ def test_a_double_root_outside_the_gaps_does_no_harm(omega, gamma):
     motion = motion_from((F(1), F(0)), omega, gamma)
     assert_solves(motion, F(11, 3))
     assert_narrow(motion, F(10**9))
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_starts_of_few_small_numbers_are_solved_or_named(seed):
+    # zeros and equal numbers make special levels and turning points of all kinds
+    rng = random.Random(seed)
+    few = (F(0), F(0), F(1), F(-1), F(1, 2), F(-1, 2), F(3, 5), F(4, 5))
+    omega, gamma = triple(rng, lambda random: random.choice(few)), triple(rng, lambda random: random.choice(few))
+    motion, refused = None, ""
+    try:
+        motion = motion_from((F(1), rng.choice(few)), omega, gamma)
+    except NotInClass as error:
+        refused = error.cause
+    if motion is not None:
+        assert_solves(motion, F(7, 3))
+    else:
+        assert any(word in refused for word in ("gamma = 0", "Delone", "degenerate", "too near"))
 
 
 def tilted(exponent):
@@ -156,6 +183,43 @@ def test_asymptotic_motions_are_motions_like_any_other(omega, gamma):
     assert all(a.overlaps(b) for a, b in pairs)
 
 
+def test_the_exponent_of_an_asymptotic_motion_is_that_of_its_enclosure():
+    motion = motion_from((F(1), F(0)), (-1, F(1, 4), F(1, 4)), UP)
+    exponent, enclosure = float(motion.exponent(60)), Validated(motion.top, motion.start)
+    logarithms = []
+    for time in (F(8), F(24)):
+        state = [midpoint(value) for value in enclosure.state(time, 100)]
+        level = Level.of(motion.top, State(state[:3], state[3:]))
+        with working_precision(200):
+            start = start_of(level)
+            # w - e is as the square of the distance, one of the two variables takes part
+            gaps = [abs(start.above(k, ball(motion_level(motion).double() * scale(motion, level)))) for k in (0, 1)]
+            logarithms.append(float(min(gaps, key=float).log()))
+    assert (logarithms[0] - logarithms[1]) / 32 == pytest.approx(exponent, rel=0.1)
+    with pytest.raises(NotInClass, match="not asymptotic"):
+        random_motion(1).exponent(60)
+
+
+@pytest.mark.parametrize(
+    ("omega", "gamma", "resting"),
+    [
+        ((F(-7, 6), F(-5, 6), -1), OTHER, 1),
+        ((F(-1, 2), 0, F(-4, 3)), (F(3, 5), 0, F(4, 5)), 1),
+        ((F(-7, 6), F(5, 6), F(-1, 6)), OTHER, 0),
+        ((0, F(-4, 3), 0), UP, 0),
+    ],
+)
+def test_a_variable_may_rest_at_a_double_root(omega, gamma, resting):
+    motion = motion_from((F(1), F(0)), omega, gamma)
+    for time in (F(7, 3), F(-40), F(10**6)):
+        assert_solves(motion, time)
+        assert_narrow(motion, time)
+    for form in motion.made.values():
+        assert isinstance(form.variables[resting], Rest)
+    pairs = zip(motion.state(F(5), 180), Validated(motion.top, motion.start).state(F(5), 180), strict=True)
+    assert all(a.overlaps(b) for a, b in pairs)
+
+
 def test_a_thousand_digits_come_out():
     assert_narrow(motion_from((F(3, 5), F(1, 3)), (F(1, 3), F(4, 5), F(-7, 10)), TILTED), F(10**6), 1000)
 
@@ -179,7 +243,9 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
     [
         ((1, F(1, 2), F(1, 3)), (F(3, 4), 1, F(1, 5)), "Delone"),
         ((F(1, 2), F(1, 3), 0), UP, "e = -13/36.*both separated variables"),
-        ((F(-7, 6), F(-5, 6), -1), OTHER, "e = 23/18.*rests at e"),
+        ((F(-5, 6), F(-1, 6), F(-1, 2)), OTHER, "e = -7/18.*rests at e, and the other passes it"),
+        ((F(-1, 2), F(1, 2), -1), UP, "too near"),
+        ((-1, 0, -1), UP, "cubic .* has a double root"),
     ],
 )
 def test_levels_that_are_not_done_are_named(omega, gamma, name):

@@ -4,7 +4,7 @@ import random
 from fractions import Fraction
 
 import pytest
-from proofs import assert_narrow, assert_solves, positive, rational
+from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import midpoint, radius
@@ -45,6 +45,7 @@ def test_every_random_motion_solves_all_six_equations(seed):
     motion = random_motion(seed)
     assert_solves(motion, rational(random.Random(seed), size=30))
     assert_narrow(motion, F(10**6))
+    assert_attitude(motion, rational(random.Random(seed + 50), size=30))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -144,6 +144,7 @@ def reference(
     digits: int = 50,
     *,
     system: System | str = HEAVY_TOP,
+    attitude: bool = False,
 ) -> Reference:
     """The known motion: proven states, from a closed form where there is one, else from a validated enclosure.
 
@@ -152,10 +153,12 @@ def reference(
         times: shape (n,), exact numbers in any order.
         digits: 1 to 20,000; relative above 1, absolute below.
         system: "heavy_top" or "gyrostat".
+        attitude: give ξ as well, fixed in space and ⟂ γ, in body components.
 
     Returns:
         A :class:`Reference`: ``method``, ``states[i][j].value`` and ``.radius`` as decimal text (the true number is
-        within the radius of the value), ``texts()``, ``to_numpy()`` and ``radii()``, each of shape (n, 6).
+        within the radius of the value), ``texts()``, ``to_numpy()`` and ``radii()``, each of shape (n, 6);
+        ``attitude[i][j]``, shape (n, 3), and ``attitude_method``, where asked for, else None.
 
     Raises:
         InputError: for what is no motion or time, and for other digits.
@@ -163,7 +166,7 @@ def reference(
     """
     body, state = arguments.motion(top, start)
     about, instants = arguments.system(system), arguments.any_times(times)
-    return proven(body, state, instants, whole(digits, "digits"), about)
+    return proven(body, state, instants, whole(digits, "digits"), about, attitude=attitude)
 
 
 def _options(**given: object) -> dict[str, Any]:

@@ -82,6 +82,7 @@ def reference(
     times: Times,
     digits: Annotated[int, typer.Option(help="Proven digits, 1 to 20000.")] = 50,
     system: SystemName = "heavy_top",
+    attitude: Annotated[bool, typer.Option("--attitude", help="Give xi too, fixed in space and across gamma.")] = False,
     normalize: Normalize = False,
     json: Json = False,
 ) -> int:
@@ -94,7 +95,7 @@ def reference(
     from heavytop.top.times import check_times
 
     top, start = _motion(inertia, weight, centre, omega, gamma, normalize, of_any_size=True)
-    found = proven(top, start, check_times(numbers(times)), digits, system_named(system))
+    found = proven(top, start, check_times(numbers(times)), digits, system_named(system), attitude=attitude)
     if json:
         print_json(found)
     else:

@@ -96,14 +96,21 @@ class Inversion:
                 columns[-1].append(columns[-1][-1] * v)
         return arb_mat(columns).transpose()
 
+    def _periods(self) -> arb_mat:
+        """What G grows by with a turn of each phase (a unit, where it never returns), a column for each."""
+        columns = [[sign * c for c in v.column] for v, sign in zip(self.variables, self.signs, strict=True)]
+        return arb_mat(columns).transpose()
+
+    def mean_rates(self, slopes: Sequence[arb]) -> list[arb]:
+        """Turns of each phase a unit of time (units, where it never returns), where G grows by ``slopes``."""
+        return self._periods().solve(arb_mat([[slope] for slope in slopes])).entries()
+
     def phases(self, target: Sequence[arb]) -> tuple[list[arb], list[int]]:
         """(θ in the first turns, whole turns n) with G(θ + 2πn) = target: balls that hold the only solution.
 
         Not finite where the working precision does not prove it.
         """
-        count = len(self.variables)
-        periods = arb_mat([v.column for v in self.variables]).transpose()
-        periods = periods * arb_mat([[self.signs[i] if i == j else 0 for j in range(count)] for i in range(count)])
+        count, periods = len(self.variables), self._periods()
         aim = arb_mat([[value] for value in target])
         lost = [arb("nan")] * count, [0] * count
         try:

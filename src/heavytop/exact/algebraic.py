@@ -19,6 +19,7 @@ from typing import Any
 from flint import arb, arb_series
 
 from heavytop.errors import InputError
+from heavytop.exact.azimuth import Azimuth, Bearing
 from heavytop.exact.balls import ball, midpoint, to_bits, working_precision
 from heavytop.exact.closed_form import whole_series
 from heavytop.exact.flint_context import current_precision, whole_evaluation
@@ -105,6 +106,22 @@ class AlgebraicMotion:
         size = ball(self.curve.gamma_square()).sqrt()
         return [*motion[:3], *(component / size for component in motion[3:])]
 
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """A unit vector fixed in space and ⟂ γ, in body components: at t = 0 along the level part of M.
+
+        Of Chaplygin's motion at rest, along the level part of what M/x tends to.
+        """
+
+        def evaluate(_working: int) -> list[arb]:
+            try:
+                azimuth, began = _azimuth(self, current_precision())
+                here = _motion(self, current_precision()).bearing(azimuth, ball(time))
+            except Undecided:
+                return [arb("nan")] * 3
+            return here.carried(began, began.along)
+
+        return to_bits(evaluate, bits, time)
+
     def rounded(self, bits: int = _ROUNDED_BITS) -> tuple[HeavyTop, State]:
         """A top of weight 1 and a start, exact, within 2^(3 − bits) of this one's, relative to sizes above 1; |γ| = 1.
 
@@ -122,6 +139,13 @@ class AlgebraicMotion:
         """
         other = Validated(top, start).state(time, bits)
         return _largest(self.state(time, bits), other, bits)
+
+
+@kept
+def _azimuth(motion: AlgebraicMotion, bits: int) -> tuple[Azimuth, Bearing]:
+    made = _motion(motion, bits)
+    azimuth = made.azimuth()
+    return azimuth, made.bearing(azimuth, arb(0))
 
 
 @kept

@@ -21,12 +21,11 @@ from typing import Any
 from flint import arb, arb_series
 
 from heavytop.errors import NotInClass, OutOfReach
-from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.attitude import turned_to_start
 from heavytop.exact.closed_form import series_length
-from heavytop.exact.motion import initial_xi
 from heavytop.exact.solution import ExactSolution
 from heavytop.top.equations import System
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from heavytop.top.heavy_top import HeavyTop, State
 
 Axes = tuple[int, int, int]
 CYCLIC: tuple[Axes, ...] = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
@@ -80,6 +79,11 @@ class Renamed:
         return f"{self.solution.method}, axes {there[0] + 1}{there[1] + 1}{there[2] + 1}"
 
     @property
+    def has_attitude(self) -> bool:
+        """Whether the solution has one."""
+        return hasattr(self.solution, "attitude")
+
+    @property
     def system(self) -> System:
         """That of the solution."""
         return self.solution.system
@@ -116,15 +120,7 @@ class Renamed:
         if attitude is None:
             raise NotInClass(f"{self.method} has no attitude in closed form.", "Integrate the attitude along with it.")
 
-        def evaluate(working: int) -> list[arb]:
-            gamma = self.start.gamma
-            length = ball(dot(gamma, gamma)).sqrt()
-            began = permuted(attitude(Fraction(0), working), self.axes)
-            across = cross([ball(g) / length for g in gamma], began)
-            wanted = initial_xi(gamma)
-            cosine, sine = dot(wanted, began), dot(wanted, across)
-            xi = permuted(attitude(time, working), self.axes)
-            eta = cross([g / length for g in self.state(time, working)[3:]], xi)
-            return [cosine * x + sine * y for x, y in zip(xi, eta, strict=True)]
+        def own(at: Fraction, working: int) -> Sequence[arb]:
+            return permuted(attitude(at, working), self.axes)
 
-        return to_bits(evaluate, bits)
+        return turned_to_start(self, own, time, bits)

@@ -8,7 +8,7 @@ With I = (A, B, C), in units with A = 1,
     c0 b4 = −(1 − 4B)(3 − 4B)² (9 − 16B)²/(32B⁴ (1 − 2B))
 
 b4 is a unit of time.  Motions are real for 3/5 < B < 5/8 and b4 < 0.
-Source: D. N. Goryachev, Mat. sbornik 21 (1899) 431; coefficients derived here from the equations, which
+Source: D. N. Goryachev, Trudy otd. fiz. nauk 10 (1899) 23; coefficients derived here from the equations, which
 :class:`heavytop.exact.one_gap.Curve` tests exactly.
 """
 

@@ -18,10 +18,10 @@ whole motion
     γ1 = −(X(u1) − X(u2))/(c (u1 − u2))     γ2 = −(α1β1 + α2β2)/(c (u1 − u2))     γ3 = −σ (α1β2 − α2β1)/(c (u1 − u2))
 
 so that turning points are points like any other.  σ is found by exclusion at the start.
-Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other,
-and where one variable tends to it the motion is asymptotic (:mod:`heavytop.exact.asymptotic`); motions where both tend
-to it (G = 0), or with a variable at rest on it, are refused.  So are motions so near to them that the Fourier
-series do not resolve them, with the distance.
+Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other.
+Where one variable tends to it the motion is asymptotic (:mod:`heavytop.exact.asymptotic`), and one may rest on it
+(:mod:`heavytop.exact.resting`).  Motions where both tend to it (G = 0) or both rest are refused; so are motions so near
+to them that the Fourier series do not resolve them, with the distance.
 Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); signs and recovery derived here from the integrals.
 """
 
@@ -30,20 +30,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import pairwise
 from typing import Any
 
-from flint import acb, arb, arb_series, fmpq_poly
+from flint import acb, arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.abel import Inversion, Variable
 from heavytop.exact.asymptotic import Approach
-from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.closed_form import ClosedForm, constant, series_length
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.gaps import Gap, Roots, distance_of_others
+from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, roots, separated_start, size_of
 from heavytop.exact.motion import kept
-from heavytop.exact.reduced import Reduced, Undecided, polynomial
+from heavytop.exact.reduced import Undecided
+from heavytop.exact.resting import Beside, Rest
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
@@ -102,107 +103,12 @@ def _motion(case: GoryachevChaplygin, _bits: int) -> Motion:
     return Motion.of(Level.of(case.top, case.start))
 
 
-class Level(Reduced):
-    """The exact level of a start."""
-
-    __slots__ = ()
-
-    @property
-    def energy(self) -> Fraction:
-        """h."""
-        w1, w2, w3 = self.omega
-        return 2 * (w1 * w1 + w2 * w2) + w3 * w3 / 2 + self.along(self.gamma)
-
-    @property
-    def third(self) -> Fraction:
-        """G, Goryachev and Chaplygin's integral."""
-        w1, w2, w3 = self.omega
-        return w3 * (w1 * w1 + w2 * w2) - self.along(self.omega) * self.gamma[2]
-
-    def sextic(self) -> fmpq_poly:
-        """f."""
-        zero, square = Fraction(0), self.moment_square * self.gamma_square
-        cubic = polynomial(-4 * self.third, -2 * self.energy, zero, Fraction(1))
-        return polynomial(zero, zero, 4 * square) - cubic * cubic
-
-    def separated(self) -> fmpq_poly:
-        """u² − r u − 4s, with the roots u1, u2."""
-        w1, w2, w3 = self.omega
-        return polynomial(-4 * (w1 * w1 + w2 * w2), -w3, Fraction(1))
-
-
-@dataclass(frozen=True, slots=True)
-class Root:
-    """A root of f: how often it is one of au − X, and of au + X."""
-
-    value: acb
-    counts: tuple[int, int]
-
-    @property
-    def multiplicity(self) -> int:
-        """As a root of f."""
-        return sum(self.counts)
-
-
-def roots(level: Level) -> list[Root]:
-    """The roots of f at the working precision; raises Undecided where it does not tell their factor."""
-    h, constant, a = ball(level.energy), 4 * ball(level.third), _size(level)
-    found: list[Root] = []
-    pairs: Any = level.sextic().complex_roots()
-    for value, many in pairs:
-        if value.is_zero():
-            found.append(Root(acb(value), (many // 2, many - many // 2)))
-            continue
-        cubics = [value * (value * value - 2 * (h + side * a)) - constant for side in (1, -1)]
-        of = [cubic.contains(0) for cubic in cubics]
-        if sum(of) != 1:
-            raise Undecided
-        found.append(Root(acb(value), (many * of[0], many * of[1])))
-    return found
-
-
-def _size(level: Level) -> arb:
-    """a = c|γ|."""
-    return ball(level.moment_square * level.gamma_square).sqrt()
-
-
-def separated_start(level: Level) -> tuple[arb, arb]:
-    """u1, u2 at t = 0; of the two the one that cancels comes from the product."""
-    w1, w2, w3 = level.omega
-    square = w1 * w1 + w2 * w2
-    larger = (abs(ball(w3)) + ball(w3 * w3 + 16 * square).sqrt()) / 2
-    smaller = 4 * ball(square) / larger
-    return (larger, -smaller) if w3 >= 0 else (smaller, -larger)
-
-
-def gap_ends(curve: Sequence[Root], places: Sequence[arb]) -> list[tuple[int, int]]:
-    """Between which two real roots u1 and u2 move; raises Undecided where the balls do not tell."""
-    real = sorted((i for i, root in enumerate(curve) if root.value.imag.is_zero()), key=lambda i: _exact(curve[i]))
-    allowed, inside = [], False
-    for low, high in pairwise(real):
-        if curve[low].value.overlaps(curve[high].value):
-            raise Undecided
-        inside ^= curve[low].multiplicity % 2 == 1
-        if inside:
-            allowed.append((low, high))
-    found = []
-    for u in places:
-        possible = [ends for ends in allowed if not (u < curve[ends[0]].value.real or u > curve[ends[1]].value.real)]
-        if len(possible) != 1:
-            raise Undecided
-        found += possible
-    return found
-
-
-def _exact(root: Root) -> Fraction:
-    return midpoint(root.value.real)
-
-
 @dataclass(frozen=True, slots=True)
 class Motion:
     """The motion of a level at one working precision.
 
-    moment, size: c and a.  ends: numbers of the roots at both ends of each gap.  origin: G at t = 0.  sign: σ.
+    moment, size: c and a.  ends: numbers of the roots at both ends of each gap.  origin: G at t = 0.  direction:
+    of its last component in t.  sign: σ.
     """
 
     level: Level
@@ -211,7 +117,9 @@ class Motion:
     curve: tuple[Root, ...]
     ends: tuple[tuple[int, int], ...]
     gaps: tuple[Variable, ...]
-    origin: tuple[arb, arb]
+    inversion: Inversion
+    origin: tuple[arb, ...]
+    direction: int
     sign: int
 
     @classmethod
@@ -221,19 +129,24 @@ class Motion:
         Raises Undecided where it does not suffice, OutOfReach where the Fourier series need too many terms.
         """
         curve, places = roots(level), separated_start(level)
-        ends = gap_ends(curve, places)
+        ends = gap_ends(level, curve, places)
         gaps = tuple(_variable(curve, pair) for pair in ends)
-        c, a = ball(level.moment_square).sqrt(), _size(level)
+        c, a = ball(level.moment_square).sqrt(), size_of(level)
         turned = level.turned()
         speeds = [c * (2 * turned[1] * turned[5] - turned[4] * u) for u in places]
         # du/dθ is −y1/√g1 and y2/√g2
         slopes = -speeds[0] * gaps[0].density(places[0]), speeds[1] * gaps[1].density(places[1])
         phases = [gap.phase(u, slope) for gap, u, slope in zip(gaps, places, slopes, strict=True)]
-        first, second = Inversion(gaps, (1, -1)).values(phases)
+        inversion, direction, moving = Inversion(gaps, (1, -1)), -1, phases
+        for k in (0, 1):
+            if isinstance(gaps[k], Rest):
+                inversion = Inversion((Beside(gaps[1 - k], gaps[k].middle),), (1,))
+                direction, moving = (1, -1)[k], [phases[1 - k]]
+        origin = tuple(inversion.values(moving))
         with series_length(1):
             possible = []
             for sign in (1, -1):
-                motion = cls(level, c, a, tuple(curve), tuple(ends), gaps, (first, second), sign)
+                motion = cls(level, c, a, tuple(curve), tuple(ends), gaps, inversion, origin, direction, sign)
                 found = motion._state([arb_series([phase], prec=1) for phase in phases], [0, 0])
                 if all(one[0].overlaps(other) for one, other in zip(found, turned, strict=True)):
                     possible.append(motion)
@@ -246,8 +159,12 @@ class Motion:
 
         Raises Undecided where the working precision does not prove the phases.
         """
-        target = [self.origin[0], self.origin[1] - ball(time * self.level.rate)]
-        phases, turns = Inversion(self.gaps, (1, -1)).phases(target)
+        own = self.direction * ball(time * self.level.rate)
+        phases, turns = self.inversion.phases([*self.origin[:-1], self.origin[-1] + own])
+        for k in (0, 1):
+            if isinstance(self.gaps[k], Rest):
+                phases.insert(k, arb(0))
+                turns.insert(k, 0)
         if not all(phase.is_finite() for phase in phases):
             raise Undecided
         with series_length(length):
@@ -258,7 +175,10 @@ class Motion:
         moving = [arb_series([phase], prec=current_length()) for phase in phases]
         for _ in range(current_length() - 1):
             u1, u2 = (gap.position(x) for gap, x in zip(self.gaps, moving, strict=True))
-            rates = [-1 / ((u1 - u2) * gap.density(u)) for gap, u in zip(self.gaps, (u1, u2), strict=True)]
+            rates = [
+                u * 0 if isinstance(gap, Rest) else -1 / ((u1 - u2) * gap.density(u))
+                for gap, u in zip(self.gaps, (u1, u2), strict=True)
+            ]
             moving = [phase + rate.integral() for phase, rate in zip(phases, rates, strict=True)]
         return moving
 
@@ -309,29 +229,38 @@ def _distance(u: Any, root: acb, many: int, middle: arb) -> Any:
 def _variable(curve: Sequence[Root], ends: tuple[int, int]) -> Variable:
     """The gap between two simple roots, or the way from a simple one to a double one and back."""
     low, high = (curve[number].value.real for number in ends)
+    if ends[0] == ends[1]:
+        return Rest(low)
     rest = Roots.of(arb(1) / 4, [(root.value, root.multiplicity) for i, root in enumerate(curve) if i not in ends])
     if curve[ends[0]].multiplicity > 1:
         return Approach(high, low, rest)
     return Approach(low, high, rest) if curve[ends[1]].multiplicity > 1 else Gap(low, high, rest)
 
 
+def _passes(curve: Sequence[Root], ends: tuple[int, int], place: Fraction) -> bool:
+    low, high = (curve[number].value.real for number in ends)
+    return not (low > ball(place) or high < ball(place))
+
+
 @whole_evaluation
 def _require_done(level: Level) -> None:
     """Raises NotInClass on the levels that are not done here, and too near to them."""
-    sextic = level.sextic()
-    multiple = sextic.gcd(sextic.derivative())
-    if multiple.degree() > 0 and level.separated().gcd(multiple).degree() > 0:
-        raise NotInClass("The level is degenerate: a separated variable rests at a double root.", _REMEDY)
+    resting = level.resting()
+    if resting == 0:
+        raise NotInClass("The level is degenerate: both separated variables rest, or one rests at 0.", _REMEDY)
     for bits in _DECISIONS:
         with working_precision(bits):
             try:
                 curve = roots(level)
-                ends = gap_ends(curve, separated_start(level))
+                ends = gap_ends(level, curve, separated_start(level))
             except Undecided:
                 continue
             if any(curve[number].counts == (1, 1) for pair in ends for number in pair):
                 raise NotInClass("The level is degenerate: G = 0, and both separated variables tend to 0.", _REMEDY)
-            apart = min(distance_of_others([root.value for root in curve], pair) for pair in ends)
+            moving = [(low, high) for low, high in ends if low != high]
+            if resting is not None and all(_passes(curve, pair, resting) for pair in moving):
+                raise NotInClass("The level is degenerate: one variable rests, and the other passes it.", _REMEDY)
+            apart = min(distance_of_others([root.value for root in curve], pair) for pair in moving)
         if apart < _DISTANCE:
             raise NotInClass(f"The level is degenerate but for {apart:.2g}, the distance of a root to a gap.", _REMEDY)
         return

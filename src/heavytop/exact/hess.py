@@ -28,46 +28,26 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import acb, arb, arb_mat, arb_series, fmpq_poly
+from flint import acb, arb, arb_mat, arb_series
 
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.abel import Inversion
-from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.azimuth import Azimuth, Bearing
+from heavytop.exact.balls import ball, to_bits, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
-from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
+from heavytop.exact.gaps import Gap, Roots
+from heavytop.exact.hess_level import Level, require_hess
 from heavytop.exact.hess_transfer import System2, Transfer
-from heavytop.exact.motion import kept
+from heavytop.exact.motion import initial_xi, kept
 from heavytop.exact.one_gap import in_units
-from heavytop.exact.reduced import Undecided, polynomial
-from heavytop.exact.scales import exponent, unit_of_time
-from heavytop.precision import shown
+from heavytop.exact.reduced import Undecided
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
 _TRIALS = 256, 1024, 4096
 _MOST_TERMS = 1 << 14
 _REMEDY = "The validated enclosure holds for every motion."
-
-
-def require_hess(top: HeavyTop, start: State) -> None:
-    """Raises NotInClass unless top and start satisfy Hess' conditions exactly."""
-    (i1, i2, i3), (a, b, c) = top.inertia, top.moment
-    if b != 0 or not (a or c):
-        raise NotInClass(
-            f"Hess needs P b = 0 and P r != 0; P r = ({', '.join(map(shown, (a, b, c)))}).", "Rename the axes."
-        )
-    section = i1 * (i2 - i3) * a * a - i3 * (i1 - i2) * c * c
-    if section != 0:
-        raise NotInClass(
-            f"Hess needs I1 (I2 - I3) a^2 = I3 (I1 - I2) c^2; times P^2 it is off by {shown(section)}.",
-            "Choose another centre of mass.",
-        )
-    along = dot(top.angular_momentum(start.omega), top.moment)
-    if along != 0:
-        raise NotInClass(f"Hess needs M·P r = 0, but M·P r = {shown(along)}.", "Choose Omega3 so that it vanishes.")
-    if not any(start.gamma):
-        raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +82,27 @@ class Hess(ClosedForm):
         except Undecided:
             return [arb("nan")] * 6
 
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 :func:`initial_xi` of γ."""
+
+        def evaluate(_working: int) -> list[arb]:
+            try:
+                azimuth, began = _azimuth(self, current_precision())
+                motion = _motion(self, current_precision())
+                here = motion.bearing(azimuth, ball(motion.level.rate * time))
+            except Undecided:
+                return [arb("nan")] * 3
+            return here.carried(began, initial_xi(self.start.gamma))
+
+        return to_bits(evaluate, bits, time)
+
+
+@kept
+def _azimuth(case: Hess, bits: int) -> tuple[Azimuth, Bearing]:
+    motion = _motion(case, bits)
+    azimuth = motion.azimuth()
+    return azimuth, motion.bearing(azimuth, arb(0))
+
 
 @kept
 def _motion(case: Hess, _bits: int) -> HessMotion:
@@ -121,86 +122,6 @@ def _require_reach(level: Level) -> None:
                 raise NotInClass(f"The level is all but degenerate: {error.cause}", _REMEDY) from error
             return
     raise NotInClass("The level is all but degenerate: two roots of the cubic are not told apart.", _REMEDY)
-
-
-@dataclass(frozen=True, slots=True)
-class Level:
-    """The exact data with I2 = 1, Ω and γ in units of ``rate`` and ``size``; moment: n in these units."""
-
-    rate: Fraction
-    size: Fraction
-    inertia: tuple[Fraction, Fraction, Fraction]
-    moment: tuple[Fraction, Fraction, Fraction]
-    omega: tuple[Fraction, Fraction, Fraction]
-    gamma: tuple[Fraction, Fraction, Fraction]
-
-    @classmethod
-    def of(cls, top: HeavyTop, start: State) -> Level:
-        """In units of ordinary size."""
-        rate = Fraction(2) ** unit_of_time(HEAVY_TOP.parameters(top, start), start.flat)
-        size = Fraction(2) ** exponent(max(map(abs, start.gamma)))
-        i1, i2, i3 = top.inertia
-        n1, n2, n3 = (n * size / (i2 * rate**2) for n in top.moment)
-        w1, w2, w3 = (w / rate for w in start.omega)
-        g1, g2, g3 = (g / size for g in start.gamma)
-        return cls(rate, size, (i1 / i2, Fraction(1), i3 / i2), (n1, n2, n3), (w1, w2, w3), (g1, g2, g3))
-
-    @property
-    def angular_momentum(self) -> tuple[Fraction, ...]:
-        """M."""
-        return tuple(i * w for i, w in zip(self.inertia, self.omega, strict=True))
-
-    @property
-    def area(self) -> Fraction:
-        """C0."""
-        found: Fraction = dot(self.angular_momentum, self.gamma)
-        return found
-
-    @property
-    def height(self) -> Fraction:
-        """s."""
-        found: Fraction = dot(self.moment, self.gamma)
-        return found
-
-    @property
-    def energy(self) -> Fraction:
-        """E."""
-        found: Fraction = dot(self.omega, self.angular_momentum) / 2 + self.height
-        return found
-
-    @property
-    def moment_square(self) -> Fraction:
-        """N²."""
-        found: Fraction = dot(self.moment, self.moment)
-        return found
-
-    @property
-    def skew(self) -> Fraction:
-        """β."""
-        return self.moment[0] * self.moment[2] * (1 / self.inertia[0] - 1 / self.inertia[2]) / self.moment_square
-
-    def cubic(self) -> fmpq_poly:
-        """s'² as a polynomial of s."""
-        zero, one, square = Fraction(0), Fraction(1), self.moment_square
-        limit = polynomial(square * dot(self.gamma, self.gamma), zero, -one)
-        return 2 * polynomial(self.energy, -one) * limit - polynomial(self.area**2 * square)
-
-    def gap(self, most: int = MOST_TERMS) -> Gap:
-        """Where s swings, at the working precision; raises OutOfReach, and Undecided where roots are not told apart."""
-        low, high, top = self.roots()
-        if not low < high < top:
-            raise Undecided
-        return Gap(low, high, Roots.of(arb(2), [(acb(top), 1)]), count=1, most=most)
-
-    def roots(self) -> list[arb]:
-        """The three roots of the cubic, in order."""
-        found: Any = self.cubic().complex_roots()
-        return sorted((root.real for root, _ in found), key=midpoint)
-
-    def in_plane(self, vector: tuple[Fraction, ...]) -> tuple[arb, arb]:
-        """The components along e_x and e_y."""
-        a, _, c = self.moment
-        return ball(c * vector[0] - a * vector[2]) / ball(self.moment_square).sqrt(), ball(vector[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,12 +165,29 @@ class HessMotion:
 
         Raises Undecided where the working precision does not prove the phase.
         """
-        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
-        if not phase.is_finite():
-            raise Undecided
+        phase, turns = self._phase(time)
         u, v = (self.matrix.at(phase, turns) * self.spinor).entries()
         scale = arb(2) ** -_exponent(abs(u) + abs(v))
         return self._state(*self._moving(phase, u * scale, v * scale))
+
+    def _phase(self, time: arb) -> tuple[arb, int]:
+        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
+        if not phase.is_finite():
+            raise Undecided
+        return phase, turns
+
+    def azimuth(self) -> Azimuth:
+        """That of n about γ: Λ' = C0 |γ| N²/(N²|γ|² − s²)."""
+        low, high, top = self.level.roots()
+        gamma = ball(dot(self.level.gamma, self.level.gamma)).sqrt()
+        pole = self.size * gamma
+        gap = Gap(low, high, Roots.of(arb(2), [(acb(top), 1), (acb(pole), 2), (acb(-pole), 2)]), count=1)
+        return Azimuth(gap, (self.area * gamma * self.size**2,))
+
+    def bearing(self, azimuth: Azimuth, time: arb) -> Bearing:
+        """n, level, and its azimuth at ``time``."""
+        phase, turns = self._phase(time)
+        return Bearing.of(self.at(time)[3:], [ball(n) for n in self.level.moment], azimuth.at(phase, turns))
 
     def _moving(self, phase: arb, u: arb, v: arb) -> tuple[Any, Any, Any]:
         """(θ, u, v) as power series in t, from their differential equations."""

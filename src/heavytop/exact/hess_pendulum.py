@@ -28,7 +28,7 @@ from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, constant, sign, tanh_sech
 from heavytop.exact.flint_context import current_precision
-from heavytop.exact.hess import require_hess
+from heavytop.exact.hess_level import require_hess
 from heavytop.exact.motion import kept
 from heavytop.exact.pendulum import Swing, swing
 from heavytop.precision import shown

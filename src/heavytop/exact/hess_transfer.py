@@ -146,7 +146,7 @@ class Transfer:
         there = _mirrored(self._inside(-phase)) if phase < 0 else self._inside(phase)
         if turns == 0:
             return there
-        power = self.period ** abs(turns)
+        power = _power(self.period, abs(turns))
         return there * (power if turns > 0 else _adjugate(power))
 
     def inverse(self, phase: arb) -> arb_mat:
@@ -183,6 +183,16 @@ def _doubled(y: tuple[arb_series, ...], b: arb_series, c: arb_series, right: int
     z1, z2 = (y4 * r1 - y2 * r3).integral(), (y4 * r2 - y2 * r4).integral()
     z3, z4 = (y1 * r3 - y3 * r1).integral(), (y1 * r4 - y3 * r2).integral()
     return (y1 + y1 * z1 + y2 * z3, y2 + y1 * z2 + y2 * z4, y3 + y3 * z1 + y4 * z3, y4 + y3 * z2 + y4 * z4)
+
+
+def _power(matrix: arb_mat, exponent: int) -> arb_mat:
+    """matrix^exponent for any exponent > 0: FLINT's own takes 64 bits."""
+    found = matrix
+    for bit in f"{exponent:b}"[1:]:
+        found = found * found
+        if bit == "1":
+            found = found * matrix
+    return found
 
 
 def _adjugate(matrix: arb_mat) -> arb_mat:

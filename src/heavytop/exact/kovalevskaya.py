@@ -12,8 +12,9 @@ Levels where the quintic has a multiple root, found exactly (Appelrot, Trudy otd
     k = 0                            Delone's class, elliptic: :mod:`heavytop.exact.delone`
     double root outside both gaps    as any other level, at any distance from it
     double root at an end of a gap   asymptotic motions (:mod:`heavytop.exact.asymptotic`)
+    a variable at rest on it         Appelrot's especially remarkable motions (:mod:`heavytop.exact.resting`);
+                                     refused if the other variable passes it
     common end of both gaps          both variables tend to it: refused
-    a variable at rest on it         Appelrot's especially remarkable motions: refused
     double root of the cubic         refused
 
 Source: S. Kovalevskaya, Acta Math. 12 (1889) 177; recovery of Ω and γ without Kötter's formulas.
@@ -32,7 +33,8 @@ from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.balls import to_bits, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
-from heavytop.exact.kovalevskaya_abel import AbelMotion, Interval, intervals, pole
+from heavytop.exact.kovalevskaya_abel import AbelMotion
+from heavytop.exact.kovalevskaya_gaps import Interval, intervals, ordered, pole
 from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
 from heavytop.exact.motion import kept
@@ -86,6 +88,24 @@ class Kovalevskaya(ClosedForm):
         except Undecided:
             return [arb("nan")] * 6
 
+    def exponent(self, bits: int) -> arb:
+        """The rate λ of an asymptotic motion, > 0: its distance from the motion that it tends to goes like e^(−λ|t|).
+
+        Raises NotInClass for any other motion.
+        """
+
+        def evaluate(working: int) -> list[arb]:
+            try:
+                motion = _motion(self, working)
+            except Undecided:
+                return [arb("nan")]
+            found = motion.exponents() if isinstance(motion, AbelMotion) else []
+            if not found:
+                raise NotInClass("The motion is not asymptotic.", "Only asymptotic ones have an exponent.")
+            return found
+
+        return to_bits(evaluate, bits)[0]
+
     def second_state(self, time: Fraction, bits: int) -> list[arb]:
         """The state at ``time`` by theta functions, to hold against :meth:`state`, which mostly inverts integrals.
 
@@ -136,8 +156,6 @@ def _require_done(level: Level) -> None:
     name = "The level is degenerate"
     if double * double == level.fourth:
         name = f"{name}: l^2 = 2 |gamma|^2 (h + e) with e = {shown(double)}, e^2 = k^2"
-        if level.separated(double) == 0:
-            raise NotInClass(f"{name}, and one separated variable rests at e.", _REMEDY)
     for bits in _DECISIONS:
         with working_precision(bits):
             try:
@@ -152,9 +170,14 @@ def _require_done(level: Level) -> None:
 
 def _require_apart(curve: Sequence[Root], ends: Sequence[Interval], name: str) -> None:
     """Raises NotInClass where neither of the two forms evaluates the motion."""
-    limits = [number for interval in ends for number in interval if number and curve[number - 1].multiplicity > 1]
-    if len(limits) > 1:
+    limits = [number for pair in ends if pair[0] != pair[1] for number in pair]
+    if sum(curve[number - 1].multiplicity > 1 for number in limits if number) > 1:
         raise NotInClass(f"{name}, and both separated variables tend to e.", _REMEDY)
+    order = [0, *(number + 1 for number in ordered(curve))]
+    for low, high in ends:
+        resting = [one for one, other in ends if one == other and low != high]
+        if resting and order.index(high) < order.index(resting[0]) < order.index(low):
+            raise NotInClass(f"{name}, one separated variable rests at e, and the other passes it.", _REMEDY)
     nearest = separation([root.value for root in curve])
     if nearest < SEPARATION and pole(curve, ends)[1] < _DISTANCE:
         raise NotInClass(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", _REMEDY)

@@ -29,79 +29,25 @@ Source: the squares are Kovalevskaya's and Kötter's; derived here, and checked 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import Any
 
 from flint import acb, acb_series, arb, arb_series
 
 from heavytop.exact.abel import Inversion, Variable
 from heavytop.exact.asymptotic import Approach
-from heavytop.exact.balls import ball, midpoint
+from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.flint_context import coefficient, current_length
-from heavytop.exact.gaps import Gap, Roots, distance_of_others
+from heavytop.exact.gaps import Gap, Roots
+from heavytop.exact.kovalevskaya_gaps import Interval, intervals, pole
 from heavytop.exact.kovalevskaya_level import ORDERS, Level, Root, Start, linear, real_part, roots, start_of
 from heavytop.exact.reduced import Undecided
+from heavytop.exact.resting import Beside, Rest
 
 _UNITS = (acb(1), acb(0, 1), acb(-1), acb(0, -1))
-_SHARES = (0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98)
-_BEYOND = (0.05, 0.3, 1.0, 3.0, 10.0)
-Interval = tuple[int, int]
-"""Numbers of the branch points at the lower and upper end in v; 0 is v = 0, j is root number j − 1."""
-
-
-def intervals(level: Level, curve: Sequence[Root], start: Start) -> tuple[Interval, Interval]:
-    """Where w1 and w2 move: pairs of numbers of branch points, (lower, upper) in v and so (upper, lower) in w.
-
-    Raises Undecided where the balls do not tell.
-    """
-    real = ordered(curve)
-    allowed, inside = [(real[0] + 1, 0)], True
-    for low, high in pairwise(real):
-        inside ^= curve[low].multiplicity % 2 == 1
-        if inside:
-            allowed.append((high + 1, low + 1))
-
-    def possible(variable: int, interval: Interval) -> bool:
-        upper, lower = interval
-        below = lower > 0 and start.above(variable, curve[lower - 1].value.real) < 0
-        return not below and not start.above(variable, curve[upper - 1].value.real) > 0
-
-    found = [[interval for interval in allowed if possible(k, interval)] for k in (0, 1)]
-    if any(len(choice) != 1 for choice in found):
-        raise Undecided
-    return found[0][0], found[1][0]
-
-
-def ordered(curve: Sequence[Root]) -> list[int]:
-    """The numbers of the real roots, rising; raises Undecided where two balls meet."""
-    real = [i for i, root in enumerate(curve) if root.value.imag.is_zero()]
-    real.sort(key=lambda i: midpoint(curve[i].value.real))
-    if any(curve[i].value.overlaps(curve[j].value) for i, j in pairwise(real)):
-        raise Undecided
-    return real
-
-
-def pole(curve: Sequence[Root], occupied: Sequence[Interval]) -> tuple[arb, float]:
-    """μ, outside both gaps, where the branch points in v come to lie as far from the gaps as possible; and how far."""
-    real = ordered(curve)
-    taken = {(upper - 1, lower - 1) for upper, lower in occupied}
-    lowest, highest = (curve[i].value.real.mid() for i in (real[0], real[-1]))
-    candidates = [highest + share * (highest - lowest) for share in _BEYOND]
-    for low, high in pairwise(real):
-        if (high, low) not in taken:
-            start, width = curve[low].value.real.mid(), (curve[high].value.real - curve[low].value.real).mid()
-            candidates += [start + share * width for share in _SHARES]
-
-    def distance(mu: arb) -> float:
-        points = [acb(0), *(1 / (root.value - mu) for root in curve)]
-        return min(distance_of_others(points, interval) for interval in occupied)
-
-    distances = [distance(mu.mid()) for mu in candidates]
-    best = max(range(len(candidates)), key=distances.__getitem__)
-    return candidates[best].mid(), distances[best]
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +62,9 @@ class AbelMotion:
     start: Start
     branch: tuple[acb, ...]
     ends: tuple[Interval, Interval]
+    variables: tuple[Variable, ...]
     inversion: Inversion
-    origin: tuple[arb, arb]
+    origin: tuple[arb, ...]
     cubic: tuple[int, ...]
     rows: tuple[tuple[acb, ...], tuple[acb, ...]]
 
@@ -136,10 +83,14 @@ class AbelMotion:
             lead *= abs(mu - root.value) ** root.multiplicity
         gaps = tuple(_variable(branch, curve, interval, lead, most) for interval in ends)
         phases = start_phases(start, mu, gaps)
-        inversion = Inversion(gaps, (1, 1))
-        first, second = inversion.values(phases)
+        inversion, moving = Inversion(gaps, (1, 1)), phases
+        for k in (0, 1):
+            if isinstance(gaps[k], Rest):
+                inversion = Inversion((Beside(gaps[1 - k], gaps[k].middle),), (1,))
+                moving = [phases[1 - k]]
+        origin = tuple(inversion.values(moving))
         cubic = tuple(i for i, root in enumerate(curve, 1) if root.cubic)
-        plain = cls(level, start, branch, ends, inversion, (first, second), cubic, ((), ()))
+        plain = cls(level, start, branch, ends, gaps, inversion, origin, cubic, ((), ()))
         return plain._with_factors(curve, mu, phases)
 
     def at(self, time: Fraction, length: int) -> list[Any]:
@@ -147,27 +98,47 @@ class AbelMotion:
 
         Raises Undecided where the working precision does not prove the phases.
         """
-        own = ball(time * self.level.rate)
-        phases, turns = self.inversion.phases([self.origin[0] - own, self.origin[1]])
+        phases, turns = self._phases(ball(time * self.level.rate))
         if not all(phase.is_finite() for phase in phases):
             raise Undecided
         with series_length(length + 1):
             velocity = self._velocity(self._moving(phases), turns)
         return self.level.restored(self.start.state(velocity, length), length)
 
+    def exponents(self) -> list[arb]:
+        """The mean rate of X of a variable that tends to a double root, in a list of its own; else nothing."""
+        open_ones = [k for k, variable in enumerate(self.variables) if isinstance(variable, Approach)]
+        return [abs(self.inversion.mean_rates([arb(-1), arb(0)])[k]) * ball(self.level.rate) for k in open_ones]
+
+    def _phases(self, time: arb) -> tuple[list[arb], list[int]]:
+        """The phases in the first turns, and whole turns."""
+        for k in (0, 1):
+            if isinstance(self.variables[k], Rest):
+                (phase,), (turns,) = self.inversion.phases([self.origin[0] + self.variables[k].middle * time])
+                return ([arb(0), phase], [0, turns]) if k == 0 else ([phase, arb(0)], [turns, 0])
+        return self.inversion.phases([self.origin[0] - time, self.origin[1]])
+
+    def _speeds(self, v1: Any, v2: Any) -> tuple[Any, Any]:
+        """θ1'/v2 and −θ2'/v1."""
+        first, second = (
+            v * 0 if isinstance(g, Rest) else 1 / ((v1 - v2) * g.density(v))
+            for g, v in zip(self.variables, (v1, v2), strict=True)
+        )
+        return first, second
+
     def _moving(self, phases: Sequence[arb]) -> list[Any]:
         """The phases as power series in t, from their differential equations."""
         moving = [arb_series([phase], prec=current_length()) for phase in phases]
         for _ in range(current_length() - 1):
-            v1, v2 = (g.position(x) for g, x in zip(self.inversion.variables, moving, strict=True))
-            first, second = (g.density(v) for g, v in zip(self.inversion.variables, (v1, v2), strict=True))
-            rates = v2 / ((v1 - v2) * first), -v1 / ((v1 - v2) * second)
+            v1, v2 = (g.position(x) for g, x in zip(self.variables, moving, strict=True))
+            first, second = self._speeds(v1, v2)
+            rates = v2 * first, -v1 * second
             moving = [phase + rate.integral() for phase, rate in zip(phases, rates, strict=True)]
         return moving
 
     def _halves(self, variable: int, phase: Any, turns: int) -> list[Any]:
         """h_kb at every branch point."""
-        gap, ends = self.inversion.variables[variable], self.ends[variable]
+        gap, ends = self.variables[variable], self.ends[variable]
         low, high = gap.ends(phase)
         side = -1 if turns % 2 else 1
         v, found = gap.position(phase), []
@@ -199,9 +170,8 @@ class AbelMotion:
 
     def _spin(self, phases: Sequence[Any], first: Sequence[Any], second: Sequence[Any]) -> Any:
         """(N'D − ND')/(h_10 h_20)."""
-        variables = self.inversion.variables
-        v1, v2 = (g.position(x) for g, x in zip(variables, phases, strict=True))
-        speeds = [1 / ((v1 - v2) * g.density(v)) for g, v in zip(variables, (v1, v2), strict=True)]
+        v1, v2 = (g.position(x) for g, x in zip(self.variables, phases, strict=True))
+        speeds = self._speeds(v1, v2)
         # v2/h_20 = s h_20, and what is left of θ1' but for 1/h_10
         rates = (
             acb_series(speeds[0]) * second[0] * self._side(1, 0),
@@ -211,16 +181,16 @@ class AbelMotion:
         for a, b in combinations(range(3), 2):
             i, j = self.cubic[a], self.cubic[b]
             weight = self.rows[0][a] * self.rows[1][b] - self.rows[0][b] * self.rows[1][a]
-            one = rates[0] * self._turn(0, phases[0], first, i, j) * second[i] * second[j]
-            two = rates[1] * self._turn(1, phases[1], second, i, j) * first[i] * first[j]
-            total += (one + two) * weight
+            for k, own, other in ((0, first, second), (1, second, first)):
+                if not isinstance(self.variables[k], Rest):
+                    total += rates[k] * self._turn(k, phases[k], own, i, j) * other[i] * other[j] * weight
         return total
 
     def _turn(self, variable: int, phase: Any, halves: Sequence[Any], i: int, j: int) -> Any:
         """(h_i' h_j − h_i h_j')/h_0, by θ: ½ s_i s_j (v_i − v_j) dv/dθ/(h_0 h_i h_j), in which the ends cancel."""
         low, high = self.ends[variable]
         signs = self._side(variable, i) * self._side(variable, j)
-        value = acb_series(self.inversion.variables[variable].bend(phase))
+        value = acb_series(self.variables[variable].bend(phase))
         below = {0, i, j}
         for number in (low, high):
             if number not in below:
@@ -244,11 +214,11 @@ class AbelMotion:
                 form = (acb_series(p * p + q * q) - e) * a + acb_series(2 * p) * b
                 left = form * ends * acb(0, -0.5)
                 right = acb_series(q) * halves[0][i] * halves[1][i] * (mu - e)
-                kappas.append(_fourth_root(left, right) * (mu - e))
+                # P_j = 0 for ever at a root where a variable rests
+                rests = (i, i) in self.ends
+                kappas.append((mu - e) if rests else _fourth_root(left, right) * (mu - e))
         first, second = (tuple(inverse[row, j] * kappas[j] for j in range(3)) for row in (1, 2))
-        return AbelMotion(
-            self.level, start, self.branch, self.ends, self.inversion, self.origin, self.cubic, (first, second)
-        )
+        return replace(self, rows=(first, second))
 
 
 def _fourth_root(left: Any, right: Any) -> acb:
@@ -280,6 +250,8 @@ def start_phases(start: Start, mu: arb, variables: Sequence[Variable]) -> list[a
 def _variable(branch: Sequence[acb], curve: Sequence[Root], interval: Interval, lead: arb, most: int) -> Variable:
     """The gap between two simple branch points, or the way from a simple one to a double one and back."""
     low, high = (branch[number].real for number in interval)
+    if interval[0] == interval[1]:
+        return Rest(low)
     if not low < high:
         raise Undecided
     many = [1, *(root.multiplicity for root in curve)]

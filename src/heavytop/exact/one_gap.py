@@ -28,6 +28,7 @@ from flint import acb, arb, arb_series, fmpq, fmpq_poly
 
 from heavytop.errors import NotInClass
 from heavytop.exact.abel import Inversion
+from heavytop.exact.azimuth import Azimuth, Bearing
 from heavytop.exact.balls import ball, midpoint, working_precision
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
@@ -77,6 +78,23 @@ class Curve:
             raise NotInClass("Omega2^2 Omega3^2 has a multiple root.", "Choose other moments of inertia.")
         return cls(inertia, power, second, third, Fraction(int(speed.p), int(speed.q)), (s, t, u))
 
+    def turning(self) -> tuple[fmpq_poly, fmpq_poly]:
+        """(numerator, denominator) of f/|Nγ| in lowest terms, f = |γ| n·M_h/|M_h|².
+
+        f is the rate at which M_h, the level part of M, turns about γ:
+        M' = γ × n in space.  Where w is not 1, M·γ = 0, and M/w turns as M does.
+        """
+        a, b, c = (_rational(moment) for moment in self.inertia)
+        s, t, u = self.heights
+        place, factor = _X**self.power, _X ** (self.power // 2)
+        square = _rational(self.gamma_square())
+        area = a * place * s + factor * (b * self.second * t + c * self.third * u)
+        numerator = a * place - area * s / square
+        denominator = a * a * place * place + factor * factor * (b * b * self.second + c * c * self.third)
+        denominator -= area * area / square
+        shared = numerator.gcd(denominator)
+        return divmod(numerator, shared)[0], divmod(denominator, shared)[0]
+
     def squares(self, x: Fraction) -> tuple[Fraction, Fraction]:
         """Q and R at x."""
         return value(self.second, x), value(self.third, x)
@@ -109,14 +127,15 @@ class _End:
 class OneGapMotion:
     """A motion on a curve at one working precision.
 
-    rests: what is left of Q and of R without the ends of the gap.  ends: which of both vanishes at the lower end, at
-    the upper end.  origin: Abel's integral at t = 0.  signs: of √Q and √R with their half angles.
+    rests: what is left of Q and of R without the ends of the gap.  stops: the lower end and the upper end.  others: the
+    other roots of QR.  origin: Abel's integral at t = 0.  signs: of √Q and √R with their half angles.
     """
 
     curve: Curve
     gap: Gap
     rests: tuple[Roots, Roots]
-    ends: tuple[int, int]
+    stops: tuple[_End, _End]
+    others: tuple[_End, ...]
     origin: arb
     signs: tuple[int, int]
 
@@ -138,13 +157,13 @@ class OneGapMotion:
         phase = gap.phase(ball(x), slope)
         # x' = K √Q √R and dx/dθ < 0 for 0 < θ < π: one sign gives the other
         both = -1 if curve.speed > 0 else 1
-        motion = cls(curve, gap, rests, (low.of, high.of), gap.integrals(phase)[0], (1, both))
+        motion = cls(curve, gap, rests, (low, high), tuple(others), gap.integrals(phase)[0], (1, both))
         there = motion._square_roots(phase, 0)
         which = next((k for k in (0, 1) if signs[k] and not there[k].contains(0)), None)
         if which is None:
             raise Undecided
         if (there[which] > 0) != (signs[which] > 0):
-            motion = cls(curve, gap, rests, motion.ends, motion.origin, (-1, -both))
+            motion = cls(curve, gap, rests, motion.stops, motion.others, motion.origin, (-1, -both))
         return motion
 
     def at(self, time: arb) -> list[Any]:
@@ -152,10 +171,34 @@ class OneGapMotion:
 
         Raises Undecided where the working precision does not prove the phase.
         """
+        phase, turns = self._phase(time)
+        return self._state(self._moving(phase), turns)
+
+    def _phase(self, time: arb) -> tuple[arb, int]:
         (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
         if not phase.is_finite():
             raise Undecided
-        return self._state(self._moving(phase), turns)
+        return phase, turns
+
+    def azimuth(self) -> Azimuth:
+        """That of the level part of M about γ; see :meth:`Curve.turning`."""
+        numerator, denominator = self.curve.turning()
+        found: Any = denominator.complex_roots()
+        doubled = [(acb(root), 2 * many) for root, many in found]
+        lead = ball(self.curve.speed) ** 2 * abs(_lead(self.curve.second) * _lead(self.curve.third))
+        roots = Roots.of(lead * _lead(denominator) ** 2, [(root.place, 1) for root in self.others] + doubled)
+        low, high = (end.place.real for end in self.stops)
+        weights = [ball(self.curve.gamma_square()).sqrt() * arb(c) for c in numerator.coeffs()]
+        return Azimuth(Gap(low, high, roots, count=len(weights)), tuple(weights))
+
+    def bearing(self, azimuth: Azimuth, time: arb) -> Bearing:
+        """M/w, level, and its azimuth at ``time``."""
+        phase, turns = self._phase(time)
+        x, (q, r) = self.gap.position(phase), self._square_roots(phase, turns)
+        s, t, u = (horner(height, x) for height in self.curve.heights)
+        a, b, c = map(ball, self.curve.inertia)
+        vector = [a * x ** (self.curve.power - self.curve.power // 2), b * q, c * r]
+        return Bearing.of([s, q * t, r * u], vector, azimuth.at(phase, turns))
 
     def _moving(self, phase: arb) -> Any:
         """The phase as a power series in t, from its differential equation."""
@@ -170,8 +213,8 @@ class OneGapMotion:
         """√Q and √R."""
         x, halves = self.gap.position(phase), self.gap.ends(phase)
         found = [sign / rest.density(x) for sign, rest in zip(self.signs, self.rests, strict=True)]
-        for which, half in zip(self.ends, halves, strict=True):
-            found[which] *= -half if turns % 2 else half
+        for stop, half in zip(self.stops, halves, strict=True):
+            found[stop.of] *= -half if turns % 2 else half
         return found[0], found[1]
 
     def _state(self, phase: Any, turns: int) -> list[Any]:

@@ -21,10 +21,11 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass, OutOfReach
-from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.azimuth import Azimuth, Bearing
+from heavytop.exact.balls import ball, to_bits, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_precision, whole_evaluation
-from heavytop.exact.motion import kept
+from heavytop.exact.motion import initial_xi, kept
 from heavytop.exact.one_gap import Curve, OneGapMotion, in_units, value
 from heavytop.exact.reduced import Undecided, polynomial
 from heavytop.exact.scales import unit_of_time
@@ -77,6 +78,27 @@ class Steklov(ClosedForm):
             return in_units(motion.at(ball(rate * time)), rate, 1 / torque)
         except Undecided:
             return [arb("nan")] * 6
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 :func:`initial_xi` of γ."""
+        rate, _ = _units(self.top, self.start)
+
+        def evaluate(_working: int) -> list[arb]:
+            try:
+                azimuth, began = _azimuth(self, current_precision())
+                here = _motion(self, current_precision()).bearing(azimuth, ball(rate * time))
+            except Undecided:
+                return [arb("nan")] * 3
+            return here.carried(began, initial_xi(self.start.gamma))
+
+        return to_bits(evaluate, bits, time)
+
+
+@kept
+def _azimuth(case: Steklov, bits: int) -> tuple[Azimuth, Bearing]:
+    motion = _motion(case, bits)
+    azimuth = motion.azimuth()
+    return azimuth, motion.bearing(azimuth, arb(0))
 
 
 @kept

@@ -283,7 +283,7 @@ class Validated:
                 loss = precision - reached + 16
             else:
                 loss = 1.25 * precision * float(min(span / run.lost_at, _FAR)) if run.lost_at else 2.0 * precision
-        raise self._refusal(time, bits, 0)
+        raise self._refusal(time, 0)
 
     def _forecast(self, direction: int, span: Fraction, start: tuple[Fraction, ...]) -> tuple[float, float]:
         """(bits that will be lost, steps that will be taken) up to ``span``."""
@@ -299,12 +299,17 @@ class Validated:
         affordable = precision
         while affordable > 0 and steps * _seconds_a_step(affordable) > self.effort:
             affordable = affordable * 15 // 16
-        raise self._refusal(time, bits, max(0, affordable - loss))
+        raise self._refusal(time, max(0, affordable - loss))
 
-    def _refusal(self, time: Fraction, bits: int, reachable: float) -> OutOfReach:
+    def _refusal(self, time: Fraction, reachable: float) -> OutOfReach:
+        at, digits = decimal_text(time, 6), int(reachable * log10(2))
+        if digits < 1:
+            return OutOfReach(
+                f"No digit at t = {at} is within reach of a validated integration.", "Ask for an earlier time."
+            )
         return OutOfReach(
-            f"So many digits at t = {decimal_text(time, 6)} are out of reach of a validated integration.",
-            f"About {int(reachable * log10(2))} digits could be proven there: ask for fewer, or for an earlier time.",
+            f"So many digits at t = {at} are out of reach of a validated integration.",
+            f"About {digits} digits could be proven there: ask for fewer, or for an earlier time.",
         )
 
 

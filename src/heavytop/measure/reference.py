@@ -11,6 +11,7 @@ import msgspec
 
 from heavytop.display import Table
 from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.exact.attitude import attitude_of
 from heavytop.exact.balls import radius_text, value_text
 from heavytop.exact.catalogue import find
 from heavytop.exact.scales import require_handy
@@ -29,6 +30,7 @@ _SHOWN = 15
 """Digits of a value in a table; all of them are in :meth:`Reference.texts`."""
 
 Finder = Callable[[HeavyTop, State, System], ExactSolution]
+Evaluate = Callable[[Fraction, int], Sequence[Any]]
 
 
 class Ball(msgspec.Struct, frozen=True):
@@ -38,10 +40,12 @@ class Ball(msgspec.Struct, frozen=True):
     radius: str
 
 
-class Reference(msgspec.Struct, frozen=True):
+class Reference(msgspec.Struct, frozen=True, omit_defaults=True):
     """Proven states; its JSON is that of ``heavytop reference``.
 
     times: exact, as decimals or fractions.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
+    attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
+    :func:`heavytop.top.angles.perpendicular` of γ; attitude_method: how it is known.
     """
 
     method: str
@@ -49,6 +53,8 @@ class Reference(msgspec.Struct, frozen=True):
     times: list[str]
     states: list[list[Ball]]
     system: str
+    attitude: list[list[Ball]] | None = None
+    attitude_method: str | None = None
 
     def texts(self) -> list[list[str]]:
         """The values as decimal text, shape (n, 6)."""
@@ -94,10 +100,11 @@ def reference(
     digits: int,
     system: System = HEAVY_TOP,
     finder: Finder = find,
+    attitude: bool = False,
 ) -> Reference:
     """The states at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1 and absolute below.
 
-    times: exact numbers in any order.  digits: 1 to 20,000.
+    times: exact numbers in any order.  digits: 1 to 20,000.  attitude: give ξ too.
     Raises InputError for other digits, for a time that is not a finite rational, and where the system does not admit
     the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
@@ -106,28 +113,31 @@ def reference(
     instants = [exact(time) for time in times]
     require_handy(top, start, instants)
     solution = finder(top, start, system)
+    method, xi = attitude_of(solution) if attitude else (None, None)
     return Reference(
         method=solution.method,
         digits=digits,
         times=[exact_text(time) for time in instants],
-        states=[ball_texts(solution, time, digits) for time in instants],
+        states=[ball_texts(solution.state, solution.method, time, digits) for time in instants],
         system=system.name,
+        attitude=None if xi is None else [ball_texts(xi, str(method), time, digits) for time in instants],
+        attitude_method=method,
     )
 
 
-def ball_texts(solution: ExactSolution, time: Fraction, digits: int) -> list[Ball]:
-    """The six balls at ``time`` as text.
+def ball_texts(evaluate: Evaluate, method: str, time: Fraction, digits: int) -> list[Ball]:
+    """The balls of ``evaluate(time, bits)`` as text.
 
     One significant digit more than ``digits`` is printed: rounded to ``digits`` of them, a value such as 1.04 may be
     wrong by five units of the digit that was promised.  Raises OutOfReach where a printed radius exceeds 10^-digits,
     relative to a value above 1.
     """
-    found = [Ball(*value_text(value, digits + 1)) for value in solution.state(time, bits_of(digits))]
+    found = [Ball(*value_text(value, digits + 1)) for value in evaluate(time, bits_of(digits))]
     for component, ball in enumerate(found, 1):
         if exact(ball.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(ball.value))):
             raise OutOfReach(
                 f"Component {component} at t = {shown(time)} is known within {ball.radius} only, not to {digits} "
-                f"digits, by {solution.method}.",
+                f"digits, by {method}.",
                 "Ask for fewer digits.",
             )
     return found

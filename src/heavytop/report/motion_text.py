@@ -44,10 +44,13 @@ def motion_text(motion: Motion) -> RenderableType:
 def reference_text(found: Reference) -> RenderableType:
     """Proven states with the radius of each component."""
     parts: list[RenderableType] = [Text(f"{found.system}, {found.digits} digits; {found.method}")]
-    for time, state in zip(found.times, found.states, strict=True):
+    if found.attitude_method not in (None, found.method):
+        parts.append(Text(f"attitude: {found.attitude_method}"))
+    for index, (time, state) in enumerate(zip(found.times, found.states, strict=True)):
         table = Table(box=None, show_header=False)
         table.add_row("t", Text(time))
-        for name, ball in zip(("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3"), state, strict=True):
+        xi = found.attitude[index] if found.attitude else []
+        for name, ball in zip(("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3", "ξ1", "ξ2", "ξ3"), [*state, *xi], strict=False):
             table.add_row(name, Text(f"{ball.value} ± {ball.radius}", overflow="fold"))
         parts += [Text(), table]
     return Group(*parts)

@@ -105,6 +105,10 @@ def cases() -> Iterator[Case]:
     yield Case("kovalevskaya", HeavyTop((2, 2, 1), 1, (0, 1, 0)), State(("1/10", "1/5", "9/10"), tilted))
     goryachev = HeavyTop((4, 4, 1), 1, (1, 0, 0))
     yield Case("goryachev-chaplygin", goryachev, State(("1/2", "1/4", "-3/4"), (0, "3/5", "4/5")))
+    hess = HeavyTop((8, 6, 3), 1, (1, 0, 2))
+    yield Case("hess", hess, State(("3/4", "1/2", -1), (0, 1, 0)))
+    yield Case("hess, M·gamma = 0", hess, State(("3/4", 0, -1), (0, 1, 0)))
+    yield Case("steklov", HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)), State((0, 4, 2), (-1, 0, 0)))
     yield Case("paper data, I1/I3 = 6", HeavyTop((6, 6, 1), 1, (0, 15, 0)), State((0, 0, 6), upright))
 
 
@@ -114,7 +118,11 @@ def motion(case: Case, digits: int) -> Motion:
     times = _TIMES_IN_REACH if isinstance(solution, Validated) else _TIMES
     enclosure = enclosure_of(solution, effort=_EFFORT)
     entries = [
-        Entry(str(time), ball_texts(solution, time, digits), certify(solution, time, digits, enclosure=enclosure))
+        Entry(
+            str(time),
+            ball_texts(solution.state, solution.method, time, digits),
+            certify(solution, time, digits, enclosure=enclosure),
+        )
         for time in times
     ]
     p = case.system.parameters(case.top, case.start)

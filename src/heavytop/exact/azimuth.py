@@ -1,0 +1,56 @@
+"""Attitude beside a variable that swings in one gap: the azimuth of a vector about the vertical is one more integral.
+
+Let h be the level part of a vector that the motion knows, and Λ its azimuth in space about γ.  Where Λ' = f(v) with a
+rational f of the variable v, Λ is an Abel integral over its phase: a polynomial over √g times the denominator of f,
+which counts as roots of multiplicity two (:mod:`heavytop.exact.gaps`).  It grows by a fixed angle with every turn.
+A vector ξ ⟂ γ fixed in space then stands at the angle δ − Λ from h, δ its angle at t = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flint import arb
+
+from heavytop.exact.gaps import Gap
+from heavytop.top.heavy_top import cross, dot
+
+
+@dataclass(frozen=True, slots=True)
+class Azimuth:
+    """Λ = Σ weights_j F_j of a gap whose roots hold the denominator of Λ'."""
+
+    gap: Gap
+    weights: tuple[arb, ...]
+
+    def at(self, phase: arb, turns: int) -> arb:
+        """Λ at the phase, after so many whole turns."""
+        parts = zip(self.weights, self.gap.integrals(phase), self.gap.column, strict=True)
+        return sum((weight * (value + turns * period) for weight, value, period in parts), arb(0))
+
+
+@dataclass(frozen=True, slots=True)
+class Bearing:
+    """h and γ × h, unit vectors in body components, and Λ at one time."""
+
+    along: tuple[arb, ...]
+    across: tuple[arb, ...]
+    azimuth: arb
+
+    @classmethod
+    def of(cls, gamma: Sequence[arb], vector: Sequence[arb], azimuth: arb) -> Bearing:
+        """From γ of any length and a vector whose level part is not 0."""
+        square = dot(gamma, gamma)
+        share = dot(vector, gamma) / square
+        level = [v - share * g for v, g in zip(vector, gamma, strict=True)]
+        length = dot(level, level).sqrt()
+        along = [v / length for v in level]
+        return cls(tuple(along), cross([g / square.sqrt() for g in gamma], along), azimuth)
+
+    def carried(self, began: Bearing, xi: Sequence[arb]) -> list[arb]:
+        """The body components here of a level vector fixed in space that has the components ``xi`` at ``began``."""
+        cosine, sine = dot(xi, began.along), dot(xi, began.across)
+        turned_sine, turned_cosine = (self.azimuth - began.azimuth).sin_cos()
+        first, second = cosine * turned_cosine + sine * turned_sine, sine * turned_cosine - cosine * turned_sine
+        return [first * a + second * b for a, b in zip(self.along, self.across, strict=True)]

@@ -1,0 +1,121 @@
+"""The exact data of a motion of Hess' top: the conditions of the class, and the cubic of the height.
+
+Notation and formulas: :mod:`heavytop.exact.hess`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from flint import acb, arb, fmpq_poly
+
+from heavytop.errors import NotInClass
+from heavytop.exact.balls import ball, midpoint
+from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
+from heavytop.exact.reduced import Undecided, polynomial
+from heavytop.exact.scales import exponent, unit_of_time
+from heavytop.precision import shown
+from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State, dot
+
+
+def require_hess(top: HeavyTop, start: State) -> None:
+    """Raises NotInClass unless top and start satisfy Hess' conditions exactly."""
+    (i1, i2, i3), (a, b, c) = top.inertia, top.moment
+    if b != 0 or not (a or c):
+        raise NotInClass(
+            f"Hess needs P b = 0 and P r != 0; P r = ({', '.join(map(shown, (a, b, c)))}).", "Rename the axes."
+        )
+    section = i1 * (i2 - i3) * a * a - i3 * (i1 - i2) * c * c
+    if section != 0:
+        raise NotInClass(
+            f"Hess needs I1 (I2 - I3) a^2 = I3 (I1 - I2) c^2; times P^2 it is off by {shown(section)}.",
+            "Choose another centre of mass.",
+        )
+    along = dot(top.angular_momentum(start.omega), top.moment)
+    if along != 0:
+        raise NotInClass(f"Hess needs M·P r = 0, but M·P r = {shown(along)}.", "Choose Omega3 so that it vanishes.")
+    if not any(start.gamma):
+        raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """The exact data with I2 = 1, Ω and γ in units of ``rate`` and ``size``; moment: n in these units."""
+
+    rate: Fraction
+    size: Fraction
+    inertia: tuple[Fraction, Fraction, Fraction]
+    moment: tuple[Fraction, Fraction, Fraction]
+    omega: tuple[Fraction, Fraction, Fraction]
+    gamma: tuple[Fraction, Fraction, Fraction]
+
+    @classmethod
+    def of(cls, top: HeavyTop, start: State) -> Level:
+        """In units of ordinary size."""
+        rate = Fraction(2) ** unit_of_time(HEAVY_TOP.parameters(top, start), start.flat)
+        size = Fraction(2) ** exponent(max(map(abs, start.gamma)))
+        i1, i2, i3 = top.inertia
+        n1, n2, n3 = (n * size / (i2 * rate**2) for n in top.moment)
+        w1, w2, w3 = (w / rate for w in start.omega)
+        g1, g2, g3 = (g / size for g in start.gamma)
+        return cls(rate, size, (i1 / i2, Fraction(1), i3 / i2), (n1, n2, n3), (w1, w2, w3), (g1, g2, g3))
+
+    @property
+    def angular_momentum(self) -> tuple[Fraction, ...]:
+        """M."""
+        return tuple(i * w for i, w in zip(self.inertia, self.omega, strict=True))
+
+    @property
+    def area(self) -> Fraction:
+        """C0."""
+        found: Fraction = dot(self.angular_momentum, self.gamma)
+        return found
+
+    @property
+    def height(self) -> Fraction:
+        """s."""
+        found: Fraction = dot(self.moment, self.gamma)
+        return found
+
+    @property
+    def energy(self) -> Fraction:
+        """E."""
+        found: Fraction = dot(self.omega, self.angular_momentum) / 2 + self.height
+        return found
+
+    @property
+    def moment_square(self) -> Fraction:
+        """N²."""
+        found: Fraction = dot(self.moment, self.moment)
+        return found
+
+    @property
+    def skew(self) -> Fraction:
+        """β."""
+        return self.moment[0] * self.moment[2] * (1 / self.inertia[0] - 1 / self.inertia[2]) / self.moment_square
+
+    def cubic(self) -> fmpq_poly:
+        """s'² as a polynomial of s."""
+        zero, one, square = Fraction(0), Fraction(1), self.moment_square
+        limit = polynomial(square * dot(self.gamma, self.gamma), zero, -one)
+        return 2 * polynomial(self.energy, -one) * limit - polynomial(self.area**2 * square)
+
+    def gap(self, most: int = MOST_TERMS) -> Gap:
+        """Where s swings, at the working precision; raises OutOfReach, and Undecided where roots are not told apart."""
+        low, high, top = self.roots()
+        if not low < high < top:
+            raise Undecided
+        return Gap(low, high, Roots.of(arb(2), [(acb(top), 1)]), count=1, most=most)
+
+    def roots(self) -> list[arb]:
+        """The three roots of the cubic, in order."""
+        found: Any = self.cubic().complex_roots()
+        return sorted((root.real for root, _ in found), key=midpoint)
+
+    def in_plane(self, vector: tuple[Fraction, ...]) -> tuple[arb, arb]:
+        """The components along e_x and e_y."""
+        a, _, c = self.moment
+        return ball(c * vector[0] - a * vector[2]) / ball(self.moment_square).sqrt(), ball(vector[1])
