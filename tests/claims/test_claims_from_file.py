@@ -134,7 +134,7 @@ def test_hess_relation_is_invariant_under_its_relation_between_the_parameters():
 def test_what_the_algebra_cannot_carry_is_undecided_and_never_holds():
     content = table("delone-homoclinic")
     # 0 for t > 0, but no algebra of this kind knows it
-    content["definitions"]["T"] = "tanh(alpha*t/sqrt(2)) + atan(t) + atan(1/t) - pi/2"
+    content["definitions"]["T"] = "tanh(alpha*t/sqrt(2)) + 2*atan(t) - atan2(2*t, 1 - t^2)"
     content |= {"domain": "t>0"}
     report = verdict(content)
     assert report.verdict == "undecided"

@@ -59,9 +59,12 @@ def _of_product(factors: Sequence[sympy.Expr]) -> tuple[sympy.Expr, ...]:
 
 
 def _inside(e: sympy.Expr) -> sympy.Expr | None:
-    """u − u0 where ``e`` is c + k f(u), with numbers c and k, and 0 at u = u0 alone."""
+    """u − u0 where ``e`` is c + k f(u), with numbers c and k, and 0 at u = u0 alone: √u = 2 where u = 4."""
     constant, rest = e.as_coeff_Add()
     factor, function = rest.as_coeff_Mul()
+    root = function.is_Pow and function.args[1] == sympy.Rational(1, 2)
+    if root and constant.is_Rational and factor.is_Rational and -constant / factor > 0:
+        return function.args[0] - (constant / factor) ** 2
     name = "exp" if isinstance(function, sympy.exp) else type(function).__name__
     if name not in _ONLY_ZERO or not constant.is_Rational or not factor.is_Rational:
         return None

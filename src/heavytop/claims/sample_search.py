@@ -15,7 +15,8 @@ import sympy
 
 # with points of the unit circle and sphere, such as (3/5, 4/5) and (2/3, 1/3, 2/3)
 _VALUES = tuple(sympy.Rational(*pair) for pair in ((2, 3), (1, 3), (4, 5), (3, 5), (-1, 2), (2, 1), (1, 1), (0, 1)))
-_SCALES = (1, -1, 1, -1, 20, -20)
+# the last for conditions with irrational numbers, which may have rational points at 0 only
+_SCALES = (1, -1, 1, -1, 20, -20, 0)
 _MOST_STEPS = 300
 _MOST_FOUND = 24
 
@@ -28,7 +29,11 @@ def states_on(
     """Rational values of ``variables`` where polynomial ``conditions`` are 0 at these parameters; none if not found."""
     numbers = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in parameters.items()}
     # divisors that are 0 there are refused where the state is checked
-    equations = [sympy.numer(sympy.together(condition.subs(numbers, simultaneous=True))) for condition in conditions]
+    equations = [
+        # one zero of sin u is as good as another
+        sympy.numer(sympy.together(condition.subs(numbers, simultaneous=True).replace(sympy.sin, lambda u: u)))
+        for condition in conditions
+    ]
     if all(equation.is_polynomial(*variables) and equation.free_symbols <= set(variables) for equation in equations):
         yield from _Search(variables).states(equations)
 
