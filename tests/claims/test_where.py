@@ -188,3 +188,9 @@ def test_no_state_is_found_where_there_is_none():
     assert not list(states_on([x**2 + 1], STATE, {}))
     assert not list(states_on([x**2 - 2], STATE, {}))
     assert not list(states_on([x - y, x - y - 1], STATE, {}))
+
+
+def test_conditions_too_large_to_expand_end_at_once():
+    large = f"({' + '.join(map(str, STATE))} + 1)^40 - 3"
+    assert verdict("free", "Omega3", (large,)) != "holds"
+    assert verdict("free", f"sin({large})*Omega3", ("Omega1",)) != "holds"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import product
-from math import prod
+from math import comb, prod
 
 import sympy
 
@@ -28,8 +28,8 @@ _ONLY_ZERO = {
     "log": (0, 1),
 }
 _ANALYTIC = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh, sympy.tanh, sympy.sech, sympy.atan, sympy.log)
-# a larger polynomial is not factored
-_MOST_OPERATIONS = 400
+# a polynomial of more terms is left as it is
+_MOST_TERMS = 1_000
 _MOST_PRODUCTS = 16
 
 
@@ -76,7 +76,7 @@ def _of_sum(e: sympy.Expr) -> tuple[sympy.Expr, ...]:
     signs = [sign_of(part) for part in e.args]
     if abs(sum(sign.value for sign in signs)) == len(signs):
         return (e,) if any(sign.strict for sign in signs) else _of_all(e.args)
-    if not e.is_polynomial(*e.free_symbols) or sympy.count_ops(e) > _MOST_OPERATIONS:
+    if not is_small_polynomial(e):
         return (e,)
     factors = sympy.factor_list(e)[1]
     if len(factors) > 1 or factors[0][1] > 1:
@@ -109,7 +109,7 @@ def _as_squares(e: sympy.Expr) -> list[sympy.Expr]:
 
 def on_conditions(e: sympy.Expr, conditions: Sequence[sympy.Expr]) -> sympy.Expr:
     """``e`` where the conditions are 0: a polynomial, or the arguments of analytic functions, reduced by them."""
-    divisors = [condition for condition in conditions if condition.free_symbols and _is_polynomial(condition)]
+    divisors = [condition for condition in conditions if condition.free_symbols and is_small_polynomial(condition)]
     if not divisors:
         return e
     shorter: dict[sympy.Expr, sympy.Expr] = {}
@@ -122,11 +122,23 @@ def on_conditions(e: sympy.Expr, conditions: Sequence[sympy.Expr]) -> sympy.Expr
 
 def _rest(e: sympy.Expr, divisors: Sequence[sympy.Expr]) -> sympy.Expr:
     """What division leaves, if that is shorter."""
-    if not e.free_symbols or not _is_polynomial(e) or sympy.count_ops(e) > _MOST_OPERATIONS:
+    if not e.free_symbols or not is_small_polynomial(e):
         return e
     rest = sympy.reduced(e, divisors)[1]
     return rest if rest.is_number or sympy.count_ops(rest) < sympy.count_ops(e) else e
 
 
-def _is_polynomial(e: sympy.Expr) -> bool:
-    return bool(e.is_polynomial(*e.free_symbols))
+def is_small_polynomial(e: sympy.Expr) -> bool:
+    """Whether it is a polynomial that can be expanded in no time."""
+    return bool(e.is_polynomial(*e.free_symbols)) and _terms(e) <= _MOST_TERMS
+
+
+def _terms(e: sympy.Expr) -> int:
+    """A bound on the terms of its expansion."""
+    if e.is_Add:
+        return sum(map(_terms, e.args))
+    if e.is_Mul:
+        return prod(map(_terms, e.args))
+    if e.is_Pow and e.args[1].is_Integer and e.args[1] > 0:
+        return comb(_terms(e.args[0]) + int(e.args[1]) - 1, int(e.args[1]))
+    return 1

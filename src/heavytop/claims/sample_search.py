@@ -13,6 +13,8 @@ from itertools import islice
 
 import sympy
 
+from heavytop.claims.real_zeros import is_small_polynomial
+
 # with points of the unit circle and sphere, such as (3/5, 4/5) and (2/3, 1/3, 2/3)
 _VALUES = tuple(sympy.Rational(*pair) for pair in ((2, 3), (1, 3), (4, 5), (3, 5), (-1, 2), (2, 1), (1, 1), (0, 1)))
 # the last for conditions with irrational numbers, which may have rational points at 0 only
@@ -34,7 +36,7 @@ def states_on(
         sympy.numer(sympy.together(condition.subs(numbers, simultaneous=True).replace(sympy.sin, lambda u: u)))
         for condition in conditions
     ]
-    if all(equation.is_polynomial(*variables) and equation.free_symbols <= set(variables) for equation in equations):
+    if all(is_small_polynomial(equation) and equation.free_symbols <= set(variables) for equation in equations):
         yield from _Search(variables).states(equations)
 
 
