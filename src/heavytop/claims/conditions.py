@@ -57,8 +57,11 @@ class Need:
             return None
         if not ball.is_finite():
             return None
+        rational = self.expression.is_rational_function(*self.expression.free_symbols)
+        if ball.is_zero() or (rational and ball.contains(0) and is_exactly_zero(self.expression, values)):
+            return self.kind is Kind.NONNEGATIVE
         if self.kind is Kind.NONZERO:
-            return not ball.is_zero() if ball.is_exact() else True if not ball.contains(0) else None
+            return True if not ball.contains(0) else None
         above = ball > 0 if self.kind is Kind.POSITIVE else ball >= 0
         below = ball <= 0 if self.kind is Kind.POSITIVE else ball < 0
         return True if above else False if below else None

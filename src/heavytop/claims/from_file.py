@@ -25,10 +25,6 @@ Three = Annotated[list[Text], msgspec.Meta(min_length=3, max_length=3)]
 Samples = Annotated[list[Text], msgspec.Meta(min_length=1, max_length=8)]
 
 
-def _two_states() -> list[list[str]]:
-    return [["1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"], ["1", "2", "-1", "3/5", "0", "4/5"]]
-
-
 class TopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """[top]: principal moments, weight, centre of mass, and the rotor λ where the claim is about `gyrostat`."""
 
@@ -47,13 +43,20 @@ class MotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[integral]: F(Ω, γ), where it is claimed to be constant, and exact states to look for a witness at."""
+    """[integral]: F(Ω, γ), where it is claimed to be constant, and exact states to look for a witness at.
+
+    Without states the audit takes some of its own, on the conditions where it finds such.
+    """
 
     value: Text
     where: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
-    states: Annotated[
-        list[Annotated[list[Text], msgspec.Meta(min_length=6, max_length=6)]], msgspec.Meta(min_length=1, max_length=8)
-    ] = msgspec.field(default_factory=_two_states)
+    states: (
+        Annotated[
+            list[Annotated[list[Text], msgspec.Meta(min_length=6, max_length=6)]],
+            msgspec.Meta(min_length=1, max_length=8),
+        ]
+        | None
+    ) = None
 
 
 class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -7,7 +7,7 @@ denominator is removable where the values are continuous across it, and two halv
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy
@@ -17,6 +17,7 @@ from heavytop.claims.algebra import Field
 from heavytop.claims.conditions import Kind, Need
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.rational import Quotient
+from heavytop.claims.real_zeros import on_conditions
 from heavytop.claims.regularity import Regularity
 from heavytop.claims.signs import NUMBER_BITS, Unprovable, used
 from heavytop.claims.statement import Place, Setting, Statement
@@ -121,6 +122,12 @@ class Region:
 
     def discharge(self, need: Need) -> str:
         """How it is discharged all over the region; "" where it is not."""
+        on_relations = on_conditions(need.expression, self._setting.relations)
+        return self._discharge(need) or (
+            self._discharge(replace(need, expression=on_relations)) if on_relations != need.expression else ""
+        )
+
+    def _discharge(self, need: Need) -> str:
         plain = sign_of(need.expression)
         if (
             plain.strict

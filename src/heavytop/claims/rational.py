@@ -211,6 +211,15 @@ class Tower:
 
     # --- absolute values and roots ----------------------------------------------------------------------------------
 
+    def ratio(self, a: Quotient, b: Quotient) -> Fraction | None:
+        """The number c with a = c b, where there is one; nothing is divided for it."""
+        above = self.reduce(self.times(a.numerator, b.denominator))
+        below = self.reduce(self.times(b.numerator, a.denominator))
+        if not above or not below:
+            return None
+        c = above.leading_coefficient() / below.leading_coefficient()
+        return Fraction(int(c.p), int(c.q)) if above == below * c else None
+
     def sign(self, value: Quotient) -> Sign:
         """The sign of a quotient where it is defined."""
         above, below = self.signs.of(value.numerator), self.signs.of(value.denominator)

@@ -14,6 +14,7 @@ import sympy
 from flint import fmpz
 
 from heavytop.claims.evaluate import evaluate
+from heavytop.claims.inverse import is_below_quarter, same_as
 from heavytop.claims.rational import Quotient
 from heavytop.claims.signs import NUMBER_BITS, Sign, Unprovable, used
 
@@ -96,8 +97,7 @@ class Transcendental:
         return terms if all(self._is_multiple(term) for term in terms) else [argument]
 
     def _is_multiple(self, argument: Quotient) -> bool:
-        ratios = (self._tower.divide(argument, base) for kind, base, _ in self._bases if kind == "exp")
-        return any(not used(ratio.numerator) and ratio.denominator == self._tower.one for ratio in ratios)
+        return any(self._tower.ratio(argument, base) is not None for kind, base, _ in self._bases if kind == "exp")
 
     def _without_logarithms(self, argument: Quotient) -> tuple[Quotient, Quotient]:
         """(argument without multiples of logarithms, their exponentials)."""
@@ -133,15 +133,14 @@ class Transcendental:
         """
         for position, (known_kind, base, index) in enumerate(self._bases):
             if kind == known_kind:
-                ratio = self._tower.divide(argument, base)
-                if not used(ratio.numerator) and ratio.denominator == self._tower.one:
-                    value = ratio.numerator.leading_coefficient()
-                    if value.q > 1:
-                        self._divisors[position] *= int(value.q)
+                value = self._tower.ratio(argument, base)
+                if value is not None:
+                    if value.denominator > 1:
+                        self._divisors[position] *= value.denominator
                         raise Refine
-                    if abs(value.p) > _MAX_MULTIPLE:
-                        raise Unprovable(f"A multiple {value.p} of an argument.")
-                    return index, int(value.p)
+                    if abs(value) > _MAX_MULTIPLE:
+                        raise Unprovable(f"A multiple {value} of an argument.")
+                    return index, int(value)
         if len(self._divisors) <= len(self._bases):
             self._divisors.append(1)
         divisor = self._divisors[len(self._bases)]
@@ -166,6 +165,9 @@ class Transcendental:
         return total
 
     def _circle_of_term(self, value: Quotient) -> Circle:
+        known = self._circle_of_number(value)
+        if known is not None:
+            return known
         inverse = self._inverse_multiple(value)
         if inverse is not None:
             return self._turned(*inverse)
@@ -181,12 +183,26 @@ class Transcendental:
             self._tower.signs.circles[index] = partner
             unit = (Fraction(-1), Fraction(1))
             self._tower.signs.ranges |= {index: unit, partner: unit}
+            if is_below_quarter(self._field, base):
+                for positive in (self._tower.gens[partner], *(1 + n * self._tower.gens[index] for n in (-1, 1))):
+                    self._tower.signs.declare(positive, Sign(1, True))
             return index
 
         index, multiple = self._multiple("circle", value, make)
         t = self._tower
         cosine = self._tower.signs.circles[index]
         return self._turned((t.polynomial(t.gens[index]), t.polynomial(t.gens[cosine])), multiple)
+
+    def _circle_of_number(self, value: Quotient) -> Circle | None:
+        """(sin, cos) of a multiple of π/12, in square roots."""
+        turn = self._tower.ratio(value, self._field.enter(sympy.pi)) if self._is_number(value) else None
+        if turn is None or 12 % turn.denominator:
+            return None
+        angle = sympy.pi * sympy.Rational(turn.numerator, turn.denominator)
+        return self._field.enter(sympy.sin(angle)), self._field.enter(sympy.cos(angle))
+
+    def _is_number(self, value: Quotient) -> bool:
+        return used(value.numerator) <= self._tower.signs.numbers.keys()
 
     def _inverse_multiple(self, value: Quotient) -> tuple[Circle, int] | None:
         """((sin, cos) of an inverse function, n) where the value is n times it."""
@@ -281,8 +297,11 @@ class Transcendental:
 
     def function(self, name: str, arguments: tuple[Quotient, ...]) -> Quotient:
         """A free generator for a function of these arguments: the same arguments, the same generator."""
-        key = (name, *(str((a.numerator, a.denominator)) for a in arguments))
+        key = _key(name, *arguments)
         if key not in self._functions:
+            same = same_as(name, arguments[0], self._field, self._known)
+            if same is not None:
+                return same
             make = getattr(sympy, name)
             meaning = make(*(self._field.expression(argument) for argument in arguments), evaluate=False)
             sign = Sign(0, False)
@@ -296,6 +315,10 @@ class Transcendental:
             self._functions[key] = index
         return self._tower.polynomial(self._tower.gens[self._functions[key]])
 
+    def _known(self, name: str, argument: Quotient) -> Quotient | None:
+        index = self._functions.get(_key(name, argument))
+        return None if index is None else self._tower.polynomial(self._tower.gens[index])
+
     def _new(self, kind: str, meaning: sympy.Expr, arguments: tuple[Quotient, ...], sign: Sign) -> int:
         constant = all(self._field.is_constant(argument) for argument in arguments)
         index = self._tower.add(
@@ -308,6 +331,10 @@ class Transcendental:
     def _set_number(self, index: int, meaning: sympy.Expr) -> None:
         if not meaning.free_symbols:
             self._tower.signs.numbers[index] = evaluate(meaning, {}, NUMBER_BITS)
+
+
+def _key(name: str, *arguments: Quotient) -> tuple[str, ...]:
+    return (name, *(str((argument.numerator, argument.denominator)) for argument in arguments))
 
 
 def _single(monomial: Any) -> int | None:

@@ -17,6 +17,7 @@ from heavytop.claims.expression import Formula, parse, symbol
 from heavytop.claims.from_file import ClaimFile, MotionTable, sample_rows
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
 from heavytop.claims.prover import shortest
+from heavytop.claims.real_zeros import conditions_for_zero
 from heavytop.claims.signs import Unprovable
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Setting, Statement
 from heavytop.claims.statements import SYMBOLIC, SYSTEMS, Motion, Triple, attitude, motion_statements
@@ -140,9 +141,8 @@ def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
 def setting_of(ground: Ground, variable: sympy.Symbol) -> Setting:
     """The setting of a claim on this ground."""
     a = ground.assumed
-    return Setting(
-        variable, a.positive, ground.samples, a.greater, relations=ground.relations, facts=a.facts, ranges=a.ranges
-    )
+    relations = tuple(part for relation in ground.relations for part in conditions_for_zero(relation))
+    return Setting(variable, a.positive, ground.samples, a.greater, relations=relations, facts=a.facts, ranges=a.ranges)
 
 
 @dataclass(frozen=True)

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
+from itertools import islice
 
 import sympy
 
 from heavytop.claims.algebra import Assumptions, Field
-from heavytop.claims.conditions import Need
+from heavytop.claims.conditions import Need, is_exactly_zero
 from heavytop.claims.expression import Formula, parse
 from heavytop.claims.from_file import ClaimFile, IntegralTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
+from heavytop.claims.real_zeros import conditions_for_zero, on_conditions
+from heavytop.claims.sample_search import states_on
 from heavytop.claims.signs import Unprovable
-from heavytop.claims.statement import ALL, Flow, Formulas, Setting, Statement
+from heavytop.claims.statement import ALL, Flow, Formulas, Place, Setting, Statement
 from heavytop.claims.structure import Names
 from heavytop.claims.user_claim import STATE, TIME, Ground, lay_ground, needs_of, setting_of
 from heavytop.precision import exact
 from heavytop.top.equations import GYROSTAT, System
 
 Rate = Callable[[sympy.Expr], sympy.Expr]
+_STATES = (("1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"), ("1", "2", "-1", "3/5", "0", "4/5"))
+# states of our own, where a file gives none
+_ENOUGH = 3
 
 
 @dataclass(frozen=True)
@@ -60,16 +67,34 @@ class UserIntegral:
         """integral or relation."""
         return self.content.kind
 
-    @property
+    @cached_property
     def setting(self) -> Setting:
-        """The file's assumptions; the samples are its parameters at each of its states."""
+        """The file's assumptions; the samples are its parameters at each of the states."""
         base = setting_of(self.ground, TIME)
-        states = [dict(zip(STATE, map(exact, values), strict=True)) for values in self._table.states]
-        samples = tuple({**sample, **state} for sample in self.ground.samples for state in states)
-        conditions = [formula.expression for formula in self.where]
-        if self.kind == "relation":
-            conditions.append(self.value.expression)
-        return replace(base, samples=samples, relations=(*self.ground.relations, *conditions))
+        conditions = [part for formula in self._zero for part in conditions_for_zero(formula.expression)]
+        samples = tuple({**row, **state} for row in self.ground.samples for state in self._states(conditions, row))
+        return replace(base, samples=samples, relations=(*base.relations, *conditions))
+
+    @property
+    def _zero(self) -> tuple[Formula, ...]:
+        """What is 0 where the claim is made."""
+        return (*self.where, self.value) if self.kind == "relation" else self.where
+
+    def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Place]:
+        """The states of the file; without them states of our own, on the conditions where such are found."""
+        given = [dict(zip(STATE, map(exact, values), strict=True)) for values in self._table.states or _STATES]
+        if self._table.states is not None:
+            return given
+        needs = needs_of([self.value, *self.where])
+
+        def serves(state: Place) -> bool:
+            place = {**parameters, **state}
+            return all(is_exactly_zero(c, place) for c in conditions) and all(need.is_met(place) for need in needs)
+
+        if any(serves(state) for state in given):
+            return given
+        found = islice(filter(serves, states_on(conditions, STATE, parameters)), _ENOUGH)
+        return [*found] or given
 
     def statements(self, system: System) -> list[Statement]:
         """dF/dt = 0 along the field of ``system``, on the conditions."""
@@ -78,7 +103,6 @@ class UserIntegral:
         def rate(value: sympy.Expr) -> sympy.Expr:
             return sum((sympy.diff(value, x) * dx for x, dx in zip(STATE, rates, strict=True)), sympy.Integer(0))
 
-        kept = tuple((str(formula.expression), rate(formula.expression)) for formula in self.where)
         needs = needs_of([self.value, *self.where]) | self.ground.needs
         if system is GYROSTAT:
             needs |= self.ground.rotor_needs
@@ -88,11 +112,35 @@ class UserIntegral:
         if self.where:
             text += ", where the conditions hold"
         value, named, names = self._with_names(rate, needs)
-        flow = Flow(rate, frozenset((*STATE, *names)), kept, self.kind == "relation")
-        values = (value, *(formula.expression for formula in self.where))
+        flow = Flow(rate, frozenset((*STATE, *names)), self._kept(rate), self.kind == "relation")
+        # a condition in simpler words is the same set
+        where = tuple(part for formula in self.where for part in conditions_for_zero(formula.expression))
+        values = (*self._parts(value), *where)
         domain = replace(ALL, points=(Fraction(0),))
         formulas = Formulas(values, named, sampled=needs)
-        return [Statement("dF/dt", 1, "smooth", domain, rate(value), text, formulas, flow)]
+        return [
+            Statement("dF/dt", component, "smooth", domain, self._on_relations(rate(part)), text, formulas, flow)
+            for component, part in enumerate(self._parts(value), 1)
+        ]
+
+    def _parts(self, value: sympy.Expr) -> tuple[sympy.Expr, ...]:
+        """What has to be constant: F; or the parts of a relation that is no polynomial, as |L| has no rate at 0."""
+        if self.kind != "relation" or value.is_polynomial(*STATE):
+            return (value,)
+        return conditions_for_zero(value) or (value,)
+
+    def _kept(self, rate: Rate) -> tuple[tuple[str, sympy.Expr], ...]:
+        """The side conditions with their rates; a relation has none of its own where it is as simple as can be."""
+        simpler = {formula: conditions_for_zero(formula.expression) for formula in self._zero}
+        return tuple(
+            (str(formula.expression), self._on_relations(rate(part)))
+            for formula, parts in simpler.items()
+            for part in parts
+            if formula in self.where or parts != (self.value.expression,)
+        )
+
+    def _on_relations(self, rate: sympy.Expr) -> sympy.Expr:
+        return on_conditions(rate, self.setting.relations)
 
     def _with_names(self, rate: Rate, needs: frozenset[Need]) -> tuple[sympy.Expr, frozenset[Need], list[sympy.Symbol]]:
         """(F, its needs, symbols): first integrals in F have got symbols, where nothing else of the state is left."""

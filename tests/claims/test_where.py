@@ -1,0 +1,180 @@
+"""Claims on conditions: states found without help, conditions in other words, and their false neighbours."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+import sympy
+
+from heavytop.claims.audit import audit_claim
+from heavytop.claims.conditions import is_exactly_zero
+from heavytop.claims.from_file import claim_from_table
+from heavytop.claims.real_zeros import conditions_for_zero
+from heavytop.claims.sample_search import states_on
+from heavytop.claims.user_claim import STATE
+from heavytop.top.equations import HEAVY_TOP
+
+AREA = "(4*Omega1*gamma1 + 4*Omega2*gamma2 + Omega3*gamma3)"
+CHAPLYGIN = "Omega3*(Omega1^2 + Omega2^2) - Omega1*gamma3"
+HESS = "(36*Omega1 + 12*Omega3)"
+K1, K2 = "(Omega1^2 - Omega2^2 - gamma1)", "(2*Omega1*Omega2 - gamma2)"
+FREE_AREA = "(2*Omega1*gamma1 + 3*Omega2*gamma2 + 5*Omega3*gamma3)"
+TOPS = {
+    "chaplygin": (["4", "4", "1"], ["1", "0", "0"]),
+    "hess": (["9", "5", "4"], ["4", "0", "3"]),
+    "kovalevskaya": (["2", "2", "1"], ["1", "0", "0"]),
+    "lagrange": (["2", "2", "1"], ["0", "0", "1"]),
+    "free": (["2", "3", "5"], ["0", "0", "0"]),
+}
+
+
+def verdict(top: str, value: str, where: tuple[str, ...] = (), kind: str = "integral", **parts) -> str:
+    inertia, centre = TOPS[top]
+    table = {
+        "name": "on conditions",
+        "kind": kind,
+        "top": {"inertia": inertia, "weight": "1", "centre": centre},
+        "integral": {"value": value, "where": list(where)},
+    } | parts
+    return audit_claim(claim_from_table(table, "test"), HEAVY_TOP).verdict
+
+
+TRUE = [
+    ("chaplygin", CHAPLYGIN, (AREA,), "integral"),
+    ("chaplygin", f"exp({CHAPLYGIN})", (f"-3*{AREA}",), "integral"),
+    ("chaplygin", CHAPLYGIN, (AREA, "gamma1^2 + gamma2^2 + gamma3^2 - 1"), "integral"),
+    ("chaplygin", CHAPLYGIN, (f"exp({AREA}) - 1",), "integral"),
+    ("chaplygin", CHAPLYGIN, (f"{AREA}^2",), "integral"),
+    ("hess", HESS, (), "relation"),
+    ("hess", f"exp({HESS}) - 1", (), "relation"),
+    ("hess", f"1 - cosh({HESS})", (), "relation"),
+    ("hess", f"2*atan({HESS})", (), "relation"),
+    ("hess", f"sqrt({HESS}^2)", (), "relation"),
+    ("hess", f"log(1 + {HESS})", (), "relation"),
+    ("hess", f"{HESS}^3", (), "relation"),
+    ("hess", f"tanh(sinh({HESS}))/(1 + Omega2^2)", (), "relation"),
+    ("hess", f"sin({HESS})*Omega1", (HESS,), "integral"),
+    ("kovalevskaya", f"{K1}^2 + {K2}^2", (), "relation"),
+    ("kovalevskaya", f"sqrt({K1}^2 + {K2}^2)", (), "relation"),
+    ("kovalevskaya", K1, (f"{K1}^2 + {K2}^2",), "integral"),
+    ("kovalevskaya", f"exp({K2})*2", (K1, K2), "integral"),
+    ("lagrange", "Omega3", ("Omega3 - 7/3",), "integral"),
+    ("lagrange", "Omega3", (AREA.replace("4", "2"),), "integral"),
+    ("lagrange", "log(-Omega3 - 8)", (), "integral"),
+    ("free", "Omega3", ("Omega1^2 + Omega2^2",), "integral"),
+    ("free", f"sin({FREE_AREA})*Omega1", (FREE_AREA,), "integral"),
+    ("free", f"(exp({FREE_AREA}) - 1)*Omega1", (FREE_AREA,), "integral"),
+    ("free", f"cos({FREE_AREA})*(4*Omega1^2 + 9*Omega2^2 + 25*Omega3^2)", (FREE_AREA,), "integral"),
+]
+FALSE = [
+    # the condition is not kept, or the claim is false on it
+    ("chaplygin", CHAPLYGIN.replace("- Omega1*", "+ Omega1*"), (AREA,), "integral"),
+    ("chaplygin", CHAPLYGIN, (f"{AREA} - 1",), "integral"),
+    ("chaplygin", CHAPLYGIN, ("Omega1",), "integral"),
+    ("hess", HESS.replace("+", "-"), (), "relation"),
+    ("hess", f"exp({HESS}) - 2", (), "relation"),
+    ("hess", f"log({HESS})", (), "relation"),
+    ("hess", f"exp({HESS.replace('+', '-')}) - 1", (), "relation"),
+    ("hess", f"sqrt({HESS.replace('+', '-')}^2)", (), "relation"),
+    # sin L = 0 and cos L = 1 at L = π, 2π too, which are not kept
+    ("hess", f"sin({HESS})", (), "relation"),
+    ("hess", f"cos({HESS}) - 1", (), "relation"),
+    ("hess", f"cosh({HESS}) - 2", (), "relation"),
+    ("hess", f"{HESS}*Omega2", (), "relation"),
+    ("hess", f"cos({HESS})*Omega1", (HESS,), "integral"),
+    ("kovalevskaya", f"{K1}^2 - {K2}^2", (), "relation"),
+    ("kovalevskaya", f"{K1}^2", (), "relation"),
+    ("kovalevskaya", f"{K1}^2 + {K2}^2 + 1", (), "relation"),
+    ("lagrange", "Omega1", (AREA.replace("4", "2"),), "integral"),
+    ("free", "Omega3", ("Omega1^2 + gamma2^2",), "integral"),
+    ("free", "Omega3", ("Omega1^2 - Omega2^2",), "integral"),
+    ("free", "Omega1*Omega2", (), "relation"),
+    ("free", "Omega1^2 + 1", (), "relation"),
+    ("free", f"sin({FREE_AREA})*Omega1", (f"{FREE_AREA} - 1",), "integral"),
+    ("free", f"sin({FREE_AREA})*Omega1", (), "integral"),
+    ("free", f"log({FREE_AREA})", (FREE_AREA,), "integral"),
+]
+
+
+@pytest.mark.parametrize(("top", "value", "where", "kind"), TRUE)
+def test_what_is_true_on_its_conditions_holds(top, value, where, kind):
+    assert verdict(top, value, where, kind) == "holds"
+
+
+@pytest.mark.parametrize(("top", "value", "where", "kind"), FALSE)
+def test_its_false_neighbours_do_not(top, value, where, kind):
+    assert verdict(top, value, where, kind) != "holds"
+
+
+def test_a_false_integral_on_a_condition_is_refuted_without_a_state():
+    assert verdict("chaplygin", CHAPLYGIN.replace("- Omega1*", "+ Omega1*"), (AREA,)) == "refuted"
+    assert verdict("free", "Omega3^2*gamma1", (FREE_AREA,)) == "refuted"
+
+
+def test_a_sum_of_squares_of_parameters_is_0_only_where_each_is():
+    parts = {"parameters": {"a": "0", "b": "0"}}
+    for value in ("a*Omega1 + b*gamma2", "Omega1*sin(a)", "Omega1*(exp(a - b) - 1)"):
+        assert verdict("free", value, relations=["a^2 + b^2"], **parts) == "holds"
+        assert verdict("free", value, relations=["2*a^2 + 2*a*b + b^2"], **parts) == "holds"
+        assert verdict("free", value.replace("Omega1", "(Omega1 + a)"), relations=["a^2 + b^2"], **parts) == "holds"
+    assert verdict("free", "a*Omega1", relations=["a^2 - b^2"], **parts) != "holds"
+    assert verdict("free", "a*Omega1", relations=["a^2 + b^3"], **parts) != "holds"
+
+
+x, y, z = STATE[:3]
+p = sympy.Symbol("p", positive=True)
+
+
+@pytest.mark.parametrize(
+    ("condition", "simpler"),
+    [
+        (sympy.exp(x) - 1, {x}),
+        (3 - 3 * sympy.exp(2 * x - y), {2 * x - y}),
+        (sympy.log(1 + x), {x}),
+        (sympy.acos(x), {x - 1}),
+        (sympy.sech(x) - 1, {x}),
+        (sympy.exp(x) - 2, {sympy.exp(x) - 2}),
+        (sympy.exp(x) + 1, {sympy.exp(x) + 1}),
+        (sympy.sin(x), {sympy.sin(x)}),
+        (sympy.cos(x) - 1, {sympy.cos(x) - 1}),
+        (sympy.sqrt(x), {sympy.sqrt(x)}),
+        (p * x**2 + y**4 / p, {x, y}),
+        (p * x**2 - y**4, {p * x**2 - y**4}),
+        (x**2 + y**2 + 1, {x**2 + y**2 + 1}),
+        (x**2 * (y**2 + z**2), {x * y, x * z}),
+        (x**3 * y / (1 + z), {x * y}),
+        (p**2 * x**2 + 2 * p * x * y + 2 * y**2, {p * x + y, y}),
+        (2 * p**2 * x**2 + 4 * p * x * y + y**2, {2 * p**2 * x**2 + 4 * p * x * y + y**2}),
+        ((1 + y**2) * x**2 + z**2 - 2 * z + 1 - x, {(1 + y**2) * x**2 + z**2 - 2 * z + 1 - x}),
+    ],
+)
+def test_conditions_in_other_words(condition, simpler):
+    assert set(conditions_for_zero(condition)) == simpler
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [
+        ("Omega1*gamma1 + Omega2*gamma2 - 3", "gamma1**2 + gamma2**2 + gamma3**2 - 1"),
+        ("Omega1*Omega2 - gamma1", "Omega2*gamma3 - gamma1*gamma2", "Omega3**2 - gamma1**2"),
+        ("Omega1**2 - Omega2**2 - gamma1", "2*Omega1*Omega2 - gamma2"),
+        ("Omega1*Omega2*Omega3", "Omega1 + Omega2 - 1"),
+        ("4*Omega1**2 - 9", "Omega2/Omega1 - 2"),
+    ],
+)
+def test_states_found_lie_exactly_on_the_conditions(texts):
+    names = {str(variable): variable for variable in STATE}
+    conditions = [sympy.sympify(text, locals=names) for text in texts]
+    states = list(states_on(conditions, STATE, {}))
+    assert states
+    for state in states:
+        assert set(state) == set(STATE)
+        assert all(isinstance(value, Fraction) for value in state.values())
+        assert all(is_exactly_zero(condition, state) for condition in conditions)
+
+
+def test_no_state_is_found_where_there_is_none():
+    assert not list(states_on([x**2 + 1], STATE, {}))
+    assert not list(states_on([x**2 - 2], STATE, {}))
+    assert not list(states_on([x - y, x - y - 1], STATE, {}))
