@@ -221,8 +221,8 @@ def _homoclinic(rows: Sequence[Row]) -> list[RenderableType]:
         lines.append([row.case, row.precision, error, with_noise(row.metrics["break_away_time"]), row.outcome])
     return [
         title("Integrators on a homoclinic motion, against its closed form"),
-        Text("  Ω error: the largest over the samples with rate·|t| <= 10; break-away: Ω wrong by 1e-3 α, where the"),
-        Text(f"  saddle has eaten every digit. {_NOISE}"),
+        Text("  Ω error: the largest over the samples with rate·|t| <= 10; break-away: Ω wrong by 1e-3 α, where"),
+        Text(f"  all significant digits are lost. {_NOISE}"),
         table(["case", "format", "Ω error", "break-away |t|", "outcome"], both(lines)),
     ]
 
