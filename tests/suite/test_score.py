@@ -276,6 +276,7 @@ def test_the_examples_of_the_documentation_can_be_scored(kind: str, tmp_path: Pa
 @pytest.mark.parametrize(("precision", "size"), [("double", "1e309"), ("extended", "-1e4933"), ("quad", "1e4933")])
 def test_a_state_too_large_for_its_format_is_not_finite(precision: str, size: str, tmp_path: Path) -> None:
     given = document() | {"precision": precision}
+    del given["bits"]
     given["states"][1] = [size, *given["states"][1][1:]]
     row = score(read(written(tmp_path, given)))
     assert (row.outcome, row.samples) == ("non_finite", 1)

@@ -92,9 +92,13 @@ class ClosedForm(ABC):
     def evaluate(self, time: Fraction) -> list[Any]:
         """The six components at ``time`` + ε, at FLINT's working precision and length of series."""
 
+    def own_time(self, time: Fraction) -> Fraction:
+        """``time`` in the unit whose size costs working bits: that of a form which works in units of its own."""
+        return time
+
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return to_bits(lambda _working: self.evaluate(time), bits, time)
+        return to_bits(lambda _working: self.evaluate(time), bits, self.own_time(time))
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`."""
@@ -104,7 +108,7 @@ class ClosedForm(ABC):
             found[:] = [whole_series(part, length) for part in self.evaluate(time)]
             return [part[0] for part in found]
 
-        to_bits(evaluate, bits, time, length)
+        to_bits(evaluate, bits, self.own_time(time), length)
         return found
 
 

@@ -74,6 +74,10 @@ class Hess(ClosedForm):
             raise NotInClass("The level is degenerate: P r·gamma rests at a double root.", _REMEDY)
         _require_reach(level)
 
+    def own_time(self, time: Fraction) -> Fraction:
+        """In the level's unit: the matrix over its period costs much at many bits."""
+        return Level.of(self.top, self.start).rate * time
+
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         try:
@@ -94,7 +98,7 @@ class Hess(ClosedForm):
                 return [arb("nan")] * 3
             return here.carried(began, initial_xi(self.start.gamma))
 
-        return to_bits(evaluate, bits, time)
+        return to_bits(evaluate, bits, self.own_time(time))
 
 
 @kept
