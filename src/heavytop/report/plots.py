@@ -80,7 +80,7 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     left_out(section, len(lanes) - len(names), "case")
     count = max(len(members) for members in lanes.values())
     lines = (count + 1) * len(names)
-    axes = new_axes("digits kept (of Ω and γ)", "case", max(2.4, 0.8 + 0.12 * lines), 0.4)
+    axes = new_axes("kept (correct decimal digits)", "case", max(2.4, 0.8 + 0.12 * lines), 0.4)
     height = 0.8 / count
     heard = []
     for index, lane in enumerate(names):
