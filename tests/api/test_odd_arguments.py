@@ -97,7 +97,10 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "observer": None,
         },
     ),
-    "reference": (ht.reference, {"top": REST, "start": STILL, "times": [1], "digits": 20, "system": "heavy_top"}),
+    "reference": (
+        ht.reference,
+        {"top": REST, "start": STILL, "times": [1], "digits": 20, "system": "heavy_top", "attitude": False},
+    ),
     "score": (
         ht.score,
         {

@@ -250,10 +250,10 @@ def test_a_rounded_gyrostat_takes_its_rotor_as_data():
 
 
 @pytest.mark.parametrize("time", [Fraction(10**6), Fraction(-(10**9)), Fraction(10**30)])
-def test_a_horizon_out_of_reach_is_refused_at_once_with_the_digits_that_could_be_reached(time):
+def test_a_horizon_out_of_reach_is_refused_at_once(time):
     vector = VECTORS[0]
     before = process_time()
-    with pytest.raises(OutOfReach, match=r"out of reach.*\n.*0 digits could be proven"):
+    with pytest.raises(OutOfReach, match=r"No digit at .*\n.*earlier time"):
         motion(vector).state(time, 100)
     assert process_time() - before < 15
 

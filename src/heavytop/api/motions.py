@@ -166,7 +166,9 @@ def reference(
     """
     body, state = arguments.motion(top, start)
     about, instants = arguments.system(system), arguments.any_times(times)
-    return proven(body, state, instants, whole(digits, "digits"), about, attitude=attitude)
+    return proven(
+        body, state, instants, whole(digits, "digits"), about, attitude=bool(arguments.flag(attitude, "attitude"))
+    )
 
 
 def _options(**given: object) -> dict[str, Any]:
