@@ -12,6 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
 import msgspec
+from heavytop.suite.measurements import measure
 
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
@@ -20,8 +21,6 @@ from heavytop.report.compare import compare
 from heavytop.report.comparison_text import headline, row_name
 from heavytop.report.policy import Policy
 from heavytop.report.verdicts import Verdict
-from heavytop.suite.measurements import measure
-from heavytop.suite.plan import Plan, expand, load
 
 PLAN = {
     "name": "false-alarms",
@@ -96,5 +95,5 @@ def main(reruns: int, plan: Plan) -> int:
 
 
 if __name__ == "__main__":
-    chosen = load(sys.argv[2])[0] if len(sys.argv) > 2 else msgspec.convert(PLAN, Plan)
+    chosen = load(sys.argv[2])[0] if len(sys.argv) > 2 else plan_of(PLAN)
     sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 50, chosen))

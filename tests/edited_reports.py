@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 from fractions import Fraction
@@ -14,9 +13,9 @@ import msgspec
 
 from heavytop.errors import InputError
 from heavytop.precision import decimal_text, exact, log10
-from heavytop.report import store
-from heavytop.report.compare import compare
+from heavytop.records import Against
 from heavytop.report.policy import Policy
+from reports import compare, store
 
 Document = dict[str, Any]
 Edit = Callable[[Document, Random], bool]
@@ -262,12 +261,44 @@ def start_failed(row: Document, random: Random) -> bool:
     return bool(metric)
 
 
-def _reference(pattern: str, change: Callable[[re.Match[str]], str]) -> Edit:
+def _reference(change: Callable[[Document], Any]) -> Edit:
+    """Edits what a row was compared with, and the words that follow from it."""
+
     def edit(row: Document, _: Random) -> bool:
-        was, row["against"] = row["against"], re.sub(pattern, change, row["against"])
-        return bool(was != row["against"])
+        was = deepcopy(row["reference"])
+        change(row["reference"])
+        row["against"] = msgspec.convert(row["reference"], Against).text
+        return bool(was != row["reference"])
 
     return edit
+
+
+def _certificates(**changes: Any) -> Edit:
+    def change(reference: Document) -> None:
+        for each in reference.get("certificates", []):
+            each |= {name: value for name, value in changes.items() if each.get(name) is not None}
+
+    return _reference(change)
+
+
+def _checked(**changes: Any) -> Edit:
+    return _reference(lambda reference: reference["checked"].update(changes) if reference.get("checked") else None)
+
+
+def _radius(change: Callable[[str], str]) -> Edit:
+    return _reference(
+        lambda reference: reference.update(radius=change(reference["radius"])) if reference.get("radius") else None
+    )
+
+
+def _not_proven(reference: Document) -> None:
+    for each in reference.get("certificates", []):
+        each["proven"] = "computed"
+
+
+def words_about_the_reference(row: Document, random: Random) -> bool:
+    row["against"] = random.choice(["known: somebody", "nothing", row["against"][:-1]])
+    return True
 
 
 def flags(row: Document, random: Random) -> bool:
@@ -342,23 +373,20 @@ EDITS: dict[str, Edit] = {
         value_changed, verdict_turned, metric_dropped, series_dropped, law_dropped, series_shorter, series_larger,
         series_without_its_end, not_finite_hidden, outcome, not_finite, horizon_shorter, reached_less, no_steps,
         more_steps, more_evaluations, bits, precision, starts_fewer, samples_fewer, start_failed, flags, order,
-        rounding, subject,
+        rounding, subject, words_about_the_reference,
     )
 } | {
-    "reference computed": _reference("known: |[(]proven[^)]*[)]", lambda at: "computed: " if ":" in at[0] else ""),
-    "reference not proven": _reference("[(]proven[^)]*[)]", lambda _: "(computed)"),
-    "radius larger": _reference(r"radius below (\S+?)(?=;|$)", lambda at: f"radius below {10**9 * float(at[1])}"),
-    "no radius": _reference(r", radius below [^;]+", lambda _: ""),
-    "digits fewer": _reference(r"to (\d+) digits", lambda _: "to 5 digits"),
-    "no certificate": _reference(r"; certified .*", lambda _: ""),
-    "certified at an earlier time": _reference(
-        r"certified at t = (-?)[\d./]+", lambda at: f"certified at t = {at[1]}1/99"
-    ),
-    "starts certified to fewer digits": _reference(r"\d+ digits or more", lambda _: "5 digits or more"),
-    "computed reference checked on fewer starts": _reference(r"on (\d+) starts up", lambda _: "on 1 starts up"),
-    "computed reference checked up to an earlier time": _reference(r"\|t\| = [^,]+, its", lambda _: "|t| = 0.3, its"),
-    "starts not certified": _reference(r"\d+ of (\d+) starts", lambda found: f"3 of {found[1]} starts"),
-    "computed reference worse": _reference(r"is \S+ of the error", lambda _: "is 2 of the error"),
+    "reference computed": _reference(lambda it: it.update(how="computed") if it["how"] == "proven" else None),
+    "reference not proven": _reference(_not_proven),
+    "radius larger": _radius(lambda radius: f"{10**9 * float(radius)}"),
+    "no radius": _radius(lambda _: ""),
+    "digits fewer": _certificates(digits=5),
+    "no certificate": _reference(lambda it: it.pop("certificates", None)),
+    "certified at an earlier time": _certificates(time="1/99"),
+    "starts not certified": _certificates(starts=3),
+    "computed reference checked on fewer starts": _checked(starts=1),
+    "computed reference checked up to an earlier time": _checked(until="0.3"),
+    "computed reference worse": _checked(part="2"),
     "exponent larger in a wide interval": _law(
         lambda law, _: law.update(exponent=law["exponent"] + 5, low=-50.0, high=50.0)
     ),

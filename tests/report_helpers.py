@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-import msgspec
-
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import SCHEMA, Law, Metric, Report, Row, Series
+from heavytop.records import SCHEMA, Law, Metric, Report, Series
+from reports import Row, replace
 
 HOSTILE = "<script>window.hacked = 1</script>\"'&$\\frac{a}$\n\x00]]>" + "x" * 10240
 TIMES = ["1", "10", "100", "1000"]
@@ -37,7 +36,7 @@ def row(**changes: object) -> Row:
         steps=1600,
         finite=True,
         metrics={
-            "drift_energy_max": msgspec.structs.replace(error("3e-15"), band=0.2),
+            "drift_energy_max": replace(error("3e-15"), band=0.2),
             "solution_error_relative_max": error("1e-10"),
         },
         measure="drift",
@@ -53,7 +52,7 @@ def row(**changes: object) -> Row:
         flags={"tolerance": "2e-16"},
         seconds={"run": 0.1},
     )
-    return msgspec.structs.replace(basis, **changes)
+    return replace(basis, **changes)
 
 
 def claim_rows(verdict: str = "refuted") -> list[Row]:
@@ -66,8 +65,8 @@ def claim_rows(verdict: str = "refuted") -> list[Row]:
     audit = row(case="c", measure="audit", integrator="audit", precision="exact", bits=0, series={}, **common)
     times = ["0.1", "1", "8"]
     return [
-        msgspec.structs.replace(audit, metrics=holds | {"(1.2).3 smooth all": value}),
-        msgspec.structs.replace(audit, system="gyrostat", metrics=holds),
+        replace(audit, metrics=holds | {"(1.2).3 smooth all": value}),
+        replace(audit, system="gyrostat", metrics=holds),
         row(
             case="c-2/forward",
             measure="claim_model",
@@ -134,7 +133,7 @@ def method(integrator: str, energy: Series, phase: Series, end: str = "1e-5", **
     series = {"drift_energy": energy, "solution_error_along": phase}
     made = work(integrator, end, 0.02)
     long = {"case": "lagrange/T=10000", "horizon": "10000", "time_reached": "10000", "series": series}
-    return msgspec.structs.replace(made, **(long | changes))
+    return replace(made, **(long | changes))
 
 
 GROWTH = [

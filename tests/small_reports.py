@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import msgspec
-
 import report_helpers
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import SCHEMA, Report, Row
 from report_helpers import error
+from reports import replace
 
 __all__ = ["error", "report", "row"]
 
@@ -26,7 +25,7 @@ def row(**changes) -> Row:
         laws={},
         seconds={},
     )
-    return msgspec.structs.replace(basis, **changes)
+    return replace(basis, **changes)
 
 
 def report(*rows: Row) -> Report:

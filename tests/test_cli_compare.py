@@ -8,7 +8,7 @@ import pytest
 import typer
 
 from heavytop.cli import run_command_line
-from heavytop.report import store
+from reports import store
 from small_reports import error, report, row
 
 

@@ -6,39 +6,71 @@ Numbers that measure something are decimal text with their log10 beside them, so
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, SupportsFloat
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, NamedTuple, SupportsFloat
 
 import msgspec
 
-SCHEMA = "heavytop-report/1"
+SCHEMA = "heavytop-report/2"
 
 UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED = "out_of_reach", "contradiction", "failed"
 """Outcomes of a row that came to nothing: it has no metrics, and says why in the place of a reference.
 
 failed: an integrator of others raised an error, or gave back what is no motion."""
 
+EXACT = "exact"
+"""The precision of a row in which no format is involved."""
+Direction = Literal["", "forward", "backward"]
 Bits = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Starts = Annotated[int, msgspec.Meta(ge=1)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
 Seconds = Annotated[float, msgspec.Meta(ge=0)]
-Kind = Literal["error", "duration", "value"]
+MetricKind = Literal["error", "duration", "value"]
 """How two values of a metric compare: a smaller error is better, a longer duration is better, a value must agree."""
+
+
+class Quantity(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """What a number is about: ``drift`` of the ``energy``, its ``max`` over the samples.
+
+    component: of a vector, or a first integral.  statistic: over the samples; of an equation its branch and domain are
+    the quantity's too.
+    """
+
+    name: str
+    component: str = ""
+    statistic: str = ""
+    branch: str = ""
+    domain: str = ""
+
+    @property
+    def text(self) -> str:
+        """The key of a report: ``drift_energy_max``, or ``(1.1).2 smooth all`` for an equation."""
+        if self.branch:
+            return f"{self.name}.{self.component} {self.branch} {self.domain}"
+        return "_".join(part for part in (self.name, self.component, self.statistic) if part)
+
+    def over(self, statistic: str) -> Quantity:
+        """The same quantity with another statistic; "" for its series."""
+        return Quantity(self.name, self.component, statistic, self.branch, self.domain)
 
 
 class Metric(msgspec.Struct, gc=False):
     """One measured number.
 
+    quantity: what it is; its text is the metric's key in the report.
+
     value: decimal text; or a word that is no number: "nan", "missing", "never", "unresolved" (smaller than ten radii
     of the reference, see ``bound``).
     log10: its decimal logarithm; null for 0 and for the words.
-    band: half-width in decades of the 95 % interval in which rounding luck alone moves the value, where measured.
+    band: half-width in decades of the 95 % interval in which rounding noise alone moves the value, where measured.
     """
 
     value: str
     log10: float | None
-    kind: Kind = "error"
+    kind: MetricKind = "error"
     bound: str | None = None
     band: Annotated[float, msgspec.Meta(ge=0, le=100)] | None = None
+    quantity: Quantity | None = None
 
     def __float__(self) -> float:
         """The nearest double, 0 where that is too small; the bound of what is unresolved, nan for the other words."""
@@ -60,17 +92,25 @@ class Metric(msgspec.Struct, gc=False):
         return float(self) >= float(other)
 
 
-class Series(msgspec.Struct):
+def by_name(found: Mapping[Quantity, Metric]) -> dict[str, Metric]:
+    """Metrics under their keys, each with its quantity."""
+    for quantity, metric in found.items():
+        metric.quantity = quantity
+    return {quantity.text: metric for quantity, metric in found.items()}
+
+
+class Series(msgspec.Struct, gc=False):
     """A measured quantity over time.  values: decimal text or the words of :class:`Metric`, one for each time."""
 
     times: list[str]
     values: list[str]
+    quantity: Quantity | None = None
 
 
 Growth = Literal["bounded", "t^0.5", "t", "t^1.5", "t^2", "exponential", "unresolved"]
 
 
-class Law(msgspec.Struct):
+class Law(msgspec.Struct, gc=False):
     """How a quantity grows with |t|: a fit to its RMS over an ensemble of starts.
 
     growth: the class; exponent of |t| (or rate of e^(rate |t|) where exponential) with its 95 % bootstrap interval over
@@ -89,12 +129,137 @@ class Law(msgspec.Struct):
     last: str | None = None
     detects: str | None = None
     lost_at: str | None = None
+    quantity: Quantity | None = None
 
 
-class Row(msgspec.Struct):
-    """One measurement, of one motion held against one reference.
+class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """What is measured.
 
-    measured: what is held (known, claimed or computed); against: what it is held against, with method and radius.
+    name: of the claim or the integrator.  branch, form: of a formula.  tolerance, step: asked of an integrator, "" for
+    what it does by itself.  high_accuracy: heyoka's.  bias: of a planted fault.  seed: of random starts.
+    """
+
+    what: Literal["claimed", "computed", "given"]
+    name: str
+    branch: str = ""
+    form: str = ""
+    tolerance: str = ""
+    step: str = ""
+    high_accuracy: bool = False
+    bias: str = ""
+    seed: int = 1
+
+    @property
+    def variant(self) -> str:
+        """What sets it apart from a plain one, as rows of ensembles name it."""
+        parts = {
+            "high_accuracy": self.high_accuracy,
+            f"tolerance {self.tolerance}": self.tolerance,
+            f"I1 off by {self.bias}": self.bias,
+            f"seed {self.seed}": self.seed != 1,
+        }
+        return ", ".join(text for text, said in parts.items() if said)
+
+    @property
+    def setting(self) -> str:
+        """``tolerance=1e-9`` or ``step=1/50``; "" where neither is asked for."""
+        return f"tolerance={self.tolerance}" if self.tolerance else f"step={self.step}" if self.step else ""
+
+
+class RowKey(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """What makes a row the same row in another report.
+
+    direction: of time, where rows differ in it.  horizon: the last time, as text.
+    """
+
+    kind: str
+    case: str
+    system: str
+    subject: Subject
+    precision: str = EXACT
+    direction: Direction = ""
+    horizon: str = "0"
+
+
+class Certified(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """That two sources of a known motion agree at a time.
+
+    digits: to which they do; None for exactly.  proven: whether both are proofs at that time, at both ends of the way
+    there, or one is computed.  starts, of_starts: how many starts of an ensemble are certified so; None for one motion.
+    """
+
+    time: str
+    digits: Count | None
+    source: str
+    proven: Literal["proven", "proven at both ends", "computed"] = "proven"
+    starts: Count | None = None
+    of_starts: Count | None = None
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        agreement = "exactly" if self.digits is None else f"to {self.digits} digits"
+        if self.starts is None:
+            return f"certified at t = {self.time} {agreement} by {self.source} ({self.proven})"
+        at_least = f"{agreement} or more by {self.source} ({self.proven})"
+        return f"{self.starts} of {self.of_starts} starts certified at t = {self.time} {at_least}"
+
+
+class Checked(msgspec.Struct, frozen=True, gc=False):
+    """How a computed reference was checked: against a wider format, on so many starts, up to a time.
+
+    part: its error as a part of the error that it measures; all decimal text.
+    """
+
+    precision: str
+    starts: Count
+    until: str
+    part: str
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return (
+            f"against {self.precision} on {self.starts} starts up to |t| = {self.until}, "
+            f"its error is {self.part} of the error measured"
+        )
+
+
+class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """What a row was compared with.
+
+    how: with proven values, with computed ones, with equations, or with none but its own first integrals.
+    radius: decimal text, of the proven balls, or within which two computed runs agree.  certificates: the first start's
+    before that of all starts.  reason: why there is none.
+    """
+
+    how: Literal["proven", "computed", "equations", "none"]
+    method: str = ""
+    radius: str = ""
+    certificates: tuple[Certified, ...] = ()
+    checked: Checked | None = None
+    reason: str = ""
+
+    @property
+    def text(self) -> str:
+        """In a sentence."""
+        if self.how == "none":
+            return f"its own first integrals; {self.reason}"
+        if self.how == "equations" or (self.how == "proven" and not self.radius):
+            return self.method
+        if self.how == "computed":
+            agreed = f" agree within {self.radius}" if self.radius else ""
+            return f"computed, not proven: {self.method}{agreed}" + (f"; {self.checked.text}" if self.checked else "")
+        said = ", for the first start; ".join(each.text for each in self.certificates)
+        return f"known: {self.method}, radius below {self.radius}; {said}"
+
+
+class Row(msgspec.Struct, gc=False):
+    """One measurement, of one motion compared with one reference.
+
+    key: what is measured, of what, how, over which time; case, system, integrator, precision, horizon and measure are
+    what other programs read of it.  reference: what it was compared with; measured and against say both in words, which
+    nothing reads.
     outcome, time_reached, steps, finite travel with every number.  seconds: timings, not compared.
     evaluations: of the field, where the integrator counts them.
     samples: how many times the largest values are over; 0 where that is not said.
@@ -112,6 +277,8 @@ class Row(msgspec.Struct):
     steps: Count
     finite: bool
     metrics: dict[str, Metric]
+    key: RowKey
+    reference: Against
     measure: str = ""
     measured: str = ""
     against: str = ""
@@ -126,9 +293,34 @@ class Row(msgspec.Struct):
     evaluations: Count | None = None
 
     @property
-    def key(self) -> tuple[str, ...]:
-        """What makes a row the same row in another report."""
-        return self.measure, self.case, self.system, self.integrator, self.precision
+    def identity(self) -> Identity:
+        """What makes it the same row in another report, and what it is called there."""
+        return Identity(self.key, self.measure, self.case, self.system, self.integrator, self.precision)
+
+    def metric(self, name: str, component: str = "", statistic: str = "") -> Metric | None:
+        """The metric of that quantity, if it is there."""
+        return self.metrics.get(Quantity(name, component, statistic).text)
+
+
+class Identity(NamedTuple):
+    """A row's key, and the names under which other programs know it."""
+
+    key: RowKey
+    measure: str
+    case: str
+    system: str
+    integrator: str
+    precision: str
+
+    @property
+    def named(self) -> dict[str, str]:
+        """Its part of JSON documents."""
+        return {name: getattr(self, name) for name in self._fields[1:]} | {"horizon": self.key.horizon}
+
+    @property
+    def elsewhere(self) -> Identity:
+        """The same but for its horizon."""
+        return self._replace(key=msgspec.structs.replace(self.key, horizon=""))
 
 
 class Report(msgspec.Struct):

@@ -15,15 +15,13 @@ import pytest
 from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate import peers
 from heavytop.integrate.peers import contract
+from heavytop.kinds import work_precision
 from heavytop.precision import DOUBLE, QUAD
-from heavytop.report import html, store
-from heavytop.report.compare import compare
+from heavytop.records import Report
 from heavytop.report.junit import comparison_junit
-from heavytop.report.overview import all_good
 from heavytop.report.policy import Policy
 from heavytop.suite.cases import CASES
-from heavytop.suite.measurements import measure, work_precision
-from heavytop.suite.plan import expand, load
+from reports import all_good, compare, expand, html, load, measure
 
 CASE = CASES["euler"]
 TIMES = [Fraction(1, 2), Fraction(2)]
@@ -272,7 +270,7 @@ def test_the_rows_of_others_go_on_and_every_surface_has_the_reason(package: Path
         assert text.endswith(" in euler/T=2 tolerance=1e-9")
     assert not any(row.metrics or row.finite for row in rows[1:])
     assert not all_good(rows)
-    report = store.Report("heavytop-report/1", {"name": "p"}, {}, rows)
+    report = Report("heavytop-report/2", {"name": "p"}, {}, rows)
     junit = comparison_junit(compare(report, report, Policy()))
     for surface in (html.report_page(report), junit):
         assert "mine:zero raised ZeroDivisionError: division by zero in euler/T=2 tolerance=1e-9" in surface

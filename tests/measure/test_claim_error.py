@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
+from heavytop.suite.measurements.claimed import CLAIM_XI, true_motion
 
 from heavytop.claims.ershkov import PartialCase
 from heavytop.errors import OutOfReach
@@ -11,7 +12,6 @@ from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.measure.claim_error import claim_attitude, exact_claim, model_error
 from heavytop.measure.computed_reference import ComputedReference
-from heavytop.suite.measurements.claimed import CLAIM_XI, true_motion
 from helpers import VECTORS
 
 TWO = PartialCase(Fraction(1), Fraction(2), Fraction(1))

@@ -17,11 +17,11 @@ from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import SCHEMA, Metric, Report
 from heavytop.report import html, plots
 from heavytop.report.overview import worst
-from heavytop.report.text import summary
 from heavytop.suite.cases import CASES
 from heavytop.suite.score import score
 from heavytop.suite.trajectory_file import Given
 from report_helpers import error, row
+from reports import replace, summary
 
 FULL = 53 * math.log10(2)
 TIMES = [Fraction(i) for i in range(1, 5)]
@@ -139,16 +139,15 @@ def test_the_summary_of_many_rows_names_the_fewest() -> None:
 def test_rounding_noise_stands_beside_the_number_it_belongs_to() -> None:
     from io import StringIO
 
-    from msgspec import structs
     from rich.console import Console
 
     metrics = {
-        "drift_energy_max": structs.replace(error("3e-15"), band=0.21),
-        "solution_error_along_max": structs.replace(error("2e-13"), band=0.34),
+        "drift_energy_max": replace(error("3e-15"), band=0.21),
+        "solution_error_along_max": replace(error("2e-13"), band=0.34),
         "solution_error_across_max": error("1e-14"),
     }
-    homoclinic = {"break_away_time": structs.replace(error("35"), kind="duration", band=0.02)}
-    homoclinic |= {"solution_error_omega_max": structs.replace(error("1e-13"), band=0.9)}
+    homoclinic = {"break_away_time": replace(error("35"), kind="duration", band=0.02)}
+    homoclinic |= {"solution_error_omega_max": replace(error("1e-13"), band=0.9)}
     rows = [row(metrics=metrics, samples=100), row(case="saddle", measure="homoclinic", metrics=homoclinic)]
     console = Console(width=200, record=True, file=StringIO())
     console.print(summary(Report(SCHEMA, {"name": "two"}, {}, rows)))

@@ -5,10 +5,10 @@ from fractions import Fraction
 from random import Random
 
 import pytest
+from heavytop.measure.luck import MOST_SEEDS, RERUNS, bands, duration_band, factor, least, reroll
 from hypothesis import given
 from hypothesis import strategies as st
 
-from heavytop.measure.luck import MOST_SEEDS, RERUNS, bands, duration_band, factor, least, reroll
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import DOUBLE, exact, rounded
 from heavytop.records import Metric

@@ -1,12 +1,10 @@
-"""What a comparison reads in ``against`` is what the code that writes the sentence knows: they are made here by it."""
+"""Which of two references is the weaker; they are made here as runs make them."""
 
 import inspect
-import math
 import pkgutil
 from dataclasses import fields, is_dataclass, replace
 from fractions import Fraction
 from importlib import import_module
-from itertools import permutations
 
 import msgspec
 import pytest
@@ -15,43 +13,24 @@ import heavytop.exact
 from heavytop.claims.ershkov import PartialCase
 from heavytop.exact.axes import ALL, renamed_state, renamed_top
 from heavytop.exact.catalogue import find
+from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.trajectory import Problem
+from heavytop.kinds.claim_model import true_motion
 from heavytop.measure.computed_reference import ComputedReference
+from heavytop.measure.ensemble_reference import Wider, reference
 from heavytop.measure.known import Known, known_motion
 from heavytop.precision import DOUBLE, EXTENDED
-from heavytop.report.against import Against, weaker
+from heavytop.records import Against
+from heavytop.report.against import weaker
 from heavytop.suite.cases import CASES
-from heavytop.suite.measurements import measure
-from heavytop.suite.measurements.claimed import true_motion
-from heavytop.suite.measurements.ensemble_reference import Wider, reference
-from heavytop.suite.plan import Plan, expand
+from reports import expand, measure, plan_of
 
 ONE = Fraction(1)
-OWN = Against("its own first integrals", False, None, None, (), (), None)
 
 
 def problem(name: str, precision=DOUBLE) -> Problem:
     case = CASES[name]
     return Problem.of(case.top, case.start, precision, case.system)
-
-
-def log(value: float) -> float:
-    return math.log10(abs(value))
-
-
-def said(known: Known) -> Against:
-    """What the text of a known motion says, worked out from its fields."""
-    certificate = known.certificate
-    proven, radius = certificate.kind != "computed", -known.bits * math.log10(2)
-    return Against("known", proven, radius, None, (certificate.agreed_digits,), (log(known.time),), None)
-
-
-def same(read: Against, known: Against) -> bool:
-    numbers = ((read.radius, known.radius), (read.part, known.part), *zip(read.times, known.times, strict=True))
-    # a radius is written to three digits, rounded up
-    close = all(a == b or (a is not None and b is not None and abs(a - b) < 5e-3) for a, b in numbers)
-    none = {"radius": None, "part": None, "times": ()}
-    return close and replace(read, **none) == replace(known, **none)
 
 
 @pytest.fixture(scope="module")
@@ -78,15 +57,21 @@ def methods() -> set[str]:
     return names | renamed
 
 
-def test_every_closed_form_under_every_certificate_is_read_as_it_is(known) -> None:
+def test_every_closed_form_is_as_good_as_any_other_under_the_same_certificate(known) -> None:
     names = methods()
     assert len(names) > 12
     assert "validated: Taylor enclosure" in names
     for each in known:
+        certificate, against = each.certificate, each.against
+        assert against.how == "proven"
+        assert Fraction(against.radius) >= Fraction(1, 2**each.bits) > Fraction(against.radius) * Fraction(99, 100)
+        (certified,) = against.certificates
+        assert (certified.digits, certified.source) == (certificate.agreed_digits, certificate.second_source)
+        assert (Fraction(certified.time), certified.proven) == (each.time, certificate.kind)
         for name in names:
-            one = replace(each, certificate=replace(each.certificate, method=name))
-            assert same(Against.of(one.text), said(one)), one.text
-            assert weaker(each.text, one.text) == ""
+            one = replace(each, certificate=replace(certificate, method=name)).against
+            assert name in one.text
+            assert weaker(against, one) == weaker(one, against) == ""
 
 
 def certified_otherwise(known: Known, **change) -> Known:
@@ -107,55 +92,55 @@ def certified_otherwise(known: Known, **change) -> Known:
 def test_a_known_motion_that_is_known_to_less_is_weaker(known, part: str, change) -> None:
     for each in known:
         less = change(each)
-        assert part in weaker(each.text, less.text), less.text
-        assert weaker(less.text, each.text) == ""
+        assert part in weaker(each.against, less.against), less.against
+        assert weaker(less.against, each.against) == ""
 
 
-def test_runs_that_agree_are_read_with_their_radius() -> None:
+def test_runs_that_agree_say_their_radius() -> None:
     case = CASES["generic"]
-    texts = [ComputedReference(case.top, case.start, [ONE / 8], bits).method for bits in (100, 160)]
-    coarse, fine = map(Against.of, texts)
-    assert (coarse.kind, coarse.proven, coarse.digits, coarse.times) == ("computed", False, (), ())
-    assert -50 < fine.radius < -44 < -32 < coarse.radius < -26
-    assert "radius" in weaker(texts[1], texts[0])
-    assert weaker(*texts) == ""
+    coarse, fine = (ComputedReference(case.top, case.start, [ONE / 8], bits).against for bits in (100, 160))
+    assert (coarse.how, coarse.certificates) == ("computed", ())
+    assert 0 < Fraction(fine.radius) < Fraction(1, 10**44) < Fraction(1, 10**32) < Fraction(coarse.radius)
+    assert "radius" in weaker(fine, coarse)
+    assert weaker(coarse, fine) == ""
 
 
-def test_the_truth_of_a_claim_is_read_whichever_it_is() -> None:
+def test_the_truth_of_a_claim_is_proven_whichever_it_is() -> None:
     times = [ONE / 8, ONE / 2]
     closed, enclosed = (true_motion(PartialCase(ONE, ONE, ONE / ratio), times)[1] for ratio in (2, 6))
-    for text in (closed, enclosed):
-        read = Against.of(text)
-        assert (read.kind, read.proven) == ("known", True)
-        assert read.times == pytest.approx((log(1 / 2),), abs=1e-5)
-        assert read.digits[0] >= 45
-        assert read.radius == pytest.approx(-160 * math.log10(2), abs=5e-3)
+    for against in (closed, enclosed):
+        assert against.how == "proven"
+        assert [Fraction(each.time) for each in against.certificates] == [ONE / 2]
+        assert against.certificates[0].digits >= 45
     assert weaker(closed, enclosed) == weaker(enclosed, closed) == ""
 
 
-def ensemble(problems: list[Problem], times: list[Fraction], name: str | None) -> str:
-    return reference(problems, problems, times, name, {}, Wider({}, lambda: None)).text
+def ensemble(problems: list[Problem], times: list[Fraction], name: str | None) -> Against:
+    wider = Wider({}, lambda: None)
+    return reference(problems, problems, times, name, propagate_ensemble, wider).against
 
 
-def test_references_of_ensembles_are_read_as_they_are() -> None:
+def test_references_of_ensembles_say_what_they_are_known_to() -> None:
     times = [ONE, Fraction(12)]
     closed = ensemble([problem("lagrange")] * 2, times, None)
-    read = Against.of(closed)
-    assert (read.kind, read.proven, read.starts) == ("known", True, 2)
-    assert len(read.digits) == len(read.times) == 2
-    assert min(read.digits) >= 19
+    first, every = closed.certificates
+    assert (closed.how, first.starts, every.starts, every.of_starts) == ("proven", None, 2, 2)
+    assert min(first.digits, every.digits) >= 19
+    assert "2 of 2 starts certified" in closed.text
     four = [problem("generic")] * 4
     computed = ensemble(four, times, "extended")
-    read = Against.of(computed)
-    assert (read.kind, read.proven, read.radius, read.digits, read.starts) == ("computed", False, None, (), 4)
-    assert read.times == pytest.approx((log(12),), abs=1e-3)
-    assert -5 < read.part < -1
+    assert (computed.how, computed.radius, computed.certificates) == ("computed", "", ())
+    assert (computed.checked.starts, Fraction(computed.checked.until)) == (4, 12)
+    assert Fraction(1, 10**5) < Fraction(computed.checked.part) < Fraction(1, 10)
     assert "starts" in weaker(computed, ensemble(four[:1], times, "extended"))
     assert "earlier" in weaker(computed, ensemble(four, times[:1], "extended"))
+    worse = msgspec.structs.replace(computed, checked=msgspec.structs.replace(computed.checked, part="1"))
+    assert "error of the computed reference" in weaker(computed, worse)
     # what was not fit to score with is no reference, whatever is said of it
-    unfit = ensemble([problem("generic", EXTENDED)], times, "extended")
-    assert "of the error measured" in unfit
-    assert Against.of(unfit) == Against.of(ensemble(four, times, None)) == OWN
+    unfit, none = ensemble([problem("generic", EXTENDED)], times, "extended"), ensemble(four, times, None)
+    assert "of the error measured" in unfit.text
+    assert unfit.how == none.how == "none"
+    assert weaker(unfit, none) == weaker(none, unfit) == ""
 
 
 PLAN = {
@@ -169,10 +154,10 @@ PLAN = {
 
 
 def test_the_other_rows_say_what_they_are_compared_with() -> None:
-    drift, steps, *formulas = (measure(task).against for task in expand(msgspec.convert(PLAN, Plan)))
-    assert Against.of(drift) == OWN
-    assert Against.of(steps) == Against("known", True, None, None, (), (), None)
-    texts = [drift, steps, *formulas]
-    for one, other in permutations(texts, 2):
-        assert bool(weaker(one, other)) is (one != other)
-    assert "proven" in weaker(steps, "known: by somebody")
+    drift, steps, *formulas = (measure(task).reference for task in expand(plan_of(PLAN)))
+    assert [each.how for each in (drift, steps, *formulas)] == ["none"] + ["proven"] * (1 + len(formulas))
+    for other in (steps, *formulas):
+        assert weaker(drift, other)
+        assert weaker(other, drift)
+    assert "proven" in weaker(steps, msgspec.structs.replace(steps, how="computed"))
+    assert weaker(Against("equations", "those of one"), Against("equations", "those of another"))

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 
 from heavytop.errors import InputError
 from heavytop.records import Law, Metric
-from heavytop.report import store
-from heavytop.report.compare import compare
 from heavytop.report.policy import Policy
+from reports import compare, store
 from small_reports import error, report, row
 
 GOOD = report(
@@ -101,7 +100,7 @@ def test_brief_and_whole_reports_compare_alike_however_they_are_laid_out(tmp_pat
     whole = compare(store.read(old), store.read(new), Policy())
     brief = compare(store.read_brief(old), store.read_brief(new), Policy())
     assert whole == brief
-    assert [(f.key[1], f.verdict.value) for f in brief.changed] == [("lagrange", "worse")]
+    assert [(f.row.case, f.verdict.value) for f in brief.changed] == [("lagrange", "worse")]
     counted = compare(store.read_brief(old), store.read_brief(new), Policy(), list_same=False)
     assert (counted.tally, counted.changed, counted.verdict) == (whole.tally, whole.changed, whole.verdict)
     assert len(counted.findings) < len(whole.findings)
@@ -136,5 +135,5 @@ def test_a_row_missing_at_the_start_and_one_new_are_told_apart(tmp_path: Path) -
     (tmp_path / "b").mkdir()
     store.write(report(*reversed(rows[1:])), tmp_path / "b")
     result = compare(store.read_brief(tmp_path / "a"), store.read_brief(tmp_path / "b"), Policy())
-    assert [(f.key[1], f.verdict.value) for f in result.changed] == [("a", "missing"), ("f", "new")]
+    assert [(f.row.case, f.verdict.value) for f in result.changed] == [("a", "missing"), ("f", "new")]
     assert result.exit_code == 3

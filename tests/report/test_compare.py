@@ -3,18 +3,16 @@
 import math
 from pathlib import Path
 
-import msgspec
 import pytest
 
 from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import Law, Metric, Row, Series
-from heavytop.report import store
-from heavytop.report.compare import compare
+from heavytop.records import Against, Law, Metric, Row, Series
 from heavytop.report.policy import Policy, Timings
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict, judge_seconds
+from reports import compare, replace, store
 from small_reports import error, report, row
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -72,7 +70,8 @@ def test_what_is_no_number_is_never_the_same_not_even_as_itself(value: str) -> N
         {"bits": 64},
         {"flags": {"tolerance": "1e-9"}},
         {"flags": {}},
-        {"against": "something else"},
+        {"reference": Against("computed", "somebody"), "against": "computed, not proven: somebody"},
+        {"measured": "computed: something else"},
     ],
 )
 def test_a_failure_another_horizon_format_flag_or_reference_is_incomparable(change) -> None:
@@ -180,7 +179,7 @@ def edited(tmp_path: Path, old: bytes, new: bytes, *, keep_digest: bool = False)
         (b'"time_reached":"100"', b'"time_reached":"99"', "a success that reached only 99"),
         (b'"1E-12"', b'"much"', "not a finite number"),
         (b'"value":"1E-12","log10":-12.0', b'"value":"nan","log10":null', "said to be finite"),
-        (b"heavytop-report/1", b"other-report/7", "schema"),
+        (b"heavytop-report/2", b"other-report/7", "schema"),
         (b'"steps":10', b'"steps":"ten"', "not a whole report"),
         (b'"metrics"', b'"metric"', "not a whole report"),
     ],
@@ -307,7 +306,7 @@ def test_a_run_that_failed_on_rounded_times_is_read(tmp_path: Path) -> None:
 
 def test_a_list_in_the_environment_differs_by_what_one_of_the_two_lacks() -> None:
     def differences(*environments):
-        two = [msgspec.structs.replace(report(row()), environment=each) for each in environments]
+        two = [replace(report(row()), environment=each) for each in environments]
         return compare(*two, Policy()).environment
 
     old, new = {"cpu": {"features": ["a", "b"]}}, {"cpu": {"features": ["b", "c", "d"]}}

@@ -9,7 +9,7 @@ import numpy
 import pytest
 
 from heavytop.claims.ershkov import PartialCase
-from heavytop.report.curves import PAPER_FIGURES, gyrostat_curves, true_curves
+from heavytop.measure.curves import PAPER_FIGURES, drawings, gyrostat_curves, true_curves
 from heavytop.report.figures import draw_figures
 
 
@@ -54,7 +54,7 @@ def test_angles_of_the_truth_satisfy_3_2():
 
 
 def test_the_files_are_complete_and_the_same_every_time(tmp_path):
-    first, second = draw_figures(tmp_path / "one"), draw_figures(tmp_path / "two")
+    first, second = (draw_figures(drawings(), tmp_path / name) for name in ("one", "two"))
     names = [file.name for file in first]
     assert names[:14] == [f"fig{number}.{kind}" for number in range(2, 9) for kind in ("svg", "png")]
     assert {"truth-ratio2.svg", "truth-ratio6.svg", "momentum-sphere.svg"} <= set(names)

@@ -8,17 +8,18 @@ from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
 
-import msgspec
 import pytest
 
 from heavytop.errors import InputError
+from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Law, Metric, Report, Series
-from heavytop.report import claim_verdict, html, plots, store, work_plots
-from heavytop.report.compare import compare
+from heavytop.report import plots
+from heavytop.report.html import MOST_ROWS
 from heavytop.report.policy import Policy
-from heavytop.report.section import MOST_PLOTS, points
+from heavytop.report.section import MOST_PLOTS, Section, points
 from heavytop.report.svg import decades, new_axes
 from report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row, work
+from reports import compare, html, replace, store
 
 RESULTS = Path(__file__).parents[2] / "results" / "default"
 
@@ -95,6 +96,10 @@ def test_headings_are_in_order_and_tables_have_headers(pages: dict[str, Page], n
     assert {"main", "header", "nav", "footer"} <= {tag for tag, _ in pages[name].tags}
 
 
+def section_of(name: str, report: Report) -> Section | None:
+    return next((section for section in html.sections([("", report)]) if section.id == name), None)
+
+
 def test_the_verdict_comes_first_then_the_sections_in_their_order(pages: dict[str, Page]) -> None:
     sections = [tags["id"] for tags in pages["report"].all("section")]
     expected = [
@@ -123,29 +128,34 @@ def test_the_verdict_comes_first_then_the_sections_in_their_order(pages: dict[st
 def test_the_headline_says_what_the_audit_found(tmp_path: Path, verdict: str, words: str) -> None:
     report = full_report()
     report.rows[:5] = claim_rows(verdict)
-    found = claim_verdict.audited(report)
-    assert found[0].verdict == verdict
-    assert found[0].refuted == (["(1.2)"] if verdict == "refuted" else [])
-    assert words in claim_verdict.headline(found)[1]
+    rows = [row for row in report.rows if row.measure == "audit"]
+    (card,) = KINDS["audit"].cards(rows)
+    assert card.lines[1].word == verdict
+    assert card.lines[1].text.endswith(", refuted (1.2)" if verdict == "refuted" else "equations proven")
+    assert words in KINDS["audit"].headline(rows)[1]
     html.write_report(report, tmp_path / "page.html")
     assert words in Page(tmp_path / "page.html").text
 
 
 def test_no_claim_no_verdict_on_one() -> None:
-    assert claim_verdict.headline([])[0] == "nothing"
+    assert KINDS["audit"].headline([]) is None
+    assert "No claim about the heavy top is audited" in html.report_page(Report("", {}, {}, [row()]))
 
 
 def test_how_wrong_and_from_when_on(pages: dict[str, Page]) -> None:
-    found = claim_verdict.wrongness(full_report())
-    assert [(each.case, each.parts_at, each.largest) for each in found] == [("c-2", "0.24", "0.25")]
-    assert found[0].at == [("0.1", "0.0025", "0.05"), ("1", "0.17", "0.34")]
+    rows = [row for row in full_report().rows if row.measure == "claim_model"]
+    (card,) = KINDS["claim_model"].cards(rows)
+    assert card.title == "c-2, smooth branch: wrong from"
+    assert card.lines[0].text == "|t| = 0.24"
+    assert card.lines[1].text.endswith("up to |t| = 8 is 0.25.")
+    assert card.rows == [("0.1", "0.0025", "0.05"), ("1", "0.17", "0.34")]
     assert "|t| = 0.24" in pages["report"].text
 
 
 def test_a_run_that_failed_is_a_verdict_and_no_number(pages: dict[str, Page]) -> None:
     assert "15 of 17 measurements reached their horizon" in pages["report"].text
     assert "Runs that did not reach their horizon" in pages["report"].text
-    section = plots.digits([("", full_report())])
+    section = section_of("digits", full_report())
     kept, lost = section.columns.index("kept"), section.columns.index("lost")
     said = {line[0]: [line[kept], line[lost]] for line in section.rows}
     assert said["lagrange"] == ["time_limit", ""]
@@ -172,7 +182,7 @@ def test_of_many_rows_the_first_and_the_worst_are_shown() -> None:
     rows[2500] = row(case="fewest digits", metrics={"solution_error_relative_max": error("1e-3")})
     shown, left_out = html.detailed(rows)
     assert len(shown) + left_out == 3000
-    assert [each.case for each in shown[html.MOST_ROWS :]][:2] == ["late failure", "fewest digits"]
+    assert [each.case for each in shown[MOST_ROWS:]][:2] == ["late failure", "fewest digits"]
     assert html.detailed(rows[:10]) == (rows[:10], 0)
 
 
@@ -207,7 +217,7 @@ def test_an_exponential_law_is_one_in_time_and_not_in_its_logarithm() -> None:
 
 
 def test_a_law_is_in_the_legend_and_in_the_numbers() -> None:
-    section = plots.growth([("", full_report())])
+    section = section_of("growth", full_report())
     assert "fitted law" in section.legend
     assert section.pictures[1].note.startswith("double: t^1.5, exponent 1.50 [1.40, 1.60].")
     assert section.pictures[0].note == ""
@@ -217,7 +227,7 @@ def test_a_law_is_in_the_legend_and_in_the_numbers() -> None:
 
 
 def test_work_and_precision_says_what_is_faster_and_what_failed(pages: dict[str, Page]) -> None:
-    section = work_plots.work_precision([("", full_report())])
+    section = section_of("work-precision", full_report())
     assert "3.0 times faster than the best peer that gets there, peer:A" in section.text[1]
     assert section.text[1] in pages["report"].text
     assert list(section.legend) == ["heyoka double", "peer:A", "peer:B", "cyrk:DOP853", "splitting:4"]
@@ -225,7 +235,7 @@ def test_work_and_precision_says_what_is_faster_and_what_failed(pages: dict[str,
     assert section.pictures[0].note == "At 1e-10 heyoka double is 3.0 × as fast as peer:A."
     for picture in section.pictures[:2]:
         assert "peer:B: gave up (1)." in picture.description
-    assert work_plots.work_precision([("", Report("", {}, {}, [row()]))]) is None
+    assert section_of("work-precision", Report("", {}, {}, [row()])) is None
     assert "1 run of work against precision gave up" in pages["report"].text
 
 
@@ -239,7 +249,7 @@ def test_rows_without_a_number_anywhere_make_a_page_all_the_same(tmp_path: Path)
                 name: Metric(word, None) if metric.kind == "error" and "break" not in name else metric
                 for name, metric in each.metrics.items()
             }
-            rows.append(msgspec.structs.replace(each, case=f"{each.case} {word}", series=series, metrics=metrics))
+            rows.append(replace(each, case=f"{each.case} {word}", series=series, metrics=metrics))
     rows += [row(case="empty", series={"drift_energy": Series([], [])}, metrics={}, horizon="0")]
     html.write_report(Report(SCHEMA, {}, {}, rows), tmp_path / "page.html")
     assert len(Page(tmp_path / "page.html").all("section")) > 3
@@ -269,7 +279,7 @@ def test_how_to_reproduce_names_the_plan_only_where_it_is_built_in() -> None:
     assert "--plan smoke " in html.commands(report)[3]
     assert "--plan FILE.toml " in html.commands(full_report(HOSTILE))[3]
     assert html.commands(report)[0] == f"git checkout {'0' * 40}"
-    unknown = msgspec.structs.replace(report, environment={"packages": {"heavytop": "0.1.0"}, "commit": None})
+    unknown = replace(report, environment={"packages": {"heavytop": "0.1.0"}, "commit": None})
     assert html.commands(unknown)[0] == "# heavytop 0.1.0"
 
 
@@ -299,7 +309,7 @@ def test_every_number_of_the_results_is_in_the_page(pages: dict[str, Page]) -> N
 def test_every_rung_has_its_marker_and_one_alone_is_seen() -> None:
     rungs = [work("heyoka tolerance=1e-8", f"{n}e-9", 0.001) for n in range(10, 20)]
     alone = work("mpmath:odefun tolerance=eps", "1e-60", 6.0, precision="real:237", bits=237)
-    (picture, _) = work_plots.work_precision([("", Report("", {}, {}, [*rungs, alone]))]).pictures
+    (picture, _) = section_of("work-precision", Report("", {}, {}, [*rungs, alone])).pictures
     data = picture.svg.replace("><", ">\n<")
     # markers are used shapes; the ticks of the axes are too, and black
     assert len(re.findall(r"<use [^>]*fill: var\(--c0\)", data)) == len(rungs)

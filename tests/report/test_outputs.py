@@ -8,7 +8,6 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
-import msgspec
 import pytest
 from rich.console import Console
 
@@ -16,16 +15,15 @@ from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Law, Report, Series
-from heavytop.report.compare import Comparison, compare
+from heavytop.report.compare import Comparison
 from heavytop.report.comparison_text import comparison
-from heavytop.report.history import history, history_json, history_svg, history_text
+from heavytop.report.history import history_json, history_svg, history_text
 from heavytop.report.history_page import history_page
-from heavytop.report.html import comparison_page, report_page
 from heavytop.report.junit import comparison_junit
 from heavytop.report.markdown import comparison_markdown
 from heavytop.report.policy import Policy
 from heavytop.report.section import logarithm
-from heavytop.report.text import summary
+from reports import compare, comparison_page, history, replace, report_page, summary
 from small_reports import error, report, row
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -52,7 +50,7 @@ def baseline() -> Report:
 
 def candidate() -> Report:
     rows = [each for each in baseline().rows if each.case != "gone"]
-    rows[0].laws = {"drift_energy": Law("t", 64, 1.0, 0.9, 1.1)}
+    rows[0] = replace(rows[0], laws={"drift_energy": Law("t", 64, 1.0, 0.9, 1.1)})
     rows[0].metrics["drift_energy_max"] = error("1e-10")
     rows[1].metrics["solution_error_across_max"] = error("1e-14")
     rows[2].outcome, rows[2].time_reached = "step_limit", "7.5"
@@ -143,7 +141,7 @@ def test_junit_is_xml_whatever_the_names_and_counts_what_it_holds() -> None:
 
 def test_a_history_marks_each_step_at_the_report_it_came_with() -> None:
     names, reports = three()
-    tracks = {(t.key[1], t.metric): t for t in history(reports, Policy())}
+    tracks = {(t.row.case, t.metric): t for t in history(reports, Policy())}
     track = tracks["euler", "drift_energy_max"]
     assert track.values == ["1E-12", "1E-12", "1E-10"]
     assert {number: verdict.value for number, (verdict, _) in track.steps.items()} == {2: "worse"}
@@ -198,7 +196,7 @@ def test_no_control_character_gets_out_to_a_terminal_or_breaks_xml() -> None:
         for measure in ("drift", "work_precision", "audit", "local_error", "score", CONTROL)
     ]
     rows.append(row(case=CONTROL, outcome="step_limit", time_reached="1", system=CONTROL, seconds={"least": 1.0}))
-    old, new = report(*rows), report(*(msgspec.structs.replace(each, metrics={CONTROL: error("1")}) for each in rows))
+    old, new = report(*rows), report(*(replace(each, metrics={CONTROL: error("1")}) for each in rows))
     old.environment[CONTROL], old.plan = CONTROL, {"name": CONTROL}
     found, tracks = compare(old, new, Policy()), history([old, new], Policy())
     texts = [

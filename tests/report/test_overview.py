@@ -4,13 +4,27 @@ from io import StringIO
 
 from rich.console import Console
 
-from heavytop.records import SCHEMA, Metric, Report, Row
-from heavytop.report.overview import MOST_ROWS, overview
+from heavytop.records import SCHEMA, Metric, Report
+from heavytop.report.overview import MOST_ROWS
+from reports import Row, overview
 
 
 def row(index: int, value: str, log10: float | None, outcome: str = "success") -> Row:
     metrics = {"drift_energy_max": Metric(value, log10), "count": Metric("7", 0.845098, "value")}
-    return Row(f"top[{index}]", "heavy_top", "heyoka", "double", 53, outcome, "1", "1", 3, True, metrics, "drift")
+    return Row(
+        case=f"top[{index}]",
+        system="heavy_top",
+        integrator="heyoka",
+        precision="double",
+        bits=53,
+        outcome=outcome,
+        horizon="1",
+        time_reached="1",
+        steps=3,
+        finite=True,
+        metrics=metrics,
+        measure="drift",
+    )
 
 
 def shown(rows) -> str:

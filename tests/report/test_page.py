@@ -11,10 +11,9 @@ from typing import Any
 
 import pytest
 
-from heavytop.report import html, store
-from heavytop.report.compare import compare
 from heavytop.report.policy import Policy
 from report_helpers import HOSTILE, error, full_report
+from reports import compare, html, store
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.records import Law, Metric, Row
+from heavytop.records import Law, Metric
 from heavytop.report import parquet
 from heavytop.report.parquet import COLUMNS, check_name, require_pyarrow, write
+from reports import Row
 
 pytest.importorskip("pyarrow")
 PLAN = {"name": "p", "sha256": "0" * 64}
@@ -89,7 +90,7 @@ def test_the_plan_is_in_the_metadata_and_the_bytes_are_the_same_twice(file: Path
 
     with ParquetFile(file) as whole:
         assert whole.schema_arrow.metadata[b"heavytop.plan.name"] == b"p"
-        assert whole.schema_arrow.metadata[b"heavytop.schema"] == b"heavytop-report/1"
+        assert whole.schema_arrow.metadata[b"heavytop.schema"] == b"heavytop-report/2"
     write(tmp_path / "again.parquet", ROWS, PLAN)
     assert (tmp_path / "again.parquet").read_bytes() == file.read_bytes()
 

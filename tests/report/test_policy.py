@@ -2,15 +2,14 @@
 
 from pathlib import Path
 
-import msgspec
 import pytest
 
 from heavytop.errors import InputError
 from heavytop.precision import exact
 from heavytop.records import Law, Row
-from heavytop.report.compare import compare
 from heavytop.report.policy import Policy, adjusted, load
 from heavytop.report.verdicts import Verdict
+from reports import compare, replace
 from small_reports import error, report, row
 
 
@@ -25,7 +24,7 @@ def verdicts(old: Row, new: Row, given: Policy) -> dict[str, Verdict]:
 
 
 def drift(value: str, band: float | None = None, **changes) -> Row:
-    metric = msgspec.structs.replace(error(value), band=band)
+    metric = replace(error(value), band=band)
     return row(metrics={"drift_energy_max": metric}, **changes)
 
 
@@ -244,7 +243,7 @@ def test_an_integrator_of_others_may_move_by_a_decade() -> None:
 
 def test_a_model_of_a_claim_agrees_to_a_millionth_whichever_way_it_went() -> None:
     def off(factor: str) -> Row:
-        value = msgspec.structs.replace(error(str(exact("0.25") * exact(factor))), kind="value")
+        value = replace(error(str(exact("0.25") * exact(factor))), kind="value")
         return row(measure="claim_model", metrics={"claim_model_error_omega_max": value})
 
     for factor, verdict in (("1.0000001", Verdict.SAME), ("5", Verdict.WORSE), ("1/5", Verdict.WORSE)):
@@ -290,8 +289,8 @@ def test_a_value_with_a_band_agrees_within_it() -> None:
     def slope(value: str) -> Row:
         from heavytop.measure.scalar import of_fraction
 
-        metric = msgspec.structs.replace(of_fraction(exact(value), "value"), band=0.01)
-        return row(metrics={"break_away_slope": metric})
+        metric = replace(of_fraction(exact(value), "value"), band=0.01)
+        return row(metrics={"break_away_slope": metric}, measure="break_away_law")
 
     assert verdicts(slope("1"), slope("1.06"), Policy())["break_away_slope"] is Verdict.SAME
     assert verdicts(slope("1"), slope("1.08"), Policy())["break_away_slope"] is Verdict.WORSE
@@ -301,7 +300,7 @@ def test_a_row_is_ignored_as_a_whole_by_a_rule_for_all_its_metrics(tmp_path: Pat
     given = policy(tmp_path, "[[rule]]\ncase = 'gone*'\nignore = true\n[[rule]]\nmetric = 'drift*'\nignore = true")
     failed = row(case="gone-2", outcome="step_limit", time_reached="1")
     old, new = report(row(), row(case="gone-1"), row(case="gone-2")), report(row(), failed, row(case="gone-3"))
-    assert {(f.key[1], f.metric, f.verdict) for f in compare(old, new, given).findings} == {
+    assert {(f.row.case, f.metric, f.verdict) for f in compare(old, new, given).findings} == {
         ("euler", "break_away_time", Verdict.SAME)
     }
     # a rule for some metrics leaves no row out

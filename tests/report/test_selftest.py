@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.report import selftest
+from heavytop.api import selftest
 
 PLAN = """
 name = "small"

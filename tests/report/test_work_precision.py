@@ -3,11 +3,11 @@
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.records import SCHEMA, Metric, Report, Row, Series
+from heavytop.records import SCHEMA, Metric, Report, Series
 from heavytop.report.svg import document
-from heavytop.report.text import summary
 from heavytop.report.work_precision import Line, Point, leads, panels
 from heavytop.report.work_precision_figure import draw_work_precision, growth_figure, work_precision_figure
+from reports import Row, summary
 
 
 def row(
@@ -24,10 +24,21 @@ def row(
     metrics["error_final"] = Metric("1", None if log10 is None else log10 - 1)
     series = Series(["1", "2"], ["1e-9", "unresolved"])
     return Row(
-        case, "heavy_top", integrator, precision, 53, outcome, "9", "9", 5, True, metrics, "work_precision",
+        case=case,
+        system="heavy_top",
+        integrator=integrator,
+        precision=precision,
+        bits=53,
+        outcome=outcome,
+        horizon="9",
+        time_reached="9",
+        steps=5,
+        finite=True,
+        metrics=metrics,
+        measure="work_precision",
         seconds={"run": 99.0, "least": seconds, "compile": compile},
         series={"drift_energy": series, "solution_error_along": series},
-    )  # fmt: skip
+    )
 
 
 OURS = [row("heyoka tolerance=1e-8", -8, 1.0), row("heyoka tolerance=1e-12", -12, 4.0)]
@@ -149,8 +160,7 @@ def test_the_summary_says_it() -> None:
 
 
 def test_the_picture_shows_every_line_and_each_failure_as_a_cross_on_the_edge() -> None:
-    report = Report(SCHEMA, {"name": "peers"}, {}, ALL)
-    figure = work_precision_figure(report)
+    figure = work_precision_figure(ALL)
     axes = figure.axes[0]
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     assert axes.get_xlabel()
@@ -163,34 +173,33 @@ def test_the_picture_shows_every_line_and_each_failure_as_a_cross_on_the_edge() 
     looks = [(line.get_color(), line.get_marker(), line.get_linestyle()) for line in drawn.values()]
     assert len(set(looks)) == len(looks)
     assert "4.5 × as fast as cyrk:DOP853" in axes.get_title()
-    assert document(figure) == document(work_precision_figure(report))
-    assert document(growth_figure(report)).count("<svg") == 1
+    assert document(figure) == document(work_precision_figure(ALL))
+    assert document(growth_figure(ALL)).count("<svg") == 1
 
 
 def test_a_case_without_any_error_is_drawn_empty() -> None:
     for rows in ([row("heyoka tolerance=1", None, 1.0)], FAILED):
-        assert "<svg" in document(work_precision_figure(Report(SCHEMA, {"name": "x"}, {}, rows)))
+        assert "<svg" in document(work_precision_figure(rows))
 
 
 def test_the_pictures_are_files(tmp_path) -> None:
     growth = [row(f"{name} tolerance=1e-5", -5, 1.0) for name in ("heyoka", "cyrk:DOP853")] + SPLITTING
-    files = draw_work_precision(Report(SCHEMA, {"name": "peers"}, {}, growth), tmp_path / "new")
+    files = draw_work_precision(growth, tmp_path / "new")
     assert [file.name for file in files] == ["work-precision.svg", "work-precision.png", "growth.svg", "growth.png"]
     assert all(file.stat().st_size > 5000 for file in files)
     with pytest.raises(InputError, match="no row of work against precision"):
-        draw_work_precision(Report(SCHEMA, {"name": "x"}, {}, []), tmp_path / "none")
+        draw_work_precision([], tmp_path / "none")
     assert not (tmp_path / "none").exists()
 
 
 def test_without_such_rows_there_is_no_picture() -> None:
-    empty = Report(SCHEMA, {"name": "x"}, {}, [])
-    assert work_precision_figure(empty) is None
-    assert growth_figure(empty) is None
+    assert work_precision_figure([]) is None
+    assert growth_figure([]) is None
     assert leads([]) == []
 
 
 def test_a_hostile_name_is_text() -> None:
     rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{$')]
-    drawn = document(work_precision_figure(Report(SCHEMA, {"name": "x"}, {}, rows)))
+    drawn = document(work_precision_figure(rows))
     assert "<script" not in drawn
     assert "<b>" not in drawn

@@ -14,8 +14,7 @@ import heavytop.report.html
 import heavytop.suite.run
 from heavytop.report import run_folder
 from heavytop.suite.files import replace
-from heavytop.suite.measurements import measure
-from heavytop.suite.plan import expand, load
+from reports import expand, load, measure
 
 warnings.simplefilter("ignore")  # of forks in a process with threads: those do nothing here
 PLAN, ROOT = sys.argv[1], Path(sys.argv[2])

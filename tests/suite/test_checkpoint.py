@@ -14,11 +14,9 @@ import msgspec
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.records import SCHEMA, Metric, Report, Row
-from heavytop.report import store
+from heavytop.records import SCHEMA, Metric, Report
 from heavytop.suite.checkpoint import Checkpoint, Saved, locked
-from heavytop.suite.measurements import measure
-from heavytop.suite.plan import expand, load
+from reports import Row, expand, load, measure, replace, store
 
 IDENTITY = {"plan name": "tiny", "heavytop": "0.1.0"}
 PLAN = """name = "tiny"
@@ -208,7 +206,7 @@ def test_a_streamed_report_is_the_one_written_at_once_a_row_a_line(tmp_path: Pat
     rows = [row(f'a "quoted"\n{{line}} {index}') for index in range(3)]
     for some in ([], rows[:1], rows):
         report = Report(SCHEMA, {"name": "x"}, {"formats": {}, "list": []}, some)
-        path = store.write(msgspec.structs.replace(report, rows=[]), tmp_path, iter(some))
+        path = store.write(replace(report, rows=[]), tmp_path, iter(some))
         assert json.loads(path.read_bytes()) == msgspec.to_builtins(report)
         assert path.read_bytes().count(b"\n") == 1 + max(1, len(some)) + 1
         assert path.read_bytes() == store.write(report, tmp_path).read_bytes()

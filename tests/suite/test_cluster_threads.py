@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.suite.plan import expand, load
-from heavytop.suite.workers import rows
+from reports import expand, load, rows
 
 PLAN = """name = "threads"
 [[measure]]

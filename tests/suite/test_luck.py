@@ -1,22 +1,16 @@
 """Rows carry the noise of their metrics, and a rerun with other roundings is the same within it."""
 
-from dataclasses import replace
-
-import msgspec
 import pytest
 
 from heavytop.errors import InputError
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
 from heavytop.precision import decimal_text, exact
 from heavytop.records import SCHEMA, Report, Row, Series
-from heavytop.report.compare import compare
-from heavytop.report.consistency import contradictions
 from heavytop.report.policy import Policy
 from heavytop.report.verdicts import Verdict
-from heavytop.suite.measurements import measure
-from heavytop.suite.plan import Plan, expand
+from reports import compare, contradictions, expand, measure, plan_of, replace
 
-PLAN = msgspec.convert(
+PLAN = plan_of(
     {
         "name": "tiny",
         "measure": [
@@ -37,8 +31,7 @@ PLAN = msgspec.convert(
                 "runs": [{"precision": "extended", "horizon": "150", "samples": 50}],
             },
         ],
-    },
-    Plan,
+    }
 )
 
 
@@ -68,7 +61,7 @@ def test_the_same_seed_is_the_same_row(reports: list[Report]) -> None:
     assert again.metrics == reports[2].rows[-1].metrics
 
 
-UNBANDED = msgspec.convert(
+UNBANDED = plan_of(
     {
         "name": "unbanded",
         "measure": [
@@ -87,8 +80,7 @@ UNBANDED = msgspec.convert(
                 "ladders": [{"integrator": "heyoka", "tolerances": ["1e-8", "eps"]}],
             },
         ],
-    },
-    Plan,
+    }
 )
 
 
@@ -105,7 +97,7 @@ def test_rows_without_a_band_are_the_same_with_other_roundings_too() -> None:
 def planted(row: Row, factor: int) -> Row:
     """All errors of a row ``factor`` times as large: those of its metrics, and those that its series hold."""
     metrics = {
-        name: msgspec.structs.replace(of_fraction(exact(m.value) * factor), band=m.band)
+        name: replace(of_fraction(exact(m.value) * factor), band=m.band)
         if m.kind == "error" and m.log10 is not None
         else m
         for name, m in row.metrics.items()
@@ -114,14 +106,14 @@ def planted(row: Row, factor: int) -> Row:
         name: Series(each.times, [decimal_text(exact(v) * factor, 8) if v != UNRESOLVED else v for v in each.values])
         for name, each in row.series.items()
     }
-    made = msgspec.structs.replace(row, metrics=metrics, series=series)
+    made = replace(row, metrics=metrics, series=series)
     assert not list(contradictions(made))
     return made
 
 
 def test_errors_a_thousand_times_larger_are_worse_in_every_row(reports: list[Report]) -> None:
     for other in reports[1:]:
-        bad = msgspec.structs.replace(other, rows=[planted(row, 1000) for row in other.rows])
+        bad = replace(other, rows=[planted(row, 1000) for row in other.rows])
         result = compare(reports[0], bad, Policy())
         worse = {finding.key for finding in result.findings if finding.verdict is Verdict.WORSE}
         assert worse == {row.key for row in other.rows}

@@ -5,12 +5,11 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-
-from heavytop.suite.measurements import measure
 from heavytop.suite.measurements.laws import break_away_law
 from heavytop.suite.measurements.shared import time_text
-from heavytop.suite.plan import expand, load
+
 from heavytop.suite.task import Task
+from reports import expand, load, measure
 
 TASKS = expand(load("default")[0])
 

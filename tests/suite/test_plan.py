@@ -5,11 +5,11 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from heavytop.suite.tables import log_spaced
 
 from heavytop.errors import InputError
 from heavytop.suite.cases import CASES, case
 from heavytop.suite.plan import BUILT_IN, expand, load, read, warnings
-from heavytop.suite.tables import log_spaced
 
 MEASURE = '[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "double", horizon = "10" }]\n'
 TOP = (

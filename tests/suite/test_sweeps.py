@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+from heavytop.suite.tables import Table
 
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
-from heavytop.suite.plan import expand, load
 from heavytop.suite.sweeps import Random
-from heavytop.suite.tables import Table
-from heavytop.suite.workers import rows
 from heavytop.top.heavy_top import dot
+from reports import expand, load, rows
 
 GRID = """[[sweep]]
 kind = "grid"

@@ -4,18 +4,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import msgspec
 import pytest
+from heavytop.suite.measurements.shared import unmeasured
 
 from heavytop.errors import Contradiction, InputError, OutOfReach
 from heavytop.measure import known
-from heavytop.report import store
-from heavytop.report.compare import compare
-from heavytop.report.overview import all_good
 from heavytop.report.policy import Policy
-from heavytop.suite.measurements.shared import unmeasured
-from heavytop.suite.plan import expand, load
-from heavytop.suite.workers import rows
+from reports import all_good, compare, expand, load, replace, rows, store
 
 PLAN = """name = "far"
 [[measure]]
@@ -114,7 +109,7 @@ def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_on
     row = unmeasured(task, OutOfReach("Nothing is known there."))
     assert row.key == ("work_precision", "euler/T=5", "heavy_top", "heyoka tolerance=eps", "double")
     assert not all_good([row])
-    assert all_good([msgspec.structs.replace(row, outcome="step_limit")])
+    assert all_good([replace(row, outcome="step_limit")])
 
 
 def test_what_only_measuring_shows_to_be_impossible_names_the_row(tmp_path: Path) -> None:

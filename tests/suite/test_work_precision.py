@@ -5,6 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from heavytop.suite.measurements import measure, work_precision
 
 from heavytop.errors import InputError
 from heavytop.exact.balls import midpoint
@@ -17,8 +18,7 @@ from heavytop.report.compare import Policy, compare
 from heavytop.report.method_growth import trend
 from heavytop.report.work_precision import panels
 from heavytop.suite.cases import CASES
-from heavytop.suite.measurements import measure, work_precision
-from heavytop.suite.plan import expand, load
+from reports import expand, load
 
 HEAD = 'name = "p"\n[[measure]]\nkind = "work_precision"\n'
 

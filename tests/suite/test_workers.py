@@ -14,9 +14,8 @@ import pytest
 
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.suite import workers
-from heavytop.suite.plan import expand, load
 from heavytop.suite.task import Task
-from heavytop.suite.workers import rows
+from reports import expand, load, rows
 
 PLAN = """name = "tiny"
 [[measure]]

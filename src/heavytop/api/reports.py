@@ -10,18 +10,20 @@ from typing import TYPE_CHECKING, Any
 from heavytop import records
 from heavytop.api import arguments
 from heavytop.api.arguments import Number
+from heavytop.api.run_folder import prepare
 from heavytop.display import Table
 from heavytop.errors import InputError, quoted
+from heavytop.kinds import KINDS
 from heavytop.measure.digits import digits_kept
 from heavytop.precision import whole
 from heavytop.report import compare as comparing
 from heavytop.report import policy as policies
 from heavytop.report import store
-from heavytop.report.comparison_text import headline, metric_name, row_name, values
+from heavytop.report.comparison_text import headline, metric_name, values
+from heavytop.report.names import row_name
 from heavytop.report.parquet import COLUMNS, lines
 from heavytop.report.printable import printable
-from heavytop.report.run_folder import prepare
-from heavytop.report.text import failed, short
+from heavytop.report.text import drifts, failed, short
 
 if TYPE_CHECKING:
     import pandas
@@ -35,7 +37,7 @@ class Report(records.Report):
     @property
     def verdict(self) -> str:
         """``complete``, or ``incomplete`` where a row failed."""
-        return "incomplete" if any(map(failed, self.rows)) else "complete"
+        return "incomplete" if any(failed(row, KINDS) for row in self.rows) else "complete"
 
     def to_pandas(self) -> pandas.DataFrame:
         """The rows as a table, a line for each metric and growth law, with the columns of `--parquet`.
@@ -49,16 +51,16 @@ class Report(records.Report):
         return pandas.DataFrame(list(lines(self.rows)), columns=list(COLUMNS))
 
     def _table(self) -> Table:
-        count = sum(map(failed, self.rows))
+        count = sum(failed(row, KINDS) for row in self.rows)
         title = f"Report of plan {self.plan.get('name', '')}: {len(self.rows)} rows, {self.verdict}"
         if count:
             title += f" ({count} failed)"
         body = []
         for row in self.rows:
             kept = digits_kept(row)
-            drifts = [m for name, m in row.metrics.items() if name.startswith("drift_") and name.endswith("_max")]
-            worst = max(drifts, key=lambda m: m.log10 or -1e9).value if drifts else ""
-            cells = (row_name(row.key), row.outcome, "" if kept is None else f"{max(kept, 0):.1f}", short(worst))
+            found = [metric for _, metric in drifts(row)]
+            worst = max(found, key=lambda m: m.log10 or -1e9).value if found else ""
+            cells = (row_name(row.identity), row.outcome, "" if kept is None else f"{max(kept, 0):.1f}", short(worst))
             body.append(list(map(printable, cells)))
         return Table(printable(title), ("row", "outcome", "digits kept", "largest drift"), body)
 
@@ -76,7 +78,7 @@ class Comparison(comparing.Comparison):
 
     def _table(self) -> Table:
         body = [
-            list(map(printable, (row_name(f.key), metric_name(f), f.verdict.value, *values(f), f.reason)))
+            list(map(printable, (row_name(f.row), metric_name(f), f.verdict.value, *values(f), f.reason)))
             for f in self.changed
         ]
         notes = [printable(f"{name}: {old} -> {new}") for name, old, new in self.environment]
@@ -148,7 +150,7 @@ def read_report(path: PathLike) -> Report:
         InputError: for a file that is missing, cut short, of another program or schema, changed since it was written,
             or inconsistent in itself.
     """
-    found = store.read(arguments.path(path, "path"))
+    found = store.read(arguments.path(path, "path"), KINDS)
     return Report(found.schema, found.plan, found.environment, found.rows)
 
 
@@ -177,7 +179,7 @@ def compare(
     """
     rules = policies.Policy() if policy is None else policies.load(arguments.path(policy, "policy"))
     rules = policies.adjusted(rules, arguments.limit(floor, "floor"), arguments.limit(loss, "loss"))
-    found = comparing.compare(_report(baseline, "baseline"), _report(candidate, "candidate"), rules)
+    found = comparing.compare(_report(baseline, "baseline"), _report(candidate, "candidate"), rules, KINDS)
     return Comparison(**{each.name: getattr(found, each.name) for each in fields(found) if each.init})
 
 
@@ -186,4 +188,4 @@ def _report(given: Any, what: str) -> records.Report:
         return given
     if not isinstance(given, str | os.PathLike):
         raise InputError(f"{what} = {quoted(given)} is no report.", "Give a Report, or the path of one.")
-    return store.read(arguments.path(given, what))
+    return store.read(arguments.path(given, what), KINDS)

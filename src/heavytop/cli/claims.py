@@ -51,10 +51,13 @@ def figures(
 
 def _drawn(out: Path, report: Path | None) -> list[Path]:
     if report is None:
+        from heavytop.measure.curves import drawings
         from heavytop.report.figures import draw_figures
 
-        return draw_figures(out)
+        return draw_figures(drawings(), out)
+    from heavytop.kinds import KINDS
+    from heavytop.kinds.work_precision import NAME
     from heavytop.report import store
     from heavytop.report.work_precision_figure import draw_work_precision
 
-    return draw_work_precision(store.read(report), out)
+    return draw_work_precision([row for row in store.read(report, KINDS).rows if row.key.kind == NAME], out)

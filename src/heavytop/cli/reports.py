@@ -26,6 +26,7 @@ def compare(
     json: Json = False,
 ) -> int:
     """Compare two reports: exit 1 if anything is worse, 3 if anything is missing or incomparable, else 0."""
+    from heavytop.kinds import KINDS
     from heavytop.report import store
     from heavytop.report.compare import compare as compare_reports
 
@@ -34,12 +35,13 @@ def compare(
     if html is not None:
         from heavytop.report.html import comparison_page
 
-        old, new = store.read(baseline), store.read(candidate)
-        result = compare_reports(old, new, rules)
-        files.append((html, comparison_page(old, new, result)))
+        old, new = store.read(baseline, KINDS), store.read(candidate, KINDS)
+        result = compare_reports(old, new, rules, KINDS)
+        files.append((html, comparison_page(old, new, result, KINDS)))
     else:
         all_of_them = json or junit is not None
-        result = compare_reports(store.read_brief(baseline), store.read_brief(candidate), rules, list_same=all_of_them)
+        before, after = (store.read_brief(path, KINDS) for path in (baseline, candidate))
+        result = compare_reports(before, after, rules, KINDS, list_same=all_of_them)
     if markdown is not None:
         from heavytop.report.markdown import comparison_markdown
 
@@ -69,6 +71,7 @@ def history(
     json: Json = False,
 ) -> int:
     """Show metrics over two reports or more, with every step marked."""
+    from heavytop.kinds import KINDS
     from heavytop.report import history as over
     from heavytop.report import store
     from heavytop.report.policy import glob
@@ -76,9 +79,9 @@ def history(
     if len(reports) < 2:
         raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")
     rules, cases, metrics = _policy(policy, None, None), glob(case), glob(metric or "*")
-    read = [store.read_brief(path) for path in reports]
-    tracks = over.history(read, rules)
-    tracks = [t for t in tracks if cases.fullmatch(t.key[1]) and metrics.fullmatch(t.metric)]
+    read = [store.read_brief(path, KINDS) for path in reports]
+    tracks = over.history(read, rules, KINDS)
+    tracks = [t for t in tracks if cases.fullmatch(t.row.case) and metrics.fullmatch(t.metric)]
     if not metric:
         tracks = [track for track in tracks if track.steps]
     names = [str(path) for path in reports]
@@ -124,6 +127,7 @@ def show(
     parquet: Annotated[Path | None, typer.Option(help="Write its rows to that file instead.")] = None,
 ) -> int:
     """Print the summary of a report, or write it as one self-contained page, or its rows as a table."""
+    from heavytop.kinds import KINDS
     from heavytop.report import overview, store, text
     from heavytop.report import parquet as tables
     from heavytop.suite.files import whole
@@ -133,18 +137,19 @@ def show(
         if html is not None and html.resolve() == parquet.resolve():
             raise InputError(f"{html} is named twice.", "Give each file a name of its own.")
     if html is None and parquet is None:
-        brief = store.read_brief(report)
+        brief = store.read_brief(report, KINDS)
         many = len(brief.rows) > overview.MOST_LISTED
         hint = "Every row is in report.json; --parquet FILE writes all as a table."
-        show_on_terminal(overview.worst(brief, brief.rows, hint) if many else text.summary(store.read(report)))
+        shown = overview.worst(brief, brief.rows, hint) if many else text.summary(store.read(report, KINDS), KINDS)
+        show_on_terminal(shown)
         return 0
-    found = store.read(report)
+    found = store.read(report, KINDS)
     with ExitStack() as stack:
         stack.enter_context(_writing())
         if html is not None:
             from heavytop.report.html import report_page
 
-            page = report_page(found).encode()
+            page = report_page(found, KINDS).encode()
             stack.enter_context(whole(html)).write(page)
         if parquet is not None:
             tables.write(parquet, found.rows, found.plan)

@@ -27,7 +27,8 @@ def run(
     save_every: Annotated[float, typer.Option(help="Seconds after which a long row saves its place.", min=0)] = 10.0,
 ) -> int:
     """Run a plan of measurements; write DIR/report.json and DIR/report.html."""
-    from heavytop.report.run_folder import PAGE, prepare
+    from heavytop.api.run_folder import PAGE, prepare
+    from heavytop.kinds import KINDS
     from heavytop.report.store import FILE as REPORT
 
     asked = prepare(
@@ -49,7 +50,7 @@ def run(
         print(f"\nReport: {directory / REPORT} (was finished already)")
         return 0 if ended.good else 3
     try:
-        with _stopped_by_signals(), Progress(asked.tasks) as advance:
+        with _stopped_by_signals(), Progress(asked.tasks, KINDS) as advance:
             ended = asked.measure(advance)
     except KeyboardInterrupt as stop:
         print(f"heavytop: interrupted; finished rows are kept: --out {directory} --resume goes on", file=sys.stderr)

@@ -18,12 +18,13 @@ def selftest(
     json: Json = False,
 ) -> int:
     """Try the suite's detectors on broken integrators: exit 1 if a fault they should see slips through."""
-    from heavytop.report import selftest as detectors
+    from heavytop.api import selftest as detectors
+    from heavytop.kinds import KINDS
 
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     tasks = detectors.tasks()
-    with Progress(tasks) as advance:
+    with Progress(tasks, KINDS) as advance:
         trials = detectors.trials(tasks, workers or os.cpu_count() or 1, advance)
     if json:
         print_json({"trials": [trial.to_json() for trial in trials]})

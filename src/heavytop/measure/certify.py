@@ -2,11 +2,10 @@
 
 The second source of a closed form is the validated integration from the same exact start.  Where that is out of reach,
 it is any other motion that is handed in (a heyoka run at twice the precision, say: computed, not proven), and where
-none is, the closed form is held against the validated integration at an early time from the start, and over the last
+none is, the closed form is compared with the validated integration at an early time from the start, and over the last
 unit of time before t from its own state there: a formula that is a motion near 0 and near t, and in between the same
 analytic function.  The unit is 1, or that of the motion (:func:`heavytop.exact.scales.unit_of_time`) where its rates
-are far from 1.  No reference below its certified digits is used to score anything: :func:`certified_state`
-widens the balls to what is certified.
+are far from 1.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, log2
+from typing import Literal
 
 from flint import arb
 
@@ -53,12 +53,7 @@ class Certificate:
     method: str
     second_source: str
     agreed_digits: int
-    kind: str
-
-    @property
-    def agreement(self) -> str:
-        """``exactly``, or ``to N digits``."""
-        return "exactly" if self.agreed_digits >= EXACTLY else f"to {self.agreed_digits} digits"
+    kind: Literal["proven", "proven at both ends", "computed"]
 
 
 def bits_of(digits: int) -> int:
@@ -106,26 +101,6 @@ def certify(
         return _early_and_last(solution, enclosure, time, values, bits)
     _require_overlap(solution, time, values, other)
     return Certificate(solution.method, "validated integration", agreed_digits(values, other), "proven")
-
-
-def certified_state(
-    solution: ExactSolution, time: Fraction, digits: int, second: tuple[str, SecondSource] | None = None
-) -> tuple[list[arb], Certificate]:
-    """The state with no radius below what is certified, and its certificate: fit to score with."""
-    certificate = certify(solution, time, digits, second)
-    values = solution.state(time, bits_of(digits))
-    if certificate.agreed_digits >= digits:
-        return values, certificate
-    return _widened(values, Fraction(1, 10) ** certificate.agreed_digits, bits_of(digits) + 64), certificate
-
-
-@whole_evaluation
-def _widened(values: Sequence[arb], slack: Fraction, bits: int) -> list[arb]:
-    with working_precision(bits):
-        return [
-            ball(midpoint(value)) + arb(0, (ball(slack * max(Fraction(1), abs(midpoint(value)))) + value.rad()).upper())
-            for value in values
-        ]
 
 
 def enclosure_of(solution: ExactSolution, start: State | None = None, effort: float = _EFFORT) -> Validated:

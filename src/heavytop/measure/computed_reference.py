@@ -17,6 +17,7 @@ from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import exact, real
+from heavytop.records import Against
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -52,7 +53,7 @@ class ComputedReference:
         states = zip(times, *(run.states for run in runs), strict=True)
         self.balls: dict[Fraction, list[arb]] = {time: _around(coarse, fine, bits) for time, coarse, fine in states}
         worst = max(float(value.rad()) for values in self.balls.values() for value in values)
-        self.method = f"computed, not proven: heyoka at {bits} and {bits + 64} bits agree within {worst:.1e}"
+        self.against = Against("computed", f"heyoka at {bits} and {bits + 64} bits", f"{worst:.1e}")
 
     def state(self, time: Fraction) -> list[arb]:
         """Six balls, or nine with the attitude vector, at one of the times."""

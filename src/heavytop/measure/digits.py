@@ -10,9 +10,9 @@ from flint import arb
 
 from heavytop.measure.scalar import largest
 from heavytop.precision import exact, log10
-from heavytop.records import Metric
+from heavytop.records import Metric, Quantity
 
-RELATIVE = "solution_error_relative_max"
+RELATIVE = Quantity("solution_error", "relative", "max")
 """The metric behind the digits kept: the largest |error|/max(1, |true value|) of a component of Ω or γ over the
 samples."""
 
@@ -37,7 +37,7 @@ def digits_kept(row: Measured) -> float | None:
     the digits that are proven.  Of an ensemble: from the root mean square over its starts of each start's largest.
     None without a reference, without a sample, and for a value that is not finite.
     """
-    metric = row.metrics.get(RELATIVE)
+    metric = row.metrics.get(RELATIVE.text)
     if metric is None or (metric.log10 is None and metric.bound is None and metric.value != "0"):
         return None
     size = metric.log10 if metric.bound is None else log10(exact(metric.bound))

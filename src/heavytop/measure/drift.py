@@ -12,12 +12,20 @@ from heavytop.exact.balls import ball, ball_from, ball_text, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.scalar import GUARD_BITS, metric, text, to_ball
-from heavytop.records import Metric, Series
+from heavytop.records import Metric, Quantity, Series, by_name
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import dot
 from heavytop.top.integrals import Integral
 
 Sums = tuple[arb, arb, arb]
+STATISTICS = ("max", "rms", "final")
+DRIFT = "drift"
+"""The name of the quantity; its components are the first integrals."""
+
+
+def drift_of(integral: str) -> Quantity:
+    """The drift of the first integral of that name."""
+    return Quantity(DRIFT, integral)
 
 
 class Running:
@@ -39,23 +47,23 @@ class Running:
         """Take in a value at ``time`` by its :meth:`following`; remember it for the series if ``keep``."""
         self.maximum, self.squares, self.final = sums
         self.count += 1
+        self.remember(time, sums, keep)
+
+    def remember(self, time: Fraction, sums: Sums, keep: bool) -> None:
+        """Remember a value for the series if ``keep``, and count it for nothing else."""
         if keep:
-            self.kept[time] = self.final
+            self.kept[time] = sums[2]
 
-    def metrics(self, name: str) -> dict[str, Metric]:
-        """``name_max``, ``name_rms``, ``name_final``; ``missing`` without a sample."""
+    def metrics(self, quantity: Quantity) -> dict[Quantity, Metric]:
+        """Its ``max``, ``rms`` and ``final``; ``missing`` without a sample."""
         if not self.count:
-            return {f"{name}_{part}": Metric("missing", None) for part in ("max", "rms", "final")}
-        rms = (self.squares / self.count).sqrt()
-        return {
-            f"{name}_max": metric(self.maximum),
-            f"{name}_rms": metric(rms),
-            f"{name}_final": metric(self.final),
-        }
+            return {quantity.over(part): Metric("missing", None) for part in STATISTICS}
+        found = (self.maximum, (self.squares / self.count).sqrt(), self.final)
+        return {quantity.over(part): metric(value) for part, value in zip(STATISTICS, found, strict=True)}
 
-    def series(self, time_text: Callable[[Fraction], str]) -> Series:
+    def series(self, quantity: Quantity, time_text: Callable[[Fraction], str]) -> Series:
         """The kept values."""
-        return Series([time_text(t) for t in self.kept], [text(v) for v in self.kept.values()])
+        return Series([time_text(t) for t in self.kept], [text(v) for v in self.kept.values()], quantity)
 
     def content(self) -> dict[str, Any]:
         """As plain text and integers, exact."""
@@ -117,11 +125,15 @@ class Drift:
     def metrics(self) -> dict[str, Metric]:
         """``drift_NAME_max``, ``_rms``, ``_final`` for every integral."""
         with working_precision(self.bits):
-            return {k: m for name, run in self.running.items() for k, m in run.metrics(f"drift_{name}").items()}
+            return by_name({q: m for each, run in self.quantities().items() for q, m in run.metrics(each).items()})
 
     def series(self, time_text: Callable[[Fraction], str]) -> dict[str, Series]:
         """``drift_NAME`` over the kept times."""
-        return {f"drift_{name}": run.series(time_text) for name, run in self.running.items()}
+        return {quantity.text: run.series(quantity, time_text) for quantity, run in self.quantities().items()}
+
+    def quantities(self) -> dict[Quantity, Running]:
+        """The running values by what they are of."""
+        return {drift_of(name): values for name, values in self.running.items()}
 
     def content(self) -> dict[str, Any]:
         """What was taken in so far, as plain text and integers, exact."""

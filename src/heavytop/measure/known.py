@@ -1,4 +1,4 @@
-"""The known motion that a run is held against: from the same rounded data, and certified by a second source."""
+"""The known motion that a run is compared with: from the same rounded data, and certified by a second source."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from heavytop.exact.gyrostat import Gyrostat
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.validated import Validated
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.certify import Certificate, certify, enclosure_of
+from heavytop.measure.certify import EXACTLY, Certificate, certify, enclosure_of
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.precision import shown
+from heavytop.records import Against, Certified
 from heavytop.top.equations import GYROSTAT
 
 _DIGITS_A_BIT = Fraction(30103, 100000)
@@ -35,12 +36,18 @@ class Known:
     bits: int
 
     @property
-    def text(self) -> str:
-        """Method, radius and certificate, for the row."""
+    def certified(self) -> Certified:
+        """Time, digits and second source."""
         c = self.certificate
+        return Certified(
+            shown(self.time), None if c.agreed_digits >= EXACTLY else c.agreed_digits, c.second_source, c.kind
+        )
+
+    @property
+    def against(self) -> Against:
+        """Method, radius and certificate, for the row."""
         limit = radius_text(Fraction(1, 2**self.bits))
-        by = f"certified at t = {shown(self.time)} {c.agreement} by {c.second_source} ({c.kind})"
-        return f"known: {c.method}, radius below {limit}; {by}"
+        return Against("proven", self.certificate.method, limit, (self.certified,))
 
 
 def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | None:

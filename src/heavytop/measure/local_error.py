@@ -1,6 +1,6 @@
 """Error of single steps of a Taylor method, and the order it has in truth.
 
-Each step is held against the enclosure of the motion that starts exactly where the step starts: what earlier steps did
+Each step is compared with the enclosure of the motion that starts exactly where the step starts: what earlier steps did
 wrong plays no part.  At heyoka's own step length the truncation error is far below rounding; so the order is seen by
 asking the step's polynomial beyond the step, at 2 h and 3 h, where its error is C τ^(p+1).
 """
@@ -21,10 +21,11 @@ from heavytop.integrate.trajectory import Problem, TaylorStep
 from heavytop.measure.drift import Running, Sums
 from heavytop.measure.scalar import GUARD_BITS, largest, metric, resolved, to_ball
 from heavytop.precision import exact
-from heavytop.records import Metric
+from heavytop.records import Metric, Quantity, by_name
 from heavytop.top.heavy_top import State
 
 _NEAR, _FAR = 2, 3
+LOCAL_ERROR, ORDER = Quantity("local_error_ulp"), Quantity("observed_order")
 
 
 class LocalError:
@@ -70,11 +71,11 @@ class LocalError:
         """``local_error_ulp_max``, ``_rms`` and ``observed_order``, the median over the steps as a whole number."""
         order = Metric("missing", None, "value")
         with working_precision(self.bits):
-            found = self.running.metrics("local_error_ulp")
+            found = self.running.metrics(LOCAL_ERROR)
             if self.orders:
                 order = metric(arb(round(median(self.orders))), "value")
-        found.pop("local_error_ulp_final")
-        return found | {"observed_order": order}
+        found.pop(LOCAL_ERROR.over("final"))
+        return by_name(found | {ORDER: order})
 
 
 def _largest_gap(state: Sequence[arb], truth: Sequence[arb]) -> arb:

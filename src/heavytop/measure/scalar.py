@@ -11,7 +11,7 @@ from flint import arb
 from heavytop.errors import InputError
 from heavytop.exact.balls import ball, midpoint, radius, radius_text
 from heavytop.precision import decimal_text, exact, log10
-from heavytop.records import Kind, Metric
+from heavytop.records import Metric, MetricKind
 
 DIGITS = 8
 UNRESOLVED = "unresolved"
@@ -41,7 +41,7 @@ def text(value: arb, digits: int = DIGITS) -> str:
     return decimal_text(midpoint(value), digits) if resolved(value) else UNRESOLVED
 
 
-def metric(value: arb, kind: Kind = "error", digits: int = DIGITS) -> Metric:
+def metric(value: arb, kind: MetricKind = "error", digits: int = DIGITS) -> Metric:
     """A ball as a metric."""
     words = text(value, digits)
     if words == "nan":
@@ -51,7 +51,7 @@ def metric(value: arb, kind: Kind = "error", digits: int = DIGITS) -> Metric:
     return of_fraction(Fraction(words), kind, words)
 
 
-def of_fraction(value: Fraction, kind: Kind = "error", words: str | None = None) -> Metric:
+def of_fraction(value: Fraction, kind: MetricKind = "error", words: str | None = None) -> Metric:
     """An exact number as a metric; log10 to six decimals."""
     return Metric(words or decimal_text(value, DIGITS), log10(value), kind)
 

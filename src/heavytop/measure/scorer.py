@@ -1,39 +1,55 @@
-"""The scorer: a stream of states in; drift, distance from the known motion and what it was compared with, out."""
+"""The scorer: states in; drift, distance from the known motion and what it was compared with, out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
-from typing import Any
+from typing import Any, Protocol
+
+from flint import arb
 
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.drift import Drift
-from heavytop.measure.known import Known, known_motion
-from heavytop.measure.solution_error import SolutionError
-from heavytop.records import Metric, Series
+from heavytop.measure.drift import Drift, Running
+from heavytop.measure.known import Known
+from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
+from heavytop.records import Against, Metric, Quantity, Series
 
 TimeText = Callable[[Fraction], str]
+
+
+class TrueMotion(Protocol):
+    """What a motion is compared with: a closed form, an enclosure, a run in a wider format."""
+
+    def state(self, time: Fraction, bits: int) -> Sequence[arb]:
+        """Six balls at ``time``."""
 
 
 class Scorer:
     """Takes in the states of one motion, one after the other, and holds what they are worth.
 
-    problem: what the integrator was given.  horizon: the last exact time in the format, where the known motion is
-    certified.  keep: the times whose values go into the series.
-    known: the known motion, or why there is none; by default it is looked for.
+    problem: what the integrator was given.  known: the known motion, or why there is none.
+    keep: the times whose values go into the series.
+    threshold, until, name: as in :class:`heavytop.measure.solution_error.SolutionError`.
     Drift is in the units of each integral, errors of Ω are in 1/time unit, of γ in none.
     """
 
     def __init__(
         self,
         problem: Problem,
-        horizon: Fraction,
+        known: Known | TrueMotion | str,
         keep: Sequence[Fraction] = (),
-        known: Known | str | None = None,
+        *,
+        threshold: Fraction | None = None,
+        until: float = math.inf,
+        name: str = SOLUTION_ERROR,
     ) -> None:
         self.drift = Drift(problem, problem.integrals(), keep)
-        self.known = known_motion(problem, horizon) if known is None else known
-        self.error = None if isinstance(self.known, str) else SolutionError(problem, self.known.solution, keep)
+        self.known = known
+        self.error: SolutionError | None = None
+        if not isinstance(known, str):
+            truth = known.solution if isinstance(known, Known) else known
+            self.error = SolutionError(problem, truth, keep, threshold, until, name)
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
         """Take in one native state."""
@@ -41,12 +57,21 @@ class Scorer:
         if self.error is not None:
             self.error(time, state)
 
+    def take(self, times: Iterable[Fraction], states: Iterable[Sequence[Any]]) -> None:
+        """Take in an array of native states, one at each of the exact times."""
+        for time, state in zip(times, states, strict=True):
+            self(time, state)
+
     @property
-    def against(self) -> str:
-        """What the motion was compared with, in words."""
-        if isinstance(self.known, str):
-            return f"its own first integrals; no reference: {self.known}"
-        return self.known.text
+    def against(self) -> Against:
+        """What the motion was compared with."""
+        if isinstance(self.known, Known):
+            return self.known.against
+        return Against("none", reason=f"no reference: {self.known}")
+
+    def running(self) -> dict[Quantity, Running]:
+        """The running values of every drift and error by what they are of."""
+        return self.drift.quantities() | (self.error.quantities() if self.error else {})
 
     def metrics(self) -> dict[str, Metric]:
         """``drift_NAME_max``, ... for every integral; ``solution_error_omega_max``, ... where there is a reference."""

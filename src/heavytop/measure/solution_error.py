@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
@@ -10,37 +11,45 @@ from flint import arb
 
 from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.digits import relative_error
 from heavytop.measure.drift import Running, Sums, parameter_balls
 from heavytop.measure.scalar import GUARD_BITS, largest, resolved, to_ball
-from heavytop.records import Metric, Series
+from heavytop.records import Metric, Quantity, Series, by_name
 
-_ERRORS = ("omega", "gamma", "along", "across")
+SOLUTION_ERROR = "solution_error"
+COMPONENTS = ("omega", "gamma", "along", "across")
+_RELATIVE = "relative"
 
 
 class SolutionError:
     """Error of Ω and of γ (largest component), of the state along the flow (phase) and across it (Euclidean), and
     relative: the largest |error|/max(1, |true value|) of a component, which says how many digits are kept.
 
-    known: the exact motion; its start and top are those of ``problem``, rounded, so no input rounding is charged.
-    threshold: the error of Ω, in units of Ω, whose first crossing is the break-away time.
+    known: what has the true ``state(time, bits)``; its start and top are those of ``problem``, rounded, so no input
+    rounding is charged.
+    threshold: the error of Ω, in units of Ω, whose first crossing is the escape time.
+    until: the |t| up to which errors count; later ones go into the series alone.
+    name: of the quantity, whose components are omega, gamma, along and across.
     """
 
     def __init__(
         self,
         problem: Problem,
-        known: ExactSolution,
+        known: Any,
         keep: Sequence[Fraction] = (),
         threshold: Fraction | None = None,
+        until: float = math.inf,
+        name: str = SOLUTION_ERROR,
     ) -> None:
         self.known = known
         self.bits = problem.precision.bits + GUARD_BITS
         self.keep = frozenset(keep)
         self.threshold = threshold
-        self.break_away: Fraction | None = None
-        self.running = {name: Running() for name in (*_ERRORS, "relative")}
+        self.until = until
+        self.name = name
+        self.escape: Fraction | None = None
+        self.running = {part: Running() for part in (*COMPONENTS, _RELATIVE)}
         self.system = problem.system
         self.parameters = parameter_balls(problem, self.bits)
 
@@ -48,10 +57,11 @@ class SolutionError:
         """Take in one native state."""
         sums, left = self._following(state, self.known.state(time, self.bits))
         keep = time in self.keep
+        counts = float(abs(time)) <= self.until
         for running, part in zip(self.running.values(), sums, strict=True):
-            running.take(time, part, keep)
-        if left and self.break_away is None:
-            self.break_away = time
+            (running.take if counts else running.remember)(time, part, keep)
+        if left and self.escape is None:
+            self.escape = time
 
     @whole_evaluation
     def _following(self, state: Sequence[Any], truth: Sequence[arb]) -> tuple[list[Sums], bool]:
@@ -66,25 +76,33 @@ class SolutionError:
             return sums, self.threshold is not None and bool(omega > ball(self.threshold))
 
     @whole_evaluation
-    def metrics(self, prefix: str = "solution_error") -> dict[str, Metric]:
-        """``PREFIX_omega_max``, ``_rms``, ``_final``; the same for gamma, along, across; ``PREFIX_relative_max``."""
+    def metrics(self) -> dict[str, Metric]:
+        """``NAME_omega_max``, ``_rms``, ``_final``; the same for gamma, along, across; ``NAME_relative_max``."""
         with working_precision(self.bits):
-            found = {k: m for name in _ERRORS for k, m in self.running[name].metrics(f"{prefix}_{name}").items()}
-            relative = f"{prefix}_relative_max"
-            return found | {relative: self.running["relative"].metrics(f"{prefix}_relative")[relative]}
+            found = {q: m for part in COMPONENTS for q, m in self.running[part].metrics(self._of(part)).items()}
+            largest_relative = self._of(_RELATIVE).over("max")
+            relative = self.running[_RELATIVE].metrics(largest_relative)[largest_relative]
+            return by_name(found | {largest_relative: relative})
 
-    def series(self, time_text: Callable[[Fraction], str], prefix: str = "solution_error") -> dict[str, Series]:
+    def series(self, time_text: Callable[[Fraction], str]) -> dict[str, Series]:
         """The same over the kept times, but for the relative error."""
-        return {f"{prefix}_{name}": self.running[name].series(time_text) for name in _ERRORS}
+        return {self._of(part).text: self.running[part].series(self._of(part), time_text) for part in COMPONENTS}
+
+    def _of(self, component: str) -> Quantity:
+        return Quantity(self.name, component)
+
+    def quantities(self) -> dict[Quantity, Running]:
+        """The running values by what they are of."""
+        return {self._of(part): values for part, values in self.running.items()}
 
     def content(self) -> dict[str, Any]:
         """What was taken in so far, as plain text and integers, exact."""
         running = {name: run.content() for name, run in self.running.items()}
-        return {"break_away": None if self.break_away is None else str(self.break_away), **running}
+        return {"escape": None if self.escape is None else str(self.escape), **running}
 
     def restore(self, content: dict[str, Any]) -> None:
         """Go on from that :meth:`content`."""
-        self.break_away = None if content["break_away"] is None else Fraction(content["break_away"])
+        self.escape = None if content["escape"] is None else Fraction(content["escape"])
         for name, run in self.running.items():
             run.restore(content[name])
 

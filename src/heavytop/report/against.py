@@ -1,27 +1,14 @@
-"""What a row was compared with, as far as its text tells, and whether that of a candidate is weaker."""
+"""Whether what a candidate was compared with is weaker than what its baseline was compared with."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.precision import exact, log10
-
-_NUMBER = r"(-?[\d./]+(?:[eE][-+]?\d+)?)"
-_RADIUS = re.compile(rf"(?:radius below|agree within) {_NUMBER}")
-_CERTIFIED = re.compile(rf"certified at t = {_NUMBER} to (\d+) digits")
-_CERTIFIED_STARTS = re.compile(r"(\d+) of \d+ starts certified")
-_CHECKED = re.compile(rf"on (\d+) starts up to \|t\| = {_NUMBER},")
-_PART = re.compile(rf"its error is {_NUMBER} of the error measured")
-_HOW = re.compile(r"\((proven at both ends|proven|computed)\)")
-_ENCLOSURE = "known: validated"
-"""What is proven where it says no more: an enclosure is its own proof."""
-_NOTHING = "its own first integrals"
-"""A row without a reference: what its text says beyond that is why."""
+from heavytop.records import Against
 
 _RADIUS_DECADES = 1.0
 """A radius may grow by that much: that of a reference for the same bits does not move at all."""
@@ -33,47 +20,66 @@ _PART_DECADES = 2.0
 """The error of a computed reference, in units of the measured one, varies by a decade from one ensemble to the next."""
 
 
-@dataclass(frozen=True, slots=True)
-class Against:
-    """A reference: its kind (``known``, ``computed``, ...), and what it is known to.
+def weaker(old: Against, new: Against) -> str:
+    """Why a candidate's reference is another or proves less than that of the baseline; empty where it is as good.
 
-    radius, part: log10 of its radius, and of its own error in units of the error measured.  digits, times: of each
-    certificate, the first start's before that of all starts; log10 of |t|.  starts: certified ones, or those that a
-    computed reference was checked on; then ``times`` holds the |t| up to which it was.  None or empty where the text
-    does not say.
+    Proven is proven, whichever closed form or enclosure it was: a better certificate makes no difference.
     """
-
-    kind: str
-    proven: bool
-    radius: float | None
-    part: float | None
-    digits: tuple[int, ...]
-    times: tuple[float, ...]
-    starts: int | None
-
-    @classmethod
-    def of(cls, text: str) -> Against:
-        """The reference that ``against`` of a row describes."""
-        kind = re.split("[:,;]", text, maxsplit=1)[0]
-        if kind == _NOTHING:
-            return cls(kind, False, None, None, (), (), None)
-        certificates, checked = _CERTIFIED.findall(text), _CHECKED.search(text)
-        starts = checked or _CERTIFIED_STARTS.search(text)
-        times = [time for time, _ in certificates] + ([checked[2]] if checked else [])
-        how = set(_HOW.findall(text))
-        return cls(
-            kind,
-            "computed" not in how if how else text.startswith(_ENCLOSURE),
-            _first_log(_RADIUS.search(text)),
-            _first_log(_PART.search(text)),
-            tuple(int(digits) for _, digits in certificates),
-            tuple(map(_log, times)),
-            int(starts[1]) if starts else None,
-        )
+    if old == new:
+        return ""
+    if old.how != new.how:
+        return f"compared with {_kind(old)} and with {_kind(new)}"
+    if old.how == "equations" and old.method != new.method:
+        return f"compared with {old.method!r} and {new.method!r}"
+    if _is_proven(old) and not _is_proven(new):
+        return "the reference is no longer proven"
+    if _grew(old.radius, new.radius, _RADIUS_DECADES):
+        return "the radius of the reference is larger, or not said"
+    if _grew(_part(old), _part(new), _PART_DECADES):
+        return "the error of the computed reference is larger, or not said"
+    if not _kept(_digits(old), _digits(new), lambda before, after: after >= _DIGITS_KEPT * before):
+        return f"the reference is certified to {_digits_text(new)} digits, not {_digits_text(old)}"
+    starts = _starts(old), _starts(new)
+    if starts[0] is not None and (starts[1] is None or starts[1] < _TIME_KEPT * starts[0]):
+        return f"the reference is certified or checked for {starts[1] or 'no'} starts, not {starts[0]}"
+    if not _kept(_times(old), _times(new), lambda before, after: after >= before + math.log10(_TIME_KEPT)):
+        return "the reference is certified or checked at an earlier time"
+    return ""
 
 
-def _first_log(found: re.Match[str] | None) -> float | None:
-    return None if found is None else _log(found[1])
+def _kind(reference: Against) -> str:
+    return {"none": "first integrals alone", "equations": reference.method}.get(
+        reference.how, f"a {reference.how} reference"
+    )
+
+
+def _is_proven(reference: Against) -> bool:
+    return reference.how == "proven" and all(each.proven != "computed" for each in reference.certificates)
+
+
+def _part(reference: Against) -> str:
+    return reference.checked.part if reference.checked else ""
+
+
+def _digits(reference: Against) -> tuple[float, ...]:
+    return tuple(math.inf if each.digits is None else each.digits for each in reference.certificates)
+
+
+def _digits_text(reference: Against) -> str:
+    return " and ".join("all" if math.isinf(each) else str(each) for each in _digits(reference)) or "no"
+
+
+def _starts(reference: Against) -> int | None:
+    """How many starts are certified, or were used to check a computed reference."""
+    if reference.checked:
+        return reference.checked.starts
+    return next((each.starts for each in reference.certificates if each.starts is not None), None)
+
+
+def _times(reference: Against) -> tuple[float, ...]:
+    """log10 |t| of each certificate, or up to which a computed reference was checked."""
+    checked = (reference.checked.until,) if reference.checked else ()
+    return tuple(map(_log, (*(each.time for each in reference.certificates), *checked)))
 
 
 def _log(text: str) -> float:
@@ -85,39 +91,10 @@ def _log(text: str) -> float:
     return -math.inf if size is None else size
 
 
-def weaker(old: str, new: str) -> str:
-    """Why a candidate's reference is another or proves less than that of the baseline; empty where it is as good.
-
-    Known is known, whichever closed form or enclosure it was: a better certificate makes no difference.
-    """
-    if old == new:
-        return ""
-    a, b = Against.of(old), Against.of(new)
-    if a.kind != b.kind:
-        return f"compared with {a.kind!r} and {b.kind!r}"
-    if a.proven and not b.proven:
-        return "the reference is no longer proven"
-    if _grew(a.radius, b.radius, _RADIUS_DECADES):
-        return "the radius of the reference is larger, or not said"
-    if _grew(a.part, b.part, _PART_DECADES):
-        return "the error of the computed reference is larger, or not said"
-    if not _kept(a.digits, b.digits, lambda old, new: new >= _DIGITS_KEPT * old):
-        return f"the reference is certified to {_digits_text(b)} digits, not {_digits_text(a)}"
-    if a.starts is not None and (b.starts is None or b.starts < _TIME_KEPT * a.starts):
-        return f"the reference is certified or checked for {b.starts or 'no'} starts, not {a.starts}"
-    if not _kept(a.times, b.times, lambda old, new: new >= old + math.log10(_TIME_KEPT)):
-        return "the reference is certified or checked at an earlier time"
-    return ""
-
-
-def _grew(old: float | None, new: float | None, decades: float) -> bool:
-    return old is not None and (new is None or not new <= old + decades)
+def _grew(old: str, new: str, decades: float) -> bool:
+    return bool(old) and (not new or not _log(new) <= _log(old) + decades)
 
 
 def _kept(old: tuple[Any, ...], new: tuple[Any, ...], enough: Callable[[Any, Any], bool]) -> bool:
     """Whether each number that the baseline says is there, and is enough."""
     return len(new) >= len(old) and all(map(enough, old, new))
-
-
-def _digits_text(reference: Against) -> str:
-    return " and ".join(map(str, reference.digits)) or "no"

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy
 
@@ -16,27 +15,26 @@ from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10
 from heavytop.records import UNMEASURED, Law, Metric, Row
 from heavytop.report.consistency import contradictions
+from heavytop.report.kind import Kind, Kinds, kind_of
+from heavytop.report.names import row_name
 from heavytop.report.printable import printable
-
-if TYPE_CHECKING:
-    from heavytop.report.store import BriefRow
 
 REMEDY = "Make it again with `heavytop run`."
 _CLOSE = 1e-5
 """How far a log10 of six decimals may be from that of its value."""
 
 
-def check_keys(file: Path, rows: Iterable[Row | BriefRow]) -> None:
+def check_keys(file: Path, rows: Iterable[Row]) -> None:
     """Raises InputError where a row is there twice."""
     seen = set()
     for row in rows:
-        if row.key in seen:
-            raise InputError(f"{file} holds the row {printable(' '.join(filter(None, row.key)))[:60]} twice.", REMEDY)
-        seen.add(row.key)
+        if row.identity in seen:
+            raise InputError(f"{file} holds the row {printable(row_name(row.identity))[:60]} twice.", REMEDY)
+        seen.add(row.identity)
 
 
-def check_rows(file: Path, rows: Sequence[Row] | Sequence[BriefRow]) -> None:
-    """Raises InputError where a row cannot be, naming it and its field."""
+def check_rows(file: Path, rows: Sequence[Row], kinds: Kinds) -> None:
+    """Raises InputError where a row cannot be, or contradicts itself, naming it and its field."""
     known: set[str] = set()
     for row in rows:
         # most rows reached the horizon of the row before
@@ -44,11 +42,11 @@ def check_rows(file: Path, rows: Sequence[Row] | Sequence[BriefRow]) -> None:
             row.horizon not in known
             or row.time_reached != row.horizon
             or row.outcome != "success"
-            or row.measure in _NEEDED
+            or kind_of(row, kinds).needed
             or row.laws
             or not row.bits
         ):
-            _check_row(file, row)
+            _check_row(file, row, kind_of(row, kinds))
             known.add(row.horizon)
     metrics = [metric for row in rows for metric in row.metrics.values()]
     if doubtful := _doubtful(metrics):
@@ -56,9 +54,13 @@ def check_rows(file: Path, rows: Sequence[Row] | Sequence[BriefRow]) -> None:
             for name, metric in row.metrics.items():
                 if id(metric) in doubtful:
                     _check_metric(f"{_where(file, row)}, {printable(name)[:60]}", metric, row.finite)
+    _check_series(file, rows)
+    for row in rows:
+        for problem in contradictions(row, kind_of(row, kinds)):
+            raise InputError(f"{_where(file, row)}, {printable(problem)[:260]}.", REMEDY)
 
 
-def check_series(file: Path, rows: Iterable[Row | BriefRow]) -> None:
+def _check_series(file: Path, rows: Iterable[Row]) -> None:
     """Raises InputError where a series has not one value for each time, or a number that is none."""
     for row in rows:
         for name, series in row.series.items():
@@ -67,14 +69,6 @@ def check_series(file: Path, rows: Iterable[Row | BriefRow]) -> None:
             for text in (*series.times, *series.values):
                 if text not in WORDS["value"] and not _plain(text):
                     _number(f"{_where(file, row)}, {printable(name)[:60]}", text)
-
-
-def check_consistency(file: Path, rows: Iterable[Row | BriefRow]) -> None:
-    """Raises InputError where the numbers of a row, each of which can be, contradict one another."""
-    for row in rows:
-        for problem in contradictions(row):
-            field, _, reason = problem.partition(": ")
-            raise InputError(f"{_where(file, row)}, {printable(field)[:60]}: {printable(reason)[:200]}.", REMEDY)
 
 
 def _plain(text: str) -> bool:
@@ -98,11 +92,11 @@ def _doubtful(metrics: Sequence[Metric]) -> set[int]:
     return set() if plain.all() else {id(metrics[index]) for index in numpy.flatnonzero(~plain).tolist()}
 
 
-def _where(file: Path, row: Row | BriefRow) -> str:
+def _where(file: Path, row: Row) -> str:
     return f"{file}, row {printable(row.case)[:60]} ({printable(row.precision)[:60]})"
 
 
-def _check_row(file: Path, row: Row | BriefRow) -> None:
+def _check_row(file: Path, row: Row, kind: Kind) -> None:
     where = _where(file, row)
     horizon, reached = (_number(f"{where}, {name}", getattr(row, name)) for name in ("horizon", "time_reached"))
     if row.outcome not in _OUTCOMES:
@@ -114,9 +108,9 @@ def _check_row(file: Path, row: Row | BriefRow) -> None:
     # a time is rounded to the format, the horizon need not be
     if reached * horizon < 0 or abs(reached) > abs(horizon) * (1 + Fraction(2, 2**row.bits)):
         raise InputError(f"{where}, time_reached: {row.time_reached} is beyond {row.horizon}.", REMEDY)
-    lacking = [name for name in _NEEDED.get(row.measure, ()) if name not in row.metrics]
+    lacking = [name for name in kind.needed if name not in row.metrics]
     if lacking and row.outcome not in UNMEASURED:
-        raise InputError(f"{where}: a row of {row.measure} without {', '.join(lacking)}.", REMEDY)
+        raise InputError(f"{where}: a row of {kind.name} without {', '.join(lacking)}.", REMEDY)
     for name, law in row.laws.items():
         _check_law(f"{where}, growth {printable(name)[:60]}", law)
 
@@ -135,17 +129,6 @@ WORDS = {
     "value": ("nan", "missing", "never", UNRESOLVED),
 }
 """What may stand in the place of a number, for each kind of metric."""
-_QUANTITIES = ("omega", "theta", "psi")
-_NEEDED = {
-    "homoclinic": ("break_away_time",),
-    "claim_model": ("claim_parts_by_1_percent_at",),
-    "claim_evaluation": (
-        *(f"claim_evaluation_error_{name}_max_finite" for name in _QUANTITIES),
-        *(f"claim_evaluation_{name}_not_finite_from" for name in _QUANTITIES),
-    ),
-    "break_away_law": ("break_away_slope", "break_away_slope_expected", "break_away_slope_off_by"),
-}
-"""Metrics that a summary of such a row cannot do without."""
 
 
 def _check_metric(where: str, metric: Metric, finite: bool) -> None:

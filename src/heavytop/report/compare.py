@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from heavytop.errors import InputError
+from heavytop.records import Identity, Row
+from heavytop.report.kind import Kinds
 from heavytop.report.policy import Policy
 from heavytop.report.row_comparison import Finding, RowComparison
-from heavytop.report.store import AnyReport, AnyRow
+from heavytop.report.store import AnyReport, Brief
 from heavytop.report.verdicts import Verdict
 
 __all__ = ["Comparison", "Finding", "compare"]
@@ -68,23 +70,33 @@ class Comparison:
         }
 
 
-def compare(baseline: AnyReport, candidate: AnyReport, policy: Policy, *, list_same: bool = True) -> Comparison:
+def compare(
+    baseline: AnyReport, candidate: AnyReport, policy: Policy, kinds: Kinds, *, list_same: bool = True
+) -> Comparison:
     """Every row of either report, in the baseline's order, new ones last.
 
     list_same: False to count what plainly stayed the same in place of listing it.
     Raises InputError where neither report has a row, or the policy leaves nothing to compare.
     """
     findings: list[Finding] = []
-    rows = RowComparison(policy, _timed(policy, baseline.environment, candidate.environment), list_same)
+    missing: list[tuple[int, Row]] = []
+    timed = _timed(policy, baseline.environment, candidate.environment)
+    checked = isinstance(baseline, Brief), isinstance(candidate, Brief)
+    rows = RowComparison(policy, kinds, timed, list_same, checked)
     others = _Others(candidate.rows)
     for row in baseline.rows:
-        key = row.key
-        match = others.take(key)
+        match = others.take(row.identity)
         if match is not None:
-            findings += rows.compare(key, row, match)
+            findings += rows.compare(row, match)
         elif not rows.ignores(row):
-            findings.append(Finding(key, "", Verdict.MISSING, row.outcome, None, "the row is missing"))
-    findings += [Finding(row.key, "", Verdict.NEW, None, row.outcome) for row in others.left() if not rows.ignores(row)]
+            missing.append((len(findings), row))
+            findings.append(Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing"))
+    for place, row in missing:
+        if (match := others.take_elsewhere(row.identity)) is not None:
+            findings[place] = rows.compare(row, match)[0]
+    findings += [
+        Finding(row.identity, "", Verdict.NEW, None, row.outcome) for row in others.left() if not rows.ignores(row)
+    ]
     if not findings and not rows.same:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
     return Comparison(
@@ -101,19 +113,29 @@ class _Others:
     def __init__(self, rows: Any) -> None:
         self._rows = rows
         self._coming = enumerate(rows)
-        self._passed: dict[tuple[str, ...], int] = {}
+        self._passed: dict[Identity, int] = {}
+        self._elsewhere: dict[Identity, list[Identity]] | None = None
 
-    def take(self, key: tuple[str, ...]) -> AnyRow | None:
-        if key in self._passed:
-            row: AnyRow = self._rows[self._passed.pop(key)]
+    def take(self, identity: Identity) -> Row | None:
+        if identity in self._passed:
+            row: Row = self._rows[self._passed.pop(identity)]
             return row
         for number, row in self._coming:
-            if row.key == key:
+            if row.identity == identity:
                 return row
-            self._passed[row.key] = number
+            self._passed[row.identity] = number
         return None
 
-    def left(self) -> Iterator[AnyRow]:
+    def take_elsewhere(self, identity: Identity) -> Row | None:
+        """The one row, of those that are left, that differs in its horizon alone; called when all are passed."""
+        if self._elsewhere is None:
+            self._elsewhere = {}
+            for each in self._passed:
+                self._elsewhere.setdefault(each.elsewhere, []).append(each)
+        near = self._elsewhere.get(identity.elsewhere, [])
+        return self.take(near.pop()) if len(near) == 1 else None
+
+    def left(self) -> Iterator[Row]:
         """Those that were not taken."""
         for number in self._passed.values():
             yield self._rows[number]

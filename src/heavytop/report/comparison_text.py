@@ -7,10 +7,10 @@ from rich.table import Table
 from rich.text import Text
 
 from heavytop.report.compare import Comparison, Finding
+from heavytop.report.names import row_name
 from heavytop.report.printable import printable
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
-from heavytop.top.equations import HEAVY_TOP
 
 _MOST = 200
 """Findings of the table: more scroll away."""
@@ -27,7 +27,7 @@ def comparison(result: Comparison) -> RenderableType:
         for column in ("verdict", "row", "metric", "baseline", "candidate", "why"):
             table.add_column(column, overflow="fold")
         for finding in result.changed[:_MOST]:
-            cells = (row_name(finding.key), metric_name(finding), *values(finding), finding.reason)
+            cells = (row_name(finding.row), metric_name(finding), *values(finding), finding.reason)
             style = _STYLE.get(finding.verdict, "")
             table.add_row(Text(finding.verdict.value, style=style), *map(Text, map(printable, cells)))
         parts.append(table)
@@ -43,11 +43,6 @@ def headline(result: Comparison) -> str:
     """The verdict and how many findings of each."""
     tally = ", ".join(f"{count} {verdict.value}" for verdict, count in result.tally.items())
     return f"Verdict: {result.verdict} ({tally})"
-
-
-def row_name(key: tuple[str, ...]) -> str:
-    """A row in a few words: its measure, case, system where it is not the heavy top, integrator and format."""
-    return " ".join(part for part in key if part and part != HEAVY_TOP.name)
 
 
 def metric_name(finding: Finding) -> str:

@@ -7,25 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy
 
-from heavytop.claims.ershkov import Branch, PartialCase
-from heavytop.measure.parting import parting
-from heavytop.report.curves import (
-    PAPER_FIGURES,
-    Curves,
-    PaperFigure,
-    claim_curves,
-    gyrostat_curves,
-    true_curves,
-)
+from heavytop.claims.ershkov import Branch
+from heavytop.measure.curves import Compared, Curves, Drawings, PaperCurve, Portrait
 from heavytop.report.svg import document
-from heavytop.top.equations import GYROSTAT
-from heavytop.top.integrals import gyrostat_energy
 
 # Okabe and Ito's colours, told apart by any eye; line styles say the same again
 ORANGE, BLUE, VERMILION, GREEN = "#E69F00", "#0072B2", "#D55E00", "#009E73"
@@ -36,21 +25,20 @@ _FORMULAS = {
     "psi": r"$\psi=(I_1/I_3)\,\alpha t+\frac{1}{2}\ln\frac{\sqrt{\alpha}+u}{\sqrt{\alpha}-u}$",
 }
 _U = r"$u=\sqrt{\alpha}\,\frac{e^{-A\sqrt{\alpha}\,t}-1}{e^{-A\sqrt{\alpha}\,t}+1}$"
-RATIOS = (2, 6)
 _BRANCHES: dict[Branch, str] = {"printed": "as printed", "smooth": "smooth branch"}
 _LINES: dict[Branch, tuple[str, Any]] = {"printed": (VERMILION, (0, (1, 1))), "smooth": (GREEN, "-.")}
 
 
-def draw_figures(directory: Path) -> list[Path]:
+def draw_figures(drawings: Drawings, directory: Path) -> list[Path]:
     """The files written into ``directory``: each figure as SVG and as PNG (at least 800 px wide)."""
     directory.mkdir(parents=True, exist_ok=True)
     files: list[Path] = []
     with _quiet_style():
-        for figure in PAPER_FIGURES:
-            files += _save(_paper_figure(figure), directory / f"fig{figure.number}")
-        for ratio in RATIOS:
-            files += _save(_comparison(ratio), directory / f"truth-ratio{ratio}")
-        files += _save(_portrait(), directory / "momentum-sphere")
+        for paper in drawings.papers:
+            files += _save(_paper_figure(paper), directory / f"fig{paper.figure.number}")
+        for compared in drawings.comparisons:
+            files += _save(_comparison(compared), directory / f"truth-ratio{compared.ratio}")
+        files += _save(_portrait(drawings.portrait), directory / "momentum-sphere")
     return files
 
 
@@ -86,15 +74,12 @@ def _save(figure: Any, stem: Path) -> list[Path]:
     return [svg, png]
 
 
-def _paper_figure(spec: PaperFigure) -> Any:
+def _paper_figure(paper: PaperCurve) -> Any:
     """One of Figs 2-8: the printed formula, its parameters, and a warning where they contradict each other."""
     figure = _new(8, 5)
     axes = figure.add_subplot()
-    # beyond A t = 37 the printed logarithm loses every digit of a double
-    span = min(4, 24 / spec.a)
-    t = numpy.linspace(-span, span, 801)
-    t = t[t != 0] if spec.angle == "phi" else t
-    axes.plot(t, spec.values(t), color=BLUE)
+    spec = paper.figure
+    axes.plot(paper.times, paper.values, color=BLUE)
     axes.set_xlabel("t")
     axes.set_ylabel(f"{_SYMBOLS[spec.angle]} (rad)")
     stated = "" if spec.ratio is None else f"$I_1/I_3={spec.ratio}$, "
@@ -121,25 +106,20 @@ def _paper_figure(spec: PaperFigure) -> Any:
     return figure
 
 
-def _comparison(ratio: int) -> Any:
+def _comparison(compared: Compared) -> Any:
     """φ, θ, ψ and Ω of the claim, the gyrostat and the true motion from the same data at t = 0."""
-    case = PartialCase(Fraction(1), Fraction(1), Fraction(1, ratio))
-    span = Fraction(6, ratio - 1) + 2
-    times = [span * index / 200 for index in range(-200, 201)]
-    truth, method = true_curves(case, times)
     drawn = (
-        ("true motion of the heavy top", truth, BLUE, "-", 2.4),
-        ("gyrostat: what the formulas solve", gyrostat_curves(case.solves, times), ORANGE, "--", 2.4),
-        ("claim as printed", claim_curves(case, times), VERMILION, ":", 2.4),
+        ("true motion of the heavy top", compared.truth, BLUE, "-", 2.4),
+        ("gyrostat: what the formulas solve", compared.gyrostat, ORANGE, "--", 2.4),
+        ("claim as printed", compared.claim, VERMILION, ":", 2.4),
     )
-    parted = {branch: parting(case, times[-1], branch) for branch in _BRANCHES}
     figure = _new(10, 6.2)
     grid = figure.subplots(2, 3, sharex=True)
     names = ("φ (rad)", "θ (rad)", "ψ (rad)", "Ω1", "Ω2", "Ω3")
     for index, (axes, name) in enumerate(zip(grid.flat, names, strict=True)):
         for label, curves, colour, style, width in drawn:
             axes.plot(curves.times, _column(curves, index), style, color=colour, lw=width, label=label)
-        for branch, found in parted.items():
+        for branch, found in compared.parted.items():
             if found:
                 colour, dashes = _LINES[branch]
                 label = f"{_BRANCHES[branch]}: Ω off by 1 % of α at t = {float(found.time):.4f}"
@@ -149,7 +129,9 @@ def _comparison(ratio: int) -> Any:
         axes.set_xlabel("t")
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
-    figure.suptitle(f"Claim, gyrostat and truth: $I_1=I_2$, $I_1/I_3={ratio}$, $\\alpha=1$; truth: {method}")
+    figure.suptitle(
+        f"Claim, gyrostat and truth: $I_1=I_2$, $I_1/I_3={compared.ratio}$, $\\alpha=1$; truth: {compared.method}"
+    )
     return figure
 
 
@@ -157,22 +139,17 @@ def _column(curves: Curves, index: int) -> Any:
     return curves.angles[:, index] if index < 3 else curves.states[:, index - 3]
 
 
-def _portrait() -> Any:
+def _portrait(portrait: Portrait) -> Any:
     """The momentum sphere of the gyrostat with its homoclinic orbit, and the true homoclinic orbit beside it."""
-    case = PartialCase(Fraction(1), Fraction(1), Fraction(1, 2))
-    times = [Fraction(index, 10) for index in range(-140, 141)]
     figure = _new(10, 5.6)
     left, right = (figure.add_subplot(1, 2, place, projection="3d") for place in (1, 2))
-    for segment in _levels(case):
+    for segment in portrait.levels:
         left.plot(*segment, color="#999999", lw=0.7)
-    moments = numpy.array([float(moment) for moment in case.solves.top.inertia])
-    orbit = gyrostat_curves(case.solves, times).states[:, :3] * moments
-    left.plot(*orbit.T, color=ORANGE, lw=2.6, label="homoclinic orbit of the gyrostat")
-    true = true_curves(case, times)[0].states[:, :3] * moments
-    length = float(case.alpha * case.i1)
+    left.plot(*portrait.gyrostat.T, color=ORANGE, lw=2.6, label="homoclinic orbit of the gyrostat")
+    length = portrait.length
     for segment in _sphere(length):
         right.plot(*segment, color="#bbbbbb", lw=0.5)
-    right.plot(*true.T, color=BLUE, lw=2.6, label="homoclinic orbit of the heavy top")
+    right.plot(*portrait.heavy_top.T, color=BLUE, lw=2.6, label="homoclinic orbit of the heavy top")
     titles = ("gyrostat: |M| = C0, level lines of its energy", "heavy top: |M| is not constant (sphere: C0)")
     for axes, title in zip((left, right), titles, strict=True):
         axes.scatter([0], [length], [0], color=VERMILION, s=40, depthshade=False, label="the saddle M = (0, C0, 0)")
@@ -187,28 +164,6 @@ def _portrait() -> Any:
         axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.2), frameon=False)
     figure.suptitle("$I_1=I_2=2I_3$, $\\alpha=1$, $I_1=1$")
     return figure
-
-
-def _levels(case: PartialCase) -> list[Any]:
-    """Level lines of the gyrostat's energy on the sphere |M| = C0."""
-    from contourpy import contour_generator
-
-    motion = case.solves
-    parameters = GYROSTAT.parameters(motion.top, motion.start)
-    moments = [float(moment) for moment in parameters.inertia]
-    p = parameters._replace(inertia=moments, rotor=float(parameters.rotor))
-    length = float(case.alpha * case.i1)
-    turn, height = numpy.meshgrid(numpy.linspace(-numpy.pi, numpy.pi, 361), numpy.linspace(-1, 1, 241))
-
-    def point(turn: Any, height: Any) -> tuple[Any, Any, Any]:
-        across = numpy.sqrt(numpy.maximum(0, 1 - height * height))
-        return length * across * numpy.cos(turn), length * height, length * across * numpy.sin(turn)
-
-    state = [m / i for m, i in zip(point(turn, height), moments, strict=True)]
-    lines = contour_generator(turn, height, gyrostat_energy(p, state))
-    low, high = float(gyrostat_energy(p, state).min()), float(gyrostat_energy(p, state).max())
-    found = [line for level in numpy.linspace(low, high, 14)[1:-1] for line in lines.lines(level)]
-    return [point(*numpy.asarray(line).T) for line in found]
 
 
 def _sphere(length: float) -> list[Any]:

@@ -12,9 +12,11 @@ from rich.text import Text
 
 from heavytop.errors import InputError
 from heavytop.precision import exact
+from heavytop.records import Identity
 from heavytop.report.compare import compare
-from heavytop.report.comparison_text import row_name
+from heavytop.report.kind import Kinds
 from heavytop.report.laws import law_text
+from heavytop.report.names import row_name
 from heavytop.report.policy import Policy
 from heavytop.report.printable import printable
 from heavytop.report.section import clip
@@ -39,34 +41,34 @@ class Track(msgspec.Struct, frozen=True):
     one report to the next has, by the number of the later report, the same left out; with the reason.
     """
 
-    key: tuple[str, ...]
+    row: Identity
     metric: str
     values: list[str | None]
     steps: dict[int, tuple[Verdict, str]]
 
 
-def history(reports: Sequence[AnyReport], policy: Policy) -> list[Track]:
+def history(reports: Sequence[AnyReport], policy: Policy, kinds: Kinds) -> list[Track]:
     """The tracks of every row and metric, in the order in which they first come up."""
-    tracks: dict[tuple[tuple[str, ...], str], Track] = {}
+    tracks: dict[tuple[Identity, str], Track] = {}
 
-    def track(key: tuple[str, ...], metric: str) -> Track:
-        return tracks.setdefault((key, metric), Track(key, metric, [None] * len(reports), {}))
+    def track(row: Identity, metric: str) -> Track:
+        return tracks.setdefault((row, metric), Track(row, metric, [None] * len(reports), {}))
 
-    outcomes: list[dict[tuple[str, ...], str]] = [{} for _ in reports]
+    outcomes: list[dict[Identity, str]] = [{} for _ in reports]
     for number, report in enumerate(reports):
         for row in report.rows:
-            outcomes[number][row.key] = row.outcome
+            outcomes[number][row.identity] = row.outcome
             for name, metric in row.metrics.items():
-                track(row.key, name).values[number] = metric.value
+                track(row.identity, name).values[number] = metric.value
             for name, law in row.laws.items():
-                track(row.key, f"growth {name}").values[number] = law_text(law)
+                track(row.identity, f"growth {name}").values[number] = law_text(law)
     for number in range(1, len(reports)):
-        for finding in compare(reports[number - 1], reports[number], policy).changed:
-            found = track(finding.key, finding.metric)
+        for finding in compare(reports[number - 1], reports[number], policy, kinds).changed:
+            found = track(finding.row, finding.metric)
             found.steps[number] = finding.verdict, finding.reason
             if not finding.metric:
-                found.values[:] = [outcome.get(finding.key) for outcome in outcomes]
-            elif finding.metric.startswith("seconds "):
+                found.values[:] = [outcome.get(finding.row) for outcome in outcomes]
+            elif finding.timing:
                 found.values[number - 1], found.values[number] = finding.baseline, finding.candidate
     return list(tracks.values())
 
@@ -77,7 +79,7 @@ def history_json(names: Sequence[str], tracks: Sequence[Track]) -> dict[str, Any
         "reports": list(names),
         "tracks": [
             {
-                **dict(zip(("measure", "case", "system", "integrator", "precision"), track.key, strict=True)),
+                **track.row.named,
                 "metric": track.metric,
                 "values": track.values,
                 "steps": [
@@ -108,7 +110,7 @@ def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableTyp
             f"{short(value or '-')} {MARK[track.steps[n][0]] if n in track.steps else ' '}"
             for n, value in enumerate(track.values)
         ]
-        cells = [row_name(track.key), track.metric or "whole row", *cells]
+        cells = [row_name(track.row), track.metric or "whole row", *cells]
         table.add_row(*(Text(printable(cell)) for cell in cells))
     return Group(*heads, Text(_LEGEND, style="dim"), Text(), table)
 
@@ -129,7 +131,7 @@ def history_svg(names: Sequence[str], tracks: Sequence[Track]) -> str:
         for track in drawn:
             heights = [_height(value) for value in track.values]
             points = [float("nan") if height is None else height for height in heights]
-            label = clip(f"{track.key[1]} {track.metric}")
+            label = clip(f"{track.row.case} {track.metric}")
             (line,) = axes.plot(range(1, len(names) + 1), points, marker="o", label=label)
             steps = [number for number in track.steps if heights[number] is not None]
             axes.plot(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from heavytop.report.comparison_text import row_name
 from heavytop.report.history import MARK, Track
+from heavytop.report.names import row_name
 from heavytop.report.section import Key, Section, clip, draw, logarithm, scientific
 from heavytop.report.store import AnyReport
 from heavytop.report.svg import Picture, decades, finish, new_axes, quiet_style
@@ -54,7 +54,7 @@ def _sections(names: Sequence[str], tracks: Sequence[Track]) -> Iterator[Section
     """One a row of the reports, in their order."""
     rows: dict[str, list[Track]] = {}
     for track in tracks:
-        rows.setdefault(row_name(track.key), []).append(track)
+        rows.setdefault(row_name(track.row), []).append(track)
     drawable = sorted((track for track in tracks if len(_points(track)) > 1), key=lambda track: not track.steps)
     drawn = {id(track) for track in drawable[:MOST_PICTURES]}
     for number, (name, own) in enumerate(rows.items()):

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Container, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace as replace_struct
+
 from heavytop.measure.digits import digits_kept
-from heavytop.records import Report, Row
-from heavytop.report import claim_plots, claim_verdict, method_growth, plots, work_plots
+from heavytop.records import UNMEASURED, Report, Row
 from heavytop.report.compare import Comparison
-from heavytop.report.comparison_text import row_name
+from heavytop.report.kind import Kinds, MakeSection, kind_of
+from heavytop.report.names import row_name
 from heavytop.report.section import Section, Sources, clip
 from heavytop.report.svg import quiet_style
 from heavytop.report.text import failed, short
@@ -22,32 +25,34 @@ MOST_WORST = 50
 MOST_FAILURES = 50
 MOST_METRICS = 100
 MOST_FINDINGS = 500
+_NOTHING = "nothing", "No claim about the heavy top is audited in this plan."
 
 
-def write_report(report: Report, path: Path) -> None:
+def write_report(report: Report, path: Path, kinds: Kinds) -> None:
     """Write the page of ``report`` to ``path``; raises InputError where it cannot be written."""
-    replace(path, report_page(report).encode())
+    replace(path, report_page(report, kinds).encode())
 
 
-def report_page(report: Report) -> str:
+def report_page(report: Report, kinds: Kinds) -> str:
     """The page of ``report``; the same report gives the same bytes."""
     rows, left_out = detailed(report.rows)
-    found = claim_verdict.audited(report)
-    failures = [row for row in report.rows if failed(row)]
-    word, sentence = claim_verdict.headline(found)
+    failures = [row for row in report.rows if failed(row, kinds)]
+    of_kind = {name: [row for row in report.rows if row.key.kind == name] for name in kinds}
+    said = [kind.headline(of_kind[name]) for name, kind in kinds.items()]
+    word, sentence = next((each for each in said if each), _NOTHING)
+    not_finite = [row for row in report.rows if row.outcome == "success" and not row.finite]
     return render(
         "report.html.j2",
         report=report,
         word=word,
         sentence=sentence,
-        audited=found,
-        systems=claim_verdict.SYSTEMS,
-        wrongness=claim_verdict.wrongness(report),
+        cards=[card for name, kind in kinds.items() for card in kind.cards(of_kind[name])],
         failures=failures[:MOST_FAILURES],
         failed=len(failures),
-        gave_up=work_plots.gave_up(report),
-        not_finite=[row for row in report.rows if row.outcome == "success" and not row.finite],
-        sections=sections([("", report)]),
+        gave_up=Counter(kind_of(row, kinds).may_give_up for row in report.rows if _gave_up(row, kinds)),
+        not_finite=not_finite,
+        overflowed=all(kind_of(row, kinds).may_overflow for row in not_finite),
+        sections=sections([("", report)], kinds),
         measures=_by_measure(rows),
         left_out=left_out,
         environment=report.environment,
@@ -56,7 +61,12 @@ def report_page(report: Report) -> str:
     )
 
 
-def comparison_page(baseline: Report, candidate: Report, comparison: Comparison) -> str:
+def _gave_up(row: Row, kinds: Kinds) -> bool:
+    """Whether a run ended early that may: a finding about its integrator, in its chart."""
+    return bool(kind_of(row, kinds).may_give_up) and row.outcome not in ("success", *UNMEASURED)
+
+
+def comparison_page(baseline: Report, candidate: Report, comparison: Comparison, kinds: Kinds) -> str:
     """The page of a comparison: verdict, changed rows, both reports on the same axes."""
     changed = comparison.changed
     sources = [("baseline", baseline), ("candidate", candidate)]
@@ -68,27 +78,32 @@ def comparison_page(baseline: Report, candidate: Report, comparison: Comparison)
         tally={verdict.value: count for verdict, count in comparison.tally.items()},
         changed=changed[:MOST_FINDINGS],
         left_out=max(0, len(changed) - MOST_FINDINGS),
-        sections=sections(sources, dict.fromkeys(finding.key[1] for finding in changed)),
+        sections=sections(sources, kinds, dict.fromkeys(finding.row.case for finding in changed)),
         differences=[[clip(part, 200) for part in each] for each in comparison.environment],
         environment=candidate.environment,
     )
 
 
-def sections(sources: Sources, first: Sequence[str] | dict[str, None] = ()) -> list[Section]:
-    """The parts of the page that have pictures; those without a row are left out."""
+def sections(sources: Sources, kinds: Kinds, first: Iterable[str] = ()) -> list[Section]:
+    """The parts of the page that have pictures, each from the rows of the kinds that ask for it."""
+    asked: dict[MakeSection, set[str]] = {}
+    for name, kind in kinds.items():
+        for make in kind.sections:
+            asked.setdefault(make, set()).add(name)
     with quiet_style():
-        made = [
-            plots.digits(sources, first),
-            claim_plots.claim_error(sources),
-            plots.growth(sources, first),
-            claim_plots.break_away(sources),
-            work_plots.work_precision(sources),
-            method_growth.method_growth(sources),
-        ]
-    found = [section for section in made if section]
+        made = [make(_only(sources, names), first) for make, names in asked.items()]
+    found = sorted((section for section in made if section), key=lambda section: section.place)
     for section in found:
         section.drop_empty_columns()
     return found
+
+
+def _only(sources: Sources, names: Container[str]) -> Sources:
+    """The sources with the rows of these kinds alone."""
+    return [
+        (source, replace_struct(report, rows=[row for row in report.rows if row.key.kind in names]))
+        for source, report in sources
+    ]
 
 
 def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
@@ -100,7 +115,7 @@ def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
 def _by_measure(rows: Sequence[Row]) -> dict[str, list[Row]]:
     found: dict[str, list[Row]] = {}
     for row in rows:
-        found.setdefault(row.measure or "other", []).append(row)
+        found.setdefault(row.key.kind or "other", []).append(row)
     return found
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 from heavytop.report.compare import Comparison
-from heavytop.report.comparison_text import metric_name, row_name
+from heavytop.report.comparison_text import metric_name
+from heavytop.report.names import row_name
 from heavytop.report.printable import printable
 from heavytop.report.verdicts import Verdict
 
@@ -29,7 +30,7 @@ def comparison_junit(result: Comparison) -> str:
     for name, old, new in result.environment:
         ElementTree.SubElement(properties, "property", name=printable(name), value=printable(f"{old} -> {new}"))
     for finding in result.findings:
-        where = f"{finding.key[0]}.{row_name(finding.key[1:])}"
+        where = f"{finding.row.key.kind}.{row_name(finding.row, with_kind=False)}"
         name = metric_name(finding)
         case = ElementTree.SubElement(suite, "testcase", classname=printable(where), name=printable(name), time="0")
         message = f"{finding.verdict.value}: {finding.baseline or '-'} -> {finding.candidate or '-'}; {finding.reason}"

@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 
 from heavytop.report.compare import Comparison
-from heavytop.report.comparison_text import headline, metric_name, row_name, values
+from heavytop.report.comparison_text import headline, metric_name, values
+from heavytop.report.names import row_name
 from heavytop.report.printable import printable
 
 _MOST = 50
@@ -22,7 +23,7 @@ def comparison_markdown(result: Comparison, page: Path | None = None) -> str:
         lines += ["| verdict | row | metric | baseline | candidate | why |", "|---|---|---|---:|---:|---|"]
         lines += [
             "| "
-            + " | ".join(map(_cell, (f.verdict.value, row_name(f.key), metric_name(f), *values(f), f.reason)))
+            + " | ".join(map(_cell, (f.verdict.value, row_name(f.row), metric_name(f), *values(f), f.reason)))
             + " |"
             for f in changed[:_MOST]
         ]

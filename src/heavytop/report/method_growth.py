@@ -5,7 +5,7 @@ Read off the rows of work against precision; drawn on the page and as a figure.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -26,7 +26,7 @@ _LOG10 = -5.0
 """The error that the rungs of the methods are to have."""
 _DECADES, _FEWEST_DECADES = 2.0, 1.5
 _ABOVE_ROUNDING = 10
-"""Times the error that rounding may have made: below, the exponent of a single motion is luck."""
+"""Times the error that rounding may have made: below, the exponent of a single motion is chance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +92,8 @@ def alike(rows: Sequence[Row]) -> list[Row]:
     """Of each method the rung whose error is nearest to 1e-5, on the case of the longest horizon that has them all."""
     found: dict[tuple[str, str], dict[str, list[tuple[float, int]]]] = {}
     for index, row in enumerate(rows):
-        name, error = row.integrator.partition(" ")[0], row.metrics.get("error_max")
-        if row.measure != "work_precision" or row.precision != "double" or row.outcome != "success":
+        name, error = row.key.subject.name, row.metrics.get("error_max")
+        if row.precision != "double" or row.outcome != "success":
             continue
         if name in METHODS and "drift_energy" in row.series and error is not None and error.log10 is not None:
             rungs = found.setdefault((row.case, row.horizon), {}).setdefault(name, [])
@@ -137,7 +137,7 @@ def keyed(rows: Sequence[Row], source: str = "") -> list[tuple[Key, Row]]:
     ]
 
 
-def method_growth(sources: Sources) -> Section | None:
+def method_growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """The section of the page: energy drift and phase error of the three methods, with the power of t of each."""
     chosen = [pair for source, report in sources for pair in keyed(alike(report.rows), source)]
     if not chosen:
@@ -150,10 +150,11 @@ def method_growth(sources: Sources) -> Section | None:
             "at the tolerance or step whose error is nearest to 1e-5.",
             "Dashed: a power of t through the largest error so far, by least squares over the last two decades of t, "
             "and in brackets that of each half. A law is named where the halves agree, and only where the error is ten "
-            "times what rounding may have made: below, the exponent of one motion is luck.",
+            "times what rounding may have made: below, the exponent of one motion is chance.",
         ],
         columns=["integrator", "error on the way", "quantity", "last |t|", "last value", "exponent", "law"],
         across=2,
+        place=60,
     )
     for number, (name, title, unit, power) in enumerate(QUANTITIES):
         axes = new_axes(TIME, unit)

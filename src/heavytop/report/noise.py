@@ -1,30 +1,23 @@
-"""Which metrics carry a noise band, how much of it a comparison allows, and when a candidate is noisier by more than
-chance.  What is allowed comes from the baseline: a candidate must not excuse itself.
+"""How much of a noise band a comparison allows, and when a candidate is noisier by more than chance.
+
+What is allowed comes from the baseline: a candidate must not excuse itself.
+
+A band is itself an estimate from 16 runs, or from the starts of an ensemble.  Of bands of two such estimates one is
+wider than the other by at most 4.2 (drift), 4.4 (growth) and 5.7 (homoclinic, where one random amplitude decides
+everything) in 175,000 pairs: `benchmarks/false_alarms.py`.  Each kind's ``noise_factor`` is above that.
 """
 
 from __future__ import annotations
 
 import math
 
-from heavytop.records import Kind, Metric
+from heavytop.records import Metric
+from heavytop.report.kind import Kind
 
-FACTORS = {"drift": 5.0, "growth": 6.0, "homoclinic": 8.0, "break_away_law": 8.0}
-"""The measures whose rows carry bands, and the factor by which the band of a rerun with other roundings may be wider.
-
-A band is itself an estimate from 16 runs, or from the starts of an ensemble.  Of bands of two such estimates one is
-wider than the other by at most 4.2 (drift), 4.4 (growth) and 5.7 (homoclinic, where one random amplitude decides
-everything) in 175,000 pairs: `benchmarks/false_alarms.py`.
-"""
-_TIMES = ("break_away_time", "break_away_slope")
 _BY_CHANCE = 1.4
 """One rerun in ten has a band wider by more than that: further, a candidate's own band is not allowed for."""
 _LEAST = 0.05
 """Decades.  A band below this excuses nothing that the allowed loss does not; its own scatter is of no interest."""
-
-
-def carries_band(measure: str, name: str, kind: Kind) -> bool:
-    """Whether rows of this measure have a band at such a metric."""
-    return measure in FACTORS and (name in _TIMES or (kind == "error" and name != "starts_failed"))
 
 
 def allowed_loss(old: Metric, new: Metric) -> float:
@@ -41,14 +34,15 @@ def allowed_gain(old: Metric, new: Metric) -> float:
     return math.hypot(old.band or 0.0, new.band or 0.0)
 
 
-def noisier(measure: str, old: Metric, new: Metric) -> bool:
+def noisier(kind: Kind, old: Metric, new: Metric) -> bool:
     """Whether the candidate's band is wider than the baseline's by more than chance."""
     if old.band is None or new.band is None or new.band <= old.band:
         return False
-    if old.kind == "error" and measure != "break_away_law":
-        return new.band > FACTORS.get(measure, 1.0) * max(old.band, _LEAST)
-    # the noise of a time is added to it: in decades it is as much wider as the time is shorter
-    return _added(new) > _added(old) + math.log10(FACTORS.get(measure, 1.0))
+    factor = kind.noise_factor or 1.0
+    if not kind.noise_is_added(old):
+        return new.band > factor * max(old.band, _LEAST)
+    # in decades such noise is as much wider as the number is smaller
+    return _added(new) > _added(old) + math.log10(factor)
 
 
 def _added(metric: Metric) -> float:

@@ -13,7 +13,8 @@ from rich.text import Text
 
 from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.records import Metric, Report, Row
-from heavytop.report.store import AnyReport, AnyRow
+from heavytop.report.kind import Kinds
+from heavytop.report.store import AnyReport
 from heavytop.report.text import failed, head, summary, table, title, with_noise
 
 MOST_ROWS = 200
@@ -22,7 +23,7 @@ MOST_LISTED = 5000
 """More rows than these nobody reads: `show` sums them up too."""
 
 
-def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
+def overview(report: Report, rows: Iterable[Row], kinds: Kinds) -> RenderableType:
     """The summary of ``report`` with these rows; where they are too many to read, the worst for each measure.
 
     The rows may be a stream of any length: none is held but the first.
@@ -30,11 +31,11 @@ def overview(report: Report, rows: Iterable[Row]) -> RenderableType:
     stream = iter(rows)
     first = list(islice(stream, MOST_ROWS + 1))
     if len(first) <= MOST_ROWS:
-        return summary(structs.replace(report, rows=first))
+        return summary(structs.replace(report, rows=first), kinds)
     return worst(report, chain(first, stream), f"`heavytop show` lists up to {MOST_LISTED} rows.")
 
 
-def worst(report: AnyReport, rows: Iterable[AnyRow], hint: str) -> RenderableType:
+def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
     """The largest error of each metric with its rounding noise, the fewest digits kept, and how many rows ended how, by
     measure and format; then the hint.
     """
@@ -43,7 +44,7 @@ def worst(report: AnyReport, rows: Iterable[AnyRow], hint: str) -> RenderableTyp
     fewest: dict[tuple[str, str], tuple[float, str]] = {}
     words: dict[tuple[str, str, str], Counter[str]] = {}
     for row in rows:
-        group = row.measure, row.precision
+        group = row.key.kind, row.precision
         counts.setdefault(group, Counter())[row.outcome] += 1
         found = largest.setdefault(group, {})
         if (kept := digits_kept(row)) is not None:
@@ -78,6 +79,6 @@ def worst(report: AnyReport, rows: Iterable[AnyRow], hint: str) -> RenderableTyp
     return Group(*parts, Text(), Text(hint))
 
 
-def all_good(rows: Iterable[Row]) -> bool:
+def all_good(rows: Iterable[Row], kinds: Kinds) -> bool:
     """Whether no row has :func:`failed`."""
-    return not any(map(failed, rows))
+    return not any(failed(row, kinds) for row in rows)

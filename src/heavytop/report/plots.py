@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
-from heavytop.records import Law, Metric, Row
+from heavytop.measure.drift import DRIFT
+from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.solution_error import SOLUTION_ERROR
+from heavytop.records import Law, Metric, Quantity, Row, Series, Subject
 from heavytop.report.section import (
     DASHED,
     MOST_PLOTS,
@@ -26,7 +29,6 @@ from heavytop.report.svg import COLOURS, MARKERS, decades, finish, new_axes, spo
 from heavytop.report.text import short
 
 MOST_LANES = 40
-_ELSEWHERE = ("homoclinic", "work_precision", "claim_evaluation", "claim_model", "audit")
 
 
 def _formats(sources: Sources) -> dict[str, int]:
@@ -42,25 +44,33 @@ def _format_key(name: str, place: int, source: str, line: bool = True) -> Key:
     return Key(label, colour, marker, "", old, line)
 
 
-def _lane(row: Row) -> tuple[str, ...]:
-    # lanes and threads side by side are how heyoka computes an ensemble, in double and in wider formats
-    return row.case, row.integrator.replace("heyoka:batch", "heyoka"), row.measure, row.system
+class _Lane(NamedTuple):
+    """What is drawn together: one case of one subject, in its formats."""
 
+    case: str
+    subject: Subject
+    many: bool
+    kind: str
+    system: str
 
-def _lane_name(lane: tuple[str, ...], most: int = 40) -> str:
-    case, integrator, measure, _ = lane
-    usual = {"drift": "", "growth": "many starts"}.get(measure, measure)
-    extra = integrator.removeprefix("heyoka").strip() or usual
-    return clip(case, most) + (f" ({clip(extra, most)})" if extra else "")
+    @classmethod
+    def of(cls, row: Row) -> _Lane:
+        return cls(row.case, row.key.subject, row.starts > 1, row.key.kind, row.system)
+
+    def name(self, most: int = 40) -> str:
+        subject = "" if self.subject.name == HEYOKA else self.subject.name
+        extra = " ".join(part for part in (subject, self.subject.variant) if part)
+        extra = extra or ("many starts" if self.many else "")
+        return clip(self.case, most) + (f" ({clip(extra, most)})" if extra else "")
 
 
 def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """Digits that each format keeps over its run, beside the digits it started with."""
-    lanes: dict[tuple[str, ...], list[tuple[str, Row]]] = {}
+    lanes: dict[_Lane, list[tuple[str, Row]]] = {}
     for source, report in sources:
         for row in report.rows:
-            if row.measure not in _ELSEWHERE and RELATIVE in row.metrics:
-                lanes.setdefault(_lane(row), []).append((source, row))
+            if RELATIVE.text in row.metrics:
+                lanes.setdefault(_Lane.of(row), []).append((source, row))
     if not lanes:
         return None
     section = Section(
@@ -73,10 +83,11 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "format to those it kept."
         ],
         columns=["case", "format", "T", "samples", "digits", "kept", "lost", "± digits"],
+        place=10,
     )
     formats = _formats(sources)
     wanted = set(first)
-    names = sorted(lanes, key=lambda lane: lane[0] not in wanted)[:MOST_LANES]
+    names = sorted(lanes, key=lambda lane: lane.case not in wanted)[:MOST_LANES]
     left_out(section, len(lanes) - len(names), "case")
     count = max(len(members) for members in lanes.values())
     lines = (count + 1) * len(names)
@@ -89,10 +100,10 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             y = index + (place - (len(lanes[lane]) - 1) / 2) * height
             full = row.bits * math.log10(2)
             kept = digits_kept(row) if row.outcome == "success" else None
-            band = row.metrics[RELATIVE].band
+            band = row.metrics[RELATIVE.text].band
             if kept is None:
                 axes.plot([0], [y], "x", color=COLOURS[key.colour], mew=1.6, ms=6)
-                said = row.outcome if row.outcome != "success" else row.metrics[RELATIVE].value
+                said = row.outcome if row.outcome != "success" else row.metrics[RELATIVE.text].value
             else:
                 axes.plot([kept, full], [y, y], "-", color=COLOURS[key.colour], lw=0.9)
                 axes.plot([full], [y], "|", color=COLOURS[key.colour], ms=6)
@@ -100,14 +111,14 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
                     axes.plot([kept - band, kept + band], [y, y], "-", color=COLOURS[key.colour], lw=4, alpha=0.3)
                 draw(axes, key, [kept], [y], 5)
                 said = digits_text(kept)
-            heard.append(f"{_lane_name(lane)}, {key.label}: {said} of {full:.1f}.")
+            heard.append(f"{lane.name()}, {key.label}: {said} of {full:.1f}.")
             lost = "" if kept is None else f"{full - max(kept, 0.0):.1f}"
             spread = "" if band is None else f"{band:.2f}"
             samples = str(row.samples or "")
             section.rows.append(
-                [_lane_name(lane), key.label, short(row.horizon), samples, f"{full:.1f}", said, lost, spread]
+                [lane.name(), key.label, short(row.horizon), samples, f"{full:.1f}", said, lost, spread]
             )
-    axes.set_yticks(range(len(names)), [_lane_name(lane, 15).replace(" (", "\n(", 1) for lane in names])
+    axes.set_yticks(range(len(names)), [lane.name(15).replace(" (", "\n(", 1) for lane in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.set_xlim(left=0)
     axes.grid(False, axis="y")
@@ -116,20 +127,34 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     return section
 
 
-_COLUMNS: tuple[tuple[str, str, str], ...] = (
-    ("drift_", "drift of a first integral", "|I(t) − I(0)| (units of ε)"),
-    ("solution_error_along", "state error along the flow", "error along (units of ε)"),
-    ("solution_error_across", "state error across the flow", "error across (units of ε)"),
+class _Column(NamedTuple):
+    """One plot of a lane: a drift, or one component of the error."""
+
+    quantity: Quantity
+    label: str
+    unit: str
+
+    def of(self, row: Row) -> dict[Quantity, Series]:
+        """The series of a row that it may draw."""
+        found = {series.quantity: series for series in row.series.values() if series.quantity}
+        wanted = self.quantity
+        return {q: s for q, s in found.items() if q.name == wanted.name and wanted.component in ("", q.component)}
+
+
+_COLUMNS = (
+    _Column(Quantity(DRIFT), "drift of a first integral", "|I(t) − I(0)| (units of ε)"),
+    _Column(Quantity(SOLUTION_ERROR, "along"), "state error along the flow", "error along (units of ε)"),
+    _Column(Quantity(SOLUTION_ERROR, "across"), "state error across the flow", "error across (units of ε)"),
 )
 
 
 def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """Drift and state error over time, on logarithmic axes that all plots share.  ``first``: cases to draw first."""
-    lanes: dict[tuple[str, ...], list[tuple[str, Row]]] = {}
+    lanes: dict[_Lane, list[tuple[str, Row]]] = {}
     for source, report in sources:
         for row in report.rows:
-            if row.bits and row.measure not in _ELSEWHERE and any(name.startswith(_PREFIXES) for name in row.series):
-                lanes.setdefault(_lane(row), []).append((source, row))
+            if row.bits and any(column.of(row) for column in _COLUMNS):
+                lanes.setdefault(_Lane.of(row), []).append((source, row))
     if not lanes:
         return None
     section = Section(
@@ -140,20 +165,17 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "that six digits are lost. Of the first integrals the one that drifts farthest is drawn. A first integral "
             "that holds is no proof that the motion is right: the distance from the true motion stands beside it.",
             "Dashed: the fitted law of growth over the span that was fitted, with the 95 % interval of its exponent; a "
-            "shade around a curve is the interval in which rounding luck alone moves it.",
+            "shade around a curve is the interval in which rounding noise alone moves it.",
         ],
         columns=["case", "format", "quantity", "last |t|", "last value", "law", "exponent", "digits gone at |t|"],
+        place=30,
     )
     wanted = set(first)
-    names = sorted(lanes, key=lambda lane: (lane[0] not in wanted, not any(row.laws for _, row in lanes[lane])))
+    names = sorted(lanes, key=lambda lane: (lane.case not in wanted, not any(row.laws for _, row in lanes[lane])))
     names = names[:MOST_PLOTS]
     left_out(section, len(lanes) - len(names), "case")
     formats = _formats(sources)
-    drawn = [
-        _growth_axes(section, lanes[lane], lane, prefix, label, unit, formats)
-        for lane in names
-        for prefix, label, unit in _COLUMNS
-    ]
+    drawn = [_growth_axes(section, lanes[lane], lane, column, formats) for lane in names for column in _COLUMNS]
     plots = [plot for plot in drawn if plot]
     x = [plot[0].get_xlim() for plot in plots]
     y = [plot[0].get_ylim() for plot in plots]
@@ -166,36 +188,32 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     return section
 
 
-_PREFIXES = tuple(prefix for prefix, _, _ in _COLUMNS)
-
-
 def _growth_axes(
     section: Section,
     members: Sequence[tuple[str, Row]],
-    lane: tuple[str, ...],
-    prefix: str,
-    label: str,
-    unit: str,
+    lane: _Lane,
+    column: _Column,
     formats: dict[str, int],
 ) -> tuple[Any, str, list[str], list[str]] | None:
     axes, heard, laws, lacking = None, [], [], []
     for source, row in members:
-        name = _largest(row, prefix)
-        if name is None:
+        largest = _largest(column.of(row))
+        if largest is None:
             lacking.append(row.precision)
             continue
+        quantity, last = largest
         epsilon = (1 - row.bits) * math.log10(2)
-        x, y = points(row.series[name], epsilon)
+        x, y = points(last, epsilon)
         if not x:
             heard.append(f"{row.precision}: nothing that the reference resolves, or exactly 0.")
             continue
         if axes is None:
-            axes = new_axes(TIME, unit)
+            axes = new_axes(TIME, column.unit)
             decades(axes.xaxis)
             decades(axes.yaxis)
         key = section.key(_format_key(row.precision, formats.get(row.precision, 0), source))
         draw(axes, key, x, y)
-        law, band = row.laws.get(name), _band(row.metrics, name)
+        law, band = row.laws.get(quantity.text), _band(row.metrics, quantity)
         if band:
             axes.fill_between(
                 x, [v - band for v in y], [v + band for v in y], color=COLOURS[key.colour], alpha=0.18, lw=0
@@ -203,14 +221,13 @@ def _growth_axes(
         if law:
             _law(axes, key, law, x, y)
             laws.append(_law_said(key.label, law))
-        what = name.removeprefix("drift_") if prefix == "drift_" else prefix.removeprefix("solution_error_")
-        heard.append(f"{key.label}: {scientific(y[-1])} ε ({what.replace('_', ' ')}) at |t| = {scientific(x[-1])}.")
-        last = row.series[name]
+        what = quantity.component.replace("_", " ")
+        heard.append(f"{key.label}: {scientific(y[-1])} ε ({what}) at |t| = {scientific(x[-1])}.")
         section.rows.append(
             [
-                _lane_name(lane),
+                lane.name(),
                 key.label,
-                f"{'drift of ' if prefix == 'drift_' else 'error '}{what.replace('_', ' ')}",
+                f"{'drift of' if quantity.name == DRIFT else 'error'} {what}",
                 short(last.times[-1]),
                 short(last.values[-1]),
                 *_law_words(law),
@@ -218,22 +235,25 @@ def _growth_axes(
         )
     if axes is None:
         return None
-    if lacking and prefix == "solution_error_across":
+    if lacking and column is _COLUMNS[-1]:
         these = ", ".join(dict.fromkeys(map(clip, lacking)))
-        section.notes.append(f"{_lane_name(lane)}: no known motion reaches as far as {these} ran, so no state error.")
-    return axes, f"{_lane_name(lane)}: {label}", heard, laws
+        section.notes.append(f"{lane.name()}: no known motion reaches as far as {these} ran, so no state error.")
+    return axes, f"{lane.name()}: {column.label}", heard, laws
 
 
-def _largest(row: Row, prefix: str) -> str | None:
-    """Of the series with that prefix the one whose last number is the largest."""
-    names = [name for name, series in row.series.items() if name.startswith(prefix) and series.values]
-    ends = {name: logarithm(row.series[name].values[-1]) for name in names}
-    return max(names, key=lambda name: -math.inf if ends[name] is None else ends[name] or 0.0, default=None)
+def _largest(found: dict[Quantity, Series]) -> tuple[Quantity, Series] | None:
+    """Of several series the one whose last number is the largest."""
+
+    def end(pair: tuple[Quantity, Series]) -> float:
+        size = logarithm(pair[1].values[-1])
+        return -math.inf if size is None else size
+
+    return max(((q, series) for q, series in found.items() if series.values), key=end, default=None)
 
 
-def _band(metrics: dict[str, Metric], name: str) -> float | None:
-    found = (metrics[key].band for key in (f"{name}_max", f"{name}_rms", f"{name}_final", name) if key in metrics)
-    return next((band for band in found if band), None)
+def _band(metrics: dict[str, Metric], quantity: Quantity) -> float | None:
+    found = (metrics.get(quantity.over(part).text) for part in ("max", "rms", "final"))
+    return next((metric.band for metric in found if metric and metric.band), None)
 
 
 def _law(axes: Any, key: Key, law: Law, x: Sequence[float], y: Sequence[float]) -> None:

@@ -7,23 +7,21 @@ from typing import Any
 
 import msgspec
 
-from heavytop.measure.luck import accumulated, assumed, least
+from heavytop.measure.rounding_noise import least
 from heavytop.precision import exact
-from heavytop.records import UNMEASURED, Metric, Row
+from heavytop.records import UNMEASURED, Identity, Metric, Quantity, Row
 from heavytop.report.against import weaker
 from heavytop.report.consistency import contradictions
+from heavytop.report.kind import Kinds, kind_of
 from heavytop.report.laws import judge_law, law_text
 from heavytop.report.noise import allowed_loss, noisier
 from heavytop.report.policy import BITS, Limits, Lookup, Policy
 from heavytop.report.series import judge_series
-from heavytop.report.store import AnyRow
 from heavytop.report.verdicts import Judged, Verdict, judge, judge_seconds
 
 _STEPS = 2
 """The same method with the same setting takes as many steps, and evaluates the field as often: a factor beyond this is
 another method."""
-_STEPWISE = ("local_error",)
-"""The measures whose samples are the steps: these may be fewer as the steps may."""
 
 
 class Finding(msgspec.Struct, frozen=True, gc=False):
@@ -32,27 +30,22 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
     metric: "" for a whole row, ``growth NAME`` for the law of a series, ``seconds NAME`` for a timing.
     """
 
-    key: tuple[str, ...]
+    row: Identity
     metric: str
     verdict: Verdict
     baseline: str | None
     candidate: str | None
     reason: str = ""
+    timing: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """The row of `compare --json`."""
-        measure, case, system, integrator, precision = self.key
-        return {
-            "case": case,
+        return self.row.named | {
             "metric": self.metric,
             "verdict": self.verdict.value,
             "baseline": self.baseline,
             "candidate": self.candidate,
             "reason": self.reason,
-            "measure": measure,
-            "system": system,
-            "integrator": integrator,
-            "precision": precision,
         }
 
 
@@ -60,26 +53,32 @@ class RowComparison:
     """Compares rows under one policy.
 
     timed: whether seconds are compared.  list_same: False to count what plainly stayed the same, in :attr:`same`.
+    checked: of the baseline and of the candidate, whether each row was found consistent as it was read.
     """
 
-    def __init__(self, policy: Policy, timed: bool, list_same: bool) -> None:
+    def __init__(
+        self, policy: Policy, kinds: Kinds, timed: bool, list_same: bool, checked: tuple[bool, bool] = (False, False)
+    ) -> None:
         self.policy = policy
+        self.kinds = kinds
         self.list_same = list_same
+        self.checked = checked
         self.same = 0
         self.lookup = Lookup(policy)
         self.timed = timed
 
-    def ignores(self, row: AnyRow) -> bool:
+    def ignores(self, row: Row) -> bool:
         """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
-        return bool(self.policy.rule) and self.lookup.metric(self.lookup.row(row.measure, row.case), "").ignore
+        return bool(self.policy.rule) and self.lookup.metric(self.lookup.row(row.key.kind, row.case), "").ignore
 
-    def compare(self, key: tuple[str, ...], old: AnyRow, new: AnyRow) -> list[Finding]:
+    def compare(self, old: Row, new: Row) -> list[Finding]:
         """All findings about a row that both reports have."""
+        key = old.identity
         if reason := self._incomparable(old, new):
             if self.ignores(old):
                 return []
             return [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
-        rules = self.lookup.row(old.measure, old.case) if self.policy.rule else ()
+        rules = self.lookup.row(old.key.kind, old.case) if self.policy.rule else ()
         found = self._metrics(key, rules, old, new)
         if old.laws or new.laws:
             found += self._laws(key, rules, old, new)
@@ -91,7 +90,7 @@ class RowComparison:
             found += self._seconds(key, rules, old, new)
         return found
 
-    def _metrics(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> list[Finding]:
+    def _metrics(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> list[Finding]:
         loss = self.lookup.metric((), "").loss
         found = []
         for name, metric in old.metrics.items():
@@ -104,6 +103,7 @@ class RowComparison:
                 and match.log10 is not None
                 and metric.kind == match.kind == "error"
                 and -loss <= metric.log10 - match.log10 <= loss
+                and metric.quantity == match.quantity
                 and (match.band == metric.band or (match.band or 9e9) < (metric.band or 0.0))
             ):
                 if self.list_same:
@@ -114,7 +114,7 @@ class RowComparison:
                 if match is None:
                     found.append(Finding(key, name, Verdict.MISSING, metric.value, None, "the metric is missing"))
                     continue
-                verdict, why = self._metric(name, metric, match, limits, old, new)
+                verdict, why = self._metric(metric, match, limits, old, new)
                 found.append(Finding(key, name, verdict, metric.value, match.value, why))
         if new.metrics.keys() != old.metrics.keys():
             found += [
@@ -124,22 +124,24 @@ class RowComparison:
             ]
         return found
 
-    def _metric(self, name: str, metric: Metric, match: Metric, limits: Limits, old: AnyRow, new: AnyRow) -> Judged:
+    def _metric(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> Judged:
         """The values first; then the noise of the candidate, which is worse where it is more than chance."""
-        least_of = least(old.metrics, name), least(new.metrics, name)
-        known = metric
-        if metric.band is None and (noise := assumed(old.measure, old.integrator)):
+        least_of = least(old.metrics, metric), least(new.metrics, match)
+        known, kind = metric, kind_of(old, self.kinds)
+        if metric.band is None and (noise := kind.assumed_band(old.key.subject)):
             known = msgspec.structs.replace(metric, band=noise)
-        judged = judge(known, match, limits, _eps(name, old), self.policy.suspicious_digits, least_of)
+        judged = judge(known, match, limits, self._eps(metric.quantity, old), self.policy.suspicious_digits, least_of)
         if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
             return judged
+        if judged[0] is Verdict.SAME and metric.quantity != match.quantity:
+            return Verdict.INCOMPARABLE, "it says that it is another quantity"
         if metric.band is not None and match.band is None and match.log10 is not None:
             return Verdict.INCOMPARABLE, f"its noise is not measured, which was {metric.band:.2g} decades"
-        if noisier(old.measure, metric, match):
+        if noisier(kind, metric, match):
             return Verdict.WORSE, f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
         return judged
 
-    def _laws(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
+    def _laws(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
         for name in dict.fromkeys((*old.laws, *new.laws)):
             metric = f"growth {name}"
             limits = self.lookup.metric(rules, metric)
@@ -150,11 +152,11 @@ class RowComparison:
             if a is None or b is None:
                 judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
             else:
-                judged = judge_law(a, b, _noise(name, old, limits))
+                judged = judge_law(a, b, self._noise(name, old, limits))
             before, after = (None if law is None else law_text(law) for law in (a, b))
             yield Finding(key, metric, judged[0], before, after, judged[1])
 
-    def _series(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
+    def _series(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
         """What changed in a series: that of a candidate which is the same is not a finding."""
         for name, series in old.series.items():
             metric = f"series {name}"
@@ -165,14 +167,14 @@ class RowComparison:
             if match is None:
                 yield Finding(key, metric, Verdict.MISSING, f"{len(series.values)} samples", None, "it is missing")
                 continue
-            exactly = any(m.kind == "value" for n, m in old.metrics.items() if n in (f"{name}_max", f"{name}_final"))
-            allowed = limits.value if exactly else max(limits.loss, _noise(name, old, limits))
-            judged = judge_series(series, match, allowed, limits.floor + _eps(name, old), exactly)
+            exactly = any(metric.kind == "value" for metric in _of_series(name, old, "max", "final"))
+            allowed = limits.value if exactly else max(limits.loss, self._noise(name, old, limits))
+            judged = judge_series(series, match, allowed, limits.floor + self._eps(series.quantity, old), exactly)
             if judged[0] is not Verdict.SAME:
                 before, after = (f"{len(each.values)} samples" for each in (series, match))
                 yield Finding(key, metric, judged[0], before, after, judged[1])
 
-    def _row(self, key: tuple[str, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
+    def _row(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
         """What makes numbers of a row incomparable beside the numbers themselves."""
         if old.finite and not new.finite:
             yield Finding(key, "", Verdict.INCOMPARABLE, "finite", "not finite", "a value is no longer finite")
@@ -187,7 +189,8 @@ class RowComparison:
                 yield Finding(key, "", Verdict.INCOMPARABLE, before, after, "other evaluations of the field")
         if old.order != new.order and self.policy.flags != "ignore":
             yield Finding(key, "", Verdict.INCOMPARABLE, str(old.order), str(new.order), "another order")
-        needed, found = -(-_samples(old) // (_STEPS if old.measure in _STEPWISE else 1)), _samples(new)
+        fewer = _STEPS if kind_of(old, self.kinds).samples_are_steps else 1
+        needed, found = -(-_samples(old) // fewer), _samples(new)
         if found < needed:
             why = "fewer samples: the largest of them is smaller"
             yield Finding(key, "", Verdict.INCOMPARABLE, f"{_samples(old)} samples", f"{found} samples", why)
@@ -198,21 +201,20 @@ class RowComparison:
                 why = "the data were rounded by more"
                 yield Finding(key, "", Verdict.INCOMPARABLE, rounded, new.input_rounding, why)
 
-    def _seconds(self, key: tuple[str, ...], rules: tuple[int, ...], old: AnyRow, new: AnyRow) -> Iterator[Finding]:
+    def _seconds(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
         for name in sorted(old.seconds.keys() & new.seconds.keys()):
             if not self.lookup.metric(rules, f"seconds {name}").ignore:
                 verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
                 before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
-                yield Finding(key, f"seconds {name}", verdict, before, after, why)
+                yield Finding(key, f"seconds {name}", verdict, before, after, why, timing=True)
 
-    def _incomparable(self, old: AnyRow, new: AnyRow) -> str:
+    def _incomparable(self, old: Row, new: Row) -> str:
         """Why two rows cannot be compared; empty where they can."""
-        for row, which in ((old, "baseline"), (new, "candidate")):
+        for row, which, checked in zip((old, new), ("baseline", "candidate"), self.checked, strict=True):
             if row.outcome != "success":
-                why = f": {row.against.removeprefix('nothing: ')}" if row.outcome in UNMEASURED else ""
+                why = f": {row.reference.reason}" if row.outcome in UNMEASURED else ""
                 return f"the {which} ended as {row.outcome} at t = {row.time_reached}{why}"
-            # a brief row is checked as it is read
-            if isinstance(row, Row) and (problem := next(contradictions(row), "")):
+            if not checked and (problem := next(contradictions(row, kind_of(row, self.kinds)), "")):
                 return f"the {which} contradicts itself: {problem}"
         if old.horizon != new.horizon and exact(old.horizon) != exact(new.horizon):
             return f"horizon {old.horizon} against {new.horizon}"
@@ -225,24 +227,27 @@ class RowComparison:
         if old.flags != new.flags and self.policy.flags != "ignore":
             names = [n for n in sorted({*old.flags, *new.flags}) if old.flags.get(n) != new.flags.get(n)]
             return "flags differ: " + ", ".join(f"{n} {old.flags.get(n)} -> {new.flags.get(n)}" for n in names)
-        subjects = [row.measured.partition(":")[0] for row in (old, new)]
-        if subjects[0] != subjects[1]:
-            return f"{subjects[0] or 'nothing'} is measured, and {subjects[1] or 'nothing'}"
-        return weaker(old.against, new.against)
+        if old.measured != new.measured:
+            return f"{old.measured or 'nothing'} is measured, and {new.measured or 'nothing'}"
+        return weaker(old.reference, new.reference)
+
+    def _eps(self, quantity: Quantity | None, row: Row) -> float:
+        """log10 of the eps of a row, or of what its roundings add up to."""
+        return (1 - row.bits) * BITS + kind_of(row, self.kinds).roundings(quantity, row.steps)
+
+    def _noise(self, name: str, row: Row, limits: Limits) -> float:
+        """Decades by which noise may move what a series or a law is about: as the metrics of its quantity."""
+        bands = [metric for metric in _of_series(name, row, "final", "rms", "max") if metric.band]
+        widest = max((allowed_loss(metric, metric) for metric in bands), default=0.0)
+        return limits.noise * max(widest, kind_of(row, self.kinds).assumed_band(row.key.subject))
 
 
-def _samples(row: AnyRow) -> int:
+def _samples(row: Row) -> int:
     """How many samples the largest values of a row are over; at least those of its series, where it does not say."""
     return row.samples or max((len(series.times) for series in row.series.values()), default=0)
 
 
-def _eps(name: str, row: AnyRow) -> float:
-    """log10 of the eps of a row, or of what its roundings add up to."""
-    return (1 - row.bits) * BITS + accumulated(row.measure, name, row.steps)
-
-
-def _noise(name: str, row: AnyRow, limits: Limits) -> float:
-    """Decades by which noise may move what a series or a law is about: as the metrics of its name."""
-    bands = [m for part in ("_final", "_rms", "_max") if (m := row.metrics.get(name + part)) is not None and m.band]
-    widest = max((allowed_loss(metric, metric) for metric in bands), default=0.0)
-    return limits.noise * max(widest, assumed(row.measure, row.integrator))
+def _of_series(name: str, row: Row, *statistics: str) -> list[Metric]:
+    """The metrics of a row that sum up its series of that name."""
+    found = ((metric.quantity, metric) for metric in row.metrics.values())
+    return [metric for q, metric in found if q and q.statistic in statistics and q.over("").text == name]

@@ -38,9 +38,33 @@ class Key:
     line: bool = True
 
 
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of a card.  style: "", "soft", "big" or "note"; word: a verdict before it."""
+
+    text: str
+    style: str = ""
+    word: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """What a kind of measurement has to say under the headline: lines, a small table, a note below."""
+
+    title: str
+    lines: list[Line]
+    caption: str = ""
+    columns: tuple[str, ...] = ()
+    rows: list[tuple[str, ...]] = field(default_factory=list)
+    note: str = ""
+
+
 @dataclass(slots=True)
 class Section:
-    """A part of the page: words, pictures with one legend, the same in numbers, and what is not drawn."""
+    """A part of the page: words, pictures with one legend, the same in numbers, and what is not drawn.
+
+    place: the sections stand in the order of their places.
+    """
 
     id: str
     title: str
@@ -51,6 +75,7 @@ class Section:
     rows: list[list[str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     across: int = 3
+    place: int = 100
 
     def key(self, key: Key) -> Key:
         """``key``, which from now on is in the legend."""

@@ -1,25 +1,15 @@
-"""The suite's own detectors, tried on integrators that are deliberately broken: which metric catches which fault.
-
-Each fault of :mod:`heavytop.integrate.broken` runs the plan `selftest`, and its report is compared with that of the
-healthy integrator, as any candidate is with its baseline.
-"""
+"""What a comparison says of a deliberately broken integrator: which metric catches which fault."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.integrate.broken import FAULTS
 from heavytop.precision import exact, log10
-from heavytop.records import SCHEMA, Report, Row
-from heavytop.report.compare import Comparison, Finding, compare
-from heavytop.report.policy import Policy
+from heavytop.report.compare import Comparison, Finding
 from heavytop.report.verdicts import Verdict
-from heavytop.suite.plan import expand, load
-from heavytop.suite.task import Task
-from heavytop.suite.workers import rows
 
 CONTROL = "control"
 _ALARMS = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
@@ -58,36 +48,13 @@ class Trial:
         }
 
 
-def tasks(plan: str = "selftest") -> list[Task]:
-    """The measurements of the plan for every integrator: healthy, healthy with other roundings, each fault."""
-    healthy = expand(load(plan)[0])
-    control = [replace(task, seed=1) for task in healthy]
-    return [*healthy, *control, *(replace(task, integrator=fault) for fault in FAULTS for task in healthy)]
-
-
-def trials(tasks: Sequence[Task], workers: int, progress: Callable[[Task], None]) -> list[Trial]:
-    """What comes of :func:`tasks`: one trial for the control and one for each fault."""
-    found: dict[int, Row] = {}
-    for index, row in rows(tasks, workers, None):
-        found[index] = row
-        progress(tasks[index])
-    names = (CONTROL, *FAULTS)
-    size = len(tasks) // (1 + len(names))
-    healthy, *others = ([found[i] for i in range(at, at + size)] for at in range(0, len(tasks), size))
-    compared = (compare(_report(healthy), _report(other), Policy()) for other in others)
-    return [_trial(name, comparison) for name, comparison in zip(names, compared, strict=True)]
-
-
-def _report(measured: Sequence[Row]) -> Report:
-    return Report(SCHEMA, {}, {}, list(measured))
-
-
-def _trial(name: str, comparison: Comparison) -> Trial:
+def trial(name: str, comparison: Comparison) -> Trial:
+    """What came of the control, or of the fault of that name."""
     alarms: dict[str, list[tuple[float, str]]] = {}
     quiet: list[tuple[bool, float, str]] = []
     for finding in comparison.findings:
-        measure, case = finding.key[:2]
-        label = f"{measure}: {finding.metric or finding.reason}"
+        case = finding.row.case
+        label = f"{finding.row.key.kind}: {finding.metric or finding.reason}"
         moved = _decades(finding)
         if finding.verdict in _ALARMS:
             alarms.setdefault(label, []).append((moved, case))

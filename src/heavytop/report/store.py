@@ -13,8 +13,9 @@ from typing import Any, TypeVar
 import msgspec
 
 from heavytop.errors import InputError
-from heavytop.records import SCHEMA, Bits, Count, Law, Metric, Report, Row, Seconds, Series, Starts
-from heavytop.report.checks import REMEDY, check_consistency, check_keys, check_rows, check_series
+from heavytop.records import SCHEMA, Report, Row
+from heavytop.report.checks import REMEDY, check_keys, check_rows
+from heavytop.report.kind import Kinds
 from heavytop.suite.files import read_whole, replace, without_repeats
 
 FILE = "report.json"
@@ -43,49 +44,16 @@ def _pieces(report: Report, rows: Iterable[Row]) -> Iterator[bytes]:
     yield (b"" if between == b",\n" else between) + b"\n]}\n"
 
 
-class BriefRow(msgspec.Struct, gc=False):
-    """What a comparison needs of a :class:`heavytop.records.Row`."""
-
-    case: str
-    system: str
-    integrator: str
-    precision: str
-    bits: Bits
-    outcome: str
-    horizon: str
-    time_reached: str
-    steps: Count
-    finite: bool
-    metrics: dict[str, Metric]
-    measure: str = ""
-    measured: str = ""
-    against: str = ""
-    order: Count | None = None
-    flags: dict[str, str] = {}
-    input_rounding: str | None = None
-    series: dict[str, Series] = {}
-    samples: Count = 0
-    starts: Starts = 1
-    laws: dict[str, Law] = {}
-    seconds: dict[str, Seconds] = {}
-    evaluations: Count | None = None
-
-    @property
-    def key(self) -> tuple[str, ...]:
-        """What makes a row the same row in another report."""
-        return self.measure, self.case, self.system, self.integrator, self.precision
-
-
 class Brief:
     """A report as a comparison needs it: its rows are read and checked each time that they are gone through, so that
     some hundred thousand of them fit into memory.
     """
 
-    def __init__(self, file: Path, parts: _Parts) -> None:
+    def __init__(self, file: Path, parts: _Parts, kinds: Kinds) -> None:
         self.file = file
         self.plan = parts.plan
         self.environment = parts.environment
-        self.rows = _Rows(file, parts.rows)
+        self.rows = _Rows(file, parts.rows, kinds)
 
 
 class _Parts(msgspec.Struct):
@@ -98,30 +66,29 @@ class _Parts(msgspec.Struct):
 class _Rows:
     """The rows of a brief report; raises InputError at one that is wrong."""
 
-    def __init__(self, file: Path, rows: list[msgspec.Raw]) -> None:
+    def __init__(self, file: Path, rows: list[msgspec.Raw], kinds: Kinds) -> None:
         self._file = file
+        self._kinds = kinds
         self._rows = rows
-        self._decode = msgspec.json.Decoder(BriefRow).decode
+        self._decode = msgspec.json.Decoder(Row).decode
 
     def __len__(self) -> int:
         return len(self._rows)
 
-    def __getitem__(self, number: int) -> BriefRow:
+    def __getitem__(self, number: int) -> Row:
         return self._decode(self._rows[number])
 
-    def __iter__(self) -> Iterator[BriefRow]:
+    def __iter__(self) -> Iterator[Row]:
         seen: set[int] = set()
         for start in range(0, len(self._rows), _CHUNK):
-            rows: list[BriefRow] = []
+            rows: list[Row] = []
             try:
                 rows.extend(map(self._decode, self._rows[start : start + _CHUNK]))
             except (msgspec.DecodeError, UnicodeDecodeError) as error:
                 place = f"row {start + len(rows) + 1}: {error}"
                 raise InputError(f"{self._file} is not a whole report: {place}.", REMEDY) from None
-            check_rows(self._file, rows)
-            check_series(self._file, rows)
-            check_consistency(self._file, rows)
-            hashes = {hash(row.key) for row in rows}
+            check_rows(self._file, rows, self._kinds)
+            hashes = {hash(row.identity) for row in rows}
             if len(hashes) < len(rows) or hashes & seen:
                 check_keys(self._file, (self._decode(row) for row in self._rows))
             seen |= hashes
@@ -129,13 +96,11 @@ class _Rows:
 
 
 AnyReport = Report | Brief
-AnyRow = Row | BriefRow
+
+_Content = TypeVar("_Content", Report, _Parts)
 
 
-_Kind = TypeVar("_Kind", Report, _Parts)
-
-
-def read(path: Path) -> Report:
+def read(path: Path, kinds: Kinds) -> Report:
     """The report at ``path``, a file or a directory with a report.json.
 
     Raises InputError for a file that is missing, truncated, of another program or schema, edited since it was written
@@ -143,18 +108,16 @@ def read(path: Path) -> Report:
     """
     file, report = _read(path, Report)
     check_keys(file, report.rows)
-    check_rows(file, report.rows)
-    check_series(file, report.rows)
-    check_consistency(file, report.rows)
+    check_rows(file, report.rows, kinds)
     return report
 
 
-def read_brief(path: Path) -> Brief:
+def read_brief(path: Path, kinds: Kinds) -> Brief:
     """The same for a comparison; what is wrong with a row is found as the rows are gone through."""
-    return Brief(*_read(path, _Parts))
+    return Brief(*_read(path, _Parts), kinds)
 
 
-def _read(path: Path, kind: type[_Kind]) -> tuple[Path, _Kind]:
+def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
     file = path
     try:
         file = path / FILE if path.is_dir() else path

@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from heavytop.records import UNMEASURED, Report, Row
+from heavytop.records import Row
 from heavytop.report.section import MOST_PLOTS, Key, Section, Sources, clip, draw, left_out, scientific
 from heavytop.report.svg import COLOURS, MARKERS, Picture, decades, finish, new_axes, spoken
 from heavytop.report.text import short
 from heavytop.report.work_precision import Line, leads, panels
 
-_NO_RUN = ("success", *UNMEASURED)
-"""Outcomes that are no giving up: a run to the end, and none at all."""
 _METRICS = (("error_max", "largest over the samples"), ("error_final", "at the end"))
 
 
-def work_precision(sources: Sources) -> Section | None:
+def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """Seconds of a run against its error, on the way and at the end; a run that gave up is a cross, and no point."""
-    rows = [(source, row) for source, report in sources for row in report.rows if row.measure == "work_precision"]
+    rows = [(source, row) for source, report in sources for row in report.rows]
     if not rows:
         return None
     section = Section(
         "work-precision",
         "Work and precision",
         [
-            "Seconds of a run, the fastest of several, against its error, largest component, held against the known "
+            "Seconds of a run, the fastest of several, against its error, largest component, compared with the known "
             "motion: the lower and the farther left, the better. A curve is one integrator over its tolerances or "
             "steps; the time to compile is apart, in the numbers. A cross on the right edge is a run that gave up "
             "before the end, at the time it took: it has no error. Charts and sentences have the fastest run, since "
@@ -47,6 +45,7 @@ def work_precision(sources: Sources) -> Section | None:
         ],
         rows=[_numbers(source, row) for source, row in rows],
         across=2,
+        place=50,
     )
     cases = list(dict.fromkeys(row.case for _, row in rows))
     left_out(section, len(cases) - MOST_PLOTS // 2, "case")
@@ -105,8 +104,3 @@ def _numbers(source: str, row: Row) -> list[str]:
         str(row.steps),
         clip(row.outcome, 30),
     ]
-
-
-def gave_up(report: Report) -> int:
-    """How many runs of such rows did not reach the end: a finding about the integrator, in its chart."""
-    return sum(row.measure == "work_precision" and row.outcome not in _NO_RUN for row in report.rows)

@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from heavytop.precision import parse
 from heavytop.records import UNMEASURED, Row
 
-OURS = "heyoka"
-CONSTANTS = "heyoka:constants"
-"""heyoka in double as well, with the numbers of the top compiled into its code."""
+OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
+"""heyoka; with the numbers of the top compiled into its code; eight motions at once.  All others are peers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +129,9 @@ def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Lin
     """The lines of each case.  metric: error_max (over the whole horizon) or error_final."""
     found: dict[str, dict[tuple[str, str], Line]] = {}
     for row in rows:
-        if row.measure != "work_precision" or row.outcome in UNMEASURED:
+        if row.outcome in UNMEASURED:
             continue
-        name, _, setting = row.integrator.partition(" ")
+        name, setting = row.key.subject.name, row.key.subject.setting
         line = found.setdefault(row.case, {}).setdefault((name, row.precision), Line(name, row.precision))
         seconds = row.seconds.get("least", math.nan)
         error = row.metrics.get(metric)
@@ -151,14 +151,14 @@ def leads(rows: Sequence[Row]) -> list[Lead]:
         lead
         for case, lines in panels(rows).items()
         for log10, formats in ((-10.0, ("double",)), (-30.0, ("quad", "real")))
-        if (lead := _lead(case, log10, [line for line in lines if line.precision.partition(":")[0] in formats]))
+        if (lead := _lead(case, log10, [line for line in lines if parse(line.precision).family in formats]))
     ]
 
 
 def _lead(case: str, log10: float, lines: Sequence[Line]) -> Lead | None:
     ours = [line for line in lines if line.integrator in (OURS, CONSTANTS)]
-    lanes = [line for line in lines if line.integrator == f"{OURS}:lanes"]
-    peers = [line for line in lines if line.integrator.partition(":")[0] != OURS]
+    lanes = [line for line in lines if line.integrator == LANES]
+    peers = [line for line in lines if line.integrator not in (OURS, CONSTANTS, LANES)]
     if not ours or not peers:
         return None
     (mine, name), (theirs, peer), (side_by_side, _) = (_quickest(group, log10) for group in (ours, peers, lanes))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.records import Report
+from heavytop.records import Row
 from heavytop.report.method_growth import QUANTITIES, alike, growth_axes, keyed
 from heavytop.report.section import TIME, clip
 from heavytop.report.svg import COLOURS, document, plain, quiet_style
@@ -29,12 +29,12 @@ _DASHES = ("-", "--", ":", "-.")
 _CROSS: dict[str, Any] = {"linestyle": "", "marker": "x", "markersize": 9, "markeredgewidth": 2}
 
 
-def draw_work_precision(report: Report, directory: Path) -> list[Path]:
+def draw_work_precision(rows: Sequence[Row], directory: Path) -> list[Path]:
     """The files written into ``directory``: work-precision and growth, as SVG and as PNG.
 
-    Raises InputError for a report without a row of work against precision.
+    rows: of work against precision; raises InputError for none.
     """
-    figures = {"work-precision": work_precision_figure(report), "growth": growth_figure(report)}
+    figures = {"work-precision": work_precision_figure(rows), "growth": growth_figure(rows)}
     if figures["work-precision"] is None:
         raise InputError("The report has no row of work against precision.", "`heavytop run --plan peers` makes them.")
     directory.mkdir(parents=True, exist_ok=True)
@@ -87,16 +87,16 @@ def work_precision_axes(axes: Any, lines: Sequence[Line], styles: dict[str, dict
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def work_precision_figure(report: Report, metric: str = "error_max") -> Any:
+def work_precision_figure(rows: Sequence[Row], metric: str = "error_max") -> Any:
     """A matplotlib figure: one panel a case, with the lead of heyoka in its title; None without such rows."""
-    cases = panels(report.rows, metric)
+    cases = panels(rows, metric)
     if not cases:
         return None
-    lead = {each.case: each for each in leads(report.rows)}
+    lead = {each.case: each for each in leads(rows)}
     styles = looks([line for lines in cases.values() for line in lines])
-    rows = -(-len(cases) // 2)
-    figure = _figure(11, 4.4 * rows + 1.2)
-    grid = figure.subplots(rows, 2, squeeze=False).ravel()
+    height = -(-len(cases) // 2)
+    figure = _figure(11, 4.4 * height + 1.2)
+    grid = figure.subplots(height, 2, squeeze=False).ravel()
     labels: dict[str, Any] = {}
     for axes, (case, lines) in zip(grid, cases.items(), strict=False):
         work_precision_axes(axes, lines, styles)
@@ -115,9 +115,9 @@ def work_precision_figure(report: Report, metric: str = "error_max") -> Any:
     return figure
 
 
-def growth_figure(report: Report) -> Any:
+def growth_figure(rows: Sequence[Row]) -> Any:
     """Energy drift and phase error over time of three methods at about the same accuracy; None without such rows."""
-    chosen = keyed(alike(report.rows))
+    chosen = keyed(alike(rows))
     if not chosen:
         return None
     with quiet_style():

@@ -87,8 +87,8 @@ class Checkpoint:
 
     def __enter__(self) -> Checkpoint:
         self._lock = locked(self.directory)
-        with ExitStack() as unless_all_is_well:
-            unless_all_is_well.callback(self._leave)
+        with ExitStack() as cleanup_on_error:
+            cleanup_on_error.callback(self._leave)
             self.check()
             for leftover in self.directory.glob(".*.partial"):
                 leftover.unlink()
@@ -97,7 +97,7 @@ class Checkpoint:
             # unbuffered: a row is with the system when add returns, and a failed write leaves nothing to fail again
             self._file = self.path.open("r+b", buffering=0)
             self._read()
-            unless_all_is_well.pop_all()
+            cleanup_on_error.pop_all()
         return self
 
     def _read(self) -> None:

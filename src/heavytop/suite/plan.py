@@ -6,31 +6,32 @@ import hashlib
 import re
 import tomllib
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
+from functools import reduce
 from importlib import resources
 from itertools import accumulate
+from operator import or_
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
 import msgspec
 
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.luck import MOST_SEEDS
-from heavytop.precision import exact, number, parse, require
+from heavytop.measure.rounding_noise import MOST_SEEDS
+from heavytop.precision import exact, number, require
+from heavytop.records import RowKey
 from heavytop.suite.cases import CASES, Case, case, require_possible
 from heavytop.suite.files import read_whole
+from heavytop.suite.kind import Kinds, Table
 from heavytop.suite.sweeps import Lazy, Sweep
-from heavytop.suite.tables import Table
-from heavytop.suite.task import Task
+from heavytop.suite.task import FINEST, Task
 from heavytop.top.equations import system
 from heavytop.top.heavy_top import HeavyTop, State
 
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
-_SETTING = re.compile(r"((?<==)|(?<=tolerance )|(?<=bias ))[^ ]+")
-"""The numbers in a task's label: 1e-3 and 0.001 are the same work."""
 _RENAME = "Give it another name."
 BUILT_IN = ("smoke", "default", "growth", "long", "peers", "selftest")
 
@@ -47,8 +48,8 @@ class Top(msgspec.Struct, forbid_unknown_fields=True):
     system: str = "heavy_top"
 
 
-class Plan(msgspec.Struct, forbid_unknown_fields=True):
-    """A whole plan."""
+class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """A whole plan; of the tables in ``measure`` each is that of its kind."""
 
     name: str
     measure: list[Table]
@@ -56,12 +57,12 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True):
     sweep: list[Sweep] = []
 
 
-def read(name: str, seed: int = 0) -> tuple[Plan, str, Sequence[Task]]:
+def read(name: str, kinds: Kinds, seed: int = 0) -> tuple[Plan, str, Sequence[Task]]:
     """The plan of that name or file, the hash of its text, and its measurements with the roundings of a seed.
 
     Raises InputError, which names the file, where :func:`load` or :func:`expand` does.
     """
-    plan, digest = load(name)
+    plan, digest = load(name, kinds)
     try:
         return plan, digest, expand(plan, seed)
     except InputError as error:
@@ -70,7 +71,7 @@ def read(name: str, seed: int = 0) -> tuple[Plan, str, Sequence[Task]]:
         raise InputError(f"{name}: {error.cause}", error.remedy) from None
 
 
-def load(name: str) -> tuple[Plan, str]:
+def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
     """The built-in plan of that name, or the one in that TOML file, and the hash of its text.
 
     Raises InputError with the place in the file for an unknown key or kind or an impossible value.
@@ -86,8 +87,7 @@ def load(name: str) -> tuple[Plan, str]:
         raise InputError(f"Unknown plan {name[:60]!r}.", f"Use {', '.join(BUILT_IN)} or a file ending in .toml.")
     try:
         table = tomllib.loads(text)
-        _require_kinds(table)
-        plan = msgspec.convert(table, Plan)
+        plan = of_document(table, kinds)
         if not re.fullmatch(_NAME, plan.name):
             raise msgspec.ValidationError(f"name {plan.name[:40]!r} is not letters, digits, '.', '_' and '-'")
     except RecursionError:
@@ -97,19 +97,29 @@ def load(name: str) -> tuple[Plan, str]:
     return plan, hashlib.sha256(text.encode()).hexdigest()
 
 
-def _require_kinds(table: dict[str, Any]) -> None:
+def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
+    """The plan in a TOML document; raises ValidationError with the place of an unknown key, kind or impossible type."""
+    tables = {each.name: each.table for each in kinds.values() if each.table is not None}
+    _require_kinds(document, "measure", tables)
+    _require_kinds(document, "sweep", {str(each.__struct_config__.tag) for each in get_args(Sweep)})
+    any_table = reduce(or_, tables.values())
+    measure = ("measure", list[any_table])  # type: ignore[valid-type]
+    whole = msgspec.defstruct("Plan", [measure], bases=(Plan,), kw_only=True)
+    plan: Plan = msgspec.convert(document, cast(type[Plan], whole))
+    return plan
+
+
+def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) -> None:
     """Raises ValidationError for a table of a kind that is not there: with those that are, and the nearest."""
-    for section, union in (("measure", Table), ("sweep", Sweep)):
-        known = sorted(str(each.__struct_config__.tag) for each in get_args(union))
-        entries = table.get(section)
-        for place, entry in enumerate(entries if isinstance(entries, list) else []):
-            kind = entry.get("kind") if isinstance(entry, dict) else None
-            if isinstance(kind, str) and kind not in known:
-                near = get_close_matches(kind, known, 1)
-                meant = f"; did you mean {near[0]}" if near else ""
-                raise msgspec.ValidationError(
-                    f"kind = {quoted(kind)} in `$.{section}[{place}]` is none of {', '.join(known)}{meant}"
-                )
+    entries = table.get(section)
+    for place, entry in enumerate(entries if isinstance(entries, list) else []):
+        kind = entry.get("kind") if isinstance(entry, dict) else None
+        if isinstance(kind, str) and kind not in known:
+            near = get_close_matches(kind, known, 1)
+            meant = f"; did you mean {near[0]}" if near else ""
+            raise msgspec.ValidationError(
+                f"kind = {quoted(kind)} in `$.{section}[{place}]` is none of {', '.join(sorted(known))}{meant}"
+            )
 
 
 def expand(plan: Plan, seed: int = 0) -> Sequence[Task]:
@@ -133,9 +143,9 @@ def expand(plan: Plan, seed: int = 0) -> Sequence[Task]:
         for whole in plan.measure
         for table, cases in _parts(whole, swept)
     ]
-    seen: dict[str, str] = {}
+    seen: dict[RowKey, str] = {}
     for task in (task for templates, _ in parts for task in templates):
-        work = _SETTING.sub(_exactly, task.label)
+        work = _exactly(task.key)
         if work in seen:
             other = "" if seen[work] == task.label else f", also as {seen[work]}"
             raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "Name each measurement once.")
@@ -196,16 +206,19 @@ def _require_name(name: str, what: str) -> None:
         raise InputError(f"The {what}'s name {name[:40]!r} is not letters, digits, '.', '_' and '-'.", _RENAME)
 
 
-def _exactly(number: re.Match[str]) -> str:
-    return number[0] if number[0] == "eps" else str(exact(number[0]))
+def _exactly(key: RowKey) -> RowKey:
+    """The key with its setting as fractions: 1e-3 and 0.001 are the same work."""
+    asked = {name: getattr(key.subject, name) for name in ("tolerance", "step", "bias")}
+    exactly = {name: text if text in ("", FINEST) else str(exact(text)) for name, text in asked.items()}
+    return msgspec.structs.replace(key, subject=msgspec.structs.replace(key.subject, **exactly))
 
 
 def _require_fit(task: Task) -> None:
     """Raises InputError, with the name of the task, where its format is not there or cannot hold its data."""
-    if task.case is None or not task.precision:
+    if task.case is None or not task.has_precision:
         return
     try:
-        precision = require(parse(task.precision))
+        precision = require(task.precision)
         Problem.of(task.case.top, task.case.start, precision, task.case.system)
         for time in task.times[:1] + task.times[-1:]:
             number(time, precision)

@@ -1,4 +1,4 @@
-"""Runs a plan: every row to disk as it is finished, the laws drawn from them at the end."""
+"""Runs a plan: every row to disk as it is finished, what the rows of a kind come to together at the end."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Checkpoint
+from heavytop.suite.kind import Kinds
 from heavytop.suite.task import Task
 from heavytop.suite.workers import rows
 
@@ -14,24 +15,24 @@ Progress = Callable[[Task], None]
 
 def run(
     tasks: Sequence[Task],
+    kinds: Kinds,
     checkpoint: Checkpoint,
     progress: Progress,
     workers: int = 1,
     scheduler: str | None = None,
 ) -> list[Row]:
-    """Every row of the tasks into the checkpoint; returns only the laws drawn from them.
+    """Every row of the tasks into the checkpoint; returns only the rows drawn from them.
 
     Rows that the checkpoint holds are not measured again.  ``progress`` hears of each task as it is done.
     """
     for index in checkpoint.offsets:
         progress(tasks[index])
-    for index, row in rows(tasks, min(workers, len(tasks)), scheduler, checkpoint.offsets, checkpoint.saved):
+    for index, row in rows(tasks, kinds, min(workers, len(tasks)), scheduler, checkpoint.offsets, checkpoint.saved):
         checkpoint.add(index, row)
         progress(tasks[index])
-    homoclinic = [index for index, task in enumerate(tasks) if task.kind == "homoclinic"]
-    if not homoclinic:
-        return []
-    from heavytop.suite.measurements.laws import break_away_law
-
-    rates = {tasks[index].name: case.rate for index in homoclinic if (case := tasks[index].case)}
-    return break_away_law(list(checkpoint.rows(homoclinic)), rates)
+    concluded: list[Row] = []
+    for kind in kinds.values():
+        if kind.concludes:
+            indices = [index for index, task in enumerate(tasks) if task.key.kind == kind.name]
+            concluded += kind.conclude(list(checkpoint.rows(indices)))
+    return concluded

@@ -8,13 +8,13 @@ import msgspec
 
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.digits import digits_kept
+from heavytop.measure.known import known_motion
 from heavytop.measure.scorer import Scorer
 from heavytop.precision import round_to
-from heavytop.records import Row
+from heavytop.records import Row, RowKey, Subject
 from heavytop.suite.cases import Case
-from heavytop.suite.measurements.computed import computed_row
-from heavytop.suite.measurements.shared import time_text
-from heavytop.suite.tables import log_spaced
+from heavytop.suite.rows import computed_row, time_text
+from heavytop.suite.sampling import log_spaced
 from heavytop.suite.task import Task
 from heavytop.suite.trajectory_file import Given
 
@@ -32,7 +32,7 @@ def score(given: Given) -> Row:
     count = next((i for i, state in enumerate(given.states) if state is None), len(given.states))
     times = [round_to(time, precision.bits) for time in given.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
-    scorer = Scorer(problem, times[-1], keep)
+    scorer = Scorer(problem, known_motion(problem, times[-1]), keep)
     for time, state in zip(times[:count], given.states, strict=False):
         assert state is not None
         scorer(time, state)
@@ -48,7 +48,9 @@ def score(given: Given) -> Row:
         flags=given.flags,
     )
     case = Case(given.name, "given", given.system, given.top, given.start)
-    task = Task("score", given.name, case, precision.name, "", tuple(times), tuple(keep))
+    subject = Subject("given", given.integrator)
+    key = RowKey("score", given.name, given.system.name, subject, precision.name, horizon=time_text(times[-1]))
+    task = Task(key, given.name, given.integrator, case, tuple(times), tuple(keep))
     row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
     reached = time_text(run.time_reached)
     return msgspec.structs.replace(row, measured=f"given: {given.integrator}", order=None, time_reached=reached)

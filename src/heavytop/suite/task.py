@@ -4,58 +4,82 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import Any
 
-from heavytop.precision import parse
+import msgspec
+
+from heavytop.measure.integrator import Integrator
+from heavytop.measure.rounding_noise import reroll
+from heavytop.precision import Precision, parse
+from heavytop.records import EXACT, RowKey, Subject
 from heavytop.suite.cases import Case
 
-if TYPE_CHECKING:
-    from heavytop.suite.starts import GrowthRun
+FINEST = "eps"
+"""In the place of a tolerance: the finest that an integrator offers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
     """One measurement, and the row it will fill.
 
-    name: as the row names its case.  case: None for an audit, whose ``form`` is the system.
-    times: exact, of the sign of the direction; for claim_evaluation they are values of k |t| with that sign.
-    keep: the times that go into the series.  precision: "" where no format is involved.
-    integrator: heyoka, or a fault of :mod:`heavytop.integrate.broken`.
+    key: of the row.  title, subject: what the row calls its case and what is measured.
+    case: None where no motion is measured.
+    times: exact, of the sign of the direction; keep: those that go into the series.
+    options: what else the kind of measurement needs to know, and it alone.
     seed: which roundings; 0 for those of the data as given.
-    ensemble: of a growth measurement.
+    fault: of :mod:`heavytop.integrate.broken`, which runs in the place of the integrator.
     """
 
-    kind: str
-    name: str
-    case: Case | None
-    precision: str
-    form: str
+    key: RowKey
+    title: str
+    subject: str
+    case: Case | None = None
     times: tuple[Fraction, ...] = ()
     keep: tuple[Fraction, ...] = ()
-    integrator: str = "heyoka"
+    options: Any = None
     seed: int = 0
-    ensemble: GrowthRun | None = None
+    fault: str = ""
 
     def of(self, case: Case) -> Task:
-        """The same measurement of another case."""
+        """The same measurement of another case of the same system."""
+        key = msgspec.structs.replace(self.key, case=case.name, system=case.system.name)
+        return replace(self, key=key, title=self.title.replace(self.key.case, case.name, 1), case=case)
+
+    @property
+    def precision(self) -> Precision:
+        """The format; raises InputError where none is involved."""
+        return parse(self.key.precision)
+
+    @property
+    def has_precision(self) -> bool:
+        """Whether a format is involved."""
+        return self.key.precision != EXACT
+
+    @property
+    def integrator(self) -> Integrator:
+        """What computes the motion."""
+        return Integrator(self.key.subject.name, self.fault)
+
+    @property
+    def given(self) -> Case:
+        """The case, with the roundings of the seed."""
         assert self.case is not None
-        return replace(self, name=case.name + self.name.removeprefix(self.case.name), case=case)
+        return replace(self.case, top=reroll(self.case.top, self.seed)) if self.seed else self.case
 
     @property
     def label(self) -> str:
         """For progress and messages."""
-        return " ".join(part for part in (self.kind, self.name, self.form, self.precision) if part)
+        precision = self.key.precision if self.has_precision else ""
+        return " ".join(part for part in (self.key.kind, self.title, self.subject, precision) if part)
 
     @property
-    def cost(self) -> float:
-        """Seconds it may take, roughly: for the progress bar and for running long ones first."""
-        if not self.precision:
-            return 5.0
-        bits = parse(self.precision).bits
+    def run_seconds(self) -> float:
+        """Seconds that heyoka takes for such a motion, roughly."""
+        bits = self.precision.bits
         per_step = 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5
-        if self.kind == "local_error":
-            return 1.0 + 0.2 * float(self.times[-1])
-        seconds = float(abs(self.times[-1])) * 4 * per_step + len(self.times) * 1e-4
-        if self.ensemble is not None:
-            return 5.0 + self.ensemble.starts * seconds / 2
-        return (3.0 if self.kind == "drift" else 1.0) + seconds
+        return float(abs(self.times[-1])) * 4 * per_step + len(self.times) * 1e-4
+
+
+def computed(name: str, **setting: Any) -> Subject:
+    """The integrator of that name with a setting as a subject."""
+    return Subject("computed", name, **setting)

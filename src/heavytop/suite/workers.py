@@ -20,10 +20,11 @@ from operator import itemgetter
 from threading import Lock, Thread
 from typing import Any
 
-from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
+from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, PeerFailed
 from heavytop.processes import ChildContext
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
+from heavytop.suite.kind import Kind, Kinds
 from heavytop.suite.task import Task
 
 _AHEAD = 4
@@ -49,6 +50,7 @@ def versions() -> Versions:
 
 def rows(
     tasks: Sequence[Task],
+    kinds: Kinds,
     workers: int,
     scheduler: str | None,
     done: Container[int] = (),
@@ -64,30 +66,30 @@ def rows(
     Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
     InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
     """
-    queue = _longest_first(tasks, done)
+    queue = _longest_first(tasks, kinds, done)
     saved = saved or (lambda index: Saved())
     if scheduler is not None:
-        yield from _on_cluster(tasks, queue, scheduler)
+        yield from _on_cluster(tasks, kinds, queue, scheduler)
     elif workers > 1:
-        yield from _in_processes(tasks, queue, workers, saved)
+        yield from _in_processes(tasks, kinds, queue, workers, saved)
     else:
         for index in queue:
-            yield index, _measure(tasks[index], saved(index))
+            yield index, _measure(kinds[tasks[index].key.kind], tasks[index], saved(index))
 
 
-def _longest_first(tasks: Sequence[Task], done: Container[int]) -> deque[int]:
-    costs = {index: task.cost for index, task in enumerate(tasks) if index not in done}
+def _longest_first(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> deque[int]:
+    costs = {index: kinds[task.key.kind].cost(task) for index, task in enumerate(tasks) if index not in done}
     return deque(sorted(costs, key=lambda index: -costs[index]))
 
 
 def _in_processes(
-    tasks: Sequence[Task], queue: deque[int], workers: int, saved: Callable[[int], Saved]
+    tasks: Sequence[Task], kinds: Kinds, queue: deque[int], workers: int, saved: Callable[[int], Saved]
 ) -> Iterator[tuple[int, Row]]:
     deaths: Counter[int] = Counter()
     under_way: UnderWay = {}
 
     def submit(index: int) -> Future[Row]:
-        return pool.submit(_measure, tasks[index], saved(index))
+        return pool.submit(_measure, kinds[tasks[index].key.kind], tasks[index], saved(index))
 
     def at_once() -> int:
         # any task that was under way when a worker died may be to blame: fewer and fewer at once tell which
@@ -118,7 +120,7 @@ def _in_processes(
                 ) from None
 
 
-def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Iterator[tuple[int, Row]]:
+def _on_cluster(tasks: Sequence[Task], kinds: Kinds, queue: deque[int], scheduler: str) -> Iterator[tuple[int, Row]]:
     with _client(scheduler) as client:
         from distributed import KilledWorker
 
@@ -126,7 +128,7 @@ def _on_cluster(tasks: Sequence[Task], queue: deque[int], scheduler: str) -> Ite
         same = versions()
 
         def submit(index: int) -> Future[Row]:
-            future: Future[Row] = pool.submit(_measure_as, same, tasks[index])
+            future: Future[Row] = pool.submit(_measure_as, same, kinds[tasks[index].key.kind], tasks[index])
             return future
 
         def at_once() -> int:
@@ -171,13 +173,14 @@ def _windowed(
             del under_way[future]
 
 
-def _measure(task: Task, saved: Saved) -> Row:
+def _measure(kind: Kind, task: Task, saved: Saved) -> Row:
     """The row of ``task``, also where it cannot be known; raises InputError with its name for impossible data."""
-    from heavytop.suite.measurements import measure
-    from heavytop.suite.measurements.shared import unmeasured
+    from heavytop.suite.rows import failed, unmeasured
 
     try:
-        return measure(task, saved)
+        return kind.measure(task, saved)
+    except PeerFailed as error:
+        return failed(task, error.cause)
     except (OutOfReach, Contradiction) as error:
         return unmeasured(task, error)
     except InputError as error:
@@ -187,22 +190,23 @@ def _measure(task: Task, saved: Saved) -> Row:
 def _ended_by_peer(task: Task, times: int) -> Row | None:
     """The failed row of a task that ended its process, where an integrator of another package ran in it; else None."""
     from heavytop.integrate.peers import BUILT_IN
-    from heavytop.suite.measurements.shared import peer_failure
+    from heavytop.integrate.registry import INTEGRATORS
+    from heavytop.suite.rows import failed
 
-    name = task.form.partition(" ")[0]
-    if task.kind != "work_precision" or name in BUILT_IN:
+    subject = task.key.subject
+    if subject.what != "computed" or subject.name in BUILT_IN or subject.name in INTEGRATORS:
         return None
-    return peer_failure(task, f"{name} ended its process {times} times")
+    return failed(task, f"{subject.name} ended its process {times} times")
 
 
-def _measure_as(expected: Versions, task: Task) -> Row:
+def _measure_as(expected: Versions, kind: Kind, task: Task) -> Row:
     """The row of ``task``; raises InputError unless the versions here are those expected."""
     here = versions()
     other = [f"{name} {here[name]} instead of {expected[name]}" for name in expected if here[name] != expected[name]]
     if other:
         raise InputError(f"A worker has {', '.join(other)}.", _SAME)
     with _one_task:
-        return _measure(task, Saved())
+        return _measure(kind, task, Saved())
 
 
 def _leave_interrupts_to_the_parent() -> None:

@@ -1,4 +1,4 @@
-"""What the motions of an ensemble are held against: closed forms, else runs in a wider format."""
+"""What the motions of an ensemble are compared with: closed forms, else runs in a wider format."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy
 from flint import arb
+from msgspec.structs import replace as replace_struct
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, working_precision
@@ -18,7 +19,8 @@ from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.growth import RESOLVED, root_mean_square
 from heavytop.measure.known import Known, certified, closed_form
 from heavytop.measure.scalar import GUARD_BITS
-from heavytop.precision import QUAD, Precision, exact, native, parse, real, shown
+from heavytop.precision import QUAD, Precision, exact, native, parse, real
+from heavytop.records import Against, Checked
 
 _CERTIFIED_AT = Fraction(2)
 """|t| at which the closed form of every start is certified; that of the first start is at the horizon too."""
@@ -31,13 +33,13 @@ Texts = list[list[str]]
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """What a run is held against.
+    """What a run is compared with.
 
     motions: one a start, None where there is none fit to score with.  radius: its error, absolute.  part: its error as
     a part of the error that it measures.
     """
 
-    text: str
+    against: Against
     motions: list[Any]
     radius: float = 0.0
     part: float = 0.0
@@ -55,7 +57,7 @@ class Wider:
 
 
 class _Sampled:
-    """Computed states at the times they were computed for, as the motion that a run is held against."""
+    """Computed states at the times they were computed for, as the motion that a run is compared with."""
 
     def __init__(self, times: Sequence[Fraction], states: Texts, precision: Precision) -> None:
         self.states = dict(zip(times, states, strict=True))
@@ -72,28 +74,30 @@ def reference(
     given: list[Problem],
     times: list[Fraction],
     name: str | None,
-    options: dict[str, Any],
+    measured: Callable[[Sequence[Problem], Sequence[Fraction]], Sequence[Trajectory]],
     wider: Wider,
 ) -> Reference:
     """The closed forms where there are any, else runs in the wider format of that ``name``; ``wider`` takes these.
 
-    true, given: what the motions are held against and what is integrated; they differ where a fault is planted.
-    options: of the integrator that is measured.
+    true, given: what the motions are compared with and what is integrated; they differ where a fault is planted.
+    measured: propagates with the integrator that is measured.
     """
     forms = [closed_form(problem) for problem in true]
     if all(forms):
         return _certified(forms, times[-1], true[0].precision.bits + GUARD_BITS)
     nothing: list[Any] = [None] * len(true)
     if name is None:
-        return Reference("its own first integrals; no closed form, and no wider format was asked for", nothing)
+        return Reference(Against("none", reason="no closed form, and no wider format was asked for"), nothing)
     precision = parse(name)
-    part, checked = _own_error(true[:_CHECKED_STARTS], given[:_CHECKED_STARTS], times, precision, options)
-    text = f"computed, not proven: heyoka in {precision.name} from the same rounded data; {checked}"
+    part, checked = _own_error(true[:_CHECKED_STARTS], given[:_CHECKED_STARTS], times, precision, measured)
+    method = f"heyoka in {precision.name} from the same rounded data"
+    against = Against("computed", method, checked=checked)
     if not part <= 1 / RESOLVED:
-        return Reference(f"its own first integrals; no closed form, and not fit to score with: {text}", nothing)
+        why = against.text if checked else f"{against.text}; not checked: no sample up to |t| = {_CHECKED_UNTIL}"
+        return Reference(Against("none", reason=f"no closed form, and not fit to score with: {why}"), nothing)
     motions = _propagated([replace(problem, precision=precision) for problem in true], times, wider)
     fit = [_Sampled(times, states, precision) if states else None for states in motions]
-    return Reference(text, list(fit), part=part)
+    return Reference(against, list(fit), part=part)
 
 
 def _certified(forms: Sequence[Any], horizon: Fraction, bits: int) -> Reference:
@@ -103,15 +107,14 @@ def _certified(forms: Sequence[Any], horizon: Fraction, bits: int) -> Reference:
     proofs = [_proof(form, early, bits) for form in forms]
     last = _proof(forms[0], horizon, bits)
     motions = [form if proof and last else None for form, proof in zip(forms, proofs, strict=True)]
-    done = [proof.certificate for proof in proofs if proof]
+    done = [proof for proof in proofs if proof]
     if not done or last is None:
-        return Reference("its own first integrals; the closed form is certified to too few digits", motions)
-    least = min(done, key=lambda proof: proof.agreed_digits)
-    text = (
-        f"{last.text}, for the first start; {len(done)} of {len(forms)} starts certified at t = {shown(early)} "
-        f"{least.agreement} or more by {done[0].second_source} ({done[0].kind})"
-    )
-    return Reference(text, motions, radius=2.0**-bits)
+        return Reference(Against("none", reason="the closed form is certified to too few digits"), motions)
+    least = min(done, key=lambda proof: proof.certificate.agreed_digits).certified
+    by = done[0].certificate
+    every = replace_struct(least, source=by.second_source, proven=by.kind, starts=len(done), of_starts=len(forms))
+    against = replace_struct(last.against, certificates=(last.certified, every))
+    return Reference(against, motions, radius=2.0**-bits)
 
 
 def _proof(form: Any, time: Fraction, bits: int) -> Known | None:
@@ -144,24 +147,25 @@ def _propagated(problems: list[Problem], times: list[Fraction], wider: Wider) ->
 
 
 def _own_error(
-    true: list[Problem], given: list[Problem], times: list[Fraction], wider: Precision, options: dict[str, Any]
-) -> tuple[float, str]:
+    true: list[Problem],
+    given: list[Problem],
+    times: list[Fraction],
+    wider: Precision,
+    measured: Callable[[Sequence[Problem], Sequence[Fraction]], Sequence[Trajectory]],
+) -> tuple[float, Checked | None]:
     """The error of a reference in ``wider`` as a part of the error of the run, both against a wider format still, over
-    a few starts and an early time; and that in words.
+    a few starts and an early time; how it was checked, None where no sample is early enough.
     """
     widest = QUAD if wider.bits < QUAD.bits else real(2 * wider.bits)
     early = [time for time in times if abs(time) <= _CHECKED_UNTIL]
     if not early:
-        return float("inf"), f"not checked: no sample up to |t| = {_CHECKED_UNTIL}"
+        return float("inf"), None
     truth, reference = (
         propagate_ensemble([replace(problem, precision=p) for problem in true], early) for p in (widest, wider)
     )
-    off = _distance(propagate_ensemble(given, early, **options), truth)
+    off = _distance(measured(given, early), truth)
     part = _distance(reference, truth) / off if off else float("inf")
-    return part, (
-        f"against {widest.name} on {len(true)} starts up to |t| = {float(early[-1]):.3g}, "
-        f"its error is {part:.1e} of the error measured"
-    )
+    return part, Checked(widest.name, len(true), f"{float(early[-1]):.3g}", f"{part:.1e}")
 
 
 def _distance(runs: Sequence[Trajectory], truth: Sequence[Trajectory]) -> float:

@@ -1,4 +1,4 @@
-"""How far rounding luck alone moves a metric: the same motion computed again with other roundings.
+"""How far rounding noise alone moves a metric: the same motion computed again with other roundings.
 
 Inertia and weight times a common factor are another top with the same motions Ω(t), γ(t): the equations (1.1) are
 homogeneous in them. With 1 + j/2^20 for the factor, dyadic data stay dyadic and every equality that defines a case
@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import Any
 
 import numpy
 
@@ -23,7 +22,6 @@ MOST_SEEDS = 1000
 _BITS, _FACTORS, _STRIDE = 20, 2**14, 10125
 """Factors are 1 + j/2^20 with j < 2^14, an odd stride apart so that those of one row differ in all their bits."""
 _CENTRAL = 0.95
-_OF_OTHERS = 0.6
 
 
 def factor(seed: int, rerun: int = 0) -> Fraction:
@@ -37,39 +35,20 @@ def reroll(top: HeavyTop, seed: int) -> HeavyTop:
     return HeavyTop([factor(seed) * moment for moment in top.inertia], factor(seed) * top.weight, top.centre)
 
 
-def least(metrics: Mapping[str, Any], name: str) -> float:
-    """log10 of what an error counts as at least: a last value below the row's own RMS is luck; -inf for the others."""
-    if not name.endswith("_final"):
+def least(metrics: Mapping[str, Metric], metric: Metric) -> float:
+    """log10 of what an error counts as at least, -inf for most: a last value below the RMS of its row is chance."""
+    quantity = metric.quantity
+    if quantity is None or quantity.statistic != "final":
         return -math.inf
-    rms = metrics.get(f"{name[:-6]}_rms")
-    return -math.inf if rms is None or rms.log10 is None else float(rms.log10)
-
-
-def accumulated(measure: str, name: str, steps: int) -> float:
-    """log10 of how many eps the roundings of ``steps`` steps add up to, where a row of one run has no bands.
-
-    Rows of work against precision are such: √n for a first integral, whose roundings walk at random, and n for the
-    distance from the true motion, in which drift adds up along the flow.  0 for all other rows.
-    """
-    if measure != "work_precision" or steps < 1:
-        return 0.0
-    return math.log10(steps) * (0.5 if name.startswith("drift_") else 1.0)
-
-
-def assumed(measure: str, integrator: str) -> float:
-    """Half-width in decades of the luck of two rows that have no bands; 0 but for integrators of others.
-
-    Their step control turns a rounding into another step: rerun with other roundings, CVODE and splitting methods move
-    by up to a decade.
-    """
-    return _OF_OTHERS if measure == "work_precision" and not integrator.startswith("heyoka") else 0.0
+    rms = metrics.get(quantity.over("rms").text)
+    return -math.inf if rms is None or rms.log10 is None else rms.log10
 
 
 def bands(runs: Sequence[Mapping[str, Metric]], floor: float, own: Mapping[str, Metric]) -> dict[str, float]:
     """The band of each error over runs that differ in their roundings alone: half its 95 % interval, in decades.
 
     floor: log10 below which all errors are the same.  own: the run that the bands are for.  It counts where it came out
-    no larger than the others: good luck is luck, but luck must not excuse what went wrong.
+    no larger than the others: chance may have made it small, but must not excuse what went wrong.
     Metrics that some run has no number for have no band.
     """
     found = {}
@@ -84,7 +63,7 @@ def bands(runs: Sequence[Mapping[str, Metric]], floor: float, own: Mapping[str, 
 
 
 def duration_band(times: Sequence[float], own: float, expected: float) -> float:
-    """The band in decades of a duration ``own`` > 0 that luck moves as it moves ``times``, by addition.
+    """The band in decades of a duration ``own`` > 0 that noise moves as it moves ``times``, by addition.
 
     expected: what the duration would be among those; it counts where it is no shorter than they are.
     """
@@ -97,7 +76,7 @@ def _size(run: Mapping[str, Metric], name: str) -> float:
     metric = run.get(name)
     if metric is None or (metric.log10 is None and metric.value != "0"):
         return math.nan
-    return max(-math.inf if metric.log10 is None else metric.log10, least(run, name))
+    return max(-math.inf if metric.log10 is None else metric.log10, least(run, metric))
 
 
 def _spread(values: Sequence[float]) -> float:

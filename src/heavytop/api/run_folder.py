@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from rich.console import RenderableType
 
 from heavytop.errors import InputError
+from heavytop.kinds import KINDS
 from heavytop.precision import whole
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report import html, overview, parquet, store
@@ -64,24 +65,22 @@ class Run:
 
     def finished(self) -> Ended:
         """The end of a run that was finished already; raises InputError where it was of another plan."""
-        report = store.read(self.directory)
+        report = store.read(self.directory, KINDS)
         checkpoint.require_same(report.plan, self.identity, self.directory)
         if self.parquet:
             parquet.write(self.directory / parquet.FILE, report.rows, report.plan)
-        return Ended(overview.overview(report, report.rows), overview.all_good(report.rows))
+        return Ended(overview.overview(report, report.rows, KINDS), overview.all_good(report.rows, KINDS))
 
     def measure(self, progress: Progress) -> Ended:
         """Measure what is not there yet, write the report and sum it up; ``progress`` hears of each finished task.
 
         Raises InputError where the folder is not fit or cannot be written; what is finished is kept for --resume.
         """
-        if self.workers == 1 and self.scheduler is None:
-            import heavytop.suite.measurements  # noqa: F401 - loads heyoka, while Ctrl-C still leaves at once
         report = Report(SCHEMA, self.identity, environment(), [])
         fit = partial(require_fit, self.directory, self.resume)
         try:
             with Checkpoint(self.directory, identity_of(report), fit, self.save_every) as rows:
-                laws = run_tasks(self.tasks, rows, progress, self.workers, self.scheduler)
+                laws = run_tasks(self.tasks, KINDS, rows, progress, self.workers, self.scheduler)
                 return self._write(report, lambda: chain(rows.rows(range(len(self.tasks))), laws))
         except OSError as error:
             raise InputError(
@@ -95,8 +94,8 @@ class Run:
             parquet.write(self.directory / parquet.FILE, rows(), report.plan)
         store.write(report, self.directory, rows())
         if len(self.tasks) <= MOST_ON_A_PAGE:
-            html.write_report(replace(report, rows=list(rows())), self.directory / PAGE)
-        return Ended(overview.overview(report, rows()), overview.all_good(rows()))
+            html.write_report(replace(report, rows=list(rows())), self.directory / PAGE, KINDS)
+        return Ended(overview.overview(report, rows(), KINDS), overview.all_good(rows(), KINDS))
 
 
 def prepare(
@@ -116,7 +115,7 @@ def prepare(
     """
     if with_parquet:
         parquet.require_pyarrow()
-    loaded, digest, tasks = read(plan, seed)
+    loaded, digest, tasks = read(plan, KINDS, seed)
     if workers is not None and whole(workers, "--workers") < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     if workers is not None and scheduler is not None:

@@ -10,15 +10,20 @@ from typing import Any
 import numpy
 
 from heavytop.claims import ershkov
+from heavytop.claims.ershkov import Branch, PartialCase
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.validated import Validated
+from heavytop.measure.parting import Parting, parting
 from heavytop.top.angles import euler_angles, perpendicular, unwrap
+from heavytop.top.equations import GYROSTAT
+from heavytop.top.integrals import gyrostat_energy
 
 NUMERIC = SimpleNamespace(
     sqrt=numpy.sqrt, exp=numpy.exp, log=numpy.log, arctan=numpy.arctan, arccos=numpy.arccos, atan2=numpy.arctan2
 )
 _BITS = 64
+RATIOS = (2, 6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +77,109 @@ class Curves:
     angles: Any
 
 
+@dataclass(frozen=True, slots=True)
+class PaperCurve:
+    """A figure of the paper over time, shapes (n,)."""
+
+    figure: PaperFigure
+    times: Any
+    values: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """Truth, gyrostat and claim from the same data at t = 0, for one I1/I3, and when claim and truth part."""
+
+    ratio: int
+    truth: Curves
+    method: str
+    gyrostat: Curves
+    claim: Curves
+    parted: dict[Branch, Parting | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Portrait:
+    """M along the homoclinic motions of the gyrostat and of the heavy top, shape (n, 3).
+
+    levels: level lines of the gyrostat's energy on the sphere |M| = ``length``, each a triple of arrays.
+    """
+
+    gyrostat: Any
+    heavy_top: Any
+    levels: list[Any]
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Drawings:
+    """All that the figures draw."""
+
+    papers: list[PaperCurve]
+    comparisons: list[Compared]
+    portrait: Portrait
+
+
+def drawings() -> Drawings:
+    """Figs 2-8, the comparisons for I1/I3 = 2 and 6, the momentum sphere."""
+    return Drawings([_paper(each) for each in PAPER_FIGURES], [_compared(ratio) for ratio in RATIOS], _portrait())
+
+
+def _paper(figure: PaperFigure) -> PaperCurve:
+    # beyond A t = 37 the printed logarithm loses every digit of a double
+    span = min(4, 24 / figure.a)
+    t = numpy.linspace(-span, span, 801)
+    t = t[t != 0] if figure.angle == "phi" else t
+    return PaperCurve(figure, t, figure.values(t))
+
+
+def _compared(ratio: int) -> Compared:
+    case = PartialCase(Fraction(1), Fraction(1), Fraction(1, ratio))
+    span = Fraction(6, ratio - 1) + 2
+    times = [span * index / 200 for index in range(-200, 201)]
+    truth, method = true_curves(case, times)
+    branches: tuple[Branch, ...] = ("printed", "smooth")
+    parted = {branch: parting(case, times[-1], branch) for branch in branches}
+    return Compared(ratio, truth, method, gyrostat_curves(case.solves, times), claim_curves(case, times), parted)
+
+
+def _portrait() -> Portrait:
+    case = PartialCase(Fraction(1), Fraction(1), Fraction(1, 2))
+    times = [Fraction(index, 10) for index in range(-140, 141)]
+    moments = numpy.array([float(moment) for moment in case.solves.top.inertia])
+    gyrostat, heavy_top = gyrostat_curves(case.solves, times), true_curves(case, times)[0]
+    orbits = [curves.states[:, :3] * moments for curves in (gyrostat, heavy_top)]
+    return Portrait(orbits[0], orbits[1], _levels(case), float(case.alpha * case.i1))
+
+
+def _levels(case: PartialCase) -> list[Any]:
+    """Level lines of the gyrostat's energy on the sphere |M| = C0."""
+    from contourpy import contour_generator
+
+    motion = case.solves
+    parameters = GYROSTAT.parameters(motion.top, motion.start)
+    moments = [float(moment) for moment in parameters.inertia]
+    p = parameters._replace(inertia=moments, rotor=float(parameters.rotor))
+    length = float(case.alpha * case.i1)
+    turn, height = numpy.meshgrid(numpy.linspace(-numpy.pi, numpy.pi, 361), numpy.linspace(-1, 1, 241))
+
+    def point(turn: Any, height: Any) -> tuple[Any, Any, Any]:
+        across = numpy.sqrt(numpy.maximum(0, 1 - height * height))
+        return length * across * numpy.cos(turn), length * height, length * across * numpy.sin(turn)
+
+    state = [m / i for m, i in zip(point(turn, height), moments, strict=True)]
+    lines = contour_generator(turn, height, gyrostat_energy(p, state))
+    low, high = float(gyrostat_energy(p, state).min()), float(gyrostat_energy(p, state).max())
+    found = [line for level in numpy.linspace(low, high, 14)[1:-1] for line in lines.lines(level)]
+    return [point(*numpy.asarray(line).T) for line in found]
+
+
 def gyrostat_curves(motion: ErshkovPartial, times: list[Fraction]) -> Curves:
     """The exact motion of the gyrostat, smooth branch: Ω as the paper has it, θ taking the sign of −t."""
     return _exact(motion, times)
 
 
-def claim_curves(case: ershkov.PartialCase, times: list[Fraction]) -> Curves:
+def claim_curves(case: PartialCase, times: list[Fraction]) -> Curves:
     """The claim as printed: u = √Ω2, positive roots and arctan."""
     t = numpy.array([float(time) for time in times])
     i1, i3, c1 = float(case.i1), float(case.i3), float(case.c1)
@@ -87,7 +189,7 @@ def claim_curves(case: ershkov.PartialCase, times: list[Fraction]) -> Curves:
     return Curves(t, numpy.stack([*v.omega, *v.gamma], axis=1), numpy.stack([v.phi, v.theta, v.psi], axis=1))
 
 
-def true_curves(case: ershkov.PartialCase, times: list[Fraction]) -> tuple[Curves, str]:
+def true_curves(case: PartialCase, times: list[Fraction]) -> tuple[Curves, str]:
     """The heavy top from the claim's own data at t = 0, and the method: closed form for I1 = 2 I3, else enclosed."""
     if case.i1 == 2 * case.i3:
         return _exact(DeloneHomoclinic(case.alpha, case.i1), times), "closed form"

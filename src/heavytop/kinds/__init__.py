@@ -1,0 +1,30 @@
+"""The kinds of measurement, one a file, in the order of the summary.  A new one is a file and a line here."""
+
+from __future__ import annotations
+
+from heavytop.kinds.audit import Audit
+from heavytop.kinds.base import Kind
+from heavytop.kinds.break_away_law import BreakAwayLaw
+from heavytop.kinds.claim_evaluation import ClaimEvaluation
+from heavytop.kinds.claim_model import ClaimModel
+from heavytop.kinds.drift import Drift
+from heavytop.kinds.growth import Growth
+from heavytop.kinds.homoclinic import Homoclinic
+from heavytop.kinds.local_error import LocalError
+from heavytop.kinds.score import Score
+from heavytop.kinds.work_precision import WorkPrecision
+
+_ALL: tuple[Kind, ...] = (
+    Audit(),
+    ClaimModel(),
+    ClaimEvaluation(),
+    Homoclinic(),
+    BreakAwayLaw(),
+    LocalError(),
+    Drift(),
+    Score(),
+    WorkPrecision(),
+    Growth(),
+)
+KINDS: dict[str, Kind] = {kind.name: kind for kind in _ALL}
+"""Each kind by its name in plans and rows."""

@@ -1,0 +1,144 @@
+"""The printed and the stable formulas (4.2)-(4.6), evaluated in a format, against themselves exactly evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
+from fractions import Fraction
+
+from rich.console import RenderableType
+from rich.text import Text
+
+from heavytop.exact.balls import working_precision
+from heavytop.kinds.base import Kind
+from heavytop.kinds.claim_section import claim_error
+from heavytop.kinds.claim_tasks import CLAIM, EVALUATION_ERROR, claim_of, claimed
+from heavytop.measure import claim_error as errors_of
+from heavytop.measure.scalar import largest, metric, of_fraction, text
+from heavytop.precision import parse
+from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
+from heavytop.report.consistency import CLOSE, sizes
+from heavytop.report.text import both, largest_over, short, table, title
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.kind import Find, Table
+from heavytop.suite.rows import exact_row, time_metric, time_text
+from heavytop.suite.sampling import positive, signed
+from heavytop.suite.task import Task
+from heavytop.top.equations import GYROSTAT
+
+NAME = "claim_evaluation"
+_COUNT = "claim_evaluation"
+_WORST, _LOST, _SINCE = "max_finite", "samples_not_finite", "not_finite_from"
+_SECONDS = 1.0
+_SUMMED_UP = ("omega", "theta", "psi")
+
+
+class ClaimEvaluationTable(Table, tag=NAME):
+    """rate_times: the values of k |t| at which the formulas are evaluated."""
+
+    cases: list[str]
+    precisions: list[str]
+    rate_times: list[str]
+    directions: tuple[Direction, ...] = ("forward", "backward")
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        times = positive(self.rate_times, "rate_times")
+        tasks = []
+        for case in claimed(find, self.cases):
+            assert case.claim is not None
+            for precision in map(parse, self.precisions):
+                for direction in self.directions:
+                    signs = signed(times, direction)
+                    end = time_text(signs[-1] / case.claim.solves.rate)
+                    for form in ("printed", "stable"):
+                        subject = Subject("claimed", "(4.2)-(4.6)", form=form)
+                        key = RowKey(NAME, case.name, GYROSTAT.name, subject, precision.name, direction, end)
+                        tasks.append(Task(key, f"{case.name}/{direction}", f"formula:{form}", case, signs, signs))
+        return tasks
+
+
+class ClaimEvaluation(Kind):
+    """The largest errors of a form in a format, and from when on it gives no number.
+
+    The times of a task are values of k t of one sign.  Errors of Ω in 1/time unit, of the angles in rad.
+    """
+
+    name = NAME
+    table = ClaimEvaluationTable
+    needed = tuple(
+        quantity.text
+        for each in _SUMMED_UP
+        for quantity in (Quantity(EVALUATION_ERROR, each, _WORST), Quantity(_COUNT, each, _SINCE))
+    )
+    may_overflow = True
+    sections = (claim_error,)
+
+    def cost(self, task: Task) -> float:
+        """The same for all."""
+        return _SECONDS
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """Of one form.  Raises OutOfReach where the formulas cannot be evaluated exactly."""
+        claim, precision, form = claim_of(task), task.precision, task.key.subject.form
+        times = [time / claim.solves.rate for time in task.times]
+        errors = [errors_of.evaluation_error(claim, time, precision, form) for time in times]
+        metrics: dict[Quantity, Metric] = {}
+        series: dict[str, Series] = {}
+        with working_precision(precision.bits + 64):
+            for name in (each.name for each in fields(errors_of.EvaluationError)):
+                values = [getattr(error, name) for error in errors]
+                finite = [value for value in values if value.is_finite()]
+                worst = metric(largest(finite)) if finite else Metric("missing", None)
+                metrics[Quantity(EVALUATION_ERROR, name, _WORST)] = worst
+                lost = Fraction(len(values) - len(finite))
+                metrics[Quantity(_COUNT, name, _LOST)] = of_fraction(lost, "value", str(lost))
+                failure = errors_of.first_failure(times, values)
+                metrics[Quantity(_COUNT, name, _SINCE)] = time_metric(failure, "duration")
+                quantity = Quantity(EVALUATION_ERROR, name)
+                texts = [text(value) for value in values]
+                series[quantity.text] = Series([time_text(time) for time in task.times], texts, quantity)
+        measured = f"{CLAIM}, {form} form, evaluated in {precision.name}; times of the series are k t"
+        against = Against("proven", "the same form exactly evaluated from the same rounded data")
+        row = exact_row(task, measured, against, by_name(metrics), precision.bits, series)
+        row.horizon = row.time_reached = task.key.horizon
+        row.finite = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
+        return row
+
+    def contradictions(self, row: Row) -> Iterator[str]:
+        """A series holds every sample: those that are not finite are counted, and the last begin somewhere."""
+        for series in row.series.values():
+            component = series.quantity.component if series.quantity else ""
+            count, since = row.metric(_COUNT, component, _LOST), row.metric(_COUNT, component, _SINCE)
+            worst = row.metric(EVALUATION_ERROR, component, _WORST)
+            lost = sum(value == "nan" for value in series.values)
+            if count is not None and count.value != str(lost):
+                yield f"{Quantity(_COUNT, component, _LOST).text}: {count.value}, where the series has {lost}"
+            if since is not None and series.values and (since.value == "never") == (series.values[-1] == "nan"):
+                yield f"{Quantity(_COUNT, component, _SINCE).text}: {since.value}, where the series says otherwise"
+            found = sizes(series)
+            if worst is not None and worst.log10 is not None and found and abs(max(found) - worst.log10) > CLOSE:
+                yield f"{Quantity(EVALUATION_ERROR, component, _WORST).text}: not the largest of its series"
+
+    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
+        """The largest errors of each form in each format, and when it gives no number."""
+        lines = [
+            (
+                row,
+                [
+                    row.precision,
+                    row.key.subject.form,
+                    *(short(row.metrics[Quantity(EVALUATION_ERROR, q, _WORST).text].value) for q in _SUMMED_UP),
+                    *(short(row.metrics[Quantity(_COUNT, q, _SINCE).text].value) for q in ("psi", "omega")),
+                ],
+            )
+            for row in rows
+        ]
+        columns = ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω from |t|"]
+        return [
+            title(
+                "Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated"
+            ),
+            Text(f"  Errors are the {largest_over(rows)}."),
+            table(columns, both(lines)),
+        ]

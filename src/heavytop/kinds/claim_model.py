@@ -1,0 +1,210 @@
+"""The claim (4.2)-(4.6), exactly evaluated, against the true motion of the heavy top from its own data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+from fractions import Fraction
+
+from flint import arb
+from rich.console import RenderableType
+from rich.text import Text
+
+from heavytop.claims.ershkov import Branch, PartialCase
+from heavytop.errors import OutOfReach
+from heavytop.exact.balls import FUNCTIONS, working_precision
+from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.kinds.base import Kind
+from heavytop.kinds.claim_section import claim_error
+from heavytop.kinds.claim_tasks import CLAIM, MODEL_ERROR, claim_of, claimed
+from heavytop.measure import claim_error as errors_of
+from heavytop.measure.computed_reference import ComputedReference
+from heavytop.measure.known import certified
+from heavytop.measure.parting import CLAIM_XI, parting, true_solution
+from heavytop.measure.scalar import largest, metric, text
+from heavytop.precision import exact
+from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
+from heavytop.report.printable import printable
+from heavytop.report.section import Card, Line, clip
+from heavytop.report.text import both, short, table, title
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.kind import Find, Table
+from heavytop.suite.rows import exact_row, time_metric, time_text
+from heavytop.suite.sampling import positive, samples, signed
+from heavytop.suite.task import Task
+from heavytop.top.angles import attitude_from_angles
+from heavytop.top.equations import HEAVY_TOP
+
+NAME = "claim_model"
+PARTS = Quantity("claim_parts_by_1_percent_at")
+_SHOWN = ("0.1", "1", "2", "5")
+_SECONDS = 5.0
+_BRANCHES: dict[Direction, tuple[Branch, ...]] = {"forward": ("smooth", "printed"), "backward": ("smooth",)}
+
+
+class ClaimModelTable(Table, tag=NAME):
+    """times: where the series is taken, t > 0.  grid: the largest errors are also over a uniform grid of that many
+    points up to the last time.
+    """
+
+    cases: list[str]
+    times: list[str]
+    grid: int = 200
+    directions: tuple[Direction, ...] = ("forward", "backward")
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        times = positive(self.times, "times")
+        every = sorted({*times, *(times[-1] * i / self.grid for i in range(1, samples(self.grid) + 1))})
+        tasks = []
+        for case in claimed(find, self.cases):
+            for direction in self.directions:
+                signs = signed(every, direction), signed(times, direction)
+                for branch in _BRANCHES[direction]:
+                    subject = Subject("claimed", "(4.2)-(4.6)", branch=branch)
+                    end = time_text(signs[1][-1])
+                    key = RowKey(NAME, case.name, HEAVY_TOP.name, subject, direction=direction, horizon=end)
+                    tasks.append(Task(key, f"{case.name}/{direction}", f"claim:{branch}", case, *signs))
+        return tasks
+
+
+class ClaimModel(Kind):
+    """The largest errors of the claim over the times, and from when on Ω is off by 1 % of α.
+
+    Errors of Ω in 1/time unit, of γ none, of the angles in rad.
+    """
+
+    name = NAME
+    table = ClaimModelTable
+    needed = (PARTS.text,)
+    sections = (claim_error,)
+
+    def cost(self, task: Task) -> float:
+        """The same for all."""
+        return _SECONDS
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """Of one branch in one direction.  Raises OutOfReach where the true motion is not proven."""
+        claim, branch = claim_of(task), _branch(task.key.subject)
+        truth, against = true_motion(claim, task.times)
+        errors = {time: errors_of.model_error(claim, time, truth, branch) for time in task.times}
+        metrics: dict[Quantity, Metric] = {}
+        series = {}
+        with working_precision(errors_of.MODEL_BITS):
+            for name in (each.name for each in fields(errors_of.ModelError)):
+                quantity = Quantity(MODEL_ERROR, name)
+                values = {time: getattr(error, name) for time, error in errors.items()}
+                metrics[quantity.over("max")] = metric(largest(values.values()), "value")
+                kept = [text(abs(values[time]), 12) for time in task.keep]
+                series[quantity.text] = Series([time_text(time) for time in task.keep], kept, quantity)
+            parted = parting(claim, task.times[-1], branch)
+            metrics[PARTS] = time_metric(None if parted is None else parted.time, "value")
+        measured = f"{CLAIM}, {branch} branch, exactly evaluated"
+        return exact_row(task, measured, against, by_name(metrics), errors_of.MODEL_BITS, series)
+
+    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
+        """The errors at a few times, and when claim and truth part."""
+        times = [time for time in _SHOWN if any(_at(row, "omega", time) for row in rows)]
+        heads = (*(f"Ω at |t|={t}" for t in times), *(f"γ at |t|={t}" for t in times[:2]))
+        lines = [
+            (
+                row,
+                [
+                    row.key.subject.branch,
+                    *(short(_at(row, "omega", t) or "-") for t in times),
+                    *(short(_at(row, "gamma", t) or "-") for t in times[:2]),
+                    short(row.metrics[PARTS.text].value),
+                ],
+            )
+            for row in rows
+        ]
+        truths = {row.key.case: row.against for row in rows}
+        return [
+            title(
+                "Claim against truth: the paper's (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0"
+            ),
+            Text(
+                "  Error of Ω, largest component; the same for γ. Exactly evaluated: no rounding is in these numbers."
+            ),
+            Text("  Off 1 %: the first |t| at which the largest component of |ΔΩ| is 1 % of α, proven, not a sample."),
+            table(["case", "branch", *heads, "Ω off 1 % of α at |t|"], both(lines)),
+            *(Text(printable(f"  {case}: truth is {text}"), style="dim") for case, text in truths.items()),
+        ]
+
+    def cards(self, rows: Sequence[Row]) -> list[Card]:
+        """How wrong the claim is, forward in time, and in full on the smooth branch, where there are several."""
+        forward = [row for row in rows if row.key.direction != "backward" and PARTS.text in row.metrics]
+        smooth = {row.case for row in forward if row.key.subject.branch == "smooth"}
+        shown = (row for row in forward if row.case not in smooth or row.key.subject.branch == "smooth")
+        return [_card(row, [each for each in forward if each.case == row.case and each is not row]) for row in shown]
+
+
+def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_of.Truth, Against]:
+    """The true heavy-top motion from the claim's own data, and what it is: a closed form, an enclosure, or two runs.
+
+    times: those at which it will be asked for.  Raises OutOfReach where it is not known up to the last of them.
+    """
+    bits = errors_of.MODEL_BITS
+    known = true_solution(claim)
+    try:
+        proven = certified(known, max(times, key=abs), bits)
+    except OutOfReach:
+        if isinstance(known, DeloneHomoclinic):
+            raise
+        computed = ComputedReference(known.top, known.start, times, xi=CLAIM_XI)
+        return lambda time: (computed.state(time)[:6], computed.state(time)[6:]), computed.against
+    if proven is None:
+        raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")
+    if not isinstance(known, DeloneHomoclinic):
+        return lambda time: (known.state(time, bits), known.attitude(time, bits)), proven.against
+
+    def delone(time: Fraction) -> tuple[list[arb], list[arb]]:
+        phi, theta, psi = known.angles(time, bits)
+        with working_precision(bits):
+            xi = attitude_from_angles(phi, theta, psi - arb.pi() / 2, FUNCTIONS)
+        return known.state(time, bits), list(xi)
+
+    return delone, proven.against
+
+
+def _branch(subject: Subject) -> Branch:
+    return "printed" if subject.branch == "printed" else "smooth"
+
+
+def _values(row: Row, component: str) -> dict[str, str]:
+    series = row.series.get(Quantity(MODEL_ERROR, component).text)
+    return dict(zip(series.times, series.values, strict=False)) if series else {}
+
+
+def _at(row: Row, component: str, time: str) -> str | None:
+    return {abs(exact(t)): value for t, value in _values(row, component).items()}.get(exact(time))
+
+
+def _card(row: Row, others: Iterable[Row]) -> Card:
+    """The branch of a row in full, and when its other branches part from the truth."""
+    horizon, parts_at = short(row.horizon.removeprefix("-")), short(row.metrics[PARTS.text].value)
+    found = row.metric(MODEL_ERROR, "omega", "max")
+    over = f"over {row.samples} samples" if row.samples else "over the samples"
+    if parts_at == "never":
+        lines = [Line(f"Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")]
+    else:
+        lines = [
+            Line(f"|t| = {parts_at}", "big"),
+            Line(
+                "The first time at which the largest component of |ΔΩ| from the true motion is 1 % of α, proven. "
+                f"The largest error {over} up to |t| = {horizon} is {short(found.value) if found else 'missing'}."
+            ),
+        ]
+    for other in others:
+        at = short(other.metrics[PARTS.text].value)
+        when = f"not up to |t| = {horizon}" if at == "never" else f"from |t| = {at}"
+        lines.append(Line(f"On the {clip(other.key.subject.branch, 20)} branch: {when}."))
+    omega, gamma = (_values(row, component) for component in ("omega", "gamma"))
+    return Card(
+        f"{clip(row.key.case)}, {clip(row.key.subject.branch, 20)} branch: wrong from",
+        lines,
+        "Error of Ω (1/time unit) and of γ (|γ| = 1)",
+        ("|t|", "|ΔΩ|", "|Δγ|"),
+        [(t, short(omega[t]), short(gamma.get(t, "missing"))) for t in _SHOWN if t in omega],
+        f"Truth: {row.against}",
+    )

@@ -1,0 +1,119 @@
+"""Drift of every first integral over a horizon, and the distance from the true motion where that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+from rich.console import RenderableType
+from rich.text import Text
+
+from heavytop.integrate.trajectory import Place, Problem
+from heavytop.kinds.base import Kind
+from heavytop.measure.integrator import HEYOKA, require
+from heavytop.measure.known import known_motion
+from heavytop.measure.reruns import Reruns
+from heavytop.measure.scorer import Scorer
+from heavytop.precision import DOUBLE, exact, number, parse
+from heavytop.records import Row, RowKey
+from heavytop.report.plots import digits, growth
+from heavytop.report.text import DIGITS, NOISE, largest_over, motions, title
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.kind import Find, Table
+from heavytop.suite.rows import computed_row, time_text
+from heavytop.suite.sampling import positive, uniform
+from heavytop.suite.task import Task, computed
+
+NAME = "drift"
+
+
+class Run(msgspec.Struct, forbid_unknown_fields=True):
+    """One format with its horizon; ``samples`` uniform samples."""
+
+    precision: str
+    horizon: str
+    samples: int = 1000
+
+
+class DriftTable(Table, tag=NAME):
+    """integrator: any that `heavytop list` shows."""
+
+    cases: list[str]
+    runs: list[Run]
+    integrator: str = HEYOKA
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        require(self.integrator)
+        runs = []
+        for run in self.runs:
+            (horizon,) = positive([run.horizon], "horizon")
+            runs.append((parse(run.precision).name, time_text(horizon), uniform(horizon, run.samples)))
+        subject = computed(self.integrator)
+        return [
+            Task(
+                RowKey(NAME, case.name, case.system.name, subject, precision, horizon=horizon),
+                case.name,
+                self.integrator,
+                case,
+                *times,
+            )
+            for case in map(find, self.cases)
+            for precision, horizon, times in runs
+        ]
+
+
+class Drift(Kind):
+    """Drift in units of each integral, errors of Ω in 1/time unit, of γ none."""
+
+    name = NAME
+    table = DriftTable
+    noise_factor = 5.0
+    sections = (digits, growth)
+
+    def cost(self, task: Task) -> float:
+        """The reruns that tell the rounding noise take a few seconds."""
+        return 3.0 + task.run_seconds
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """Of one run.  Raises Contradiction where two proofs of the known motion exclude each other, InputError for a
+        place reached with other flags.
+        """
+        case, precision = task.given, task.precision
+        problem = Problem.of(case.top, case.start, precision, case.system)
+        # samples are taken at the rounded times, so the series must be asked for by these
+        keep = [exact(number(time, precision)) for time in task.keep]
+        known = known_motion(problem, exact(number(task.times[-1], precision)))
+        scorer = Scorer(problem, known, keep)
+        before = saved.load()
+        if before is not None:
+            scorer.restore(before["measures"])
+
+        def mark(place: Place) -> None:
+            if saved.due():
+                saved.save({"run": place.content(precision), "measures": scorer.content()})
+
+        going_on: dict[str, Any] = {}
+        if task.integrator.takes_many:
+            going_on = {"place": None if before is None else Place.of(before["run"], precision), "mark": mark}
+        run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **going_on)
+        assert task.case is not None
+        plain = Problem.of(task.case.top, case.start, DOUBLE, case.system)
+        reruns = Reruns(plain, task.integrator, task.seed)
+        metrics = reruns.drift_bands(run, task.times[-1], scorer.metrics(), scorer.error is not None)
+        return computed_row(task, run, metrics, scorer.series(time_text), scorer.against)
+
+    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
+        """A line a row."""
+        return [
+            title(
+                "Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals"
+            ),
+            Text(
+                f"  Both absolute, {largest_over(rows)}: an invariant that holds is no proof that the motion is right."
+            ),
+            Text(f"  {DIGITS}"),
+            Text(f"  {NOISE}"),
+            motions(rows),
+        ]

@@ -1,0 +1,256 @@
+"""How drift and the distance from the true motion grow over an ensemble of random starts: laws and their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+import msgspec
+from rich.console import RenderableType
+from rich.text import Text
+
+from heavytop.errors import InputError
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.kinds.base import Kind
+from heavytop.measure.drift import DRIFT
+from heavytop.measure.ensemble import Ended, complete, growing
+from heavytop.measure.ensemble_reference import Reference, Texts, Wider, reference
+from heavytop.measure.integrator import HEYOKA, require
+from heavytop.measure.scalar import of_fraction
+from heavytop.measure.scorer import Scorer
+from heavytop.precision import decimal_text, exact, number, parse, physical, usable_tolerance
+from heavytop.records import Law, Metric, Quantity, Row, RowKey, by_name
+from heavytop.report.plots import digits
+from heavytop.report.plots import growth as over_time
+from heavytop.report.text import short, table, title
+from heavytop.suite.cases import Case
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.kind import Find, Table
+from heavytop.suite.rows import input_rounding, time_text
+from heavytop.suite.starts import random_starts
+from heavytop.suite.task import Task, computed
+
+NAME = "growth"
+FAILED = Quantity("starts_failed")
+_MOST_BITS = 900
+"""Errors of more bits underflow in the floats that laws of growth are fitted with."""
+_LIMITS = {"starts": range(1, 100_001), "samples": range(4, 1001), "decades": range(1, 13)}
+
+
+class Run(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """One format with its horizon, and how its ensemble is made.
+
+    samples: a decade, over ``decades`` decades before the horizon.  starts: random ones, the same for the same seed.
+    tolerance, high_accuracy: of the integrator.  bias: a relative error of I1 in the field that is integrated and not
+    in the reference: a planted fault.  reference: the wider format whose runs stand for the truth where no closed form
+    is known; None for none.
+    """
+
+    precision: str
+    horizon: str
+    starts: int = 64
+    seed: int = 1
+    samples: int = 16
+    decades: int = 5
+    tolerance: str | None = None
+    high_accuracy: bool = False
+    bias: str | None = None
+    reference: str | None = None
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Those of the integrator."""
+        tolerance = {} if self.tolerance is None else {"tolerance": exact(self.tolerance)}
+        return tolerance | ({"high_accuracy": True} if self.high_accuracy else {})
+
+
+class GrowthTable(Table, tag=NAME):
+    """integrator: any that `heavytop list` shows."""
+
+    cases: list[str]
+    runs: list[Run]
+    integrator: str = HEYOKA
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        require(self.integrator)
+        return [_task(case, run, self.integrator) for case in map(find, self.cases) for run in self.runs]
+
+
+def _task(case: Case, run: Run, integrator: str) -> Task:
+    """One row; raises InputError for an impossible value, and for a case without random starts."""
+    precision = parse(run.precision)
+    if precision.bits > _MOST_BITS:
+        raise InputError(f"An ensemble in {precision.name}.", f"Laws of growth are fitted up to real:{_MOST_BITS}.")
+    for name, limits in _LIMITS.items():
+        if (value := getattr(run, name)) not in limits:
+            raise InputError(f"{name} = {value} in a growth run.", f"Give {limits[0]} to {limits[-1]}.")
+    horizon = physical(exact(run.horizon), "horizon")
+    if horizon <= 0:
+        raise InputError(f"horizon = {run.horizon} in a growth run.", "Give a positive number.")
+    if run.tolerance is not None:
+        usable_tolerance(run.tolerance, precision)
+    if run.bias is not None and abs(exact(run.bias)) >= 1:
+        raise InputError(f"bias = {run.bias} in a growth run.", "Give a relative error between -1 and 1.")
+    if run.reference is not None and parse(run.reference).bits <= precision.bits:
+        raise InputError(f"{run.reference} is no reference for {run.precision}.", "Name a format with more bits.")
+    random_starts(case, 1, run.seed)
+    steps = range(-run.samples * run.decades, 1)
+    times = tuple(horizon * Fraction(f"{10 ** (step / run.samples):.4g}") for step in steps)
+    asked = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}
+    subject = computed(integrator, seed=run.seed, **asked)
+    key = RowKey(NAME, case.name, case.system.name, subject, precision.name, horizon=time_text(horizon))
+    return Task(key, case.name, f"{integrator} {subject.variant}".rstrip(), case, times, times, run)
+
+
+class _Done(msgspec.Struct):
+    """What of a row is done, by the index of the start: its text is the place of a row in progress."""
+
+    reference: dict[int, Texts]
+    motions: dict[int, Ended]
+
+
+class Growth(Kind):
+    """The law of each error, its interval, its detection power.  Each metric is a root mean square over the starts."""
+
+    name = NAME
+    table = GrowthTable
+    noise_factor = 6.0
+    sections = (digits, over_time)
+
+    def carries_band(self, metric: Metric) -> bool:
+        """Every error; how many starts failed is none."""
+        return super().carries_band(metric) and metric.quantity != FAILED
+
+    def cost(self, task: Task) -> float:
+        """Of all starts, a few of them side by side."""
+        return 5.0 + int(task.options.starts) * task.run_seconds / 2
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """A start that ``saved`` holds is not computed again.
+
+        Raises InputError for data outside the range of the format, OutOfReach where a first integral is not resolved.
+        """
+        case, precision, run = task.given, task.precision, task.options
+        starts = random_starts(case, run.starts, run.seed + task.seed)
+        true = [Problem.of(case.top, start, precision, case.system) for start in starts]
+        given = [_biased(problem, run.bias) for problem in true]
+        times = [exact(number(time, precision)) for time in task.times]
+        before = saved.load()
+        done = _Done({}, {}) if before is None else msgspec.convert(before, _Done, strict=False)
+        wider = Wider(done.reference, lambda: save())
+
+        def save() -> None:
+            if saved.due():
+                saved.save(msgspec.to_builtins(_Done(wider.done, done.motions), str_keys=True))
+
+        def measured(problems: Sequence[Problem], instants: Sequence[Fraction]) -> list[Trajectory]:
+            return task.integrator.propagate_many(problems, instants, **run.options)
+
+        began = perf_counter()
+        compared = reference(true, given, times, run.reference, measured, wider)
+        ready = perf_counter()
+        known = ["none fit to score with" if motion is None else motion for motion in compared.motions]
+        scorers = [Scorer(problem, motion, times) for problem, motion in zip(true, known, strict=True)]
+        complete(done.motions, given, times, scorers, save, task.integrator, run.options)
+        motions = [done.motions[index] for index in range(len(starts))]
+        seconds = {"reference": ready - began, "run": perf_counter() - ready, "compile": motions[0].compile}
+        rounding = max(input_rounding(case.top, start, p) for start, p in zip(starts, true, strict=True))
+        return _row(task, starts, motions, scorers, compared, seconds, rounding)
+
+    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
+        """A line for each law."""
+        lines = [
+            [
+                f"{row.case} {row.key.subject.variant}".rstrip(),
+                row.precision,
+                _label(law),
+                f"{law.starts} of {row.starts}" if law.starts < row.starts else str(law.starts),
+                law.growth,
+                _exponent(law),
+                short(law.detects or "-", 2),
+                short(law.lost_at or "-", 2),
+            ]
+            for row in rows
+            for law in row.laws.values()
+        ]
+        columns = ["case", "format", "quantity", "starts", "grows like", "exponent or rate [95 %]", "detects"]
+        chaotic = any(law.growth == "exponential" for row in rows for law in row.laws.values())
+        return [
+            title(
+                "Growth laws: root mean square over random starts, drift of the first integrals and distance from truth"
+            ),
+            Text(
+                "  Detects: the smallest relative fault a step that these starts would have told from the healthy law."
+            ),
+            *([Text("  Rate: the median over the starts of their finite-time rates.")] if chaotic else []),
+            table([*columns, "lost at |t|"], lines),
+        ]
+
+
+def _biased(problem: Problem, bias: str | None) -> Problem:
+    """The problem with its first moment of inertia off by the relative ``bias``: the planted fault."""
+    if bias is None:
+        return problem
+    first, *rest = problem.parameters.inertia
+    off = exact(number(first * (1 + exact(bias)), problem.precision))
+    return replace(problem, parameters=problem.parameters._replace(inertia=(off, *rest)))
+
+
+def _row(
+    task: Task,
+    starts: Sequence[Any],
+    motions: Sequence[Ended],
+    scorers: Sequence[Scorer],
+    compared: Reference,
+    seconds: dict[str, float],
+    rounding: Fraction,
+) -> Row:
+    """Where the motions ended, and what they come to together."""
+    precision, first = task.precision, motions[0]
+    failed = [motion for motion in motions if motion.outcome != Outcome.SUCCESS.value]
+    reached = min((abs(Fraction(motion.time_reached)) for motion in failed), default=abs(task.times[-1]))
+    found = growing(starts, task.times, motions, scorers, compared, time_text)
+    metrics = {FAILED: of_fraction(Fraction(len(failed)), words=str(len(failed)))} | found.metrics
+    computed_by = f"computed: {first.integrator} in {precision.name}"
+    return Row(
+        case=task.title,
+        system=task.key.system,
+        integrator=f"{first.integrator} {task.key.subject.variant}".rstrip(),
+        precision=precision.name,
+        bits=precision.bits,
+        outcome=failed[0].outcome if failed else first.outcome,
+        horizon=time_text(task.times[-1]),
+        time_reached=time_text(reached),
+        steps=sum(motion.steps for motion in motions),
+        finite=not failed and not any(m.value in ("nan", "missing") for m in metrics.values()),
+        metrics=by_name(metrics),
+        key=task.key,
+        reference=compared.against,
+        measure=NAME,
+        measured=f"{computed_by}, {len(motions)} random starts, root mean square over them",
+        against=compared.against.text,
+        order=first.order,
+        flags=first.flags | {"bias": task.options.bias or "none"},
+        input_rounding=decimal_text(rounding, 3),
+        series=found.series,
+        samples=len(task.times),
+        starts=len(motions),
+        laws=found.laws,
+        seconds=seconds,
+    )
+
+
+def _label(law: Law) -> str:
+    """What a law is about."""
+    quantity = law.quantity or Quantity("")
+    return quantity.component if quantity.name == DRIFT else f"error {quantity.component}"
+
+
+def _exponent(law: Law) -> str:
+    if law.exponent is None:
+        return "-"
+    return f"{law.exponent:.3f}" + ("" if law.low is None or law.high is None else f" [{law.low:.3f}, {law.high:.3f}]")

@@ -1,0 +1,176 @@
+"""Integrators on a homoclinic motion, against its closed form, until they escape from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+
+from rich.console import RenderableType
+from rich.text import Text
+
+from heavytop.errors import OutOfReach
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.kinds.base import Kind
+from heavytop.kinds.break_away_law import ESCAPE, break_away_law, escape_times
+from heavytop.kinds.claim_section import claim_error
+from heavytop.kinds.claim_tasks import INTEGRATION_ERROR
+from heavytop.measure.drift import DRIFT
+from heavytop.measure.integrator import HEYOKA, require
+from heavytop.measure.known import Known, certified
+from heavytop.measure.reruns import Remembered, Reruns, escape_band
+from heavytop.measure.scalar import GUARD_BITS
+from heavytop.measure.scorer import Scorer
+from heavytop.measure.solution_error import SOLUTION_ERROR
+from heavytop.precision import DOUBLE, exact, parse
+from heavytop.records import Direction, Metric, Quantity, Row, RowKey, by_name
+from heavytop.report.text import NOISE, both, table, title, with_noise
+from heavytop.suite.cases import Case
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.kind import Find, Table
+from heavytop.suite.rows import computed_row, time_metric, time_text
+from heavytop.suite.sampling import samples, signed
+from heavytop.suite.task import Task, computed
+from heavytop.top.equations import Parameters
+
+NAME = "homoclinic"
+ESCAPED = Fraction(1, 1000)
+"""A computed homoclinic motion has escaped when Ω is wrong by this, in units of α."""
+WINDOW = 10
+"""The error of a homoclinic run is a number only while rate·|t| is below this; later the saddle amplifies rounding."""
+_CERTIFIED_AT = 4
+"""The closed form of a homoclinic case is certified at this |t|."""
+
+
+class HomoclinicTable(Table, tag=NAME):
+    """samples: samples in one unit of 1/rate.  integrator: any that `heavytop list` shows."""
+
+    cases: list[str]
+    precisions: list[str]
+    samples: int = 8
+    directions: tuple[Direction, ...] = ("forward", "backward")
+    integrator: str = HEYOKA
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        require(self.integrator)
+        tasks = []
+        for case in map(find, self.cases):
+            spacing = Fraction(round(64 / (samples(self.samples) * case.rate)) or 1, 64)
+            for precision in map(parse, self.precisions):
+                end = _end(case, precision.bits)
+                times = [spacing * i for i in range(1, int(end / spacing) + 1)]
+                keep = times[self.samples - 1 :: self.samples]
+                for direction in self.directions:
+                    signs = signed(times, direction)
+                    subject = computed(self.integrator)
+                    name, horizon = precision.name, time_text(signs[-1])
+                    key = RowKey(NAME, case.name, case.system.name, subject, name, direction, horizon)
+                    title = f"{case.name}/{direction}"
+                    tasks.append(Task(key, title, self.integrator, case, signs, signed(keep, direction)))
+        return tasks
+
+
+class Homoclinic(Kind):
+    """When a run leaves a homoclinic motion, and its error and drift before.
+
+    Errors of Ω in 1/time unit, of γ none.
+    """
+
+    name = NAME
+    table = HomoclinicTable
+    needed = (ESCAPE.text,)
+    noise_factor = 8.0
+    concludes = True
+    sections = (claim_error, escape_times)
+
+    def carries_band(self, metric: Metric) -> bool:
+        """Every error, and the time."""
+        return super().carries_band(metric) or metric.quantity == ESCAPE
+
+    def series_has_more(self, quantity: Quantity | None) -> bool:
+        """Near a saddle, errors are taken early, and the series goes on."""
+        return quantity is None or quantity.name != DRIFT
+
+    def conclude(self, rows: Sequence[Row]) -> list[Row]:
+        """How the escape time grows with the bits."""
+        return break_away_law(rows)
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """The case has a homoclinic closed form, and the format takes its data exactly; the times are uniform.
+
+        Raises OutOfReach where the closed form is not certified for the format.
+        """
+        case, precision = task.given, task.precision
+        closed = case.homoclinic
+        assert closed is not None
+        problem = Problem.of(case.top, case.start, precision, case.system)
+        given = case.system.parameters(case.top, case.start)
+        exactly = Parameters(tuple(given.inertia), tuple(given.moment), Fraction(given.rotor))
+        if (problem.parameters, problem.start) != (exactly, case.start):
+            raise ValueError(f"{case.name} is not exact in {precision.name}: its data must be dyadic")
+        early = Fraction(_CERTIFIED_AT if task.times[-1] > 0 else -_CERTIFIED_AT)
+        known = certified(closed, early, precision.bits + GUARD_BITS)
+        if known is None:
+            raise OutOfReach(f"{closed.method} is not certified for {precision.name}.", "Use a format with fewer bits.")
+        scorer = _scorer(case, problem, known, task.keep)
+        run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer)
+        metrics = _with_bands(task, run, _metrics(scorer), Remembered(closed.state))
+        error = scorer.error
+        assert error is not None
+        series = error.series(time_text) | scorer.drift.series(time_text)
+        return computed_row(task, run, metrics, series, known.against)
+
+    def contradictions(self, row: Row) -> Iterator[str]:
+        """A motion escapes before the run ends."""
+        away = row.metrics.get(ESCAPE.text)
+        if away is not None and away.log10 is not None and abs(exact(away.value)) > abs(exact(row.horizon)):
+            yield f"{ESCAPE.text}: {away.value} is beyond the horizon {row.horizon}"
+
+    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
+        """A line for each case and format."""
+        lines = []
+        for row in rows:
+            names = (name for name in (INTEGRATION_ERROR, SOLUTION_ERROR) if row.metric(name, "omega", "max"))
+            error = row.metric(next(names, SOLUTION_ERROR), "omega", "max")
+            cells = [row.precision, with_noise(error), with_noise(row.metrics[ESCAPE.text]), row.outcome]
+            lines.append((row, cells))
+        return [
+            title("Integrators on a homoclinic motion, against its closed form"),
+            Text("  Ω error: the largest over the samples with rate·|t| <= 10; escape: Ω wrong by 1e-3 α, where"),
+            Text(f"  all significant digits are lost. {NOISE}"),
+            table(["case", "format", "Ω error", "escape |t|", "outcome"], both(lines)),
+        ]
+
+
+def _end(case: Case, bits: int) -> float:
+    """|t| by which a run with so many bits has escaped."""
+    return (1.1 * bits * math.log(2) + 4) / case.rate
+
+
+def _scorer(case: Case, problem: Problem, known: Known | Remembered, keep: Sequence[Fraction] = ()) -> Scorer:
+    name = INTEGRATION_ERROR if case.claim else SOLUTION_ERROR
+    until = WINDOW / case.rate
+    return Scorer(problem, known, keep, threshold=ESCAPED * case.alpha, until=until, name=name)
+
+
+def _metrics(scorer: Scorer) -> dict[str, Metric]:
+    assert scorer.error is not None
+    escape = time_metric(scorer.error.escape, "duration")
+    return by_name({ESCAPE: escape}) | scorer.error.metrics() | scorer.drift.metrics()
+
+
+def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric], known: Remembered) -> dict[str, Metric]:
+    """``metrics`` of a row with their bands, that of the escape time from the times of the reruns."""
+    case = task.case
+    assert case is not None
+    reruns = Reruns(Problem.of(case.top, case.start, DOUBLE, case.system), task.integrator, task.seed)
+    if run.outcome is not Outcome.SUCCESS or not reruns.possible:
+        return metrics
+    times = [time for time in task.times[3::4] if float(abs(time)) <= _end(case, DOUBLE.bits)]
+    banded, found = reruns.escape_bands(run, times, metrics, lambda given: _scorer(case, given, known))
+    escapes = [abs(each) for each in found if each is not None]
+    own = banded[ESCAPE.text]
+    if own.log10 is not None and len(escapes) == len(found):
+        own.band = escape_band(exact(own.value), escapes, case.rate, task.precision.bits)
+    return banded

@@ -1,0 +1,30 @@
+"""Motions computed elsewhere, scored like our own: no plan asks for them, `heavytop score` makes their rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from msgspec import structs
+from rich.console import RenderableType
+from rich.text import Text
+
+from heavytop.kinds.base import Kind
+from heavytop.records import Row
+from heavytop.report.plots import digits, growth
+from heavytop.report.text import DIGITS, largest_over, motions, title
+
+
+class Score(Kind):
+    """Rows of :mod:`heavytop.suite.score`."""
+
+    name = "score"
+    sections = (digits, growth)
+
+    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
+        """A line a row."""
+        return [
+            title("Motions computed elsewhere: distance from the true motion, and drift of the first integrals"),
+            Text(f"  Both absolute, {largest_over(rows)}."),
+            Text(f"  {DIGITS}"),
+            motions([structs.replace(row, case=f"{row.case} {row.integrator}") for row in rows]),
+        ]

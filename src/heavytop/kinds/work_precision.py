@@ -1,0 +1,268 @@
+"""Seconds against error: one integrator at one tolerance or step, over a horizon, compared with the known motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache, lru_cache
+from statistics import median
+from time import perf_counter, sleep
+from typing import Any
+
+import msgspec
+from rich.console import RenderableType
+from rich.text import Text
+
+from heavytop.errors import InputError
+from heavytop.exact.solution import ExactSolution
+from heavytop.integrate import peers
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.kinds.base import Kind
+from heavytop.measure.drift import DRIFT
+from heavytop.measure.known import Known, known_motion
+from heavytop.measure.scalar import metric, of_fraction
+from heavytop.measure.scorer import Scorer
+from heavytop.measure.solution_error import SOLUTION_ERROR
+from heavytop.precision import exact, number, parse, usable_tolerance
+from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.consistency import CLOSE, bound, ended, size_of, sizes
+from heavytop.report.method_growth import method_growth
+from heavytop.report.printable import printable
+from heavytop.report.text import table, title
+from heavytop.report.work_plots import work_precision
+from heavytop.report.work_precision import CONSTANTS, LANES, OURS, leads, panels
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.kind import Find, Table
+from heavytop.suite.rows import computed_row, time_text
+from heavytop.suite.sampling import positive, uniform
+from heavytop.suite.task import FINEST, Task, computed
+from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.heavy_top import State
+
+NAME = "work_precision"
+_ENOUGH_SECONDS = 0.3
+_RUNS = range(3, 101)
+_REST = 0.002
+"""Seconds of sleep before a run: it then starts on a fresh slice of the processor's time."""
+_TOO_LONG = 3.0
+"""A run of so many seconds is timed once."""
+ERROR_MAX, ERROR_FINAL, RETURN = (
+    Quantity("error", statistic="max"),
+    Quantity("error", statistic="final"),
+    Quantity("return_error"),
+)
+_OF_OTHERS = 0.6
+"""Decades of rounding noise of integrators of others, whose step control turns a rounding into another step: rerun with
+other roundings, CVODE and splitting methods move by up to a decade."""
+
+
+class Ladder(msgspec.Struct, forbid_unknown_fields=True):
+    """One integrator in one format; ``tolerances``, of which "eps" is the finest it offers, or ``steps`` if fixed."""
+
+    integrator: str
+    precision: str = "double"
+    tolerances: list[str] = []
+    steps: list[str] = []
+
+    def subjects(self) -> Iterator[Subject]:
+        """One a rung; raises InputError for an integrator that is unknown, or built in and not installed."""
+        peers.require(self.integrator)
+        if not self.tolerances and not self.steps:
+            raise InputError(f"The ladder of {self.integrator} is empty.", "Give it tolerances, or steps.")
+        for text in self.tolerances + self.steps:
+            if text != FINEST and not 0 < exact(text) <= 1:
+                raise InputError(f"A tolerance or step of {text[:60]!r}.", "Give numbers above 0, up to 1.")
+            if self.integrator in (OURS, CONSTANTS, LANES) and text in self.tolerances and text != FINEST:
+                usable_tolerance(text, parse(self.precision))
+        yield from (computed(self.integrator, tolerance=text) for text in self.tolerances)
+        yield from (computed(self.integrator, step=text) for text in self.steps)
+
+
+class WorkPrecisionTable(Table, tag=NAME):
+    """Each rung of each ladder over the same horizon; ``samples`` uniform samples."""
+
+    cases: list[str]
+    horizon: str
+    ladders: list[Ladder]
+    samples: int = 100
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row."""
+        (horizon,) = positive([self.horizon], "horizon")
+        times, end = uniform(horizon, self.samples), time_text(horizon)
+        rungs = [(parse(each.precision).name, subject) for each in self.ladders for subject in each.subjects()]
+        return [
+            Task(
+                RowKey(NAME, case.name, case.system.name, subject, precision, horizon=end),
+                f"{case.name}/T={end}",
+                f"{subject.name} {subject.setting}",
+                case,
+                *times,
+            )
+            for case in map(find, self.cases)
+            for precision, subject in rungs
+        ]
+
+
+class WorkPrecision(Kind):
+    """error_final and error_max (largest component, at the end and over the samples), return_error, and drift.
+
+    seconds: ``run`` is the median and ``least`` the fastest of ``repeats`` runs to the end alone; ``compile`` is apart.
+    """
+
+    name = NAME
+    table = WorkPrecisionTable
+    may_give_up = "work against precision"
+    sections = (work_precision, method_growth)
+
+    def assumed_band(self, subject: Subject) -> float:
+        """That of integrators of others."""
+        return 0.0 if subject.name in (OURS, CONSTANTS, LANES) else _OF_OTHERS
+
+    def roundings(self, quantity: Quantity | None, steps: int) -> float:
+        """√n eps for a first integral, whose roundings walk at random, and n for the distance from the true motion, in
+        which drift adds up along the flow.
+        """
+        if steps < 1:
+            return 0.0
+        return math.log10(steps) * (0.5 if quantity is not None and quantity.name == DRIFT else 1.0)
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """Raises PeerFailed where the integrator of others fails."""
+        case, precision = task.given, task.precision
+        problem = Problem.of(case.top, case.start, precision, case.system)
+        # found before the runs: looking through the installed packages empties the caches of the processor
+        peer = peers.ready(task.key.subject.name, _setting(task.key.subject))
+
+        def integrate(times: Any, start: State = case.start) -> Trajectory:
+            top = case.top if start is case.start else problem.top
+            return peer(top, start, times, precision, system=case.system)
+
+        seconds, alone = _timed(lambda: integrate(task.times[-1:]))
+        sampled = integrate(task.times)
+        scorer = _scored(task, problem, sampled)
+        metrics = _metrics(scorer, bool(sampled.times))
+        done = alone.outcome is Outcome.SUCCESS and sampled.outcome is Outcome.SUCCESS
+        if case.system is HEAVY_TOP:
+            metrics[RETURN] = _returned(problem, alone, integrate) if done else _missing()
+        if not done:
+            metrics[ERROR_FINAL] = _missing()
+        run = replace(alone, times=sampled.times, states=sampled.states, seconds=seconds)
+        if not done and alone.outcome is Outcome.SUCCESS:
+            run = replace(run, outcome=sampled.outcome, time_reached=sampled.time_reached)
+        row = computed_row(task, run, by_name(metrics), scorer.series(time_text), scorer.against)
+        return msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
+
+    def contradictions(self, row: Row) -> Iterator[str]:
+        """The errors are the largest of Ω and γ."""
+        names = (Quantity(SOLUTION_ERROR, part).text for part in ("omega", "gamma"))
+        both = [row.series[name] for name in names if name in row.series]
+        largest, last = (row.metrics.get(quantity.text) for quantity in (ERROR_MAX, ERROR_FINAL))
+        if len(both) < 2 or largest is None:
+            return
+        found = [size for series in both for size in sizes(series)]
+        if found and max(found) > bound(largest) + CLOSE:
+            yield "error_max: smaller than its series"
+        if last is None or last.log10 is None:
+            return
+        if largest.log10 is not None and last.log10 > largest.log10 + CLOSE:
+            yield "error_final: larger than the largest"
+        if not all(ended(series, row) for series in both):
+            return
+        ends = [size for series in both if (size := size_of(series.values[-1])) is not None]
+        if len(ends) == len(both) and abs(max(ends) - last.log10) > CLOSE:
+            yield "error_final: not the last value of its series"
+
+    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
+        """A table a case, then how heyoka compares."""
+        parts: list[RenderableType] = [title("Work against precision: seconds that an error takes, whole horizon")]
+        for case, lines in panels(rows).items():
+            cells = []
+            for line in lines:
+                best = line.best
+                found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", f"{best.seconds:.2g} s"]
+                at = (line.seconds_at(log10) for log10 in (-6.0, -10.0, -14.0))
+                found += ["-" if seconds is None else f"{seconds:.2g} s" for seconds in at]
+                cells.append([line.label, *found, str(len(line.failures) or "")])
+            columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "gave up"]
+            parts += [table(columns, cells), Text()]
+        return parts + [Text(printable(f"  {lead.text}"), style="bold") for lead in leads(rows)]
+
+
+def _missing() -> Metric:
+    return Metric("missing", None)
+
+
+def _setting(subject: Subject) -> tuple[str, Fraction] | None:
+    """What the integrator is asked for; None for the finest that it offers."""
+    if FINEST in (subject.tolerance, subject.step):
+        return None
+    return ("tolerance", exact(subject.tolerance)) if subject.tolerance else ("step", exact(subject.step))
+
+
+def _timed(integrate: Any) -> tuple[dict[str, float], Trajectory]:
+    """Median seconds of several runs after one to warm up, and one of the runs."""
+    run: Trajectory = integrate()
+    compile_seconds = run.seconds["compile"]
+    began, spent = perf_counter(), [run.seconds["run"]]
+    if spent[0] < _TOO_LONG and run.outcome is Outcome.SUCCESS:
+        spent = []
+        while len(spent) < _RUNS[-1] and (len(spent) < _RUNS[0] or perf_counter() - began < _ENOUGH_SECONDS):
+            sleep(_REST)
+            run = integrate()
+            spent.append(run.seconds["run"])
+    figures = {"compile": compile_seconds, "run": median(spent), "least": min(spent), "repeats": float(len(spent))}
+    return figures, run
+
+
+def _scored(task: Task, problem: Problem, run: Trajectory) -> Scorer:
+    keep = [exact(number(time, problem.precision)) for time in task.keep]
+    scorer = Scorer(problem, _known(problem, exact(number(task.times[-1], problem.precision))), keep)
+    scorer.take(run.times, run.states)
+    return scorer
+
+
+def _metrics(scorer: Scorer, sampled: bool) -> dict[Quantity, Metric]:
+    """The largest drifts, and the errors."""
+    found = ((each.quantity, each) for each in scorer.drift.metrics().values())
+    metrics = {quantity: each for quantity, each in found if quantity and quantity.statistic == "max"}
+    if scorer.error is not None and sampled:
+        omega, gamma = (scorer.error.running[part] for part in ("omega", "gamma"))
+        metrics[ERROR_FINAL] = metric(omega.final.max(gamma.final))
+        metrics[ERROR_MAX] = metric(omega.maximum.max(gamma.maximum))
+    elif scorer.error is not None:
+        metrics[ERROR_MAX] = _missing()
+    return metrics
+
+
+def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:
+    """How far from the start the way back ends, largest component.
+
+    The way back is the way on from (−Ω, γ): the heavy top is reversible, (Ω, γ, t) -> (−Ω, γ, −t).
+    """
+    end = [exact(value) for value in run.states[-1]]
+    back = integrate([run.times[-1]], State([-value for value in end[:3]], end[3:]))
+    if back.outcome is not Outcome.SUCCESS:
+        return _missing()
+    signs = (-1, -1, -1, 1, 1, 1)
+    pairs = zip(signs, back.states[-1], problem.start.flat, strict=True)
+    return of_fraction(max(abs(sign * exact(value) - start) for sign, value, start in pairs))
+
+
+class _Remembered:
+    """A known motion whose states are worked out once for all integrators that are compared with it."""
+
+    def __init__(self, solution: ExactSolution) -> None:
+        self.solution = solution
+        self.state = cache(solution.state)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.solution, name)
+
+
+@lru_cache(maxsize=8)
+def _known(problem: Problem, horizon: Fraction) -> Known | str:
+    found = known_motion(problem, horizon)
+    return found if isinstance(found, str) else replace(found, solution=_Remembered(found.solution))

@@ -1,0 +1,119 @@
+"""An integrator as the measurements call it: by its name, one motion or many, whatever it offers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.integrate import peers, registry, taylor
+from heavytop.integrate.broken import FAULTS
+from heavytop.integrate.ensemble import Finished
+from heavytop.integrate.ensemble import Observer as EnsembleObserver
+from heavytop.integrate.taylor import Observer
+from heavytop.integrate.trajectory import Problem, TaylorStep, Trajectory
+from heavytop.precision import Precision
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+HEYOKA = "heyoka"
+
+
+def require(name: str, with_steps: bool = False) -> None:
+    """Raises InputError for an integrator that is unknown, or built in and not installed; ``with_steps``: also for one
+    that does not hand over its single steps.
+    """
+    if name not in registry.INTEGRATORS:
+        peers.require(name)
+    if with_steps and name != HEYOKA:
+        raise InputError(f"The integrator {name} does not hand over its single steps.", f"Use {HEYOKA}.")
+
+
+@dataclass(frozen=True, slots=True)
+class Integrator:
+    """The integrator of that name, or a planted fault of :mod:`heavytop.integrate.broken` in the place of heyoka."""
+
+    name: str = HEYOKA
+    fault: str = ""
+
+    @property
+    def takes_many(self) -> bool:
+        """Whether many motions go side by side, which makes each cheap."""
+        return not self.fault and self.name in registry.INTEGRATORS
+
+    def propagate(
+        self,
+        top: HeavyTop,
+        start: State,
+        times: Sequence[Any],
+        precision: Precision,
+        system: System,
+        observer: Observer,
+        **going_on: Any,
+    ) -> Trajectory:
+        """The motion of an exact top and start; every state goes to ``observer``.
+
+        going_on: place and mark as in :func:`heavytop.integrate.taylor.propagate`, of no use to an integrator that
+        knows no places.  Raises PeerFailed for whatever an integrator of others does wrong.
+        """
+        if self.fault:
+            return FAULTS[self.fault].propagate(top, start, times, precision, system=system, observer=observer)
+        if self.name in registry.INTEGRATORS:
+            call = registry.propagator(self.name, {})
+            run: Trajectory = call(top, start, times, precision, system=system, observer=observer, **going_on)
+            return run
+        run = peers.ready(self.name)(top, start, times, precision, system=system)
+        for time, state in zip(run.times, run.states, strict=True):
+            observer(time, state)
+        return run
+
+    def propagate_many(
+        self,
+        problems: Sequence[Problem],
+        times: Sequence[Any],
+        observer: EnsembleObserver,
+        finished: Finished | None = None,
+        threads: int | None = None,
+        **options: Any,
+    ) -> list[Trajectory]:
+        """The motions of ``problems``, as :func:`heavytop.integrate.ensemble.propagate_ensemble`; one after the other
+        where the integrator takes no more.  Raises InputError for an option that it does not have.
+        """
+        if self.takes_many:
+            many = registry.ensemble_propagator(self.name, options)
+            runs: list[Trajectory] = many(problems, times, observer=observer, finished=finished, threads=threads)
+            return runs
+        if options:
+            raise InputError(f"The integrator {self.name} has no {', '.join(options)}.", "Leave it out.")
+        runs = []
+        for index, problem in enumerate(problems):
+            watch = _watching(observer, index)
+            runs.append(self.propagate(*_given(problem), times, problem.precision, problem.system, watch))
+            if finished is not None:
+                finished(index, runs[-1])
+        return runs
+
+    def first_steps(
+        self, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
+    ) -> tuple[Trajectory, list[TaylorStep]]:
+        """As :func:`heavytop.integrate.taylor.first_steps`."""
+        steps = FAULTS[self.fault].first_steps if self.fault else taylor.first_steps
+        return steps(top, start, until, precision, system=system)
+
+
+def _given(problem: Problem) -> tuple[HeavyTop, State]:
+    """A top and a start that round to ``problem``; raises InputError for a gyrostat that is off its exact data."""
+    if problem.system is HEAVY_TOP:
+        return problem.top, problem.start
+    if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system) != problem:
+        raise InputError("A gyrostat off its exact data is integrated side by side only.", "Use heyoka or words.")
+    return problem.given
+
+
+def _watching(observer: EnsembleObserver, index: int) -> Callable[[Fraction, Any], None]:
+    def watch(time: Fraction, state: Any) -> None:
+        observer(index, time, state)
+
+    return watch

@@ -1,0 +1,136 @@
+"""The rounding noise of one trajectory: its motion computed again with other roundings.
+
+Rounding noise is free of scale: the reruns are in double, whatever the format of the run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cache
+
+from flint import arb
+from msgspec.structs import replace as replace_struct
+
+from heavytop.exact.balls import working_precision
+from heavytop.integrate.ensemble import propagate_ensemble
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.measure.integrator import Integrator
+from heavytop.measure.known import closed_form
+from heavytop.measure.rounding_noise import RERUNS, bands, duration_band, factor
+from heavytop.measure.scalar import to_ball
+from heavytop.measure.scorer import Scorer
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, available, exact, number, real, round_to
+from heavytop.records import Metric
+from heavytop.top.equations import GYROSTAT
+
+_STEPS = 500_000
+"""A longer run is rerun over about its first so many steps only."""
+_STEPS_SINGLY = 2000
+"""The same for an integrator that takes one motion at a time."""
+_SAMPLES = 64
+_BITS = 32
+"""Bits of a top whose multiples by 1 + j/2^20 are exact in double: all its reruns then have one reference."""
+_FLOOR = math.log10(float(DOUBLE.eps)) - 1
+
+Metrics = dict[str, Metric]
+
+
+class Remembered:
+    """A known motion that works out each state once: state(time, bits) as in heavytop.exact.solution."""
+
+    def __init__(self, state: Callable[[Fraction, int], list[arb]]) -> None:
+        self.state = cache(state)
+
+
+@dataclass(frozen=True, slots=True)
+class Reruns:
+    """How a run is computed again: in double, from the exact data ``problem``, with the roundings of ``seed``."""
+
+    problem: Problem
+    integrator: Integrator
+    seed: int
+
+    @property
+    def possible(self) -> bool:
+        """Whether the integrator can be given the same motion with other roundings."""
+        return self.problem.system is not GYROSTAT or self.integrator.takes_many
+
+    def drift_bands(self, run: Trajectory, horizon: Fraction, metrics: Metrics, known: bool) -> Metrics:
+        """``metrics`` of a run with their bands; as they are where it failed, or cannot be computed again.
+
+        known: whether the distance from the true motion is among them.
+        """
+        if run.outcome is not Outcome.SUCCESS or not self.possible:
+            return metrics
+        most = _STEPS if self.integrator.takes_many else _STEPS_SINGLY
+        end = horizon if run.steps <= most else horizon * most / run.steps
+        times = [exact(number(end * i / _SAMPLES, DOUBLE)) for i in range(1, _SAMPLES + 1)]
+        problem = _short(self.problem)
+        truth: Remembered | str = _truth(problem, times) if known else "not asked for"
+        reruns = self._of(problem, times, lambda given: Scorer(given, truth))
+        return _banded(run, metrics, [scorer.metrics() for scorer in reruns])
+
+    def escape_bands(
+        self, run: Trajectory, times: Sequence[Fraction], metrics: Metrics, scorer: Callable[[Problem], Scorer]
+    ) -> tuple[Metrics, list[Fraction | None]]:
+        """``metrics`` with their bands, and when each of the reruns escapes from the known motion."""
+        reruns = self._of(self.problem, times, scorer)
+        errors = [each.error for each in reruns]
+        escapes = [None if error is None else error.escape for error in errors]
+        return _banded(run, metrics, [each.metrics() for each in reruns]), escapes
+
+    def _of(self, problem: Problem, times: Sequence[Fraction], scorer: Callable[[Problem], Scorer]) -> list[Scorer]:
+        """The scorers of the same motion with other roundings."""
+        p = problem.parameters
+        problems = []
+        for index in range(1, RERUNS + 1):
+            scale = factor(self.seed, index)
+            inertia, moment = (tuple(scale * value for value in part) for part in (p.inertia, p.moment))
+            problems.append(replace(problem, parameters=p._replace(inertia=inertia, moment=moment)))
+        scorers = [scorer(given) for given in problems]
+        self.integrator.propagate_many(problems, times, lambda i, time, state: scorers[i](time, state), threads=1)
+        return scorers
+
+
+def escape_band(own: Fraction, escapes: Sequence[Fraction], rate: float, bits: int) -> float:
+    """The band in decades of an escape time of a run with ``bits`` bits, from those of reruns in double.
+
+    The rounding noise of an escape time is added to it, some ln 2/rate in every format.
+    """
+    time, gained = float(own), (bits - DOUBLE.bits) * math.log(2) / rate
+    return duration_band([float(each) for each in escapes], time, time - gained)
+
+
+def _short(problem: Problem) -> Problem:
+    p = problem.parameters
+    inertia, moment = (tuple(round_to(value, _BITS) for value in part) for part in (p.inertia, p.moment))
+    return replace(problem, parameters=p._replace(inertia=inertia, moment=moment))
+
+
+def _truth(problem: Problem, times: Sequence[Fraction]) -> Remembered:
+    """The closed form, or a run in a wider format: truth enough for a band."""
+    if (known := closed_form(problem)) is not None:
+        return Remembered(known.state)
+    wider = next(p for p in (EXTENDED, QUAD, real(QUAD.bits)) if not available()[p.family])
+    (run,) = propagate_ensemble([replace(problem, precision=wider)], times)
+    states = dict(zip(run.times, run.states, strict=True))
+
+    def state(time: Fraction, bits: int) -> list[arb]:
+        with working_precision(bits):
+            return [to_ball(value) for value in states[time]]
+
+    return Remembered(state)
+
+
+def _banded(run: Trajectory, metrics: Metrics, reruns: list[Metrics]) -> Metrics:
+    """The metrics with the bands of the reruns, the run itself beside them in units of its eps."""
+    coarser = math.log10(2) * (run.problem.precision.bits - DOUBLE.bits)
+    own = {
+        name: metric if metric.log10 is None else replace_struct(metric, log10=metric.log10 + coarser)
+        for name, metric in metrics.items()
+    }
+    found = bands(reruns, _FLOOR, own)
+    return {name: replace_struct(metric, band=found.get(name)) for name, metric in metrics.items()}

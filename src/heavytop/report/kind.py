@@ -1,0 +1,85 @@
+"""What a report needs to know of a kind of measurement.  The kinds are in :mod:`heavytop.kinds`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Protocol
+
+from rich.console import RenderableType
+
+from heavytop.records import Metric, Quantity, Row, Subject
+from heavytop.report.section import Card, Section, Sources
+
+MakeSection = Callable[[Sources, Iterable[str]], Section | None]
+"""A part of the page from the rows of the kinds that ask for it, and the cases to draw first; None for no picture."""
+
+
+class Kind(Protocol):
+    """One kind of measurement, as far as it is compared, summed up and drawn; what it does not say is the usual.
+
+    needed: the metrics that its summary cannot do without.
+    noise_factor: by how much the noise band of a rerun may be wider by chance; None where its rows carry none.
+    samples_are_steps: so these may be fewer as the steps may.
+    may_give_up: what its runs are called, where that one does not reach its horizon is what the rows are there to show.
+    may_overflow: the same of values that are not finite.
+    sections: of the page.
+    """
+
+    name: str
+    needed: tuple[str, ...] = ()
+    noise_factor: float | None = None
+    samples_are_steps: bool = False
+    may_give_up: str = ""
+    may_overflow: bool = False
+    sections: tuple[MakeSection, ...] = ()
+
+    def carries_band(self, metric: Metric) -> bool:
+        """Whether its rows have a noise band at such a metric."""
+        return self.noise_factor is not None and metric.kind == "error"
+
+    def noise_is_added(self, metric: Metric) -> bool:
+        """Whether noise is added to the number, and does not multiply it."""
+        return metric.kind != "error"
+
+    def assumed_band(self, subject: Subject) -> float:
+        """Half-width in decades of the rounding noise of a row that has no bands."""
+        return 0.0
+
+    def roundings(self, quantity: Quantity | None, steps: int) -> float:
+        """log10 of how many eps the roundings of ``steps`` steps add up to, where the row has no bands."""
+        return 0.0
+
+    def series_has_more(self, quantity: Quantity | None) -> bool:
+        """Whether a series goes on where the metrics of its quantity have stopped."""
+        return False
+
+    def contradictions(self, row: Row) -> Iterator[str]:
+        """What contradicts something else in a row of this kind that succeeded, as ``FIELD: REASON``."""
+        return iter(())
+
+    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
+        """Its part of the summary for a terminal, from rows that were measured."""
+        return []
+
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """A word (refuted, holds, undecided) and the sentence that opens the page; None where it has nothing to say."""
+        return None
+
+    def cards(self, rows: Sequence[Row]) -> list[Card]:
+        """What stands under that sentence."""
+        return []
+
+
+class Unknown(Kind):
+    """A kind that this program does not have: its rows are compared and listed."""
+
+    name = ""
+
+
+Kinds = Mapping[str, Kind]
+_UNKNOWN = Unknown()
+
+
+def kind_of(row: Row, kinds: Kinds) -> Kind:
+    """The kind of a row."""
+    return kinds.get(row.key.kind, _UNKNOWN)

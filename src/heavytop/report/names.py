@@ -1,0 +1,14 @@
+"""What a row is called, for people."""
+
+from __future__ import annotations
+
+from heavytop.records import Identity
+from heavytop.top.equations import HEAVY_TOP
+
+
+def row_name(row: Identity, with_kind: bool = True) -> str:
+    """Its kind, case, system where it is not the heavy top, subject, format, and up to which time."""
+    system = "" if row.system == HEAVY_TOP.name else row.system
+    horizon = "" if row.key.horizon == "0" else f"to {row.key.horizon}"
+    parts = (row.key.kind if with_kind else "", row.case, system, row.integrator, row.precision, horizon)
+    return " ".join(part for part in parts if part)

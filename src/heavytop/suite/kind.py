@@ -1,0 +1,59 @@
+"""What a run needs to know of a kind of measurement.  The kinds are in :mod:`heavytop.kinds`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+import msgspec
+
+from heavytop.records import Row
+from heavytop.suite.cases import Case
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.task import Task
+
+Find = Callable[[str], Case]
+"""The case of a name; raises InputError for an unknown one."""
+
+
+class Table(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
+    """A table `[[measure]]` of a plan; unknown keys are errors."""
+
+    def tasks(self, find: Find) -> list[Task]:
+        """One a row; raises InputError for an impossible value."""
+        raise NotImplementedError
+
+
+class Kind(Protocol):
+    """One kind of measurement, as far as it is run.
+
+    name: in a plan and in the rows.  table: its table in a plan, tagged with the name; None where no plan asks for it.
+    """
+
+    @property
+    def name(self) -> str:
+        """As plans and rows have it."""
+
+    @property
+    def table(self) -> type[Table] | None:
+        """Its table in a plan."""
+
+    def measure(self, task: Task, saved: Saved) -> Row:
+        """The row of ``task``; a run that fails is a row with its outcome.
+
+        saved: the place of an earlier, interrupted measurement of this row, and where this one keeps its own.
+        Raises OutOfReach, Contradiction and PeerFailed, which are rows too.
+        """
+
+    def cost(self, task: Task) -> float:
+        """Seconds it may take, roughly: for the progress bar and for running long ones first."""
+
+    @property
+    def concludes(self) -> bool:
+        """Whether all rows of the kind together come to more rows."""
+
+    def conclude(self, rows: Sequence[Row]) -> list[Row]:
+        """What all rows of the kind together come to; called where it :attr:`concludes`."""
+
+
+Kinds = Mapping[str, Kind]

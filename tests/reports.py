@@ -1,0 +1,157 @@
+"""Reports as the command line joins them, with every kind of measurement; and rows made from their flat names."""
+
+from __future__ import annotations
+
+from functools import partial
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec
+
+from heavytop import records
+from heavytop.kinds import KINDS
+from heavytop.records import Against, Metric, Quantity, RowKey, Series, Subject
+from heavytop.report import compare as _compare
+from heavytop.report import consistency as _consistency
+from heavytop.report import history as _history
+from heavytop.report import html as _html
+from heavytop.report import overview as _overview
+from heavytop.report import store as _store
+from heavytop.report import text as _text
+from heavytop.report.kind import kind_of
+from heavytop.suite import plan as _plan
+from heavytop.suite import workers as _workers
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.task import Task
+
+compare = partial(_compare.compare, kinds=KINDS)
+history = partial(_history.history, kinds=KINDS)
+summary = partial(_text.summary, kinds=KINDS)
+failed = partial(_text.failed, kinds=KINDS)
+overview = partial(_overview.overview, kinds=KINDS)
+all_good = partial(_overview.all_good, kinds=KINDS)
+report_page = partial(_html.report_page, kinds=KINDS)
+comparison_page = partial(_html.comparison_page, kinds=KINDS)
+write_report = partial(_html.write_report, kinds=KINDS)
+load = partial(_plan.load, kinds=KINDS)
+expand = _plan.expand
+plan_of = partial(_plan.of_document, kinds=KINDS)
+read_plan = partial(_plan.read, kinds=KINDS)
+store = SimpleNamespace(
+    read=partial(_store.read, kinds=KINDS),
+    read_brief=partial(_store.read_brief, kinds=KINDS),
+    write=_store.write,
+    FILE=_store.FILE,
+    DIGEST=_store.DIGEST,
+)
+html = SimpleNamespace(
+    report_page=report_page,
+    comparison_page=comparison_page,
+    write_report=write_report,
+    sections=lambda sources, first=(): _html.sections(sources, KINDS, first),
+    detailed=_html.detailed,
+    commands=_html.commands,
+)
+
+
+def rows(tasks: Any, workers: int, scheduler: str | None = None, *more: Any, **others: Any) -> Any:
+    return _workers.rows(tasks, KINDS, workers, scheduler, *more, **others)
+
+
+def measure(task: Task, saved: Saved | None = None) -> records.Row:
+    return KINDS[task.key.kind].measure(task, saved or Saved())
+
+
+def contradictions(row: records.Row) -> Any:
+    return _consistency.contradictions(row, kind_of(row, KINDS))
+
+
+_STATISTICS = ("max_finite", "samples_not_finite", "not_finite_from", "max", "rms", "final", "expected", "off_by")
+_NAMES = (
+    "drift",
+    "solution_error",
+    "integration_error",
+    "claim_model_error",
+    "claim_evaluation_error",
+    "claim_evaluation",
+    "local_error_ulp",
+    "break_away_slope",
+    "error",
+)
+
+
+def quantity(text: str) -> Quantity:
+    """What the key of a metric or a series stands for."""
+    if text.startswith("("):
+        equation, branch, domain = text.split()
+        name, _, component = equation.rpartition(".")
+        return Quantity(name, component, "", branch, domain)
+    name = next((n for n in _NAMES if text == n or text.startswith(n + "_")), None)
+    if name is None:
+        return Quantity(text)
+    rest = text[len(name) + 1 :]
+    statistic = next((s for s in _STATISTICS if rest == s or rest.endswith("_" + s)), "")
+    component = rest.removesuffix(statistic).strip("_")
+    found = Quantity(name, component, statistic)
+    assert found.text == text
+    return found
+
+
+def subject(integrator: str, measure: str = "") -> Subject:
+    """What the text of a row says is measured."""
+    name, _, rest = integrator.partition(" ")
+    if measure == "score":
+        return Subject("given", integrator)
+    if name.startswith("claim:"):
+        return Subject("claimed", "(4.2)-(4.6)", branch=name.removeprefix("claim:"))
+    if name.startswith("formula:"):
+        return Subject("claimed", "(4.2)-(4.6)", form=name.removeprefix("formula:"))
+    if name == "audit":
+        return Subject("claimed", "audit")
+    for setting in ("tolerance", "step"):
+        if rest.startswith(setting):
+            return Subject("computed", name, **{setting: rest.removeprefix(setting).lstrip("= ")})
+    return Subject("computed", integrator)
+
+
+def Row(**given: Any) -> records.Row:  # noqa: N802 - in the place of the record
+    """A row from the keys that a report documents; the typed ones follow from them, unless they are given."""
+    measure = given.setdefault("measure", "")
+    case, slash, direction = given["case"].rpartition("/")
+    if not slash or direction not in ("forward", "backward"):
+        case, direction = given["case"].partition("/T=")[0], ""
+    given["key"] = given.get("key") or RowKey(
+        measure,
+        case,
+        given["system"],
+        subject(given["integrator"], measure),
+        given["precision"],
+        direction,
+        given["horizon"],
+    )
+    text = given.setdefault("against", "")
+    given["reference"] = given.get("reference") or Against("proven", text)
+    for name, metric in given["metrics"].items():
+        if metric.quantity is None or metric.quantity.text != name:
+            given["metrics"][name] = msgspec.structs.replace(metric, quantity=quantity(name))
+    for part in ("series", "laws"):
+        for name, each in given.get(part, {}).items():
+            if each.quantity is None:
+                given[part][name] = msgspec.structs.replace(each, quantity=quantity(name))
+    return records.Row(**given)
+
+
+def replace(record: Any, **changes: Any) -> Any:
+    """`msgspec.structs.replace`, with the key of a row following its flat names."""
+    if not isinstance(record, records.Row):
+        return msgspec.structs.replace(record, **changes)
+    flat = {name: getattr(record, name) for name in record.__struct_fields__} | changes
+    if {"case", "system", "integrator", "precision", "horizon", "measure"} & changes.keys() and "key" not in changes:
+        flat["key"] = None
+    if "against" in changes and "reference" not in changes:
+        flat["reference"] = None
+    flat |= {part: dict(flat[part]) for part in ("metrics", "series", "laws")}
+    return Row(**flat)
+
+
+__all__ = ["Metric", "Series"]
