@@ -11,13 +11,13 @@ from itertools import chain
 from pathlib import Path
 
 from msgspec.structs import replace
-from rich.console import RenderableType
 
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.precision import whole
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report import html, overview, parquet, store
+from heavytop.report.brief import brief
 from heavytop.report.environment import environment
 from heavytop.suite import checkpoint
 from heavytop.suite.checkpoint import Checkpoint, identity_of
@@ -35,7 +35,7 @@ MOST_ON_A_PAGE = 5000
 class Ended:
     """A run that is over: its summary for people, and whether no row failed."""
 
-    summary: RenderableType
+    summary: str
     good: bool
 
 
@@ -69,7 +69,7 @@ class Run:
         checkpoint.require_same(report.plan, self.identity, self.directory)
         if self.parquet:
             parquet.write(self.directory / parquet.FILE, report.rows, report.plan)
-        return Ended(overview.overview(report, report.rows, KINDS), overview.all_good(report.rows, KINDS))
+        return Ended(brief(report, report.rows, KINDS), overview.all_good(report.rows, KINDS))
 
     def measure(self, progress: Progress) -> Ended:
         """Measure what is not there yet, write the report and sum it up; ``progress`` hears of each finished task.
@@ -95,7 +95,7 @@ class Run:
         store.write(report, self.directory, rows())
         if len(self.tasks) <= MOST_ON_A_PAGE:
             html.write_report(replace(report, rows=list(rows())), self.directory / PAGE, KINDS)
-        return Ended(overview.overview(report, rows(), KINDS), overview.all_good(rows(), KINDS))
+        return Ended(brief(report, rows(), KINDS), overview.all_good(rows(), KINDS))
 
 
 def prepare(

@@ -125,11 +125,13 @@ def show(
     report: Annotated[Path, typer.Argument(help="Report or its folder.")],
     html: Annotated[Path | None, typer.Option(help="Write the report as a page to that file instead.")] = None,
     parquet: Annotated[Path | None, typer.Option(help="Write its rows to that file instead.")] = None,
+    full: Annotated[bool, typer.Option("--full", help="Print every row and law.")] = False,
 ) -> int:
     """Print the summary of a report, or write it as one self-contained page, or its rows as a table."""
     from heavytop.kinds import KINDS
     from heavytop.report import overview, store, text
     from heavytop.report import parquet as tables
+    from heavytop.report.brief import brief
     from heavytop.suite.files import whole
 
     if parquet is not None:
@@ -137,11 +139,17 @@ def show(
         if html is not None and html.resolve() == parquet.resolve():
             raise InputError(f"{html} is named twice.", "Give each file a name of its own.")
     if html is None and parquet is None:
-        brief = store.read_brief(report, KINDS)
-        many = len(brief.rows) > overview.MOST_LISTED
-        hint = "Every row is in report.json; --parquet FILE writes all as a table."
-        shown = overview.worst(brief, brief.rows, hint) if many else text.summary(store.read(report, KINDS), KINDS)
-        show_on_terminal(shown)
+        if not full:
+            found = store.read(report, KINDS)
+            print(brief(found, found.rows, KINDS))
+            print(f"\nEvery row: heavytop show {report} --full")
+            return 0
+        streamed = store.read_brief(report, KINDS)
+        if len(streamed.rows) > overview.MOST_LISTED:
+            hint = "Every row is in report.json; --parquet FILE writes all as a table."
+            show_on_terminal(overview.worst(streamed, streamed.rows, hint))
+        else:
+            show_on_terminal(text.summary(store.read(report, KINDS), KINDS))
         return 0
     found = store.read(report, KINDS)
     with ExitStack() as stack:

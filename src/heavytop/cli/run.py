@@ -7,11 +7,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from time import perf_counter
 from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import command, show_on_terminal
+from heavytop.cli.app import command
 from heavytop.cli.progress import Progress
 
 
@@ -46,18 +47,20 @@ def run(
         print(f"heavytop: warning: {warning}", file=sys.stderr)
     if asked.is_finished:
         ended = asked.finished()
-        show_on_terminal(ended.summary)
+        print(ended.summary)
         print(f"\nReport: {directory / REPORT} (was finished already)")
         return 0 if ended.good else 3
+    began = perf_counter()
     try:
         with _stopped_by_signals(), Progress(asked.tasks, KINDS) as advance:
             ended = asked.measure(advance)
     except KeyboardInterrupt as stop:
         print(f"heavytop: interrupted; finished rows are kept: --out {directory} --resume goes on", file=sys.stderr)
         return 143 if isinstance(stop, _Terminated) else 130
-    show_on_terminal(ended.summary)
+    print(ended.summary)
     page = directory / PAGE
-    print(f"\nReport: {directory / REPORT}")
+    print(f"\nMade in {perf_counter() - began:.0f} s. Every row: heavytop show {directory} --full")
+    print(f"Report: {directory / REPORT}")
     print(f"Page:   {page if page.exists() else f'none for so many rows; `heavytop show {directory} --html FILE`'}")
     return 0 if ended.good else 3
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from textwrap import wrap
 from time import perf_counter
 from typing import Any
 
@@ -35,6 +36,7 @@ from heavytop.suite.task import Task, computed
 
 NAME = "growth"
 FAILED = Quantity("starts_failed")
+_SUMMED_UP = ("integrals", "along", "across")
 _MOST_BITS = 900
 """Errors of more bits underflow in the floats that laws of growth are fitted with."""
 _LIMITS = {"starts": range(1, 100_001), "samples": range(4, 1001), "decades": range(1, 13)}
@@ -189,6 +191,31 @@ class Growth(Kind):
             *([Text("  Rate: the median over the starts of their finite-time rates.")] if chaotic else []),
             table([*columns, "lost at |t|"], lines),
         ]
+
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """The laws, those of all first integrals as one; motions with the same laws together."""
+        found: dict[tuple[str, ...], list[str]] = {}
+        for row in rows:
+            laws: dict[str, dict[str, None]] = {}
+            for law in row.laws.values():
+                quantity = law.quantity or Quantity("")
+                what = "integrals" if quantity.name == DRIFT else quantity.component
+                if what in _SUMMED_UP and (law.growth, law.exponent) != ("bounded", None):  # exactly 0
+                    laws.setdefault(what, {})[law.growth] = None
+            said = (" or ".join(laws.get(what, {"-": None})) for what in _SUMMED_UP)
+            found.setdefault((row.precision, row.key.subject.variant, *said), []).append(row.key.case)
+        if not found:
+            return []
+        printed = [_columns("Grows like", "integrals", "error along", "across")]
+        for (precision, variant, *said), cases in found.items():
+            name = f"  {precision} {variant}".rstrip() + f": {', '.join(cases)}"
+            first, *rest = wrap(name, 35, subsequent_indent="    ")
+            printed += [_columns(first, *said), *rest]
+        return printed
+
+
+def _columns(name: str, integrals: str, along: str, across: str) -> str:
+    return f"{name:37}{integrals:17}{along:13}{across}"
 
 
 def _biased(problem: Problem, bias: str | None) -> Problem:

@@ -73,6 +73,15 @@ class LocalError(Kind):
             error(time, step)
         return computed_row(task, run, error.metrics(), {}, _AGAINST)
 
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """The largest error of a step, a line a motion and format."""
+        largest = local_error.LOCAL_ERROR.over("max").text
+        return [
+            f"{row.case} in {row.precision}: a step is off by {short(row.metrics[largest].value)} eps at most"
+            for row in rows
+            if largest in row.metrics
+        ]
+
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line a row."""
         quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)

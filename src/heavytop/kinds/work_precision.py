@@ -27,6 +27,7 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import exact, number, parse, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.brief import wrapped
 from heavytop.report.consistency import CLOSE, bound, ended, size_of, sizes
 from heavytop.report.method_growth import method_growth
 from heavytop.report.printable import printable
@@ -189,6 +190,10 @@ class WorkPrecision(Kind):
             columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "gave up"]
             parts += [table(columns, cells), Text()]
         return parts + [Text(printable(f"  {lead.text}"), style="bold") for lead in leads(rows)]
+
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """How heyoka compares, a sentence a case."""
+        return [line for lead in leads(rows) if lead.short for line in wrapped(f"{lead.case}: {lead.short}.")]
 
 
 def _missing() -> Metric:
