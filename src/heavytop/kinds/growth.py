@@ -202,8 +202,8 @@ class Growth(Kind):
                 what = "integrals" if quantity.name == DRIFT else quantity.component
                 if what in _SUMMED_UP and (law.growth, law.exponent) != ("bounded", None):  # exactly 0
                     laws.setdefault(what, {})[law.growth] = None
-            said = (" or ".join(laws.get(what, {"-": None})) for what in _SUMMED_UP)
-            found.setdefault((row.precision, row.key.subject.variant, *said), []).append(row.key.case)
+            named = (" or ".join(laws.get(what, {"-": None})) for what in _SUMMED_UP)
+            found.setdefault((row.precision, row.key.subject.variant, *named), []).append(row.key.case)
         if not found:
             return []
         printed = [_columns("Grows like", "integrals", "error along", "across")]

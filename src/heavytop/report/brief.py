@@ -13,7 +13,7 @@ from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.records import Report, Row
 from heavytop.report.kind import Kinds
 from heavytop.report.printable import printable
-from heavytop.report.section import logarithm
+from heavytop.report.section import clip, logarithm
 from heavytop.report.text import failed, failure
 
 WIDTH = 80
@@ -90,7 +90,7 @@ def digits_lines(rows: Sequence[Row], title: str) -> list[str]:
     lines = [f"{title:{_NAME}}" + "".join(f"{name:>{_CELL}}" for _, name in formats)]
     for name, cells in table.items():
         found = "".join(f"{cells[each][1] if each in cells else '-':>{_CELL}}" for _, each in formats)
-        lines.append(f"  {shorten(name, _NAME - 2, placeholder='...'):{_NAME - 2}}{found}")
+        lines.append(f"  {clip(name, _NAME - 2):{_NAME - 2}}{found}")
     return lines
 
 
