@@ -15,10 +15,10 @@ import pytest
 from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate import peers
 from heavytop.integrate.peers import contract
+from heavytop.kinds import work_precision
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import Report
 from heavytop.report.junit import comparison_junit
-from heavytop.kinds import work_precision
 from heavytop.report.policy import Policy
 from heavytop.suite.cases import CASES
 from reports import all_good, compare, expand, html, load, measure
