@@ -15,7 +15,6 @@ from typing import Any
 import numpy
 import pytest
 from flint import arb, ctx
-from heavytop.suite.measurements.shared import time_text
 
 from heavytop.exact.balls import ball_from, ball_text, midpoint, radius, to_bits, working_precision
 from heavytop.exact.closed_form import series_length
@@ -32,6 +31,7 @@ from heavytop.measure.drift import Drift
 from heavytop.measure.reference import reference
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, real
 from heavytop.suite.cases import CASES
+from heavytop.suite.rows import time_text
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import holding

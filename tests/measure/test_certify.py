@@ -16,7 +16,7 @@ from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.validated import Validated
-from heavytop.measure.certify import _digits, agreed_digits, certified_state, certify
+from heavytop.measure.certify import _digits, agreed_digits, certify
 from heavytop.measure.known import certified
 from heavytop.measure.reference import reference
 from heavytop.measure.scalar import GUARD_BITS
@@ -89,21 +89,18 @@ def test_a_formula_wrong_only_far_away_loses_its_digits():
     assert 18 <= certificate.agreed_digits <= 20
 
 
-def test_a_computed_second_source_gives_the_digits_it_has_and_widens_the_balls():
+def test_a_computed_second_source_gives_the_digits_it_has():
     truth = KNOWN[0]
 
     def rough(time, bits):
         with working_precision(bits):
             return [value + arb("1e-25") for value in truth.state(time, bits)]
 
-    balls, certificate = certified_state(truth, Fraction(10**6), 50, ("a computed run", rough))
+    # where validated integration does not reach
+    certificate = certify(truth, Fraction(10**6), 50, ("a computed run", rough))
     assert certificate.kind == "computed"
     assert certificate.second_source == "a computed run"
     assert 24 <= certificate.agreed_digits <= 25
-    for ball in balls:
-        assert radius(ball) >= Fraction(1, 10**25)
-    for ball, value in zip(balls, truth.state(Fraction(10**6), 170), strict=True):
-        assert abs(midpoint(ball) - midpoint(value)) < radius(ball)
 
 
 def test_validated_stands_on_its_own_proof():

@@ -4,14 +4,15 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
-from heavytop.suite.measurements.claimed import CLAIM_XI, true_motion
 
 from heavytop.claims.ershkov import PartialCase
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.kinds.claim_model import true_motion
 from heavytop.measure.claim_error import claim_attitude, exact_claim, model_error
 from heavytop.measure.computed_reference import ComputedReference
+from heavytop.measure.parting import CLAIM_XI
 from helpers import VECTORS
 
 TWO = PartialCase(Fraction(1), Fraction(2), Fraction(1))
@@ -50,15 +51,15 @@ def test_the_truth_for_six_is_the_motion_of_the_vectors() -> None:
     known = ComputedReference(SIX.solves.top, SIX.solves.start, [Fraction(1)])
     for value, text in zip(known.state(Fraction(1)), given["state"], strict=True):
         assert abs(midpoint(value) - Fraction(text)) < Fraction(1, 10**58)
-    assert "computed, not proven" in known.method
+    assert "computed, not proven" in known.against.text
 
 
 def test_the_computed_truth_and_the_closed_form_agree_where_there_are_both() -> None:
     times = [Fraction(1, 2), Fraction(3)]
     delone = DeloneHomoclinic(TWO.alpha, TWO.i1)
     computed = ComputedReference(delone.top, delone.start, times, xi=CLAIM_XI)
-    truth, method = true_motion(TWO, times)
-    assert method.startswith("known")
+    truth, against = true_motion(TWO, times)
+    assert against.how == "proven"
     for time in times:
         state, xi = truth(time)
         with working_precision(200):

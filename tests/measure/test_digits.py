@@ -15,13 +15,13 @@ from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
 from heavytop.measure.known import known_motion
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import SCHEMA, Metric, Report
-from heavytop.report import html, plots
+from heavytop.report import plots
 from heavytop.report.overview import worst
 from heavytop.suite.cases import CASES
 from heavytop.suite.score import score
 from heavytop.suite.trajectory_file import Given
 from report_helpers import error, row
-from reports import replace, summary
+from reports import html, replace, summary
 
 FULL = 53 * math.log10(2)
 TIMES = [Fraction(i) for i in range(1, 5)]
@@ -81,7 +81,7 @@ def test_a_fast_component_counts_relative_and_a_slow_one_absolute() -> None:
 
 def test_numbers_bounds_and_words() -> None:
     def kept(metric: Metric) -> float | None:
-        return digits_kept(row(metrics={RELATIVE: metric}))
+        return digits_kept(row(metrics={RELATIVE.text: metric}))
 
     assert kept(error("1e-10")) == 10
     assert kept(error("1e2")) == -2
@@ -129,7 +129,9 @@ def test_the_summary_of_many_rows_names_the_fewest() -> None:
 
     from rich.console import Console
 
-    rows = [row(case=f"top[{i}]", metrics={RELATIVE: error(value)}) for i, value in enumerate(("1e-9", "3e-5", "1e-7"))]
+    rows = [
+        row(case=f"top[{i}]", metrics={RELATIVE.text: error(value)}) for i, value in enumerate(("1e-9", "3e-5", "1e-7"))
+    ]
     console = Console(width=160, record=True, file=StringIO())
     console.print(worst(Report(SCHEMA, {"name": "many"}, {}, []), rows, "hint"))
     (line,) = [line for line in console.export_text().splitlines() if "digits kept, fewest" in line]

@@ -80,7 +80,7 @@ def test_solution_error_of_a_run_started_on_a_known_motion() -> None:
         propagate(known.top, known.start, [1, 2, 3, 4], precision, observer=error)
         values = {k: exact(m.value) for k, m in error.metrics().items()}
         assert 0 < values["solution_error_omega_max"] < 2000 * precision.eps
-        assert error.break_away is None
+        assert error.escape is None
 
 
 def test_a_perturbed_start_is_charged_to_the_solution_error_with_its_size() -> None:

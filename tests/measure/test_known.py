@@ -35,8 +35,8 @@ def test_every_case_finds_its_reference_from_the_rounded_data(name: str, method:
     assert isinstance(known, Known)
     assert method in known.solution.method
     assert known.certificate.agreed_digits >= 19
-    assert f"certified at t = 5 to {known.certificate.agreed_digits} digits" in known.text
-    assert "radius below" in known.text
+    assert f"certified at t = 5 to {known.certificate.agreed_digits} digits" in known.against.text
+    assert "radius below" in known.against.text
     for value, start in zip(known.solution.state(Fraction(0), 117), given.start.flat, strict=True):
         assert abs(midpoint(value) - start) <= radius(value)
 
@@ -96,9 +96,9 @@ def test_a_reference_with_fewer_digits_than_the_format_scores_nothing() -> None:
 def test_values_that_are_exact_are_said_to_agree_exactly(top: HeavyTop, start: State) -> None:
     at_start, later = (known_motion(Problem.of(top, start, DOUBLE), Fraction(time)) for time in (0, 7))
     assert isinstance(at_start, Known)
-    assert "certified at t = 0 exactly by " in at_start.text
+    assert "certified at t = 0 exactly by " in at_start.against.text
     assert isinstance(later, Known)
-    assert f"certified at t = 7 to {later.certificate.agreed_digits} digits by " in later.text
+    assert f"certified at t = 7 to {later.certificate.agreed_digits} digits by " in later.against.text
     assert later.certificate.agreed_digits < 100
 
 

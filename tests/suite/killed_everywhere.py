@@ -12,7 +12,7 @@ from pathlib import Path
 
 import heavytop.report.html
 import heavytop.suite.run
-from heavytop.report import run_folder
+from heavytop.api import run_folder
 from heavytop.suite.files import replace
 from reports import expand, load, measure
 
@@ -24,7 +24,7 @@ SURROUNDINGS = run_folder.environment()
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "os.rmdir", "fcntl.flock")
 
 
-def rows(tasks, workers, scheduler, done, saved) -> Iterator:
+def rows(tasks, kinds, workers, scheduler, done, saved) -> Iterator:
     for index, task in enumerate(tasks):
         if index not in done:
             saved(index).save({"task": task.label})
@@ -33,7 +33,7 @@ def rows(tasks, workers, scheduler, done, saved) -> Iterator:
 
 heavytop.suite.run.rows = rows
 run_folder.environment = lambda: SURROUNDINGS
-heavytop.report.html.write_report = lambda report, path: replace(path, repr(report.rows).encode())  # quick
+heavytop.report.html.write_report = lambda report, path, kinds: replace(path, repr(report.rows).encode())  # quick
 
 
 def run(out: Path, killed_at: int) -> int:

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy
 import pytest
-from heavytop.suite.measurements import ensemble_reference, ensembles, measure
 from rich.console import Console
 
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
 from heavytop.integrate.ensemble import propagate_ensemble
+from heavytop.kinds import growth
+from heavytop.measure import ensemble_reference
+from heavytop.measure.integrator import Integrator
 from heavytop.records import Report
 from heavytop.report.policy import Policy
 from heavytop.suite.cases import CASES
@@ -21,7 +23,7 @@ from heavytop.suite.starts import random_starts
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import cross
 from heavytop.top.integrals import holding
-from reports import compare, expand, load, summary
+from reports import compare, expand, load, measure, summary
 
 CLASSES = ("euler", "lagrange", "kovalevskaya", "generic", "gyrostat")
 
@@ -148,7 +150,7 @@ def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatc
         return type(start)([Fraction(10) ** 140, Fraction(10) ** 140, 1], start.gamma)
 
     plain = row(tmp_path, "kovalevskaya", 'horizon = "20", starts = 10, decades = 2')
-    monkeypatch.setattr(ensembles, "random_starts", with_a_wild_one)
+    monkeypatch.setattr(growth, "random_starts", with_a_wild_one)
     found = row(tmp_path, "kovalevskaya", 'horizon = "20", starts = 10, decades = 2')
     assert plain.metrics["starts_failed"].value == "0"
     assert found.metrics["starts_failed"].value == "1"
@@ -160,7 +162,7 @@ def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatc
 def test_the_laws_are_said_in_words(tmp_path: Path) -> None:
     console = Console(width=160, record=True, file=StringIO())
     (task,) = tasks(tmp_path, '"kovalevskaya"', 'precision = "double", horizon = "2e3", starts = 9, decades = 4')
-    console.print(summary(Report("s", {"name": "own"}, {}, [measure(replace(task, name="mine"))])))
+    console.print(summary(Report("s", {"name": "own"}, {}, [measure(replace(task, title="mine"))])))
     text = console.export_text()
     assert "Growth laws" in text
     (line,) = [line for line in text.splitlines() if "energy" in line]
@@ -227,8 +229,11 @@ def test_a_row_goes_on_behind_the_starts_that_are_done(tmp_path: Path, monkeypat
             asked.append(len(problems))
         return propagate_ensemble(problems, *args, **options)
 
-    for module in (ensembles, ensemble_reference):
-        monkeypatch.setattr(module, "propagate_ensemble", watched)
+    def watched_too(self, problems, times, observer=None, finished=None, **options):
+        return watched(problems, times, observer=observer, finished=finished, **options)
+
+    monkeypatch.setattr(ensemble_reference, "propagate_ensemble", watched)
+    monkeypatch.setattr(Integrator, "propagate_many", watched_too)
     path = tmp_path / "row-0.partial"
     deaths = 0
     while True:
@@ -238,25 +243,25 @@ def test_a_row_goes_on_behind_the_starts_that_are_done(tmp_path: Path, monkeypat
             break
         except Killed:
             deaths += 1
-    total = task.ensemble.starts * (2 if task.ensemble.reference else 1)
+    total = task.options.starts * (2 if task.options.reference else 1)
     assert deaths == total // 3
-    assert asked[0] == task.ensemble.starts
+    assert asked[0] == task.options.starts
     # what was done is not done again
     assert asked[-1] <= 3
     row.seconds = whole.seconds = {}
     assert row == whole
 
 
-def _with_a_nan(problems, times, *, observer, **options):
+def _with_a_nan(_, problems, times, observer, finished, **options):
     def spoilt(index, time, state):
         observer(index, time, state * numpy.nan if (index, time) == (0, times[-1]) else state)
 
-    return propagate_ensemble(problems, times, observer=spoilt, **options)
+    return propagate_ensemble(problems, times, observer=spoilt, finished=finished, **options)
 
 
 def test_a_start_that_is_not_finite_is_kept_as_it_is(tmp_path: Path, monkeypatch) -> None:
     (task,) = tasks(tmp_path, '"euler"', 'precision = "double", horizon = "20", starts = 9, samples = 4')
-    monkeypatch.setattr(ensembles, "propagate_ensemble", _with_a_nan)
+    monkeypatch.setattr(Integrator, "propagate_many", _with_a_nan)
     saved = Saved(tmp_path / "row-0.partial", "this plan", every=0)
     one = measure(task, saved)
     again = measure(task, saved)

@@ -5,9 +5,9 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from heavytop.suite.measurements.laws import break_away_law
-from heavytop.suite.measurements.shared import time_text
 
+from heavytop.kinds.break_away_law import break_away_law
+from heavytop.suite.rows import time_text
 from heavytop.suite.task import Task
 from reports import expand, load, measure
 
@@ -23,7 +23,7 @@ def task(label: str) -> Task:
 def test_the_break_away_time_grows_linearly_with_the_bits(case: str, rate: float) -> None:
     labels = [f"homoclinic {case}/forward {name}" for name in ("double", "extended", "quad", "real:237")]
     rows = [measure(task(label)) for label in labels]
-    (law,) = break_away_law(rows, {f"{case}/forward": rate})
+    (law,) = break_away_law(rows)
     slope = float(Fraction(law.metrics["break_away_slope"].value))
     assert slope == pytest.approx(math.log(2) / rate, rel=0.1)
     for row in rows:
@@ -38,7 +38,7 @@ def test_a_failed_member_is_left_out_of_the_law() -> None:
     row = measure(task("homoclinic delone/forward double"))
     failed = measure(task("homoclinic delone/forward extended"))
     failed.outcome = "step_limit"
-    assert break_away_law([row, failed], {"delone/forward": 1.0}) == []
+    assert break_away_law([row, failed]) == []
 
 
 def test_the_long_run_of_euler_is_held_against_its_closed_form() -> None:

@@ -5,11 +5,13 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from heavytop.suite.tables import log_spaced
 
 from heavytop.errors import InputError
 from heavytop.suite.cases import CASES, case
-from heavytop.suite.plan import BUILT_IN, expand, load, read, warnings
+from heavytop.suite.plan import BUILT_IN, warnings
+from heavytop.suite.sampling import log_spaced
+from reports import expand, load
+from reports import read_plan as read
 
 MEASURE = '[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "double", horizon = "10" }]\n'
 TOP = (
@@ -45,14 +47,14 @@ def test_the_plans_that_ship_expand(name: str) -> None:
 
 def test_the_default_plan_holds_what_it_promises() -> None:
     tasks = expand(load("default")[0])
-    horizons = {(t.case.name, t.precision): t.times[-1] for t in tasks if t.kind == "drift"}
+    horizons = {(t.case.name, t.key.precision): t.times[-1] for t in tasks if t.key.kind == "drift"}
     for name in ("euler", "lagrange", "kovalevskaya", "generic", "gyrostat"):
         assert horizons[name, "double"] == 10**5
         assert horizons[name, "extended"] == 10**4
         assert horizons[name, "quad"] == 10**3
         assert horizons[name, "real:237"] == 50
-    model = [t for t in tasks if t.kind == "claim_model"]
-    assert {t.name for t in model} == {f"ershkov-partial-{r}/{d}" for r in (2, 6) for d in ("forward", "backward")}
+    model = [t for t in tasks if t.key.kind == "claim_model"]
+    assert {t.title for t in model} == {f"ershkov-partial-{r}/{d}" for r in (2, 6) for d in ("forward", "backward")}
     assert all({Fraction(1, 10), Fraction(1), Fraction(2)} <= {abs(t) for t in task.keep} for task in model)
 
 
@@ -95,7 +97,7 @@ def test_homoclinic_cases_have_dyadic_data(name: str) -> None:
         ),
         (
             f"name = 'x'\n{GROWTH}",
-            "growth euler tolerance 1.0e-3 double twice, also as growth euler tolerance 1e-3 double",
+            "growth euler heyoka tolerance 1.0e-3 double twice, also as growth euler heyoka tolerance 1e-3 double",
         ),
         ("name = 'x'\n[[measure]", "not valid"),
         ("", "name"),
@@ -114,7 +116,7 @@ def test_what_is_impossible_is_refused_and_named(tmp_path: Path, text: str, mess
 
 def test_a_top_of_one_s_own_is_measured_under_its_name(tmp_path: Path) -> None:
     (task,) = plan_of(tmp_path, f"name = 'x'\n{TOP}{MEASURE.replace('euler', 'mine')}")
-    assert task.name == "mine"
+    assert task.title == "mine"
     assert task.case.start.omega[2] == Fraction(-2, 3)
     with pytest.raises(InputError, match="not a unit vector"):
         plan_of(tmp_path, f"name = 'x'\n{TOP.replace('3/5', '2/5')}{MEASURE}")

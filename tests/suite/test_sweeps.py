@@ -4,13 +4,12 @@ import re
 import tracemalloc
 from fractions import Fraction
 from pathlib import Path
-from typing import get_args
 
 import pytest
-from heavytop.suite.tables import Table
 
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
+from heavytop.kinds import KINDS
 from heavytop.suite.sweeps import Random
 from heavytop.top.heavy_top import dot
 from reports import expand, load, rows
@@ -42,8 +41,8 @@ def test_a_grid_is_the_cartesian_product_with_places_for_names(tmp_path: Path) -
     tasks = plan_of(tmp_path, GRID + RANDOM + MEASURE)
     grid = [f"g[{i},{j}]" for i in range(2) for j in range(3)]
     names = ["euler", *grid, "r[0]", "r[1]", "r[2]"]
-    assert [(t.name, t.precision) for t in tasks] == [(n, p) for n in names for p in ("double", "quad")]
-    assert all(task.case.name == task.name for task in tasks)
+    assert [(t.title, t.key.precision) for t in tasks] == [(n, p) for n in names for p in ("double", "quad")]
+    assert all(task.case.name == task.title for task in tasks)
     assert len(tasks) == 20
     place = tasks[2 * 5]
     assert place.name == "g[1,1]"
@@ -57,7 +56,7 @@ def test_a_grid_is_the_cartesian_product_with_places_for_names(tmp_path: Path) -
 def test_names_that_say_more_than_the_case_keep_what_they_say(tmp_path: Path) -> None:
     work = 'kind = "work_precision"\nhorizon = "5"\nladders = [{ integrator = "heyoka", tolerances = ["1e-6"] }]\n'
     tasks = plan_of(tmp_path, RANDOM + '[[measure]]\ncases = ["sweep:r", "euler"]\n' + work)
-    assert [task.name for task in tasks] == ["r[0]/T=5", "r[1]/T=5", "r[2]/T=5", "euler/T=5"]
+    assert [task.title for task in tasks] == ["r[0]/T=5", "r[1]/T=5", "r[2]/T=5", "euler/T=5"]
     assert [task.case.name for task in tasks] == ["r[0]", "r[1]", "r[2]", "euler"]
 
 
@@ -67,15 +66,15 @@ def test_the_plan_in_the_documentation_is_one_and_every_kind_is_there(tmp_path: 
     (tmp_path / "plan.toml").write_text(example, "utf-8")
     tasks = expand(load(str(tmp_path / "plan.toml"))[0])
     assert len(tasks) == 2 * (1 + 1 + 6 + 100)
-    assert {"mine", "faster[1,2]", "many[99]"} <= {task.name for task in tasks}
-    kinds = {kind.__struct_config__.tag for kind in get_args(Table)}
+    assert {"mine", "faster[1,2]", "many[99]"} <= {task.title for task in tasks}
+    kinds = {kind.name for kind in KINDS.values() if kind.table is not None}
     assert kinds == set(re.findall(r"^\| `(\w+)` \|", text, re.M))
 
 
 def test_weights_are_an_axis_too(tmp_path: Path) -> None:
     grid = GRID.replace('"3/2"\n', '["1", "2", "4"]\n')
     tasks = plan_of(tmp_path, grid + MEASURE.replace('"euler", ', "").replace(', "sweep:r"', ""))
-    assert tasks[2 * (1 * 9 + 2 * 3 + 1)].name == "g[1,2,1]"
+    assert tasks[2 * (1 * 9 + 2 * 3 + 1)].title == "g[1,2,1]"
     assert tasks[2 * (1 * 9 + 2 * 3 + 1)].case.top.weight == 4
 
 
@@ -115,7 +114,7 @@ def test_a_million_rows_are_planned_without_making_them(tmp_path: Path) -> None:
     try:
         tasks = plan_of(tmp_path, plan)
         assert len(tasks) == 2_000_002
-        assert tasks[-1].name == "r[999999]"
+        assert tasks[-1].title == "r[999999]"
         assert tracemalloc.get_traced_memory()[1] < 2**20
     finally:
         tracemalloc.stop()

@@ -5,11 +5,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from heavytop.suite.measurements.shared import unmeasured
 
 from heavytop.errors import Contradiction, InputError, OutOfReach
 from heavytop.measure import known
 from heavytop.report.policy import Policy
+from heavytop.suite.rows import unmeasured
 from reports import all_good, compare, expand, load, replace, rows, store
 
 PLAN = """name = "far"
@@ -60,14 +60,15 @@ def test_a_plan_with_rows_out_of_reach_ends_with_all_others_and_exit_3(tmp_path:
     assert "Only 0 of 160 bits" in (tmp_path / "out" / "report.html").read_text()
     comparison = compare(report, report, Policy())
     assert comparison.exit_code == 3
-    assert {finding.key for finding in comparison.changed} == {row.key for row in lost}
+    assert {finding.row for finding in comparison.changed} == {row.identity for row in lost}
     assert heavytop("show", tmp_path / "out").returncode == 0
 
 
 def test_a_row_out_of_reach_has_the_key_that_it_has_within(tmp_path: Path) -> None:
     far, near = (tasks_of(tmp_path, PLAN + FAR.replace("1e100", end)) for end in ("1e100", "2"))
     keys, others = (
-        [row.key for _, row in sorted(rows(tasks, 1, None), key=lambda pair: pair[0])] for tasks in (far, near)
+        [row.identity.elsewhere for _, row in sorted(rows(tasks, 1, None), key=lambda pair: pair[0])]
+        for tasks in (far, near)
     )
     assert keys == others
 
@@ -79,7 +80,9 @@ def test_a_contradiction_is_the_outcome_of_its_row_alone(tmp_path: Path, monkeyp
     monkeypatch.setattr(known, "certify", contradict)
     ((_, row),) = rows(tasks_of(tmp_path, PLAN), 1, None)
     assert (row.outcome, row.against) == ("contradiction", "nothing: Two sources exclude each other.")
-    assert row.key == ("drift", "euler", "heavy_top", "heyoka", "double")
+    key = row.key
+    named = (key.kind, key.case, key.system, key.subject.name, key.precision)
+    assert named == ("drift", "euler", "heavy_top", "heyoka", "double")
 
 
 def test_steps_of_a_top_at_rest_are_out_of_reach(tmp_path: Path) -> None:

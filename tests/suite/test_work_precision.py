@@ -5,20 +5,20 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from heavytop.suite.measurements import measure, work_precision
 
 from heavytop.errors import InputError
 from heavytop.exact.balls import midpoint
 from heavytop.exact.catalogue import find
 from heavytop.integrate.peers.scipy_ivp import dop853
 from heavytop.integrate.trajectory import Problem
+from heavytop.kinds import work_precision
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Report
 from heavytop.report.compare import Policy, compare
 from heavytop.report.method_growth import trend
 from heavytop.report.work_precision import panels
 from heavytop.suite.cases import CASES
-from reports import expand, load
+from reports import expand, load, measure
 
 HEAD = 'name = "p"\n[[measure]]\nkind = "work_precision"\n'
 

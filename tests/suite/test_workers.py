@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from multiprocessing import active_children
 from pathlib import Path
 
@@ -62,7 +63,11 @@ class Poison:
 
 
 def poisoned(tasks) -> list[Task]:
-    return [*tasks[:2], Task("drift", "poison", Poison(), "double", "", tasks[0].times), *tasks[2:4]]
+    return [*tasks[:2], with_case(tasks[0], "poison", Poison()), *tasks[2:4]]
+
+
+def with_case(task: Task, name: str, case: object) -> Task:
+    return replace(task, title=name, case=case)
 
 
 def kill(pid: int) -> None:
@@ -111,7 +116,7 @@ class Slow(Poison):
 
 @pytest.mark.parametrize("stop", [GeneratorExit, KeyboardInterrupt, InputError])
 def test_a_run_that_is_stopped_does_not_wait_for_what_is_under_way(tasks, tmp_path: Path, stop) -> None:
-    slow = Task("drift", "slow", Slow(tmp_path / "done"), "double", "", tasks[0].times)
+    slow = with_case(tasks[0], "slow", Slow(tmp_path / "done"))
     stream = rows([tasks[0], slow], 2, None)
     next(stream)
     with pytest.raises(stop):
@@ -125,11 +130,12 @@ def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     script = tmp_path / "parent.py"
     script.write_text(
         "from multiprocessing import active_children\n"
+        "from heavytop.kinds import KINDS\n"
         "from heavytop.suite.plan import expand, load\n"
         "from heavytop.suite.workers import rows\n"
         "if __name__ == '__main__':\n"
-        f"    tasks = expand(load({str(tmp_path / 'tiny.toml')!r})[0])\n"
-        "    stream = rows(tasks, 2, None)\n"
+        f"    tasks = expand(load({str(tmp_path / 'tiny.toml')!r}, KINDS)[0])\n"
+        "    stream = rows(tasks, KINDS, 2, None)\n"
         "    next(stream)\n"
         "    print(*(child.pid for child in active_children()), flush=True)\n"
         "    input()\n"

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import HEYOKA, Integrator
 from heavytop.measure.rounding_noise import reroll
 from heavytop.precision import Precision, parse
 from heavytop.records import EXACT, RowKey, Subject
@@ -69,8 +69,11 @@ class Task:
     @property
     def label(self) -> str:
         """For progress and messages."""
+        plain = self.subject in (HEYOKA, self.key.kind)
+        system = self.key.system if self.case is None else ""
         precision = self.key.precision if self.has_precision else ""
-        return " ".join(part for part in (self.key.kind, self.title, self.subject, precision) if part)
+        parts = (self.key.kind, self.title, "" if plain else self.subject, system, precision)
+        return " ".join(part for part in parts if part)
 
     @property
     def run_seconds(self) -> float:

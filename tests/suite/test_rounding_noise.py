@@ -1,5 +1,7 @@
 """Rows carry the noise of their metrics, and a rerun with other roundings is the same within it."""
 
+from dataclasses import replace as replace_dataclass
+
 import pytest
 
 from heavytop.errors import InputError
@@ -115,14 +117,16 @@ def test_errors_a_thousand_times_larger_are_worse_in_every_row(reports: list[Rep
     for other in reports[1:]:
         bad = replace(other, rows=[planted(row, 1000) for row in other.rows])
         result = compare(reports[0], bad, Policy())
-        worse = {finding.key for finding in result.findings if finding.verdict is Verdict.WORSE}
-        assert worse == {row.key for row in other.rows}
+        worse = {finding.row for finding in result.findings if finding.verdict is Verdict.WORSE}
+        assert worse == {row.identity for row in other.rows}
 
 
 def test_a_run_that_failed_has_no_bands() -> None:
     task = expand(PLAN, 0)[-1]
-    wild = replace(task.case.start, omega=tuple(exact(x) for x in ("1e140", "1e140", "1")))
-    row = measure(replace(task, precision="double", case=replace(task.case, start=wild)))
+    wild = replace_dataclass(task.case.start, omega=tuple(exact(x) for x in ("1e140", "1e140", "1")))
+    key = replace(task.key, precision="double")
+    case = replace_dataclass(task.case, start=wild)
+    row = measure(replace_dataclass(task, key=key, case=case))
     assert row.outcome != "success"
     assert {metric.band for metric in row.metrics.values()} == {None}
 

@@ -5,13 +5,13 @@ from fractions import Fraction
 from random import Random
 
 import pytest
-from heavytop.measure.luck import MOST_SEEDS, RERUNS, bands, duration_band, factor, least, reroll
 from hypothesis import given
 from hypothesis import strategies as st
 
+from heavytop.measure.rounding_noise import MOST_SEEDS, RERUNS, bands, duration_band, factor, least, reroll
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import DOUBLE, exact, rounded
-from heavytop.records import Metric
+from heavytop.records import Metric, Quantity, by_name
 from heavytop.suite.cases import CASES
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 
@@ -70,14 +70,15 @@ def test_what_is_below_the_floor_or_zero_has_no_spread_and_words_have_no_band() 
 
 
 def test_a_last_value_counts_as_its_rms_at_least() -> None:
-    metrics = {"x_rms": error(1e-10), "x_final": error(1e-14), "y_final": error(1e-14)}
-    assert least(metrics, "x_final") == pytest.approx(-10)
-    assert least(metrics, "x_rms") == least(metrics, "y_final") == -math.inf
-    runs = [{"x_rms": error(1e-10), "x_final": error(size)} for size in (1e-14, 1e-12, 1e-10)]
+    x, y = Quantity("x"), Quantity("y")
+    metrics = by_name({x.over("rms"): error(1e-10), x.over("final"): error(1e-14), y.over("final"): error(1e-14)})
+    assert least(metrics, metrics["x_final"]) == pytest.approx(-10)
+    assert least(metrics, metrics["x_rms"]) == least(metrics, metrics["y_final"]) == -math.inf
+    runs = [by_name({x.over("rms"): error(1e-10), x.over("final"): error(s)}) for s in (1e-14, 1e-12, 1e-10)]
     assert bands(runs, -20, {})["x_final"] == 0
 
 
-def test_luck_that_is_added_to_a_duration() -> None:
+def test_noise_that_is_added_to_a_duration() -> None:
     times = [100 + (-1) ** i for i in range(16)]
     plain = duration_band(times, 100, 50)
     assert plain == pytest.approx(math.log10(1 + 2 / 100 / math.sqrt(2)), abs=1e-4)
