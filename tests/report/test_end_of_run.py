@@ -38,9 +38,9 @@ def test_the_digits_of_each_motion_and_format_stand_in_a_table() -> None:
     ]
     assert said(*rows) == [
         "Plan p: 3 measurements, all finished.",
-        "Digits right, to |t|            double          quad",
-        "  euler                     7.0 to 1e5             -",
-        f"  {'a' * 21}…             -     9.0 to 20",
+        f"{'Digits right, to |t|':40}        double          quad",
+        f"  {'euler':38}    7.0 to 1e5             -",
+        f"  {'a' * 37}…             -     9.0 to 20",
     ]
 
 

@@ -108,6 +108,7 @@ def prepare(
     seed: int = 0,
     save_every: float = checkpoint.EVERY,
     with_parquet: bool = False,
+    integrator: str = "",
 ) -> Run:
     """The run of a plan into the folder ``out``, by default a new one under heavytop-results; nothing is written yet.
 
@@ -115,7 +116,7 @@ def prepare(
     """
     if with_parquet:
         parquet.require_pyarrow()
-    loaded, digest, tasks = read(plan, KINDS, seed)
+    loaded, digest, tasks = read(plan, KINDS, seed, integrator)
     if workers is not None and whole(workers, "--workers") < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     if workers is not None and scheduler is not None:
@@ -123,7 +124,7 @@ def prepare(
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
     run = Run(
-        {"name": loaded.name, "sha256": digest, "seed": str(seed)},
+        {"name": loaded.name, "sha256": digest, "seed": str(seed)} | ({"integrator": integrator} if integrator else {}),
         tasks,
         warnings(loaded),
         out or Path("heavytop-results") / f"{loaded.name}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}",

@@ -18,7 +18,8 @@ from heavytop.cli.progress import Progress
 
 @command
 def run(
-    plan: Annotated[str, typer.Option(help="smoke, default, growth, long, peers, or a TOML file.")] = "default",
+    plan: Annotated[str, typer.Option(help="smoke, default, growth, long, peers, gate, or a TOML file.")] = "default",
+    integrator: Annotated[str, typer.Option(help="Measure this one beside heyoka.")] = "",
     out: Annotated[Path | None, typer.Option(help="New folder for the report.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the rows that --out already holds.")] = False,
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
@@ -39,6 +40,7 @@ def run(
         workers=workers,
         scheduler=scheduler,
         seed=seed,
+        integrator=integrator,
         save_every=save_every,
         with_parquet=parquet,
     )

@@ -50,6 +50,10 @@ class LocalErrorTable(Table, tag=NAME):
             for precision in self.precisions
         ]
 
+    def beside(self, integrator: str) -> Table | None:
+        """Nothing: other integrators do not hand over their single steps."""
+        return None
+
 
 class LocalError(Kind):
     """Errors of steps in units of eps times the largest component of the state."""

@@ -33,7 +33,7 @@ from heavytop.report.method_growth import method_growth
 from heavytop.report.printable import printable
 from heavytop.report.text import table, title
 from heavytop.report.work_plots import work_precision
-from heavytop.report.work_precision import CONSTANTS, LANES, OURS, leads, panels
+from heavytop.report.work_precision import CONSTANTS, LANES, OURS, beside_ours, leads, panels
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import computed_row, time_text
@@ -105,6 +105,12 @@ class WorkPrecisionTable(Table, tag=NAME):
             for case in map(find, self.cases)
             for precision, subject in rungs
         ]
+
+    def beside(self, integrator: str) -> Table | None:
+        """Its finest rung in each format that heyoka has a ladder in."""
+        formats = dict.fromkeys(each.precision for each in self.ladders if each.integrator == OURS)
+        ladders = [Ladder(integrator, precision, [FINEST]) for precision in formats]
+        return msgspec.structs.replace(self, ladders=ladders) if ladders else None
 
 
 class WorkPrecision(Kind):
@@ -193,6 +199,8 @@ class WorkPrecision(Kind):
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
         """How heyoka compares, a sentence a case."""
+        if beside := beside_ours(rows):
+            return [line for sentence in beside for line in wrapped(f"{sentence}.")]
         return [line for lead in leads(rows) if lead.short for line in wrapped(f"{lead.case}: {lead.short}.")]
 
 

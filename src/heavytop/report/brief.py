@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import chain, islice
 from math import inf
 from textwrap import shorten, wrap
 
 from heavytop.measure.digits import digits_kept, digits_text
-from heavytop.records import Report, Row
+from heavytop.records import UNMEASURED, Report, Row
 from heavytop.report.kind import Kinds
 from heavytop.report.printable import printable
 from heavytop.report.section import clip, logarithm
@@ -21,7 +21,7 @@ LINES = 21
 """The command says in four more where the report is and what shows the rest."""
 MOST_ROWS = 1000
 """More rows than these are counted, not listed."""
-_NAME, _CELL, _MOST_COLUMNS = 24, 14, 4
+_CELL, _MOST_COLUMNS = 14, 4
 _MOST_FAILURES = 3
 _FEWEST = 2
 
@@ -45,7 +45,8 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
 
     if len(first) <= MOST_ROWS:
         held = list(seen(first))
-        parts = [kind.brief([row for row in held if row.key.kind == name]) for name, kind in kinds.items()]
+        measured = [row for row in held if row.outcome not in UNMEASURED]
+        parts = [kind.brief([row for row in measured if row.key.kind == name]) for name, kind in kinds.items()]
     else:
         parts = [_counted(seen(chain(first, stream)))]
     head = f"Plan {report.plan.get('name', '?')}: {number} measurements, "
@@ -72,25 +73,38 @@ def wrapped(text: str, indent: str = "  ") -> list[str]:
     return wrap(text, WIDTH, subsequent_indent=indent, break_on_hyphens=False)
 
 
+def named(rows: Sequence[Row]) -> Callable[[Row], str]:
+    """What a row is called among these: its case, and its integrator where they have several."""
+    several = len({row.key.subject.name for row in rows}) > 1
+    return lambda row: f"{row.key.case}, {row.key.subject.name}" if several else row.key.case
+
+
 def digits_lines(rows: Sequence[Row], title: str) -> list[str]:
-    """Digits right at every sample: a line a motion and integrator, a column a format, each with its time."""
+    """Digits right at every sample, each with its time: a line a motion, a column a format, or an integrator where all
+    are in one format.
+    """
     known = [(row, kept) for row in rows if (kept := digits_kept(row)) is not None]
-    formats = sorted({(row.bits, row.precision) for row, _ in known})[:_MOST_COLUMNS]
-    several = len({row.key.subject.name for row, _ in known}) > 1
+    formats = [name for _, name in sorted({(row.bits, row.precision) for row, _ in known})]
+    names, columns = named([row for row, _ in known]), formats[:_MOST_COLUMNS]
+    if len(formats) == 1:
+        columns = list(dict.fromkeys(row.key.subject.name for row, _ in known))[:_MOST_COLUMNS]
     table: dict[str, dict[str, tuple[float, str]]] = {}
     for row, kept in known:
-        name = f"{row.key.case}, {row.key.subject.name}" if several else row.key.case
+        name, column = names(row), row.precision
+        if len(formats) == 1:
+            name, column = row.key.case, row.key.subject.name
         until = logarithm(row.horizon.removeprefix("-"))
         cell = f"{digits_text(kept)} to {'0' if until is None else _until(until)}"
         cells = table.setdefault(name, {})
         # of two horizons the longer
-        cells[row.precision] = max(cells.get(row.precision, (-inf, "")), (-inf if until is None else until, cell))
+        cells[column] = max(cells.get(column, (-inf, "")), (-inf if until is None else until, cell))
     if not table:
         return []
-    lines = [f"{title:{_NAME}}" + "".join(f"{name:>{_CELL}}" for _, name in formats)]
+    wide = min(40, WIDTH - _CELL * len(columns))
+    lines = [f"{title:{wide}}" + "".join(f"{clip(name, _CELL - 1):>{_CELL}}" for name in columns)]
     for name, cells in table.items():
-        found = "".join(f"{cells[each][1] if each in cells else '-':>{_CELL}}" for _, each in formats)
-        lines.append(f"  {clip(name, _NAME - 2):{_NAME - 2}}{found}")
+        found = "".join(f"{cells[each][1] if each in cells else '-':>{_CELL}}" for each in columns)
+        lines.append(f"  {clip(name, wide - 2):{wide - 2}}{found}")
     return lines
 
 
