@@ -254,6 +254,19 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
         return f"known: {self.method}, radius below {self.radius}; {said}"
 
 
+class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """The exact data of a motion, as text: integers, decimals or fractions.
+
+    omega, gamma: of its start; empty for an ensemble of starts.
+    """
+
+    inertia: tuple[str, ...]
+    weight: str
+    centre: tuple[str, ...]
+    omega: tuple[str, ...] = ()
+    gamma: tuple[str, ...] = ()
+
+
 class Row(msgspec.Struct, gc=False):
     """One measurement, of one motion compared with one reference.
 
@@ -263,6 +276,7 @@ class Row(msgspec.Struct, gc=False):
     outcome, time_reached, steps, finite travel with every number.  seconds: timings, not compared.
     evaluations: of the field, where the integrator counts them.
     samples: how many times the largest values are over; 0 where that is not said.
+    data: of the top and its start, before any rounding; null where no motion is measured.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     """
 
@@ -291,6 +305,7 @@ class Row(msgspec.Struct, gc=False):
     laws: dict[str, Law] = {}
     seconds: dict[str, Seconds] = {}
     evaluations: Count | None = None
+    data: Data | None = None
 
     @property
     def identity(self) -> Identity:
