@@ -15,6 +15,7 @@ from heavytop.kinds import work_precision
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Report
 from heavytop.report.method_growth import trend
+from heavytop.report.policy import Policy
 from heavytop.report.work_precision import panels
 from heavytop.suite.cases import CASES
 from reports import compare, expand, load, measure
