@@ -41,7 +41,7 @@ def report_page(report: Report, kinds: Kinds) -> str:
     said = [kind.headline(of_kind[name]) for name, kind in kinds.items()]
     word, sentence = next((each for each in said if each), _NOTHING)
     not_finite = [row for row in report.rows if row.outcome == "success" and not row.finite]
-    return _render(
+    return render(
         "report.html.j2",
         report=report,
         word=word,
@@ -70,7 +70,7 @@ def comparison_page(baseline: Report, candidate: Report, comparison: Comparison,
     """The page of a comparison: verdict, changed rows, both reports on the same axes."""
     changed = comparison.changed
     sources = [("baseline", baseline), ("candidate", candidate)]
-    return _render(
+    return render(
         "comparison.html.j2",
         report=candidate,
         baseline=baseline,
@@ -139,7 +139,7 @@ def commands(report: Report) -> list[str]:
     return lines
 
 
-def _render(template: str, **context: Any) -> str:
+def render(template: str, **context: Any) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
