@@ -13,13 +13,15 @@ from pathlib import Path
 import heavytop.report.html
 import heavytop.suite.run
 from heavytop.api import run_folder
+from heavytop.kinds import KINDS
+from heavytop.suite.checkpoint import Saved
 from heavytop.suite.files import replace
-from reports import expand, load, measure
+from heavytop.suite.plan import expand, load
 
 warnings.simplefilter("ignore")  # of forks in a process with threads: those do nothing here
 PLAN, ROOT = sys.argv[1], Path(sys.argv[2])
-TASKS = expand(load(PLAN)[0])
-ROWS = {task.label: measure(task) for task in TASKS}
+TASKS = expand(load(PLAN, KINDS)[0])
+ROWS = {task.label: KINDS[task.key.kind].measure(task, Saved()) for task in TASKS}
 SURROUNDINGS = run_folder.environment()
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "os.rmdir", "fcntl.flock")
 

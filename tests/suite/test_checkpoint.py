@@ -32,7 +32,19 @@ runs = [{ precision = "extended", horizon = "4", samples = 12 }]
 
 
 def row(name: str) -> Row:
-    return Row(name, "heavy_top", "none", "double", 53, "success", "1", "1", 0, True, {"e": Metric("1e-3", -3.0)})
+    return Row(
+        case=name,
+        system="heavy_top",
+        integrator="none",
+        precision="double",
+        bits=53,
+        outcome="success",
+        horizon="1",
+        time_reached="1",
+        steps=0,
+        finite=True,
+        metrics={"e": Metric("1e-3", -3.0)},
+    )
 
 
 def checkpoint(folder: Path, identity: dict[str, str] | None = None) -> Checkpoint:

@@ -190,7 +190,7 @@ def test_an_impossible_ensemble_is_refused(tmp_path: Path, cases: str, run: str,
 
 
 def test_the_plan_growth_plants_its_faults() -> None:
-    runs = [task.ensemble for task in expand(load("growth")[0])]
+    runs = [task.options for task in expand(load("growth")[0])]
     assert {run.tolerance for run in runs} == {None, "1e-9"}
     assert {run.bias for run in runs} == {None, "1e-12"}
     assert {run.high_accuracy for run in runs} == {False, True}

@@ -52,11 +52,11 @@ def test_the_long_run_of_euler_is_held_against_its_closed_form() -> None:
 
 
 def test_printed_formulas_that_die_are_said_not_to_be_finite() -> None:
-    row = measure(task("claim_evaluation ershkov-partial-2/backward printed double"))
+    row = measure(task("claim_evaluation ershkov-partial-2/backward formula:printed double"))
     assert row.finite is False
     assert row.metrics["claim_evaluation_omega_not_finite_from"].value == "710"
     assert int(row.metrics["claim_evaluation_psi_samples_not_finite"].value) > 10
-    stable = measure(task("claim_evaluation ershkov-partial-2/backward stable double"))
+    stable = measure(task("claim_evaluation ershkov-partial-2/backward formula:stable double"))
     assert stable.finite is True
     assert stable.metrics["claim_evaluation_psi_not_finite_from"].value == "never"
 

@@ -11,6 +11,7 @@ from heavytop.suite.cases import CASES, case
 from heavytop.suite.plan import BUILT_IN, warnings
 from heavytop.suite.sampling import log_spaced
 from reports import expand, load
+from reports import plan_of as plan_from
 from reports import read_plan as read
 
 MEASURE = '[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "double", horizon = "10" }]\n'
@@ -202,3 +203,32 @@ def test_a_tolerance_below_eps_is_refused_before_anything_runs(
             read(str(file))
     else:
         assert len(read(str(file))[2]) == 1
+
+
+def test_one_case_may_stand_at_several_horizons_and_each_has_a_name_of_its_own() -> None:
+    runs = [{"precision": "double", "horizon": horizon, "samples": 2} for horizon in ("10", "1e2", "1000")]
+    table = {"kind": "drift", "cases": ["euler"], "runs": runs}
+    tasks = expand(plan_from({"name": "x", "measure": [table]}))
+    assert [task.title for task in tasks] == ["euler", "euler/T=100", "euler/T=1000"]
+    assert [task.key.horizon for task in tasks] == ["10", "100", "1000"]
+    assert {task.key.case for task in tasks} == {"euler"}
+    with pytest.raises(InputError, match="twice"):
+        expand(plan_from({"name": "x", "measure": [table, {**table, "runs": [{**runs[0], "horizon": "1e1"}]}]}))
+
+
+@pytest.mark.parametrize("kind", ["drift", "growth", "homoclinic"])
+def test_every_kind_that_propagates_takes_any_integrator(kind: str) -> None:
+    table: dict = {"kind": kind, "cases": ["delone" if kind == "homoclinic" else "euler"], "integrator": "words"}
+    run = {"precision": "double", "horizon": "10"}
+    table |= {"precisions": ["double"]} if kind == "homoclinic" else {"runs": [run]}
+    (task, *_) = expand(plan_from({"name": "x", "measure": [table]}))
+    assert task.key.subject.name == task.integrator.name == "words"
+    with pytest.raises(InputError, match="Unknown integrator"):
+        expand(plan_from({"name": "x", "measure": [table | {"integrator": "nobody"}]}))
+
+
+def test_steps_are_those_of_an_integrator_that_hands_them_over() -> None:
+    table = {"kind": "local_error", "cases": ["euler"], "precisions": ["double"], "horizon": "1"}
+    assert expand(plan_from({"name": "x", "measure": [table | {"integrator": "heyoka"}]}))
+    with pytest.raises(InputError, match="does not hand over its single steps"):
+        expand(plan_from({"name": "x", "measure": [table | {"integrator": "words"}]}))

@@ -45,7 +45,7 @@ def test_a_grid_is_the_cartesian_product_with_places_for_names(tmp_path: Path) -
     assert all(task.case.name == task.title for task in tasks)
     assert len(tasks) == 20
     place = tasks[2 * 5]
-    assert place.name == "g[1,1]"
+    assert place.title == "g[1,1]"
     assert place.case.top.inertia == (3, Fraction(5, 2), Fraction(3, 2))
     assert place.case.start.omega == (1, 2, 3)
     assert [task.label for task in tasks[-2:]] == ["drift r[2] double", "drift r[2] quad"]
@@ -124,7 +124,7 @@ def test_swept_tasks_share_their_times_and_are_measured_under_their_names(tmp_pa
     tasks = plan_of(tmp_path, RANDOM + MEASURE.replace('"euler", "sweep:g", ', ""))
     assert tasks[0].times is tasks[2].times
     found = dict(rows(tasks[:2], 1, None))
-    assert [found[i].key for i in range(2)] == [
+    assert [found[i].identity[1:] for i in range(2)] == [
         ("drift", "r[0]", "heavy_top", "heyoka", precision) for precision in ("double", "quad")
     ]
     assert all(row.outcome == "success" for row in found.values())

@@ -110,7 +110,7 @@ def test_a_peer_that_gives_up_is_no_failure_but_a_row_that_came_to_nothing_is_on
     ladder += 'ladders = [{ integrator = "heyoka", tolerances = ["eps"] }]\n'
     (task,) = tasks_of(tmp_path, 'name = "work"\n' + ladder)
     row = unmeasured(task, OutOfReach("Nothing is known there."))
-    assert row.key == ("work_precision", "euler/T=5", "heavy_top", "heyoka tolerance=eps", "double")
+    assert row.identity[1:] == ("work_precision", "euler/T=5", "heavy_top", "heyoka tolerance=eps", "double")
     assert not all_good([row])
     assert all_good([replace(row, outcome="step_limit")])
 

@@ -14,11 +14,11 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.kinds import work_precision
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Report
-from heavytop.report.compare import Policy, compare
 from heavytop.report.method_growth import trend
+from heavytop.report.policy import Policy
 from heavytop.report.work_precision import panels
 from heavytop.suite.cases import CASES
-from reports import expand, load, measure
+from reports import compare, expand, load, measure
 
 HEAD = 'name = "p"\n[[measure]]\nkind = "work_precision"\n'
 

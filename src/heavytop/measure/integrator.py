@@ -50,16 +50,17 @@ class Integrator:
         times: Sequence[Any],
         precision: Precision,
         system: System,
-        observer: Observer,
+        observer: Observer | None = None,
         **going_on: Any,
     ) -> Trajectory:
-        """The motion of an exact top and start; every state goes to ``observer``.
+        """The motion of an exact top and start; every state goes to ``observer``, where there is one.
 
         going_on: place and mark as in :func:`heavytop.integrate.taylor.propagate`, of no use to an integrator that
         knows no places.  Raises PeerFailed for whatever an integrator of others does wrong.
         """
         if self.fault:
-            return FAULTS[self.fault].propagate(top, start, times, precision, system=system, observer=observer)
+            watch = observer or (lambda time, state: None)
+            return FAULTS[self.fault].propagate(top, start, times, precision, system=system, observer=watch)
         if self.name in registry.INTEGRATORS:
             call = registry.propagator(self.name, {})
             run: Trajectory = call(top, start, times, precision, system=system, observer=observer, **going_on)
@@ -68,15 +69,16 @@ class Integrator:
             run = peers.ready(self.name)(top, start, times, precision, system=system)
         except InputError as error:  # what a peer of this program cannot be asked for is one row's failure too
             raise PeerFailed(error.cause.removesuffix(".")) from None
-        for time, state in zip(run.times, run.states, strict=True):
-            observer(time, state)
+        if observer is not None:
+            for time, state in zip(run.times, run.states, strict=True):
+                observer(time, state)
         return run
 
     def propagate_many(
         self,
         problems: Sequence[Problem],
         times: Sequence[Any],
-        observer: EnsembleObserver,
+        observer: EnsembleObserver | None = None,
         finished: Finished | None = None,
         threads: int | None = None,
         **options: Any,
@@ -92,7 +94,7 @@ class Integrator:
             raise InputError(f"The integrator {self.name} has no {', '.join(options)}.", "Leave it out.")
         runs = []
         for index, problem in enumerate(problems):
-            watch = _watching(observer, index)
+            watch = None if observer is None else _watching(observer, index)
             runs.append(self.propagate(*_given(problem), times, problem.precision, problem.system, watch))
             if finished is not None:
                 finished(index, runs[-1])

@@ -7,8 +7,7 @@ from heavytop.top.equations import HEAVY_TOP
 
 
 def row_name(row: Identity, with_kind: bool = True) -> str:
-    """Its kind, case, system where it is not the heavy top, subject, format, and up to which time."""
+    """Its kind, case, system where it is not the heavy top, subject and format."""
     system = "" if row.system == HEAVY_TOP.name else row.system
-    horizon = "" if row.key.horizon == "0" else f"to {row.key.horizon}"
-    parts = (row.key.kind if with_kind else "", row.case, system, row.integrator, row.precision, horizon)
+    parts = (row.key.kind if with_kind else "", row.case, system, row.integrator, row.precision)
     return " ".join(part for part in parts if part)

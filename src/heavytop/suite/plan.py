@@ -163,13 +163,16 @@ def expand(plan: Plan, seed: int = 0) -> Sequence[Task]:
         for table, cases in _parts(whole, swept)
     ]
     seen: dict[RowKey, str] = {}
-    for task in (task for templates, _ in parts for task in templates):
-        work = _exactly(task.key)
-        if work in seen:
-            other = "" if seen[work] == task.label else f", also as {seen[work]}"
-            raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "Name each measurement once.")
-        seen[work] = task.label
-        _require_fit(task)
+    for templates, _ in parts:
+        for place, task in enumerate(templates):
+            work = _exactly(task.key)
+            if work in seen:
+                other = "" if seen[work] == task.label else f", also as {seen[work]}"
+                raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "Name each once.")
+            if task.label in seen.values():  # one case at several horizons
+                templates[place] = replace(task, title=f"{task.title}/T={task.key.horizon}")
+            seen[work] = templates[place].label
+            _require_fit(task)
     if not seen:
         raise InputError(f"The plan {plan.name} measures nothing.", "Give it at least one [[measure]] with cases.")
     ends = list(accumulate(len(templates) * len(cases or (None,)) for templates, cases in parts))
