@@ -67,6 +67,12 @@ class Roots:
             product = product * ((v - x) * (v - x) + y * y) ** many
         return (-product if constant(product) < 0 else product).rsqrt()
 
+    def with_line(self, slope: arb) -> Roots:
+        """(slope v − 1)² g; not finite where ``slope`` may be 0, and is not."""
+        if slope.is_zero():
+            return self
+        return replace(self, lead=self.lead * slope * slope, real=(*self.real, (1 / slope, 2)))
+
     def scaled(self, factor: arb) -> Roots:
         """factor · g."""
         return replace(self, lead=self.lead * factor)

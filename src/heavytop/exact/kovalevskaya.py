@@ -30,14 +30,16 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import NotInClass, OutOfReach
+from heavytop.exact.azimuth import Bearing
 from heavytop.exact.balls import to_bits, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.kovalevskaya_abel import AbelMotion
+from heavytop.exact.kovalevskaya_attitude import KovalevskayaAttitude
 from heavytop.exact.kovalevskaya_gaps import Interval, intervals, ordered, pole
 from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
-from heavytop.exact.motion import kept
+from heavytop.exact.motion import initial_xi, kept
 from heavytop.exact.reduced import Undecided
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
@@ -88,6 +90,26 @@ class Kovalevskaya(ClosedForm):
         except Undecided:
             return [arb("nan")] * 6
 
+    @property
+    def has_attitude(self) -> bool:
+        """Whether :meth:`attitude` holds: not where a variable rests, nor very near M·γ = 0 and degenerate levels."""
+        return _has_attitude(self)
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 :func:`initial_xi` of γ.
+
+        Raises OutOfReach where a variable rests, and where the Fourier series need too many terms.
+        """
+
+        def evaluate(working: int) -> list[arb]:
+            try:
+                azimuth, began = _attitude(self, working)
+                return azimuth.bearing(time).carried(began, initial_xi(self.start.gamma))
+            except Undecided:
+                return [arb("nan")] * 3
+
+        return to_bits(evaluate, bits, time)
+
     def exponent(self, bits: int) -> arb:
         """The rate λ of an asymptotic motion, > 0: its distance from the motion that it tends to goes like e^(−λ|t|).
 
@@ -132,6 +154,27 @@ def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion | ThetaMotion:
         if not _has_thetas(level):
             return AbelMotion.of(level, 8 * MOST_TERMS)
     return ThetaMotion.of(level)
+
+
+@whole_evaluation
+def _has_attitude(case: Kovalevskaya) -> bool:
+    with working_precision(_DECISIONS[1]):
+        try:
+            _attitude(case, _DECISIONS[1])
+        except Undecided:
+            return True
+        except OutOfReach:
+            return False
+    return True
+
+
+@kept
+def _attitude(case: Kovalevskaya, bits: int) -> tuple[KovalevskayaAttitude, Bearing]:
+    motion = _motion(case, bits)
+    if isinstance(motion, ThetaMotion):
+        motion = AbelMotion.of(motion.level, 8 * MOST_TERMS)
+    azimuth = KovalevskayaAttitude.of(motion, 8 * MOST_TERMS)
+    return azimuth, azimuth.bearing(Fraction(0))
 
 
 @kept

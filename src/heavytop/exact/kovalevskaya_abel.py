@@ -54,12 +54,13 @@ _UNITS = (acb(1), acb(0, 1), acb(-1), acb(0, -1))
 class AbelMotion:
     """The motion of a level at one working precision.
 
-    branch: the branch points in v, number 0 is 0.  cubic: the numbers of the three e_j, and μ − e_j.  ends: of the
-    gaps.  rows: the rows of 𝓜^−1 for Y and Z, times κ_j.  origin: G at t = 0.
+    pole: μ.  branch: the branch points in v, number 0 is 0.  ends: of the gaps.  origin: G at t = 0.  cubic: numbers of
+    the three e_j.  rows: the rows of 𝓜^−1 for Y and Z, times κ_j.
     """
 
     level: Level
     start: Start
+    pole: arb
     branch: tuple[acb, ...]
     ends: tuple[Interval, Interval]
     variables: tuple[Variable, ...]
@@ -90,7 +91,7 @@ class AbelMotion:
                 moving = [phases[1 - k]]
         origin = tuple(inversion.values(moving))
         cubic = tuple(i for i, root in enumerate(curve, 1) if root.cubic)
-        plain = cls(level, start, branch, ends, gaps, inversion, origin, cubic, ((), ()))
+        plain = cls(level, start, mu, branch, ends, gaps, inversion, origin, cubic, ((), ()))
         return plain._with_factors(curve, mu, phases)
 
     def at(self, time: Fraction, length: int) -> list[Any]:
@@ -98,17 +99,41 @@ class AbelMotion:
 
         Raises Undecided where the working precision does not prove the phases.
         """
+        return self.level.restored(self.reduced(*self.phases(time), length), length)
+
+    def phases(self, time: Fraction) -> tuple[list[arb], list[int]]:
+        """The phases at ``time`` in the first turns, and whole turns; raises Undecided."""
         phases, turns = self._phases(ball(time * self.level.rate))
         if not all(phase.is_finite() for phase in phases):
             raise Undecided
+        return phases, turns
+
+    def reduced(self, phases: Sequence[arb], turns: Sequence[int], length: int) -> tuple[Any, ...]:
+        """The six components there in the turned frame, series in t' of that length or longer."""
         with series_length(length + 1):
-            velocity = self._velocity(self._moving(phases), turns)
-        return self.level.restored(self.start.state(velocity, length), length)
+            velocity = self._velocity(self.moving(phases), turns)
+        return self.start.state(velocity, length)
 
     def exponents(self) -> list[arb]:
         """The mean rate of X of a variable that tends to a double root, in a list of its own; else nothing."""
         open_ones = [k for k, variable in enumerate(self.variables) if isinstance(variable, Approach)]
         return [abs(self.inversion.mean_rates([arb(-1), arb(0)])[k]) * ball(self.level.rate) for k in open_ones]
+
+    def approach(self, phases: Sequence[arb], turns: Sequence[int]) -> arb | None:
+        """(log q √((w1 − e)(w2 − e)))' in t' where one variable tends to a double root e; None where none does.
+
+        The number under the logarithm goes to 0, its rate of change is as exact as the phases.
+        """
+        for variable, (low, high) in zip(self.variables, self.ends, strict=True):
+            if not isinstance(variable, Approach):
+                continue
+            number = high if variable.length > 0 else low
+            with series_length(2):
+                first, second = (self.halves(k, x, turns[k]) for k, x in enumerate(self.moving(phases)))
+                below = sum((a * (first[i] * second[i]) for a, i in zip(self.rows[1], self.cubic, strict=True)), acb(0))
+                value = first[number] * second[number] / below
+                return arb((coefficient(value, 1) / coefficient(value, 0)).real)
+        return None
 
     def _phases(self, time: arb) -> tuple[list[arb], list[int]]:
         """The phases in the first turns, and whole turns."""
@@ -126,7 +151,7 @@ class AbelMotion:
         )
         return first, second
 
-    def _moving(self, phases: Sequence[arb]) -> list[Any]:
+    def moving(self, phases: Sequence[arb]) -> list[Any]:
         """The phases as power series in t, from their differential equations."""
         moving = [arb_series([phase], prec=current_length()) for phase in phases]
         for _ in range(current_length() - 1):
@@ -136,7 +161,7 @@ class AbelMotion:
             moving = [phase + rate.integral() for phase, rate in zip(phases, rates, strict=True)]
         return moving
 
-    def _halves(self, variable: int, phase: Any, turns: int) -> list[Any]:
+    def halves(self, variable: int, phase: Any, turns: int) -> list[Any]:
         """h_kb at every branch point."""
         gap, ends = self.variables[variable], self.ends[variable]
         low, high = gap.ends(phase)
@@ -161,7 +186,7 @@ class AbelMotion:
 
     def _velocity(self, phases: Sequence[Any], turns: Sequence[int]) -> tuple[Any, Any, Any]:
         """(p, q, r) from series of the phases."""
-        first, second = (self._halves(k, phases[k], turns[k]) for k in (0, 1))
+        first, second = (self.halves(k, phases[k], turns[k]) for k in (0, 1))
         products = [first[i] * second[i] for i in self.cubic]
         above, below = (sum((a * h for a, h in zip(row, products, strict=True)), acb_series([0])) for row in self.rows)
         half = 1 / (2 * below)
@@ -206,7 +231,7 @@ class AbelMotion:
         alphas, betas, inverse = linear(start, values)
         with series_length(ORDERS):
             p, q = (arb_series(x) for x in start.motion[:2])
-            halves = [self._halves(k, phase, 0) for k, phase in enumerate(self._moving(phases))]
+            halves = [self.halves(k, phase, 0) for k, phase in enumerate(self.moving(phases))]
             ends = halves[0][0] * halves[1][0]
             kappas = []
             for i, a, b, e in zip(self.cubic, alphas, betas, values, strict=True):
