@@ -83,6 +83,10 @@ class Kovalevskaya(ClosedForm):
             raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
         _require_done(Level.of(self.top, self.start))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Without what was made: balls do not go from process to process."""
+        return type(self), (self.top, self.start)
+
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         try:
