@@ -93,7 +93,7 @@ def test_a_variable_may_rest_at_a_double_root(sign):
         assert_solves(motion, time)
         assert_narrow(motion, time)
     for form in motion.made.values():
-        assert isinstance(form.gaps[0 if sign > 0 else 1], Rest)
+        assert isinstance(form.line.variables[0 if sign > 0 else 1], Rest)
 
 
 def test_a_thousand_digits_come_out():

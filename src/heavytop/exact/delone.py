@@ -43,6 +43,7 @@ from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.integrals import kovalevskaya_xi
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +69,7 @@ class Delone(ClosedForm):
             raise NotInClass(
                 f"Delone needs P c = 0 and P r != 0, but P r = ({', '.join(map(shown, (n1, n2, n3)))}).", remedy
             )
-        (w1, w2, _), (g1, g2, _) = self.start.omega, self.start.gamma
-        xi = w1 * w1 - w2 * w2 - (n1 * g1 - n2 * g2) / i3, 2 * w1 * w2 - (n1 * g2 + n2 * g1) / i3
+        xi = kovalevskaya_xi(HEAVY_TOP.parameters(self.top, self.start), self.start.flat, (0, 1, 2))
         if any(xi):
             raise NotInClass(f"Delone needs xi = 0, but xi = {shown(xi[0])} + i ({shown(xi[1])}).", remedy)
 

@@ -41,6 +41,7 @@ from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
 from heavytop.exact.motion import initial_xi, kept
 from heavytop.exact.reduced import Undecided
+from heavytop.exact.separated import REMEDY, decide, require_plane_centre
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -50,8 +51,7 @@ SEPARATION = 2.0**-27
 """Where two roots are nearer than this, over the largest, the periods are not integrated."""
 _DISTANCE = 3e-4
 """cosh β − 1 of :func:`pole` where the Fourier series take :data:`MOST_TERMS` terms for 50 digits."""
-_REMEDY = "The validated enclosure holds for every motion."
-_DECISIONS = (64, 256, 1024, 4096)
+_ATTITUDE_BITS = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,19 +68,7 @@ class Kovalevskaya(ClosedForm):
     made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
-        if i1 != i2 or i1 != 2 * i3:
-            raise NotInClass(
-                f"Kovalevskaya needs I1 = I2 = 2 I3; I1 - I2 = {shown(i1 - i2)}, I1 - 2 I3 = {shown(i1 - 2 * i3)}.",
-                "Rename the axes if need be.",
-            )
-        if n3 != 0 or n1 == n2 == 0:
-            raise NotInClass(
-                f"Kovalevskaya needs P c = 0 and P r != 0, but P r = ({', '.join(map(shown, (n1, n2, n3)))}).",
-                "The centre of mass lies in the plane of the equal moments.",
-            )
-        if not any(self.start.gamma):
-            raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
+        require_plane_centre("Kovalevskaya", 2, self.top, self.start)
         _require_done(Level.of(self.top, self.start))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -162,9 +150,9 @@ def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion | ThetaMotion:
 
 @whole_evaluation
 def _has_attitude(case: Kovalevskaya) -> bool:
-    with working_precision(_DECISIONS[1]):
+    with working_precision(_ATTITUDE_BITS):
         try:
-            _attitude(case, _DECISIONS[1])
+            _attitude(case, _ATTITUDE_BITS)
         except Undecided:
             return True
         except OutOfReach:
@@ -199,32 +187,28 @@ def _require_done(level: Level) -> None:
     if level.fourth == 0:
         raise NotInClass("k = 0: the motion is in Delone's class.", "Use that class: its motions are elliptic.")
     if cubic.gcd(cubic.derivative()).degree() > 0:
-        raise NotInClass("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", _REMEDY)
+        raise NotInClass("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", REMEDY)
     name = "The level is degenerate"
     if double * double == level.fourth:
         name = f"{name}: l^2 = 2 |gamma|^2 (h + e) with e = {shown(double)}, e^2 = k^2"
-    for bits in _DECISIONS:
-        with working_precision(bits):
-            try:
-                curve = roots(level)
-                ends = intervals(level, curve, start_of(level))
-                _require_apart(curve, ends, name)
-            except Undecided:
-                continue
-        return
-    raise NotInClass("The motion is too near to one on a degenerate level to tell them apart.", _REMEDY)
+
+    def test() -> None:
+        curve = roots(level)
+        _require_apart(curve, intervals(level, curve, start_of(level)), name)
+
+    decide(test)
 
 
 def _require_apart(curve: Sequence[Root], ends: Sequence[Interval], name: str) -> None:
     """Raises NotInClass where neither of the two forms evaluates the motion."""
     limits = [number for pair in ends if pair[0] != pair[1] for number in pair]
     if sum(curve[number - 1].multiplicity > 1 for number in limits if number) > 1:
-        raise NotInClass(f"{name}, and both separated variables tend to e.", _REMEDY)
+        raise NotInClass(f"{name}, and both separated variables tend to e.", REMEDY)
     order = [0, *(number + 1 for number in ordered(curve))]
     for low, high in ends:
         resting = [one for one, other in ends if one == other and low != high]
         if resting and order.index(high) < order.index(resting[0]) < order.index(low):
-            raise NotInClass(f"{name}, one separated variable rests at e, and the other passes it.", _REMEDY)
+            raise NotInClass(f"{name}, one separated variable rests at e, and the other passes it.", REMEDY)
     nearest = separation([root.value for root in curve])
     if nearest < SEPARATION and pole(curve, ends)[1] < _DISTANCE:
-        raise NotInClass(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", _REMEDY)
+        raise NotInClass(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", REMEDY)

@@ -69,12 +69,18 @@ def spin(p: Parameters, y: Any, axes: Axes) -> Any:
     return y[axes[2]]
 
 
-def kovalevskaya(p: Parameters, y: Any, axes: Axes) -> Any:
-    """|ξ|² with ξ = (Ω1 + iΩ2)² − (n1 + i n2)(γ1 + iγ2), n = P r/I3, the small moment on axis ``axes[2]``."""
+def kovalevskaya_xi(p: Parameters, y: Any, axes: Axes) -> tuple[Any, Any]:
+    """ξ = (Ω1 + iΩ2)² − (n1 + i n2)(γ1 + iγ2), n = P r/I3, the small moment on axis ``axes[2]``: (real, imaginary)."""
     i, j, k = axes
     a, b = p.moment[i], p.moment[j]
     real = y[i] * y[i] - y[j] * y[j] - (a * y[3 + i] - b * y[3 + j]) / p.inertia[k]
     imaginary = y[i] * y[j] + y[i] * y[j] - (a * y[3 + j] + b * y[3 + i]) / p.inertia[k]
+    return real, imaginary
+
+
+def kovalevskaya(p: Parameters, y: Any, axes: Axes) -> Any:
+    """|ξ|² of :func:`kovalevskaya_xi`."""
+    real, imaginary = kovalevskaya_xi(p, y, axes)
     return real * real + imaginary * imaginary
 
 
