@@ -34,7 +34,7 @@ from typing import Any
 
 from flint import acb, arb, arb_series
 
-from heavytop.errors import NotInClass
+from heavytop.errors import LevelNotDone, NotInClass
 from heavytop.exact.abel import Variable
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm, constant, series_length
@@ -214,18 +214,18 @@ def _require_done(level: Level) -> None:
     """Raises NotInClass on the levels that are not done here, and too near to them."""
     resting = level.resting()
     if resting == 0:
-        raise NotInClass("The level is degenerate: both separated variables rest, or one rests at 0.", REMEDY)
+        raise LevelNotDone("The level is degenerate: both separated variables rest, or one rests at 0.", REMEDY)
 
     def test() -> None:
         curve = roots(level)
         ends = gap_ends(level, curve, separated_start(level))
         if any(curve[number].counts == (1, 1) for pair in ends for number in pair):
-            raise NotInClass("The level is degenerate: G = 0, and both separated variables tend to 0.", REMEDY)
+            raise LevelNotDone("The level is degenerate: G = 0, and both separated variables tend to 0.", REMEDY)
         moving = [(low, high) for low, high in ends if low != high]
         if resting is not None and all(_passes(curve, pair, resting) for pair in moving):
-            raise NotInClass("The level is degenerate: one variable rests, and the other passes it.", REMEDY)
+            raise LevelNotDone("The level is degenerate: one variable rests, and the other passes it.", REMEDY)
         apart = min(distance_of_others([root.value for root in curve], pair) for pair in moving)
         if apart < _DISTANCE:
-            raise NotInClass(f"The level is degenerate but for {apart:.2g}, the distance of a root to a gap.", REMEDY)
+            raise LevelNotDone(f"The level is degenerate but for {apart:.2g}, the distance of a root to a gap.", REMEDY)
 
     decide(test)

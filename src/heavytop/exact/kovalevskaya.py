@@ -29,7 +29,7 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import NotInClass, OutOfReach
+from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.azimuth import Bearing
 from heavytop.exact.balls import to_bits, working_precision
 from heavytop.exact.closed_form import ClosedForm
@@ -187,7 +187,7 @@ def _require_done(level: Level) -> None:
     if level.fourth == 0:
         raise NotInClass("k = 0: the motion is in Delone's class.", "Use that class: its motions are elliptic.")
     if cubic.gcd(cubic.derivative()).degree() > 0:
-        raise NotInClass("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", REMEDY)
+        raise LevelNotDone("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", REMEDY)
     name = "The level is degenerate"
     if double * double == level.fourth:
         name = f"{name}: l^2 = 2 |gamma|^2 (h + e) with e = {shown(double)}, e^2 = k^2"
@@ -203,12 +203,12 @@ def _require_apart(curve: Sequence[Root], ends: Sequence[Interval], name: str) -
     """Raises NotInClass where neither of the two forms evaluates the motion."""
     limits = [number for pair in ends if pair[0] != pair[1] for number in pair]
     if sum(curve[number - 1].multiplicity > 1 for number in limits if number) > 1:
-        raise NotInClass(f"{name}, and both separated variables tend to e.", REMEDY)
+        raise LevelNotDone(f"{name}, and both separated variables tend to e.", REMEDY)
     order = [0, *(number + 1 for number in ordered(curve))]
     for low, high in ends:
         resting = [one for one, other in ends if one == other and low != high]
         if resting and order.index(high) < order.index(resting[0]) < order.index(low):
-            raise NotInClass(f"{name}, one separated variable rests at e, and the other passes it.", REMEDY)
+            raise LevelNotDone(f"{name}, one separated variable rests at e, and the other passes it.", REMEDY)
     nearest = separation([root.value for root in curve])
     if nearest < SEPARATION and pole(curve, ends)[1] < _DISTANCE:
-        raise NotInClass(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", REMEDY)
+        raise LevelNotDone(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", REMEDY)

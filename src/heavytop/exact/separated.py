@@ -13,7 +13,7 @@ from typing import Any
 
 from flint import arb, arb_series
 
-from heavytop.errors import NotInClass
+from heavytop.errors import LevelNotDone, NotInClass
 from heavytop.exact.abel import Inversion, Variable
 from heavytop.exact.asymptotic import Approach
 from heavytop.exact.balls import working_precision
@@ -44,7 +44,7 @@ def require_plane_centre(name: str, ratio: int, top: HeavyTop, start: State) -> 
 
 
 def decide(test: Callable[[], None]) -> None:
-    """``test`` at the first working precision that suffices for it.  Raises NotInClass where none does."""
+    """``test`` at the first working precision that suffices for it.  Raises LevelNotDone where none does."""
     for bits in _DECISIONS:
         with working_precision(bits):
             try:
@@ -52,7 +52,7 @@ def decide(test: Callable[[], None]) -> None:
             except Undecided:
                 continue
         return
-    raise NotInClass("The motion is too near to one on a degenerate level to tell them apart.", REMEDY)
+    raise LevelNotDone("The motion is too near to one on a degenerate level to tell them apart.", REMEDY)
 
 
 def variable_between(low: arb, high: arb, double: tuple[bool, bool], rest: Roots, most: int) -> Variable:
