@@ -17,7 +17,7 @@ from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
 from heavytop.claims.from_file import ClaimFile, sample_rows
 from heavytop.claims.real_zeros import conditions_for_zero
-from heavytop.claims.signs import Unprovable
+from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import Setting
 from heavytop.claims.statements import SYSTEMS
 from heavytop.errors import InputError

@@ -19,7 +19,7 @@ from heavytop.claims.from_file import IntegralTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
 from heavytop.claims.real_zeros import conditions_for_zero, on_conditions
 from heavytop.claims.sample_search import states_on
-from heavytop.claims.signs import Unprovable
+from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import ALL, Flow, Formulas, Place, Setting, Statement
 from heavytop.claims.structure import Names
 from heavytop.precision import exact
