@@ -22,7 +22,7 @@ from heavytop.claims.evaluate import evaluate
 from heavytop.claims.proof import Condition
 from heavytop.claims.prover import Prover
 from heavytop.claims.rational import Quotient
-from heavytop.claims.signs import Unprovable
+from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import Formulas, Setting, Statement
 from heavytop.exact.balls import radius as radius_of
 from heavytop.exact.balls import radius_text, value_text
