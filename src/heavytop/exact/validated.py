@@ -216,6 +216,15 @@ class Validated:
         """
         return self._enclosure(time, bits, self.start.flat)
 
+    def cost(self, time: Fraction, bits: int) -> float:
+        """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock."""
+        if time == 0:
+            return 0.0
+        direction, start = (1 if time > 0 else -1), self.start.flat
+        motion = self._motion(direction, start)
+        loss, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start)
+        return steps * _seconds_a_step(*motion.precision(bits + loss + 8, steps))
+
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
         """ξ: three balls.  Raises InputError where |γ| is not 1 exactly and no ``xi`` was given."""
         xi = self.xi
