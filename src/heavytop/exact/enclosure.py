@@ -44,10 +44,10 @@ from flint import arb, fmpz
 from gmpy2 import mpz
 
 from heavytop.exact.quadratic import Matrix, Quadratic
-from heavytop.exact.recurrence import coefficients
 from heavytop.exact.step_series import StepSeries, Whole
 from heavytop.words.proven import Carrier
 from heavytop.words.variation import variation as variation_of
+from heavytop.words.whole_series import coefficients
 
 _UNIT = 2.0**-53
 # relative room for the rounding of every bound below: each is a sum or product of a few hundred terms of one sign

@@ -57,7 +57,7 @@ class StepSeries(Protocol):
 
 @dataclass(frozen=True)
 class Whole:
-    """Coefficients of :func:`heavytop.exact.recurrence.coefficients`, each rounded to nearest."""
+    """Coefficients of :func:`heavytop.words.whole_series.coefficients`, each rounded to nearest."""
 
     values: list[list[int]]
     precision: int

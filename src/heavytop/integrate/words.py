@@ -49,8 +49,7 @@ def propagate_words(
     tolerance: the local error aimed at, relative to the state; None for what the format can show.
     The other arguments and what is raised: as in :func:`heavytop.integrate.taylor.propagate`.
 
-    Raises InputError for a tolerance that is not positive and below 1, and for formats and data that need more words
-    than there are.  A failed run is an outcome, not an exception.
+    Raises InputError for a tolerance that is not positive and below 1.  A failed run is an outcome, not an exception.
     """
     problem = Problem.of(top, start, require(precision), system, xi)
     targets = [number(time, precision) for time in check_times(times)]

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from math import ceil
 from typing import Any
 
 from flint import arb
@@ -19,7 +20,7 @@ from heavytop.exact.balls import ball, midpoint, radius, radius_text, working_pr
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.integrate.words import follow
-from heavytop.integrate.words_engines import Arithmetic, Words, choose
+from heavytop.integrate.words_engines import Arithmetic, DoubleDouble, choose
 from heavytop.precision import Precision, exact, number, real
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -31,11 +32,12 @@ EFFORT = 60.0
 """Seconds of the model of the cost that each run may take; absurd starts and times would take for ever."""
 _MOST_STEPS = 10**8
 _SEARCH = 8
+_WORD_BITS = 1032
 
 
 def seconds_a_step(bits: int) -> float:
     """A model of the cost of a step in so many bits, not a measurement: no result depends on a clock."""
-    return 3e-6 + 4e-12 * bits**3
+    return 3e-6 + 4e-12 * bits**3 if bits <= _WORD_BITS else 6e-8 * bits**2
 
 
 class ComputedReference:
@@ -107,9 +109,10 @@ def _bits(arithmetic: Arithmetic) -> int:
 
 
 def _accuracy(arithmetic: Arithmetic) -> int:
-    """On a grid, all its bits but a few; else what the local error aims at."""
-    aim = arithmetic.tolerance
-    return _bits(arithmetic) - _SEARCH if isinstance(arithmetic, Words) else (1 / aim).__ceil__().bit_length() - 1
+    """What the local error of double-double aims at; else all bits but a few."""
+    if isinstance(arithmetic, DoubleDouble):
+        return ceil(1 / arithmetic.tolerance).bit_length() - 1
+    return _bits(arithmetic) - _SEARCH
 
 
 def _run(problem: Problem, times: Sequence[Fraction], words: int) -> Trajectory:
