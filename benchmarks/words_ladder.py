@@ -30,21 +30,22 @@ def format_of(bits: int) -> Precision:
     return next((precision for precision in FORMATS if precision.bits == bits), None) or real(bits)
 
 
-def cost(problem: Problem, run, rounds: int) -> float:
-    """Seconds a unit of time: the median of turns of about a tenth of a second."""
-    span = Fraction(1, 4)
-    first = run(problem, None, span)
-    span = max(span, Fraction(min(1000, int(4 * _TURN / first)), 4))
-    return median(run(problem, None, span) for _ in range(rounds))
+def span_of(problem: Problem, run) -> Fraction:
+    """Units of time that take about a tenth of a second."""
+    short = Fraction(1, 4)
+    run(problem, None, short)
+    return max(short, Fraction(min(4000, int(4 * _TURN / run(problem, None, short))), 4))
 
 
 def measured(bits: int, rounds: int) -> tuple[float, float | None]:
-    """Microseconds a unit of time of the Kovalevskaya top, by words and by heyoka."""
+    """Microseconds a unit of time of the Kovalevskaya top, by words and by heyoka: medians of turns."""
     precision = format_of(bits)
     problem = Problem.of(*MOTIONS["kovalevskaya"], precision)
-    ours = cost(problem, by_words, rounds)
-    theirs = None if precision.family == "double-double" else cost(problem, by_heyoka, rounds)
-    return ours * 1e6, None if theirs is None else theirs * 1e6
+    runs = [by_words] if precision.family == "double-double" else [by_words, by_heyoka]
+    spans = [span_of(problem, run) for run in runs]
+    turns = [[run(problem, None, span) * 1e6 for run, span in zip(runs, spans, strict=True)] for _ in range(rounds)]
+    ours, *theirs = (median(column) for column in zip(*turns, strict=True))
+    return ours, theirs[0] if theirs else None
 
 
 def draw(rows: list[tuple[int, float, float | None]], out: Path) -> None:
