@@ -31,15 +31,15 @@ def test_the_truth_is_proven_up_to_100_and_beyond_where_that_is_cheap() -> None:
     problem = Problem.of(CHAOTIC, START, DOUBLE)
     for horizon in (30, 120):
         found = truth(problem, times(horizon))
-        assert found.kind == "proven"
+        assert found.against.how == "proven"
         assert found.ends is None
-        assert found.text.startswith("known: validated")
+        assert found.against.text.startswith("known: validated")
 
 
 def test_a_closed_form_is_proven_at_any_time() -> None:
     found = truth(Problem.of(EULER, START, QUAD), times(10**5, 3))
-    assert found.kind == "proven"
-    assert "Euler" in found.text
+    assert found.against.how == "proven"
+    assert "Euler" in found.against.text
 
 
 def test_the_gyrostat_takes_the_rotor_of_the_problem() -> None:
@@ -56,10 +56,10 @@ def test_what_is_too_dear_to_prove_is_computed_and_right(monkeypatch: pytest.Mon
     monkeypatch.setattr(truths, "CHEAP", 0.0)
     problem = Problem.of(CHAOTIC, START, DOUBLE)
     found = truth(problem, times(120, 2))
-    assert found.kind == "computed"
+    assert found.against.how == "computed"
     assert found.ends is None
-    assert "words of 106 and 138 bits agree within" in found.text
-    assert "no closed form, and no enclosure beyond" in found.text
+    assert "words of 106 and 138 bits agree within" in found.against.text
+    assert "no closed form, and no enclosure beyond" in found.against.text
     proven = Validated(problem.top, problem.start)
     for time in times(120, 2):
         for value, true in zip(found.state(time), proven.state(time, 120), strict=True):
@@ -70,10 +70,10 @@ def test_what_is_too_dear_to_prove_is_computed_and_right(monkeypatch: pytest.Mon
 def test_the_truth_of_a_chaotic_row_ends_where_its_format_has_no_digit_left() -> None:
     problem = Problem.of(CHAOTIC, START, DOUBLE)
     found = truth(problem, times(1200, 12))
-    assert found.kind == "computed"
+    assert found.against.how == "computed"
     assert found.ends is not None
     assert Fraction(200) <= found.ends <= Fraction(600)
-    assert f"no digit is left from t = {found.ends} on" in found.text
+    assert f"no digit is left from t = {found.ends} on" in found.against.text
     with pytest.raises(OutOfReach, match=f"from t = {found.ends} on"):
         found.state(Fraction(1200))
     assert found.state(Fraction(100))
@@ -98,7 +98,7 @@ def test_the_choice_and_the_text_are_the_same_however_busy_the_machine_is(monkey
     monkeypatch.setattr("time.perf_counter", lambda: 0.0)
     monkeypatch.setattr("time.process_time", lambda: 0.0)
     again = truth(problem, times(130, 2))
-    assert (first.kind, first.text, first.ends) == (again.kind, again.text, again.ends)
+    assert (first.against, first.ends) == (again.against, again.ends)
     costs = [Validated(CHAOTIC, START).cost(Fraction(t), 117) for t in (0, 50, 200, 800)]
     assert costs == sorted(costs)
     assert costs[0] == 0

@@ -12,8 +12,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Literal, Protocol
+from typing import Protocol
 
+import msgspec
 from flint import arb
 
 from heavytop.errors import InputError, OutOfReach
@@ -21,6 +22,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.measure.computed_reference import MORE_BITS, ComputedReference
 from heavytop.measure.known import Known, known_motion
 from heavytop.precision import shown
+from heavytop.records import Against
 
 CHEAP = 1.0
 """Seconds of the model of the cost that the enclosure of a row may take beyond |t| = 100."""
@@ -37,12 +39,11 @@ class Balls(Protocol):
 class Truth:
     """The states of a row at its times.
 
-    kind: ``proven`` or ``computed``.  text: method, radius or agreement, for the row.
+    against: how it is known, proven or computed, by which method and to which radius or agreement, for the row.
     ends: the first time at which the format has no digit left; None where it keeps one to the last.
     """
 
-    kind: Literal["proven", "computed"]
-    text: str
+    against: Against
     bits: int
     source: Balls = field(repr=False)
     ends: Fraction | None = None
@@ -63,18 +64,16 @@ def truth(problem: Problem, times: Sequence[Fraction]) -> Truth:
     horizon = max(times, key=abs)
     known = known_motion(problem, horizon, CHEAP)
     if isinstance(known, Known):
-        return Truth("proven", known.text, known.bits, known.solution)
+        return Truth(known.against, known.bits, known.solution)
     try:
         computed = ComputedReference.of(problem, times, problem.precision.bits + MORE_BITS)
     except InputError as error:
         raise OutOfReach(f"{known}; {error.cause}", error.remedy) from error
     ends = last_digit(computed, times, problem.precision.bits)
-    if ends is None:
-        text = computed.method
-    else:
-        before = [time for time in times if abs(time) < abs(ends)]
-        text = f"{computed.text(before)}, and no digit is left from t = {shown(ends)} on"
-    return Truth("computed", f"{text} ({known})", computed.bits, computed, ends)
+    before = times if ends is None else [time for time in times if abs(time) < abs(ends)]
+    until = "" if ends is None else shown(ends)
+    against = msgspec.structs.replace(computed.against_at(before), until=until, reason=str(known))
+    return Truth(against, computed.bits, computed, ends)
 
 
 def last_digit(computed: ComputedReference, times: Sequence[Fraction], bits: int) -> Fraction | None:
