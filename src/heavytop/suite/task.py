@@ -51,11 +51,15 @@ class Task:
         """Seconds it may take, roughly: for the progress bar and for running long ones first."""
         if not self.precision:
             return 5.0
-        bits = parse(self.precision).bits
-        per_step = 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5
+        per_step = seconds_a_step(parse(self.precision).bits)
         if self.kind == "local_error":
             return 1.0 + 0.2 * float(self.times[-1])
         seconds = float(abs(self.times[-1])) * 4 * per_step + len(self.times) * 1e-4
         if self.ensemble is not None:
             return 5.0 + self.ensemble.starts * seconds / 2
         return (3.0 if self.kind == "drift" else 1.0) + seconds
+
+
+def seconds_a_step(bits: int) -> float:
+    """Seconds that one step of heyoka takes in a format of so many bits, roughly."""
+    return 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5
