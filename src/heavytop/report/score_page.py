@@ -40,7 +40,7 @@ def digits_lost(row: Row) -> Section | None:
             f"Digits lost: log10 of the error in units of ε = 2^(1 − bits) of {row.precision}, of its part along the "
             "flow (phase) and of its part across it. The axis ends where the format has no digit left."
         ],
-        columns=["t", *_PARTS.values()],
+        columns=["t", *_PARTS],
     )
     axes = new_axes(TIME, "digits lost", 3.2)
     epsilon = (1 - row.bits) * math.log10(2)
@@ -58,7 +58,7 @@ def digits_lost(row: Row) -> Section | None:
     axes.axhline(most, color="#555555", lw=0.9, ls=(0, (4, 3)))
     decades(axes.xaxis)
     section.rows = _table(row, epsilon)
-    section.notes.append(f"Dashed: all {most:.1f} digits of {row.precision} are lost.")
+    section.notes.append(f"Dashed: all {most:.0f} digits of {row.precision} are lost.")
     section.pictures.append(finish(axes, "Digits lost over time", spoken(heard), "lost"))
     return section
 

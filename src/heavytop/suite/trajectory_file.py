@@ -32,8 +32,9 @@ from heavytop.precision import (
 from heavytop.suite import written_numbers
 from heavytop.suite.cases import Case
 from heavytop.suite.files import read_whole, without_repeats
+from heavytop.suite.trajectory_case import require_case
 from heavytop.suite.trajectory_table import REMEDY, VECTORS, Table, unknown
-from heavytop.top.equations import NAMES, VARIABLES, System, system
+from heavytop.top.equations import VARIABLES, System, system
 from heavytop.top.heavy_top import HeavyTop, State, dot, require_physical
 from heavytop.top.times import check_times
 
@@ -159,8 +160,10 @@ def _given(document: dict[str, Any], stem: str, sha256: str, case: Case | None, 
     top, at_start = _top(document, case), _row_of_start(document)
     start = _start(document, case, at_start)
     times = check_times([written_numbers.finite(value, "a time") for value in _list(document, "times")])
+    if not any(times):
+        raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
     if case is not None:
-        _require_case(case, top, start, which, at_start)
+        require_case(case, top, start, which, at_start)
     require_physical(top, start)
     rows = _list(document, "states")
     _require_states(times, rows)
@@ -230,32 +233,6 @@ def _row_of_start(document: dict[str, Any]) -> State | None:
     values = [written_numbers.number(value, "a component of a state") for value in rows[0]]
     found = [value for value in values if value is not None]
     return State(found[:3], found[3:]) if len(found) == 6 else None
-
-
-def _require_case(case: Case, top: HeavyTop, start: State, which: System, at_start: State | None) -> None:
-    """Raises InputError where the file says something else than the case."""
-    said: list[tuple[str, Any, Any]] = [("system", which.name, case.system.name)]
-    said += [("weight", top.weight, case.top.weight)]
-    said += [(f"I{i}", new, old) for i, (new, old) in enumerate(zip(top.inertia, case.top.inertia, strict=True), 1)]
-    said += [
-        (f"{name} of the centre", new, old) for name, new, old in zip("abc", top.centre, case.top.centre, strict=True)
-    ]
-    said += [(name, new, old) for name, new, old in zip(NAMES, start.flat, case.start.flat, strict=True)]
-    if at_start is not None:
-        rows = zip(NAMES, at_start.flat, case.start.flat, strict=True)
-        said += [(f"{name} of the row t = 0", new, old) for name, new, old in rows]
-    for what, new, old in said:
-        if new != old and (isinstance(new, str) or not _rounded_alike(new, old)):
-            texts = [value if isinstance(value, str) else shown(value) for value in (new, old)]
-            raise InputError(
-                f"The file says {what} = {texts[0]}, but in the case {case.name} it is {texts[1]}.",
-                f"`heavytop list --case {case.name}` shows the data; leave --case out to score the file by its own.",
-            )
-
-
-def _rounded_alike(new: Fraction, old: Fraction) -> bool:
-    """Whether a number is the other one, rounded to three digits or more."""
-    return abs(new - old) <= max(abs(old), Fraction(1)) * Fraction(1, 1000)
 
 
 def of_arrays(
