@@ -8,7 +8,11 @@ from typing import Annotated
 import typer
 
 from heavytop.cli.app import Json, command, print_json, require_new, show_on_terminal
+from heavytop.cli.progress import counted, followed, waiting
 from heavytop.errors import InputError
+
+_AUDIT_SECONDS, _FIGURE_SECONDS = 6.0, 1.0
+"""Expected, for the time left: of an audit, and of each figure."""
 
 
 @command
@@ -19,10 +23,16 @@ def audit(
     json: Json = False,
 ) -> int:
     """Prove or refute a motion, equation by equation: exit 0 if all hold, 1 if one is refuted, 3 if undecided."""
+    from heavytop.claims.audit import PAPER, only_branch
     from heavytop.claims.audit import audit as audit_named
-    from heavytop.claims.audit import only_branch
+    from heavytop.claims.guard import SECONDS
 
-    report = audit_named(claim, system)
+    if claim in PAPER:
+        with followed(f"audit of {claim}", "equations", _AUDIT_SECONDS) as progress:
+            report = audit_named(claim, system, progress)
+    else:
+        with waiting(f"audit of {claim}", SECONDS):
+            report = audit_named(claim, system)
     if branch is not None:
         report = only_branch(report, branch)
     if json:
@@ -51,9 +61,10 @@ def figures(
 
 def _drawn(out: Path, report: Path | None) -> list[Path]:
     if report is None:
-        from heavytop.report.figures import draw_figures
+        from heavytop.report.figures import FIGURES, draw_figures
 
-        return draw_figures(out)
+        with counted("figures", FIGURES, "figures", _FIGURE_SECONDS) as advance:
+            return draw_figures(out, advance)
     from heavytop.report import store
     from heavytop.report.work_precision_figure import draw_work_precision
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal
+from heavytop.cli.progress import watched
 from heavytop.errors import InputError
 
 Inertia = Annotated[str, typer.Option(help="Principal moments A,B,C at the fixed point.")]
@@ -19,6 +20,8 @@ Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly
 SystemName = Annotated[str, typer.Option(help="heavy_top or gyrostat.")]
 Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]
 
+_REFERENCE_SECONDS = 30.0
+"""Expected of an enclosure, before anything is known of it."""
 _SLOW_BITS = 2000
 """From here on a single step takes seconds, and about 20 times as long with twice the bits."""
 
@@ -95,7 +98,10 @@ def reference(
     from heavytop.top.times import check_times
 
     top, start = _motion(inertia, weight, centre, omega, gamma, normalize, of_any_size=True)
-    found = proven(top, start, check_times(numbers(times)), digits, system_named(system), attitude=attitude)
+    instants = check_times(numbers(times))
+    watch = _Watch([abs(time) for time in instants])
+    with watched("reference", watch.fraction, _REFERENCE_SECONDS):
+        found = proven(top, start, instants, digits, system_named(system), watch.find, attitude)
     if json:
         print_json(found)
     else:
@@ -103,6 +109,26 @@ def reference(
 
         show_on_terminal(reference_text(found))
     return 0
+
+
+class _Watch:
+    """How far a reference has come: a closed form takes no time to speak of, an enclosure goes from 0 to each time."""
+
+    def __init__(self, spans: list[Any]) -> None:
+        self.last = max(spans)
+        self.solution: Any = None
+
+    def find(self, top: Any, start: Any, system: Any) -> Any:
+        """The known motion, which is watched from now on."""
+        from heavytop.exact.catalogue import find
+
+        self.solution = find(top, start, system)
+        return self.solution
+
+    def fraction(self) -> float:
+        """Part of the span that is enclosed."""
+        reached = getattr(self.solution, "reached", None)
+        return float(reached() / self.last) if reached is not None and self.last else 0.0
 
 
 def _motion(

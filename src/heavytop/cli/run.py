@@ -49,7 +49,7 @@ def run(
         print(f"\nReport: {directory / REPORT} (was finished already)")
         return 0 if ended.good else 3
     try:
-        with _stopped_by_signals(), Progress(asked.tasks) as advance:
+        with _stopped_by_signals(), Progress(asked.tasks, asked.workers) as advance:
             ended = asked.measure(advance)
     except KeyboardInterrupt as stop:
         print(f"heavytop: interrupted; finished rows are kept: --out {directory} --resume goes on", file=sys.stderr)

@@ -23,8 +23,9 @@ def selftest(
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     tasks = detectors.tasks()
-    with Progress(tasks) as advance:
-        trials = detectors.trials(tasks, workers or os.cpu_count() or 1, advance)
+    at_once = workers or os.cpu_count() or 1
+    with Progress(tasks, at_once) as advance:
+        trials = detectors.trials(tasks, at_once, advance)
     if json:
         print_json({"trials": [trial.to_json() for trial in trials]})
     else:

@@ -5,9 +5,10 @@ matplotlib is drawn without a display and without a date, so that the same progr
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,16 +42,25 @@ _BRANCHES: dict[Branch, str] = {"printed": "as printed", "smooth": "smooth branc
 _LINES: dict[Branch, tuple[str, Any]] = {"printed": (VERMILION, (0, (1, 1))), "smooth": (GREEN, "-.")}
 
 
-def draw_figures(directory: Path) -> list[Path]:
-    """The files written into ``directory``: each figure as SVG and as PNG (at least 800 px wide)."""
+FIGURES = len(PAPER_FIGURES) + len(RATIOS) + 1
+
+
+def draw_figures(directory: Path, progress: Callable[[], None] = lambda: None) -> list[Path]:
+    """The files written into ``directory``: each figure as SVG and as PNG (at least 800 px wide).
+
+    progress: called after each of the :data:`FIGURES` figures.
+    """
     directory.mkdir(parents=True, exist_ok=True)
+    drawings: list[tuple[str, Callable[[], Any]]] = [
+        *((f"fig{figure.number}", partial(_paper_figure, figure)) for figure in PAPER_FIGURES),
+        *((f"truth-ratio{ratio}", partial(_comparison, ratio)) for ratio in RATIOS),
+        ("momentum-sphere", _portrait),
+    ]
     files: list[Path] = []
     with _quiet_style():
-        for figure in PAPER_FIGURES:
-            files += _save(_paper_figure(figure), directory / f"fig{figure.number}")
-        for ratio in RATIOS:
-            files += _save(_comparison(ratio), directory / f"truth-ratio{ratio}")
-        files += _save(_portrait(), directory / "momentum-sphere")
+        for name, draw in drawings:
+            files += _save(draw(), directory / name)
+            progress()
     return files
 
 
