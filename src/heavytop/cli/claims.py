@@ -22,7 +22,11 @@ def audit(
     branch: Annotated[str | None, typer.Option(help="smooth or printed: that branch alone.")] = None,
     json: Json = False,
 ) -> int:
-    """Prove or refute a motion, equation by equation: exit 0 if all hold, 1 if one is refuted, 3 if undecided."""
+    """Prove or refute a claimed motion, by equation.
+
+    Exit 0 if all equations hold, 1 if one is refuted, 3 if none is refuted but one is undecided.  Takes 5 to 20
+    seconds.
+    """
     from heavytop.claims.audit import PAPER, only_branch
     from heavytop.claims.audit import audit as audit_named
     from heavytop.claims.guard import SECONDS
@@ -49,7 +53,11 @@ def figures(
     out: Annotated[Path, typer.Option(help="Folder for the pictures.")],
     report: Annotated[Path | None, typer.Option(help="Draw work against precision of this report instead.")] = None,
 ) -> int:
-    """Draw Figs 2-8 of the paper, and the same with the true motion beside the claim, as SVG and PNG."""
+    """Draw Figs 2-8 of the paper, and the true motion.
+
+    The true motion beside the claim, all as SVG and PNG.  Takes about 20 seconds.
+    """
+    out = out.absolute()
     require_new(out)
     try:
         for file in _drawn(out, report):

@@ -16,7 +16,7 @@ def list_(
     case: Annotated[str | None, typer.Option(help="Show the data of that case, ready to paste.")] = None,
     json: Json = False,
 ) -> int:
-    """List cases, plans, formats, integrators; a case's data."""
+    """List cases, plans, formats and integrators."""
     if case is not None:
         return _one_case(case, json)
     listed = _everything()

@@ -42,9 +42,10 @@ def propagate(
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
     json: Json = False,
 ) -> int:
-    """Integrate one motion of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ and print its states.
+    """Integrate one motion and print its states.
 
-    γ points up: the energy is ½ Ω·M + P r·γ.  Numbers are exact: 3, 0.25, 1e-3, -2/5.
+    The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up: the energy is ½ Ω·M + P r·γ.
+    Numbers are exact: 3, 0.25, 1e-3, -2/5.
     """
     from heavytop import precision as formats
     from heavytop.top.equations import system as system_named
@@ -89,9 +90,10 @@ def reference(
     normalize: Normalize = False,
     json: Json = False,
 ) -> int:
-    """Print proven states: a closed form where there is one, else a validated enclosure.
+    """Print proven states of one motion.
 
-    The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
+    By a closed form where there is one, at once; else by a validated enclosure: seconds up to t = 100, half a minute up
+    to t = 1000.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
     """
     from heavytop.measure.reference import reference as proven
     from heavytop.top.equations import system as system_named

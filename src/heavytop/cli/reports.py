@@ -25,7 +25,10 @@ def compare(
     html: Annotated[Path | None, typer.Option(help="Write a page that draws both on the same axes.")] = None,
     json: Json = False,
 ) -> int:
-    """Compare two reports: exit 1 if anything is worse, 3 if anything is missing or incomparable, else 0."""
+    """Compare two reports; exit 1 if anything is worse.
+
+    Else exit 3 if anything is missing or incomparable, else 0.
+    """
     from heavytop.report import store
     from heavytop.report.compare import compare as compare_reports
 
@@ -67,7 +70,7 @@ def history(
     svg: Annotated[Path | None, typer.Option(help="Draw the metrics shown over the reports.")] = None,
     json: Json = False,
 ) -> int:
-    """Show metrics over two reports or more, with every step marked."""
+    """Show metrics over reports, with every step marked."""
     from heavytop.report import history as over
     from heavytop.report import store
     from heavytop.report.policy import glob
@@ -117,7 +120,10 @@ def show(
     html: Annotated[Path | None, typer.Option(help="Write the report as a page to that file instead.")] = None,
     parquet: Annotated[Path | None, typer.Option(help="Write its rows to that file instead.")] = None,
 ) -> int:
-    """Print the summary of a report, or write it as one self-contained page, or its rows as a table."""
+    """Print the summary of a report, or write its page.
+
+    The page is one self-contained file; --parquet writes the rows as a table instead.
+    """
     from heavytop.report import overview, store, text
     from heavytop.report import parquet as tables
     from heavytop.suite.files import whole

@@ -26,13 +26,18 @@ def run(
     seed: Annotated[int, typer.Option(help="Measure the same motions with other roundings: 0 to 1000.")] = 0,
     save_every: Annotated[float, typer.Option(help="Seconds after which a long row saves its place.", min=0)] = 10.0,
 ) -> int:
-    """Run a plan of measurements; write DIR/report.json and DIR/report.html."""
+    """Run a plan of measurements and write its report.
+
+    It goes to DIR/report.json and DIR/report.html.  On two cores smoke takes about 20 seconds, default a minute or two,
+    peers and growth a few minutes, long an hour.
+    """
     from heavytop.report.run_folder import PAGE, prepare
     from heavytop.report.store import FILE as REPORT
 
     asked = prepare(
         plan,
-        out,
+        # whatever an integrator does to the working directory
+        None if out is None else out.absolute(),
         resume=resume,
         workers=workers,
         scheduler=scheduler,

@@ -17,7 +17,10 @@ def selftest(
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
     json: Json = False,
 ) -> int:
-    """Try the suite's detectors on broken integrators: exit 1 if a fault they should see slips through."""
+    """Try the detectors on integrators broken on purpose.
+
+    Exit 1 if a fault they should see slips through.  Takes about five minutes on two cores.
+    """
     from heavytop.report import selftest as detectors
 
     if workers is not None and workers < 1:

@@ -148,7 +148,7 @@ def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Sc
         raise InputError(
             f"{precision.name} from this start needs {bits} bits, more than the {grid_of(MOST_WORDS).total} that "
             "the integrator words has.",
-            "Use fewer bits, or --integrator heyoka.",
+            "Use fewer bits, or the integrator heyoka.",
         )
     return Words(wanted, grid), scaled
 

@@ -29,7 +29,7 @@ def require_case(case: Case, top: HeavyTop, start: State, which: System, at_star
             texts = [value if isinstance(value, str) else _briefly(value) for value in (new, old)]
             raise InputError(
                 f"The file says {what} = {texts[0]}, but in the case {case.name} it is {texts[1]}.",
-                f"`heavytop list --case {case.name}` shows the data; leave --case out to score the file by its own.",
+                f"`heavytop list --case {case.name}` shows the data; without a case the file is scored by its own.",
             )
 
 
