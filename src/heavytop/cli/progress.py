@@ -134,9 +134,9 @@ def counted(label: str, count: int, unit: str, expected: float) -> Iterator[Call
     with Bar(Estimator(count, expected), count, unit) as bar, _watched(bar, label):
 
         def advance() -> None:
+            # drawn by the thread that looks twice a second: there may be very many parts
             bar.finished += 1
             bar.estimator.advance(1)
-            bar.show(label)
 
         yield advance
 

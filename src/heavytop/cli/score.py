@@ -9,7 +9,11 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, command, print_json, require_new, show_on_terminal
+from heavytop.cli.progress import counted
 from heavytop.errors import InputError
+
+_STATE_SECONDS = 1e-3
+"""Expected of comparing one state."""
 
 
 @command
@@ -35,7 +39,8 @@ def score(
     given = read(trajectory, None if case is None else case_named(case))
     for warning in given.warnings():
         print(f"heavytop: warning: {warning}", file=sys.stderr)
-    found = assess(given)
+    with counted("score", 2 * len(given.times), "states", _STATE_SECONDS) as advance:
+        found = assess(given, advance)
     if out is not None:
         _write_report(found.row, given.sha256, out)
     if html is not None:

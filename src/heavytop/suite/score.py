@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Assessment", "Peer", "assess", "complete", "digits_kept", "score"]
 
+Progress = Callable[[], None]
 PEER = "heyoka"
 _EFFORT = 20.0
 """Seconds that the run of heyoka beside the scored one may take, roughly."""
@@ -100,16 +102,19 @@ def score(given: Given) -> Row:
     return _scored(given)[0]
 
 
-def assess(given: Given) -> Assessment:
-    """The row of :func:`score`, heyoka beside it, and what explains the error."""
-    row, scorer = _scored(given)
+def assess(given: Given, progress: Progress = lambda: None) -> Assessment:
+    """The row of :func:`score`, heyoka beside it, and what explains the error.
+
+    progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
+    """
+    row, scorer = _scored(given, progress)
     states = _finite(given)
     times = given.times[: len(states)]
     diagnoses = diagnose(given.top, given.start, given.system, times, states, given.precision, _size(row))
-    return Assessment(row, _peer(given, scorer, len(states)), diagnoses, given.format_guessed)
+    return Assessment(row, _peer(given, scorer, len(states), progress), diagnoses, given.format_guessed)
 
 
-def _scored(given: Given) -> tuple[Row, Scorer]:
+def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Scorer]:
     precision = given.precision
     problem = Problem.of(given.top, given.start, precision, given.system)
     states = _finite(given)
@@ -121,6 +126,7 @@ def _scored(given: Given) -> tuple[Row, Scorer]:
         scorer.error.known = cast("ExactSolution", _Remembering(scorer.error.known))
     for time, state in zip(times, states, strict=False):
         scorer(time, state)
+        progress()
     run = Trajectory(
         problem,
         given.integrator,
@@ -168,7 +174,7 @@ class _Measured:
     metrics: dict[str, Metric]
 
 
-def _peer(given: Given, scorer: Scorer, count: int) -> Peer | None:
+def _peer(given: Given, scorer: Scorer, count: int, progress: Progress) -> Peer | None:
     """heyoka's own run over the same times, compared with the same known motion."""
     precision = given.precision
     if scorer.error is None or not count or precision == DOUBLE_DOUBLE:
@@ -176,8 +182,15 @@ def _peer(given: Given, scorer: Scorer, count: int) -> Peer | None:
     error = SolutionError(Problem.of(given.top, given.start, precision, given.system), scorer.error.known)
     limit = max(1, int(_EFFORT / seconds_a_step(precision.bits)))
     times = given.times[:count]
+
+    def observe(time: Fraction, state: Any) -> None:
+        error(time, state)
+        progress()
+
     try:
-        run = propagate(given.top, given.start, times, precision, system=given.system, step_limit=limit, observer=error)
+        run = propagate(
+            given.top, given.start, times, precision, system=given.system, step_limit=limit, observer=observe
+        )
     except HeavyTopError:  # a format that this platform lacks, or numbers outside its range
         return None
     digits = digits_kept(_Measured(precision.bits, error.metrics()))

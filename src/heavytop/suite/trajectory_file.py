@@ -49,6 +49,8 @@ _NAME = 200
 _MOST = 100_000
 _FITS_ANYWHERE = 1 << 1023
 """Every format holds numbers below that."""
+_SMALLEST, _LARGEST = Fraction(1, 1 << 1000), 1 << 1000
+"""Between them a double has all its bits."""
 _SLACK = 8
 """γ may be off the unit sphere by so many bits of rounding."""
 _ROW_SLACK = Fraction(1, 100)
@@ -330,9 +332,16 @@ def _integer(value: Any, what: str) -> int:
 
 def _state(values: list[Fraction | None], precision: Precision) -> tuple[Fraction, ...] | None:
     """The numbers rounded to the format; None where one is not finite there, as 1e400 in double."""
-    found = tuple(round_to(value, precision.bits) for value in values if value is not None)
+    found = tuple(_rounded(value, precision) for value in values if value is not None)
     finite = len(found) == len(values) and all(_fits(value, precision) for value in found)
     return found if finite else None
+
+
+def _rounded(value: Fraction, precision: Precision) -> Fraction:
+    """As :func:`heavytop.precision.round_to`; the processor's own rounding where it does the same."""
+    if precision is DOUBLE and _SMALLEST <= abs(value) < _LARGEST:
+        return Fraction(float(value))
+    return round_to(value, precision.bits)
 
 
 def _fits(value: Fraction, precision: Precision) -> bool:

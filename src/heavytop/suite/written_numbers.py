@@ -24,6 +24,8 @@ _HEX = re.compile(r"([+-]?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)\.?([0-9a-fA-F]*
 _NOT_FINITE = re.compile(r"[+-]?(nan(\([^)]*\))?|inf|infinity|1\.?#(inf|ind|qnan|snan)\d*)", re.IGNORECASE)
 _FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[dDqQ]|(?=[+-]\d{3,}$))([+-]?\d+)")
 """1.5D+00, 1.5Q+00, and 1.5-101, where there was no room for the letter."""
+_PLAIN = re.compile(r"[+-]?\d{1,40}(\.\d{0,40})?([eE][+-]?\d{1,3})?")
+"""Most numbers; none of them is beyond what is read."""
 _WIDEST = 20_000
 """Exponents of 2 in a file, up to that: quad has 16,384, and powers of what is larger take minutes."""
 _REMEDY = "docs/score.md shows both forms of the file."
@@ -36,6 +38,8 @@ def number(value: Any, what: str) -> Fraction | None:
     if not isinstance(value, str):
         raise InputError(f"{what} is a {type(value).__name__}, not a number.", _REMEDY)
     text = value.strip()
+    if _PLAIN.fullmatch(text):
+        return exact(text)
     if _NOT_FINITE.fullmatch(text):
         return None
     hexadecimal, fortran = _HEX.fullmatch(text), _FORTRAN.fullmatch(text)
@@ -83,9 +87,9 @@ def bits_of(text: str) -> int:
 
 
 def _bits(text: str) -> int:
-    value = number(text, "a component of a state")
-    if _HEX.fullmatch(text.strip()) and value:
-        return (value.numerator // (value.numerator & -value.numerator)).bit_length()
+    if _HEX.fullmatch(text.strip()):
+        value = number(text, "a component of a state") or Fraction(0)
+        return (value.numerator // (value.numerator & -value.numerator)).bit_length() if value else 0
     digits = digits_written(text)
     return next((form.bits for form in (DOUBLE, EXTENDED, QUAD) if digits <= form.digits), 0) or int(
         (digits - 1) / math.log10(2)
