@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from heavytop.measure.diagnosis import Diagnosis
+from heavytop.measure.suspects import FLOOR
 from heavytop.report.text import short
 
 _SENTENCES = {
@@ -40,7 +41,7 @@ def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
 
 
 def _size(value: float) -> str:
-    return short(f"{value:.2e}", 2)
+    return short(f"{value:.2e}", 2) if value >= FLOOR else f"less than {FLOOR:.0e}"
 
 
 def _said(found: Diagnosis, system: str) -> str:
