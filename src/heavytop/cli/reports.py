@@ -25,7 +25,10 @@ def compare(
     html: Annotated[Path | None, typer.Option(help="Write a page that draws both on the same axes.")] = None,
     json: Json = False,
 ) -> int:
-    """Compare two reports: exit 1 if anything is worse, 3 if anything is missing or incomparable, else 0."""
+    """Compare two reports; exit 1 if anything is worse.
+
+    Else exit 3 if anything is missing or incomparable, else 0.
+    """
     from heavytop.kinds import KINDS
     from heavytop.report import store
     from heavytop.report.compare import compare as compare_reports
@@ -70,7 +73,7 @@ def history(
     html: Annotated[Path | None, typer.Option(help="Write a page with a small chart a metric.")] = None,
     json: Json = False,
 ) -> int:
-    """Show metrics over two reports or more, with every step marked."""
+    """Show metrics over reports, with every step marked."""
     from heavytop.kinds import KINDS
     from heavytop.report import history as over
     from heavytop.report import store
@@ -127,7 +130,10 @@ def show(
     parquet: Annotated[Path | None, typer.Option(help="Write its rows to that file instead.")] = None,
     full: Annotated[bool, typer.Option("--full", help="Print every row and law.")] = False,
 ) -> int:
-    """Print the summary of a report, or write it as one self-contained page, or its rows as a table."""
+    """Print the summary of a report, or write its page.
+
+    The page is one self-contained file; --parquet writes the rows as a table instead.
+    """
     from heavytop.kinds import KINDS
     from heavytop.report import overview, store, text
     from heavytop.report import parquet as tables

@@ -225,6 +225,11 @@ class Validated:
         loss, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start)
         return steps * _seconds_a_step(*motion.precision(bits + loss + 8, steps))
 
+    def reached(self) -> Fraction:
+        """The |t| up to which the latest enclosure has come, for those who wait; any thread may ask."""
+        latest = next(reversed(list(self._runs.values())), None)
+        return Fraction(0) if latest is None else latest.nodes[-1].time / Fraction(2) ** self.unit
+
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
         """ξ: three balls.  Raises InputError where |γ| is not 1 exactly and no ``xi`` was given."""
         xi = self.xi
