@@ -6,13 +6,14 @@ from pathlib import Path
 import pytest
 
 SOURCE = Path(__file__).parents[1] / "src" / "heavytop"
-GROUND = {"display", "errors", "precision", "processes", "records"}
+GROUND = {"display", "errors", "precision", "processes", "records", "version"}
 MAY_IMPORT = {
     "errors": set(),
     "precision": {"errors"},
     "display": set(),
     "processes": set(),
     "records": set(),
+    "version": set(),
     "top": GROUND,
     "words": GROUND | {"top"},
     "exact": GROUND | {"top", "words"},
