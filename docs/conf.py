@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import heavytop
+from pygments.lexers.special import TextLexer
 
 HERE = Path(__file__).parent
 
@@ -16,6 +17,7 @@ version = release = heavytop.__version__
 
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_nb"]
 exclude_patterns = ["_build", "**.ipynb_checkpoints"]
+toc_object_entries = False
 html_theme = "furo"
 html_title = "heavytop"
 html_theme_options = {"navigation_with_keys": True}
@@ -26,7 +28,7 @@ html_copy_source = False
 default_role = "code"
 pygments_style = "default"
 
-myst_enable_extensions = ["deflist", "colon_fence", "dollarmath", "attrs_block"]
+myst_enable_extensions = ["deflist", "colon_fence", "attrs_block"]
 myst_heading_anchors = 3
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE / "_build" / "notebooks")
@@ -66,3 +68,4 @@ def plain_bars(app: Any, what: str, name: str, thing: Any, options: Any, lines: 
 def setup(app: Any) -> None:
     """Called by Sphinx; before napoleon, whose own markup has bars."""
     app.connect("autodoc-process-docstring", plain_bars, priority=100)
+    app.add_lexer("csv", TextLexer)
