@@ -1,8 +1,8 @@
 """Build the site into docs/_build/html: ``python docs/build.py``.
 
 Every warning is an error, pictures and notebooks are executed, nothing is fetched.  Then every link inside the site is
-followed, and the words of pages, docstrings and messages are looked up among common misspellings.  Ends with exit code 1
-where anything was found.  ``--fresh`` executes notebooks again that have not changed.
+followed, and the words of pages, docstrings and messages are looked up among common misspellings.  Exit code 1 where
+anything was found.  ``--fresh`` executes notebooks again that have not changed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from urllib.parse import unquote, urlsplit
 DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "_build" / "html"
 ROOT = DOCS.parent
-SPELLED = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "results", "examples", "src", "tests", "benchmarks"]
+SPELLED = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "results", "examples", "src", "benchmarks"]
 
 
 class Page(HTMLParser):

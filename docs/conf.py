@@ -6,8 +6,9 @@ import re
 from pathlib import Path
 from typing import Any
 
-import heavytop
 from pygments.lexers.special import TextLexer
+
+import heavytop
 
 HERE = Path(__file__).parent
 

@@ -20,7 +20,7 @@ BEGIN {
     print "# inertia: 2, 2, 1\n# weight: 1\n# centre: 0, 0, 0.5\n# omega: 0.25, -0.5, 1.75\n# gamma: 0.6, 0, 0.8"
     print "t,omega1,omega2,omega3,gamma1,gamma2,gamma3"
     y[1] = 0.25; y[2] = -0.5; y[3] = 1.75; y[4] = 0.6; y[5] = 0; y[6] = 0.8
-    for (n = 1; n <= 50; n++) {
+    for (n = 1; n <= 20; n++) {
         for (s = 0; s < 128; s++) step(1 / 128)
         printf "%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", n, y[1], y[2], y[3], y[4], y[5], y[6]
     }

@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from heavytop.cli import app
+from heavytop.version import commit
 from helpers import VECTORS
 
 COMMAND = [sys.executable, "-m", "heavytop"]

@@ -10,14 +10,15 @@ from pathlib import Path
 
 import pytest
 import typer
-from documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
 
 import heavytop as ht
+from documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
 from heavytop.cli import app
 from heavytop.report import policy
 from heavytop.suite import plan
 
 NOT_CODE = {"text", "{eval-rst}", "{toctree}", "{image}", "{figure}", "{note}", "{include} ../CHANGELOG.md"}
+CELL = "{code-cell} ipython3"
 MOST_LINES = 10
 """Of a picture in the gallery."""
 DOCS = ROOT / "docs"
@@ -34,14 +35,13 @@ def test_the_code_of_a_page_runs(
     environment = folder_like_a_checkout(tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setenv("MPLBACKEND", "Agg")
     names: dict[str, object] = {"__name__": "page"}
     for block in to_run(page):
         where = f"{name(page)}:{block.line}"
         if block.file:
             (tmp_path / block.file).write_text(block.text, "utf-8")
-        if block.language in ("python", "{code-cell} ipython3"):
-            exec(compile(without_options(block.text), where, "exec"), names)
+        if block.language == "python":
+            exec(compile(block.text, where, "exec"), names)
         elif block.language == "sh":
             done = run_shell(block.text, tmp_path, environment)
             assert done.returncode == 0, f"{where}\n{done.stdout}\n{done.stderr}"
@@ -61,8 +61,11 @@ TABLES = (ht.Trajectory, ht.Reference, ht.Score, ht.Report, ht.Comparison, ht.Au
 
 
 def to_run(page: Path) -> list[Block]:
-    """The blocks of code without a reason not to run them; the two commands of the README are run by .ci/run."""
-    found = [block for block in blocks(page) if block.language not in NOT_CODE and not block.not_run]
+    """The blocks of code without a reason not to run them.
+
+    Not here: the two commands of the README, which .ci/run runs, and cells, which run when the site is built.
+    """
+    found = [block for block in blocks(page) if block.language not in NOT_CODE | {CELL} and not block.not_run]
     return [block for block in found if block.language or page.name != "README.md"]
 
 
@@ -92,9 +95,9 @@ def read_toml(text: str, folder: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_every_block_says_what_it_is_and_why_it_is_not_run(page: Path) -> None:
-    known = {"sh", "python", "{code-cell} ipython3", "toml", "json", "csv", *NOT_CODE}
-    for number, block in enumerate(blocks(page)):
-        two_commands = page.name == "README.md" and number == 0
+    known = {"sh", "python", CELL, "toml", "json", "csv", *NOT_CODE}
+    for block in blocks(page):
+        two_commands = page.name == "README.md" and "&& .venv/bin/heavytop run\n" in block.text
         assert two_commands or block.language in known, f"{name(page)}:{block.line}: {block.language!r}"
         assert not block.not_run or len(block.not_run) > 15, "a reason"
     for line in page.read_text("utf-8").splitlines():
@@ -104,7 +107,7 @@ def test_every_block_says_what_it_is_and_why_it_is_not_run(page: Path) -> None:
 def commands(text: str) -> list[str]:
     """Lines that start with the program, without what belongs to the shell."""
     lines = [line.strip().removeprefix(".venv/bin/") for line in text.splitlines()]
-    return [SHELL.split(line)[0].strip() for line in lines if line.startswith("heavytop ")]
+    return [SHELL.split(line)[0].strip() for line in lines if re.match("heavytop [a-z]", line)]
 
 
 SHELL = re.compile(r"\|\||&&|;|>|&$|\s#\s")
@@ -138,7 +141,9 @@ def test_a_block_that_fails_is_seen(tmp_path: Path) -> None:
     for text in ("false\ntrue\n", "true # exit code 1\n", "false | true\n", "heavytop audit none.toml # exit code 3\n"):
         assert run_shell(text, tmp_path, environment).returncode != 0
     page = tmp_path / "page.md"
-    page.write_text("<!-- not run: why -->\n~~~sh\na\n```\n~~~\n<!-- file: b.py -->\n\n```python\nc\n```\n```\nd\n```\n")
+    page.write_text(
+        "<!-- not run: why -->\n~~~sh\na\n```\n~~~\n<!-- file: b.py -->\n\n```python\nc\n```\n```\nd\n```\n"
+    )
     assert blocks(page) == [
         Block(2, "sh", "a\n```\n", "why", ""),
         Block(8, "python", "c\n", "", "b.py"),
@@ -152,11 +157,17 @@ def test_every_public_name_is_in_the_reference_once() -> None:
 
 
 def test_a_picture_of_the_gallery_is_a_few_lines_of_code() -> None:
-    pictures = [block for block in blocks(DOCS / "gallery.md") if block.language.startswith("{code-cell}")]
+    pictures = [block for block in blocks(DOCS / "gallery.md") if block.language == CELL and "plt.show()" in block.text]
     assert len(pictures) >= 8
     for block in pictures:
         lines = [line for line in without_options(block.text).splitlines() if line.strip()]
         assert len(lines) <= MOST_LINES, f"line {block.line}: {len(lines)} lines"
+
+
+def test_the_tutorial_shows_the_example_as_it_is() -> None:
+    shown = [block.text for block in blocks(DOCS / "tutorials" / "gate-my-integrator.md")]
+    for file in ("mine.py", "gate.toml"):
+        assert (ROOT / "examples" / "mine" / file).read_text("utf-8") in shown
 
 
 def test_every_page_is_in_a_table_of_contents() -> None:
