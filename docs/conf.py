@@ -27,6 +27,7 @@ html_css_files = ["site.css"]
 html_show_copyright = False
 html_copy_source = False
 default_role = "code"
+smartquotes = False
 pygments_style = "default"
 
 myst_enable_extensions = ["deflist", "colon_fence", "attrs_block"]
