@@ -10,6 +10,8 @@ import sympy
 from heavytop.claims.algebra import Assumptions, Field
 from heavytop.claims.conditions import Kind, Need, condition, conditions_of, is_exactly_zero
 from heavytop.claims.judge import judge
+from heavytop.claims.proof import Region
+from heavytop.claims.prover import Prover
 from heavytop.claims.regularity import Regularity
 from heavytop.claims.signs import Sign
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
@@ -279,6 +281,25 @@ def test_where_a_derivative_may_have_a_kink_nothing_is_refuted() -> None:
     kink = sympy.sign(sympy.sqrt(2) - sympy.sqrt(T))
     assert verdict(3 + kink, Domain("t>0", 1, (Fraction(2),))) is None
     assert verdict(3 + kink, Domain("t>0", 1, (Fraction(2), Fraction(3)))) is False
+
+
+def test_a_kink_is_no_place_where_a_residual_is_defined() -> None:
+    setting = Setting(T, (P,), ({P: Fraction(2)},))
+    kink = Statement("1", 1, "smooth", ALL, sympy.sign(sympy.sqrt(T + 1) - sympy.sqrt(2)) + T, "")
+    prover = Prover([kink], setting)
+    # at 1 the difference of roots is 0, and only to a ball: nobody knows
+    assert [prover.is_defined(kink, {T: Fraction(t), P: Fraction(2)}) for t in (0, 1, 1 + Fraction(1, 10**100), 2)] == [
+        *(True, False, True, True)
+    ]
+
+
+def test_what_fails_on_the_relations_is_not_removable() -> None:
+    statement = Statement("1", 1, "smooth", ALL, T, "")
+    for relations, expected in (((), True), ((A - 1,), False)):
+        setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(1)},), relations=relations)
+        field = Field(setting.assumptions(0), [A - 1])
+        region = Region(field, setting, statement, list(setting.places(statement)))
+        assert region.is_removable(Need(Kind.NONZERO, A - 1)) is expected
 
 
 def test_what_is_off_by_less_than_a_short_ball_shows_is_refuted_all_the_same() -> None:

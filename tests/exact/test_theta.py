@@ -51,6 +51,18 @@ def test_jacobi_functions_and_waves_at_numbers_are_those_at_series(m, bits):
             assert_same(quick.imag, slow.imag, scale)
 
 
+def test_an_argument_too_wide_to_be_reduced_gives_no_number():
+    """The truncated series are proven for |u| ≤ 2K·reach alone; a ball that sticks out is not a number."""
+    with working_precision(100):
+        functions = jacobi(ball(Fraction(99, 100)), ball(Fraction(1, 100)))
+        reach = functions.period[1]
+        for middle in (arb(0), 7 * functions.period[0]):
+            inside, beyond = (middle + arb(0, (reach * part).upper()) for part in (0.99, 1.01))
+            assert functions.reduced(inside)[0].is_finite()
+            assert not functions.reduced(beyond)[0].is_finite()
+            assert not any(value.is_finite() for value in functions.functions(beyond))
+
+
 @pytest.mark.parametrize("bits", [64, 300, 2000])
 def test_a_lattice_at_numbers_is_that_at_series(bits):
     rng = random.Random(9)

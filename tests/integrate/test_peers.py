@@ -62,33 +62,6 @@ def test_every_peer_and_heyoka_agree_to_the_tolerance(name: str, case: str) -> N
     assert alone.seconds["compile"] >= 0
 
 
-@pytest.mark.parametrize("name", ["scipy:DOP853", "cyrk:DOP853", "sundials:CVODE", "diffrax:Dopri8", "splitting:4"])
-def test_backwards_is_forwards_of_the_reversed_motion(name: str) -> None:
-    need(name)
-    case = CASES["generic"]
-    knob = setting_of(name)
-    back = peers.run(name, case.top, case.start, [-t for t in TIMES], setting=knob)
-    turned = type(case.start)([-w for w in case.start.omega], case.start.gamma)
-    forth = peers.run(name, case.top, turned, TIMES, setting=knob)
-    signs = np.array([-1, -1, -1, 1, 1, 1])
-    for one, other in zip(back.states, forth.states, strict=True):
-        np.testing.assert_allclose(one, signs * other, rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize("name", [*peers.BUILT_IN])
-@pytest.mark.parametrize("times", [[0], [0, "1/4"]], ids=str)
-def test_the_start_is_its_own_sample(name: str, times: list) -> None:
-    need(name)
-    case = CASES["lagrange"]
-    asked = [Fraction(time) for time in times]
-    run = peers.run(name, case.top, case.start, asked, DOUBLE)
-    ours = propagate(case.top, case.start, asked, DOUBLE)
-    assert (run.outcome, run.times, run.states.shape) == (Outcome.SUCCESS, tuple(asked), (len(asked), 6))
-    np.testing.assert_allclose(run.to_numpy(), ours.to_numpy(), rtol=0, atol=1e-3)
-    if asked[0] == 0:
-        assert [exact(value) for value in run.states[0]] == list(run.problem.start.flat)
-
-
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda s: s.name)
 def test_the_compiled_field_is_the_field(system) -> None:
     generator = np.random.default_rng(7)

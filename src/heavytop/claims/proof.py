@@ -154,7 +154,7 @@ class Region:
 
     def is_removable(self, need: Need) -> bool:
         """It fails on a set without interior at most."""
-        if self._setting.relations or need.kind is Kind.NONNEGATIVE:
+        if self._setting.relations:  # on them it may fail all over
             return False
         try:
             value = self.field.enter(need.expression)

@@ -14,6 +14,7 @@ from heavytop.integrate.peers.double import Given, Solved, compiled_once, double
 from heavytop.integrate.trajectory import Outcome
 from heavytop.top.equations import Parameters, System
 
+_LEAST_STEP = 2.0**-60  # of the whole time
 _MOST_STEPS = 2**24
 
 
@@ -34,7 +35,10 @@ def _compiled(system: System, count: int) -> Callable[..., Any]:
             start,
             numbers,
             saveat=diffrax.SaveAt(ts=times),
-            stepsize_controller=diffrax.PIDController(rtol=tolerance, atol=tolerance),
+            # where the field is not finite every step is refused: without a least one it would never end
+            stepsize_controller=diffrax.PIDController(
+                rtol=tolerance, atol=tolerance, dtmin=_LEAST_STEP * abs(times[-1]), force_dtmin=False
+            ),
             max_steps=_MOST_STEPS,
             throw=False,
         )
@@ -50,6 +54,9 @@ def _solve(given: Given) -> Solved:
         run = code(given.start, given.times, given.numbers, given.setting)
         states = numpy.asarray(jax.block_until_ready(run.ys))
     # diffrax fills what it did not reach with infinities
+    unreached = numpy.isinf(states).all(axis=1)
+    if run.result != diffrax.RESULTS.successful and unreached.any():
+        states = states[: int(numpy.argmax(unreached))]
     limit = bool(run.result == diffrax.RESULTS.max_steps_reached)
     outcome = Outcome.STEP_LIMIT if limit else Outcome.STEP_TOO_SMALL
     return Solved(states, 0.0, int(run.stats["num_steps"]), None, seconds, outcome)

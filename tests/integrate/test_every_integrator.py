@@ -1,0 +1,165 @@
+"""One contract for every integrator that `list` names: this program's two, the peers, and the planted faults' base."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.integrate import peers, registry
+from heavytop.integrate.broken import Integrator
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.precision import DOUBLE, exact
+from heavytop.suite.cases import CASES
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+F = Fraction
+NAMES = [*dict.fromkeys([*registry.INTEGRATORS, *peers.BUILT_IN]), "planted fault"]
+GENERIC, GYROSTAT_CASE = CASES["generic"], CASES["gyrostat"]
+FORWARDS_ONLY = {"mpmath:odefun"}
+NEVER_OVERFLOWS = {"mpmath:odefun", "words"}
+"""Their exponents have no end, or they scale the time: they would take 1e200 steps."""
+HANGING = HeavyTop((3, 2, 1), 1, (0, 0, F(1, 2))), State((0, 0, 0), (0, 0, 1))
+ERROR = {"splitting:2": 1e-3, "splitting:4": 1e-7, "scipy:Radau": 1e-6}
+
+
+def call(name: str, top: HeavyTop, start: State, times: Sequence[Fraction], system: System = HEAVY_TOP) -> Trajectory:
+    """One run in double, through the very call that everything else takes."""
+    if name == "planted fault":
+        seen: list[Any] = []
+        run = Integrator("none").propagate(
+            top, start, times, system=system, observer=lambda _, y: seen.append(y.copy())
+        )
+        return Trajectory(**{f: getattr(run, f) for f in run.__dataclass_fields__} | {"states": np.array(seen)})
+    options: dict[str, Any] = {"step": F(1, 64)} if name.startswith("splitting") else {}
+    if name.startswith("scipy:Radau"):
+        options = {"tolerance": F(1, 10**8)}
+    return registry.propagator(name, options)(top, start, times, DOUBLE, system=system)
+
+
+def bits(run: Trajectory) -> list[list[str]]:
+    return [[float(x).hex() for x in state] for state in run.states]
+
+
+def agree(name: str, one: Sequence[Any], other: Sequence[Any]) -> None:
+    np.testing.assert_allclose(np.asarray(one, float), np.asarray(other, float), rtol=0, atol=ERROR.get(name, 1e-9))
+
+
+def ends_well(run: Trajectory, times: Sequence[Fraction]) -> None:
+    assert run.outcome is Outcome.SUCCESS
+    assert run.times == tuple(times)
+    assert run.time_reached == times[-1]
+    assert np.shape(run.states) == (len(times), 6)
+    assert run.steps >= 0
+    assert run.integrator
+    assert run.seconds["run"] >= 0
+    assert run.seconds["compile"] >= 0
+
+
+def start_is_its_own_sample(name: str) -> None:
+    for times in ([F(0)], [F(0), F(1)]):
+        run = call(name, GENERIC.top, GENERIC.start, times)
+        ends_well(run, times)
+        assert [exact(x) for x in run.states[0]] == list(Problem.of(GENERIC.top, GENERIC.start, DOUBLE).start.flat)
+    assert call(name, GENERIC.top, GENERIC.start, [F(0)]).steps == 0
+
+
+def samples_are_those_of_one_motion(name: str) -> None:
+    many = call(name, GENERIC.top, GENERIC.start, [F(1, 4), F(1, 2), F(1)])
+    alone = call(name, GENERIC.top, GENERIC.start, [F(1)])
+    ends_well(many, [F(1, 4), F(1, 2), F(1)])
+    ends_well(alone, [F(1)])
+    agree(name, many.states[-1], alone.states[-1])
+    assert bits(call(name, GENERIC.top, GENERIC.start, [F(1)])) == bits(alone), "the same call gives the same bits"
+
+
+def backwards_is_the_reversed_motion(name: str) -> None:
+    times = [F(1, 2), F(1)]
+    reversed_start = State([-w for w in GENERIC.start.omega], GENERIC.start.gamma)
+    if name in FORWARDS_ONLY:
+        with pytest.raises(InputError, match="forwards only"):
+            call(name, GENERIC.top, GENERIC.start, [-t for t in times])
+        return
+    back = call(name, GENERIC.top, GENERIC.start, [-t for t in times])
+    ends_well(back, [-t for t in times])
+    forth = call(name, GENERIC.top, reversed_start, times)
+    agree(name, back.states, np.array([-1, -1, -1, 1, 1, 1]) * np.asarray(forth.states, float))
+
+
+def rest_stays_rest(name: str) -> None:
+    top, start = HANGING
+    run = call(name, top, start, [F(1), F(50)])
+    ends_well(run, [F(1), F(50)])
+    assert [[exact(x) for x in state] for state in run.states] == [list(start.flat)] * 2
+
+
+def the_gyrostat_is_another_system(name: str) -> None:
+    if name == "planted fault":
+        with pytest.raises(InputError, match="not for gyrostat"):
+            call(name, GYROSTAT_CASE.top, GYROSTAT_CASE.start, [F(1)], GYROSTAT_CASE.system)
+        return
+    run = call(name, GYROSTAT_CASE.top, GYROSTAT_CASE.start, [F(1)], GYROSTAT_CASE.system)
+    ends_well(run, [F(1)])
+    ours = call("heyoka", GYROSTAT_CASE.top, GYROSTAT_CASE.start, [F(1)], GYROSTAT_CASE.system)
+    agree(name, run.states, ours.states)
+
+
+def what_is_not_finite_is_no_success(name: str) -> None:
+    """Ω of 1e200 overflows double in Ω × Ω: whatever an integrator makes of it, no NaN passes as a success."""
+    wild = State([F(10) ** 200] * 3, GENERIC.start.gamma)
+    if name in NEVER_OVERFLOWS:
+        return
+    run = call(name, GENERIC.top, wild, [F(1)])
+    assert np.isfinite(np.asarray(run.states, float)).all()
+    if name.startswith("splitting"):  # steps of one length, each a rotation: nothing overflows
+        ends_well(run, [F(1)])
+        return
+    assert run.outcome in (Outcome.NON_FINITE, Outcome.STEP_TOO_SMALL, Outcome.STEP_LIMIT)
+    assert abs(run.time_reached) < 1
+    assert len(run.states) == len(run.times) == 0
+
+
+def bad_times_are_refused(name: str) -> None:
+    for times in ([], [F(1), F(1)], [F(2), F(1)], [F(-1), F(1)]):
+        with pytest.raises(InputError):
+            call(name, GENERIC.top, GENERIC.start, times)
+
+
+def threads_do_not_mix(name: str) -> None:
+    starts = [State((F(k, 10), F(2, 5), F(9, 10)), GENERIC.start.gamma) for k in range(6)]
+    in_order = [bits(call(name, GENERIC.top, start, [F(1, 2), F(1)])) for start in starts]
+    with ThreadPoolExecutor(3) as pool:
+        at_once = list(pool.map(lambda start: bits(call(name, GENERIC.top, start, [F(1, 2), F(1)])), starts))
+    assert at_once == in_order
+
+
+CONTRACT: tuple[Callable[[str], None], ...] = (
+    start_is_its_own_sample,
+    samples_are_those_of_one_motion,
+    backwards_is_the_reversed_motion,
+    rest_stays_rest,
+    the_gyrostat_is_another_system,
+    what_is_not_finite_is_no_success,
+    bad_times_are_refused,
+    threads_do_not_mix,
+)
+
+
+def need(name: str) -> None:
+    """Skip where the peer's package is not there; a broken adapter fails."""
+    module = {"cyrk": "CyRK", "sundials": "sksundae", "diffrax": "diffrax"}.get(name.partition(":")[0])
+    if module:
+        pytest.importorskip(module)
+
+
+@pytest.mark.parametrize("clause", CONTRACT, ids=lambda clause: clause.__name__)
+@pytest.mark.parametrize("name", NAMES)
+def test_every_integrator_keeps_the_contract(name: str, clause: Callable[[str], None]) -> None:
+    need(name)
+    clause(name)
