@@ -44,7 +44,9 @@ def timed(key: str, limit: float, folder: Path) -> int:
     done = run_shell(block.text, folder, dict(os.environ))
     seconds = perf_counter() - began
     good = done.returncode == 0 and seconds < limit
-    print(f"README line {block.line}, {key}: {seconds:.0f} s" + ("" if good else f", FAILED\n{done.stdout}{done.stderr}"))
+    print(
+        f"README line {block.line}, {key}: {seconds:.0f} s" + ("" if good else f", FAILED\n{done.stdout}{done.stderr}")
+    )
     return 0 if good else 1
 
 
