@@ -19,10 +19,12 @@ from heavytop.records import Law, Report, Series
 from heavytop.report.compare import Comparison, compare
 from heavytop.report.comparison_text import comparison
 from heavytop.report.history import history, history_json, history_svg, history_text
+from heavytop.report.history_page import history_page
 from heavytop.report.html import comparison_page, report_page
 from heavytop.report.junit import comparison_junit
 from heavytop.report.markdown import comparison_markdown
 from heavytop.report.policy import Policy
+from heavytop.report.section import logarithm
 from heavytop.report.text import summary
 from small_reports import error, report, row
 
@@ -163,6 +165,27 @@ def test_a_history_is_drawn_with_its_steps() -> None:
     for wrong in ([], tracks * 10):
         with pytest.raises(InputError, match="cannot be drawn"):
             history_svg(names, wrong)
+
+
+def test_a_history_has_a_page_with_a_chart_a_metric_and_its_steps() -> None:
+    names, reports = three()
+    tracks = history(reports, Policy())
+    page = history_page([HOSTILE, *names[1:]], reports, tracks)
+    assert page == history_page([HOSTILE, *names[1:]], reports, tracks)
+    assert "<script" not in page
+    drawn = [t for t in tracks if sum(logarithm(value) is not None for value in t.values) > 1]
+    assert page.count("<figure class") == len(drawn) > 3
+    assert "worse at 3: 6.6 bits lost" in page
+    assert "1e-10 ▲ worse" in page
+    for track in tracks:
+        assert (track.metric or "whole row") in page
+    missing = [track for track in tracks if not track.metric]
+    quiet = history_page(names, reports, missing)
+    assert "<figure class" not in quiet
+    assert "missing" in quiet
+    many = history_page(names, reports, 60 * tracks)
+    assert many.count("<figure class") == 120
+    assert "more in the table alone" in many
 
 
 CONTROL = "a\x00\x1b[31m\x07\x9b1m\u202e\ufffe[/red]$b"

@@ -64,7 +64,8 @@ def history(
     metric: Annotated[str, typer.Option(help="Only metrics that match this pattern, changed or not.")] = "",
     case: Annotated[str, typer.Option(help="Only cases that match this pattern.")] = "*",
     policy: Annotated[Path | None, typer.Option(help="TOML file of what counts as a step.")] = None,
-    svg: Annotated[Path | None, typer.Option(help="Draw the metrics shown over the reports.")] = None,
+    svg: Annotated[Path | None, typer.Option(help="Draw the metrics shown into one picture.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page with a small chart a metric.")] = None,
     json: Json = False,
 ) -> int:
     """Show metrics over two reports or more, with every step marked."""
@@ -75,13 +76,18 @@ def history(
     if len(reports) < 2:
         raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")
     rules, cases, metrics = _policy(policy, None, None), glob(case), glob(metric or "*")
-    tracks = over.history([store.read_brief(path) for path in reports], rules)
+    read = [store.read_brief(path) for path in reports]
+    tracks = over.history(read, rules)
     tracks = [t for t in tracks if cases.fullmatch(t.key[1]) and metrics.fullmatch(t.metric)]
     if not metric:
         tracks = [track for track in tracks if track.steps]
     names = [str(path) for path in reports]
-    if svg is not None:
-        _write([(svg, over.history_svg(names, tracks))])
+    files = [] if svg is None else [(svg, over.history_svg(names, tracks))]
+    if html is not None:
+        from heavytop.report.history_page import history_page
+
+        files.append((html, history_page(names, read, tracks)))
+    _write(files)
     if json:
         print_json(over.history_json(names, tracks))
     else:

@@ -23,7 +23,7 @@ from heavytop.report.svg import document, quiet_style
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
 
-_MARK = {
+MARK = {
     Verdict.WORSE: "▲",
     Verdict.BETTER: "▼",
     Verdict.INCOMPARABLE: "≠",
@@ -105,7 +105,7 @@ def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableTyp
         table.add_column(str(number), justify="right", overflow="fold")
     for track in tracks:
         cells = [
-            f"{short(value or '-')} {_MARK[track.steps[n][0]] if n in track.steps else ' '}"
+            f"{short(value or '-')} {MARK[track.steps[n][0]] if n in track.steps else ' '}"
             for n, value in enumerate(track.values)
         ]
         cells = [row_name(track.key), track.metric or "whole row", *cells]

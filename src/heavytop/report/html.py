@@ -35,7 +35,7 @@ def report_page(report: Report) -> str:
     found = claim_verdict.audited(report)
     failures = [row for row in report.rows if failed(row)]
     word, sentence = claim_verdict.headline(found)
-    return _render(
+    return render(
         "report.html.j2",
         report=report,
         word=word,
@@ -60,7 +60,7 @@ def comparison_page(baseline: Report, candidate: Report, comparison: Comparison)
     """The page of a comparison: verdict, changed rows, both reports on the same axes."""
     changed = comparison.changed
     sources = [("baseline", baseline), ("candidate", candidate)]
-    return _render(
+    return render(
         "comparison.html.j2",
         report=candidate,
         baseline=baseline,
@@ -124,7 +124,7 @@ def commands(report: Report) -> list[str]:
     return lines
 
 
-def _render(template: str, **context: Any) -> str:
+def render(template: str, **context: Any) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
