@@ -175,8 +175,8 @@ def test_every_page_is_in_a_table_of_contents() -> None:
     for page in PAGES:
         for block in blocks(page):
             if block.language == "{toctree}":
-                entries = [line for line in block.text.split() if not line.startswith(":") and line != "contents"]
-                listed |= {page.parent / f"{entry}{suffix}" for entry in entries for suffix in (".md", ".ipynb")}
+                entries = [line for line in block.text.splitlines() if not line.startswith(":")]
+                listed |= {found for entry in entries for found in page.parent.glob(f"{entry}.*")}
     there = [*(page for page in PAGES if DOCS in page.parents), *DOCS.glob("notebooks/*.ipynb")]
     assert [page for page in there if page not in listed] == []
 
