@@ -50,7 +50,6 @@ napoleon_numpy_docstring = False
 napoleon_custom_sections = [("Source", "notes_style")]
 
 nitpicky = True
-suppress_warnings = ["toc.empty_glob"]  # layout*
 # of other packages no inventory is at hand offline; of the inner rooms the pages show none
 nitpick_ignore_regex = [
     ("py:.*", r"(fractions|decimal|collections|os|pathlib|typing|enum|numpy|np|pandas|msgspec|NDArray)\b.*"),
