@@ -26,9 +26,10 @@ SHELLS = ("bash", "zsh", "fish")
 
 def _version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version
+        from heavytop.version import commit, version
 
-        print(f"heavytop {version('heavytop')}")
+        made_from = commit()
+        print(f"heavytop {version()}" + (f" (commit {made_from})" if made_from else ""))
         raise typer.Exit
 
 
@@ -49,7 +50,7 @@ def _completion(shell: str | None) -> None:
 @app.callback()
 def _common(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show version and commit, and exit.")
     ] = False,
     completion: Annotated[
         str | None,
