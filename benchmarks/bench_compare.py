@@ -13,7 +13,7 @@ from random import Random
 
 import pytest
 
-from heavytop.records import SCHEMA, Metric, Report, Row
+from heavytop.records import SCHEMA, Against, Metric, Report, Row, RowKey, Subject
 from heavytop.report import store
 
 ROWS = 100_000
@@ -30,9 +30,8 @@ FLAGS = {
     "code_cache": "none",
     "coefficients": "par",
 }
-AGAINST = (
-    "known: closed form: Euler-Poinsot, Jacobi functions, radius below 6.02E-36; certified at t = 100000 to 43 digits"
-)
+HEYOKA = Subject("computed", "heyoka")
+AGAINST = Against("proven", "closed form: Euler-Poinsot")
 
 
 def metric(random: Random) -> Metric:
@@ -55,9 +54,13 @@ def large(folder: Path, seed: int) -> Path:
             steps=164352,
             finite=True,
             metrics={name: metric(random) for name in NAMES},
+            key=RowKey(
+                "drift", f"top-{number}", "heavy_top", Subject("computed", "heyoka"), "double", horizon="100000"
+            ),
+            reference=AGAINST,
             measure="drift",
             measured="computed: heyoka in double",
-            against=AGAINST,
+            against=AGAINST.text,
             order=20,
             flags=FLAGS,
             input_rounding="6.34E-17",

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from heavytop.integrate import peers
+from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE, exact
 from heavytop.report.store import read
 from heavytop.suite.cases import CASES
@@ -24,7 +25,7 @@ REPEATS, TURNS = 15, 20
 def rungs(case: str) -> dict[str, str]:
     """The setting of each integrator."""
     found: dict[str, tuple[float, str]] = {}
-    for row in read(REPORT).rows:
+    for row in read(REPORT, KINDS).rows:
         name, _, setting = row.integrator.partition(" ")
         error = row.metrics.get("error_max")
         if row.case != case or row.precision != "double" or row.outcome != "success" or name not in OURS + THEIRS:

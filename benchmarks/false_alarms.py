@@ -12,15 +12,18 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
 import msgspec
-from heavytop.suite.measurements import measure
 
+from heavytop.kinds import KINDS
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import SCHEMA, Report
 from heavytop.report.compare import compare
-from heavytop.report.comparison_text import headline, row_name
+from heavytop.report.comparison_text import headline
+from heavytop.report.names import row_name
 from heavytop.report.policy import Policy
 from heavytop.report.verdicts import Verdict
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.plan import Plan, expand, load, of_document
 
 PLAN = {
     "name": "false-alarms",
@@ -55,7 +58,9 @@ FACTORS = ("2", "5", "10", "30", "100", "1000")
 
 
 def report(seed: int, plan: Plan) -> Report:
-    return Report(SCHEMA, {"name": plan.name}, {}, [measure(task) for task in expand(plan, seed)])
+    return Report(
+        SCHEMA, {"name": plan.name}, {}, [KINDS[task.key.kind].measure(task, Saved()) for task in expand(plan, seed)]
+    )
 
 
 def spoiled(good: Report, factor: str) -> Report:
@@ -75,18 +80,18 @@ def main(reruns: int, plan: Plan) -> int:
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         reports = list(pool.map(report, range(reruns + 1), [plan] * (reruns + 1)))
     baseline, others = reports[0], reports[1:]
-    results = [compare(baseline, other, Policy()) for other in others]
+    results = [compare(baseline, other, Policy(), KINDS) for other in others]
     alarms = [result for result in results if result.verdict != "same"]
-    print(f"a report against itself: {compare(baseline, baseline, Policy()).verdict}")
+    print(f"a report against itself: {compare(baseline, baseline, Policy(), KINDS).verdict}")
     metrics = len(results[0].findings)
     print(f"{len(others) - len(alarms)} of {len(others)} reruns with other seeds: same ({metrics} metrics each)")
     for result in alarms:
         print(" ", headline(result))
         for finding in result.changed:
-            print("   ", row_name(finding), finding.metric, finding.baseline, finding.candidate, finding.reason)
+            print("   ", row_name(finding.row), finding.metric, finding.baseline, finding.candidate, finding.reason)
     print("errors planted in the reruns, every one larger by a factor:")
     for factor in FACTORS:
-        planted = [compare(baseline, spoiled(other, factor), Policy()) for other in others]
+        planted = [compare(baseline, spoiled(other, factor), Policy(), KINDS) for other in others]
         worse = sum(result.tally.get(Verdict.WORSE, 0) for result in planted)
         reported = sum(result.verdict == "worse" for result in planted)
         errors = sum(m.kind == "error" and m.log10 is not None for row in baseline.rows for m in row.metrics.values())
@@ -95,5 +100,5 @@ def main(reruns: int, plan: Plan) -> int:
 
 
 if __name__ == "__main__":
-    chosen = load(sys.argv[2])[0] if len(sys.argv) > 2 else plan_of(PLAN)
+    chosen = load(sys.argv[2], KINDS)[0] if len(sys.argv) > 2 else of_document(PLAN, KINDS)
     sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 50, chosen))

@@ -17,17 +17,21 @@ def child(count: int) -> None:
     from msgspec.structs import replace
 
     import heavytop.suite.run
-    from heavytop.report.run_folder import Run
+    from heavytop.api.run_folder import Run
+    from heavytop.kinds import KINDS
+    from heavytop.records import RowKey
     from heavytop.suite.cases import CASES
-    from heavytop.suite.measurements import measure
-    from heavytop.suite.task import Task
+    from heavytop.suite.checkpoint import Saved
+    from heavytop.suite.task import Task, computed
 
     times = tuple(range(1, 11))
-    tasks = [Task("drift", f"euler-{index}", CASES["euler"], "double", "", times, times) for index in range(count)]
-    row = measure(tasks[0])
+    names = [f"euler-{index}" for index in range(count)]
+    keys = [RowKey("drift", name, "heavy_top", computed("heyoka"), "double", horizon="10") for name in names]
+    tasks = [Task(key, key.case, "heyoka", CASES["euler"], times, times) for key in keys]
+    row = KINDS["drift"].measure(tasks[0], Saved())
 
     def rows(tasks, *_) -> Iterator:
-        return ((index, replace(row, case=task.name)) for index, task in enumerate(tasks))
+        return ((index, replace(row, case=task.title, key=task.key)) for index, task in enumerate(tasks))
 
     heavytop.suite.run.rows = rows
     with tempfile.TemporaryDirectory() as folder:

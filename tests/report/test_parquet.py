@@ -75,7 +75,7 @@ def test_pandas_reads_values_as_text_and_logarithms_as_numbers(file: Path) -> No
     assert table["log10"].isna().tolist() == [False, True, True, True, True, True]
     assert table["bits"].tolist() == [3400] * 6
     assert table["bound"][1] == "1E-1000"
-    assert table["metric"].isna().tolist() == [False] * 4 + [True]
+    assert table["metric"].isna().tolist() == [False] * 4 + [True, True]
 
 
 def test_duckdb_reads_laws_and_rows_without_any_number(file: Path) -> None:

@@ -26,6 +26,7 @@ from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import decimal_text, exact, number, parse, physical, usable_tolerance
 from heavytop.records import Law, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.brief import named, wrapped
+from heavytop.report.names import computed_by
 from heavytop.report.plots import digits
 from heavytop.report.plots import growth as over_time
 from heavytop.report.text import short, table, title
@@ -177,7 +178,7 @@ class Growth(Kind):
         """A line for each law."""
         lines = [
             [
-                f"{row.case} {row.key.subject.variant}".rstrip(),
+                f"{row.case}{computed_by(row)} {row.key.subject.variant}".rstrip(),
                 row.precision,
                 _label(law),
                 f"{law.starts} of {row.starts}" if law.starts < row.starts else str(law.starts),
@@ -265,7 +266,7 @@ def _row(
     reached = min((abs(Fraction(motion.time_reached)) for motion in failed), default=abs(task.times[-1]))
     found = growing(starts, task.times, motions, scorers, compared, time_text)
     metrics = {FAILED: of_fraction(Fraction(len(failed)), words=str(len(failed)))} | found.metrics
-    computed_by = f"computed: {first.integrator} in {precision.name}"
+    who = f"computed: {first.integrator} in {precision.name}"
     return Row(
         case=task.title,
         system=task.key.system,
@@ -281,7 +282,7 @@ def _row(
         key=task.key,
         reference=compared.against,
         measure=NAME,
-        measured=f"{computed_by}, {len(motions)} random starts, root mean square over them",
+        measured=f"{who}, {len(motions)} random starts, root mean square over them",
         against=compared.against.text,
         order=first.order,
         flags=first.flags | {"bias": task.options.bias or "none"},

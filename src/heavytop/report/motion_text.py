@@ -35,8 +35,9 @@ def motion_text(motion: Motion) -> RenderableType:
     if not motion.complete:
         parts += [Text(), Text(f"Reached t = {motion.to_json()['time_reached']} only.", style="bold")]
     elif motion.drift:
-        worst = {k[6:-4]: m.value for k, m in motion.drift.items() if k.endswith("_max")}
-        drifts = ", ".join(f"{name} {short(value, 2)}" for name, value in worst.items())
+        found = [(metric.quantity, metric) for metric in motion.drift.values()]
+        worst = [(quantity.component, metric) for quantity, metric in found if quantity and quantity.statistic == "max"]
+        drifts = ", ".join(f"{name} {short(metric.value, 2)}" for name, metric in worst)
         parts += [Text(), Text(f"Largest drift of the first integrals at these times: {drifts}")]
     return Group(*parts)
 

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from heavytop.records import Identity
+from heavytop.measure.integrator import HEYOKA
+from heavytop.records import Identity, Row
 from heavytop.top.equations import HEAVY_TOP
+
+
+def computed_by(row: Row) -> str:
+    """`` NAME`` of the integrator, "" for heyoka and for what is not computed: behind the case in tables."""
+    subject = row.key.subject
+    return f" {subject.name}" if subject.what == "computed" and subject.name != HEYOKA else ""
 
 
 def row_name(row: Identity, with_kind: bool = True) -> str:

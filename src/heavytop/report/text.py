@@ -17,6 +17,7 @@ from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import decimal_text, exact
 from heavytop.records import FAILED, UNMEASURED, Metric, Report, Row
 from heavytop.report.kind import Kinds, kind_of
+from heavytop.report.names import computed_by
 from heavytop.report.printable import printable
 from heavytop.report.store import AnyReport
 
@@ -116,8 +117,8 @@ def both(lines: Iterable[tuple[Row, Sequence[str]]]) -> list[list[str]]:
     """The cells of each row behind its case; what is the same forward and backward once, and then without direction."""
     found: dict[tuple[str, ...], list[Row]] = {}
     for row, cells in lines:
-        found.setdefault((row.key.case, *cells), []).append(row)
-    return [[case if len(rows) > 1 else rows[0].case, *cells] for (case, *cells), rows in found.items()]
+        found.setdefault((row.key.case, computed_by(row), *cells), []).append(row)
+    return [[(case if len(rows) > 1 else rows[0].case) + name, *cells] for (case, name, *cells), rows in found.items()]
 
 
 def motions(rows: Sequence[Row]) -> Table:
@@ -129,7 +130,19 @@ def motions(rows: Sequence[Row]) -> Table:
         error, across = ("no reference" if each is None else with_noise(each, 2) for each in errors)
         kept = digits_kept(row)
         digits = "-" if kept is None else digits_text(kept)
-        lines.append([row.case, row.precision, row.horizon, str(row.steps), row.outcome, digits, error, across, cells])
+        lines.append(
+            [
+                row.case + computed_by(row),
+                row.precision,
+                row.horizon,
+                str(row.steps),
+                row.outcome,
+                digits,
+                error,
+                across,
+                cells,
+            ]
+        )
     columns = [
         "case",
         "format",
