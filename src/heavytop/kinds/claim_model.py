@@ -139,7 +139,7 @@ class ClaimModel(Kind):
             if PARTS.text in row.metrics and row.key.direction != "backward":
                 found.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
         said = ((case, ", ".join(f"{t} ({branch})" for branch, t in times.items())) for case, times in found.items())
-        return [line for case, times in said for line in wrapped(f"{case}: Ω off by 1 % of α from |t| = {times} on")]
+        return [line for case, times in said for line in wrapped(f"{case}: Ω is off by 1 % of α at |t| = {times}")]
 
     def cards(self, rows: Sequence[Row]) -> list[Card]:
         """How wrong the claim is, forward in time, and in full on the smooth branch, where there are several."""
