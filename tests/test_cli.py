@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from heavytop.cli import app
+from heavytop.version import commit
 from helpers import VECTORS
 
 COMMAND = [sys.executable, "-m", "heavytop"]
@@ -318,9 +319,11 @@ def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130(after: float
     assert "Traceback" not in errors
 
 
-def test_the_version_is_that_of_the_package() -> None:
+def test_the_version_is_that_of_the_package_with_its_commit() -> None:
     done = run("--version")
-    assert (done.returncode, done.stdout) == (0, f"heavytop {version('heavytop')}\n")
+    made_from = commit()
+    told = f" (commit {made_from})" if made_from else ""
+    assert (done.returncode, done.stdout) == (0, f"heavytop {version('heavytop')}{told}\n")
 
 
 def test_help_lists_the_commands_and_loads_nothing_heavy() -> None:

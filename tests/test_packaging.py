@@ -1,7 +1,12 @@
 """What a fresh machine installs: everything pinned, with hashes and without addresses; two commands in the README."""
 
 import re
+import shutil
+import subprocess
+import sys
+import tarfile
 import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -24,7 +29,9 @@ def pinned(file: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize(
-    ("file", "extras"), [("run.txt", []), ("test.txt", ["test", "peers", "parquet", "cluster"])], ids=["run", "test"]
+    ("file", "extras"),
+    [("run.txt", []), ("test.txt", ["test", "peers", "parquet", "cluster"]), ("docs.txt", ["docs"])],
+    ids=["run", "test", "docs"],
 )
 def test_every_dependency_is_pinned_with_hashes_and_without_addresses(file: str, extras: list[str]) -> None:
     wanted = names(PROJECT["dependencies"]) | {"hatchling"}
@@ -33,10 +40,17 @@ def test_every_dependency_is_pinned_with_hashes_and_without_addresses(file: str,
     assert wanted <= set(pinned(file))
 
 
-def test_both_files_pin_the_same_versions() -> None:
-    run, test = (set(re.findall(r"^[\w.-]+==\S+", (ROOT / "constraints" / f).read_text("utf-8"), re.M))
-                 for f in ("run.txt", "test.txt"))  # fmt: skip
-    assert run <= test
+def versions(file: str) -> set[str]:
+    return set(re.findall(r"^[\w.-]+==\S+", (ROOT / "constraints" / file).read_text("utf-8"), re.M))
+
+
+def test_all_files_pin_the_same_versions() -> None:
+    assert versions("run.txt") <= versions("test.txt")
+    assert versions("run.txt") <= versions("docs.txt")
+    both = versions("test.txt") | versions("docs.txt")
+    for name in {text.split("==")[0] for text in both}:
+        told = [{v for v in versions(file) if v.startswith(f"{name}==")} for file in ("test.txt", "docs.txt")]
+        assert not all(told) or told[0] == told[1], name
 
 
 def test_the_quick_start_is_two_commands() -> None:
@@ -44,3 +58,48 @@ def test_the_quick_start_is_two_commands() -> None:
     assert len(first) == 2
     assert first[0].endswith("heavytop run")
     assert "-m pytest" in first[1]
+
+
+def git(folder: Path, *arguments: str) -> str:
+    identity = ["-c", "user.name=test", "-c", "user.email=test@localhost"]
+    done = subprocess.run(["git", "-C", folder, *identity, *arguments], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def build(folder: Path, kind: str) -> Path:
+    """The wheel or sdist that the project in ``folder`` makes, without a build environment of its own."""
+    out = folder.parent / f"{folder.name}-{kind}"
+    code = f"import hatchling.build; print(hatchling.build.build_{kind}({str(out)!r}))"
+    out.mkdir()
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return out / done.stdout.splitlines()[-1]
+
+
+def recorded(wheel: Path) -> str | None:
+    with zipfile.ZipFile(wheel) as content:
+        names = [name for name in content.namelist() if name.endswith(".dist-info/extra_metadata/commit.txt")]
+        return content.read(names[0]).decode().strip() if names else None
+
+
+def test_a_wheel_records_its_commit_also_by_way_of_an_sdist(tmp_path: Path) -> None:
+    project = tmp_path / "project"
+    (project / "src" / "heavytop").mkdir(parents=True)
+    for name in ("pyproject.toml", "hatch_build.py", "README.md", "LICENSE", "src/heavytop/version.py"):
+        shutil.copy(ROOT / name, project / name)
+    assert recorded(build(project, "wheel")) is None, "no git, and nothing recorded"
+    git(project, "init", "--quiet")
+    git(project, "add", ".")
+    git(project, "commit", "--quiet", "--message", "all")
+    commit = git(project, "rev-parse", "HEAD")
+    clean = project.rename(tmp_path / "clean")
+    assert recorded(build(clean, "wheel")) == commit
+    with tarfile.open(build(clean, "sdist")) as content:
+        content.extractall(tmp_path / "elsewhere", filter="data")
+    (unpacked,) = (tmp_path / "elsewhere").iterdir()
+    git(tmp_path, "init", "--quiet")
+    git(tmp_path, "commit", "--quiet", "--allow-empty", "--message", "another project around it")
+    assert recorded(build(unpacked, "wheel")) == commit
+    (clean / "README.md").write_text("changed")
+    dirty = clean.rename(tmp_path / "dirty")
+    assert recorded(build(dirty, "wheel")) == f"{commit}-dirty"

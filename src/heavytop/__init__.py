@@ -79,9 +79,9 @@ if not TYPE_CHECKING:  # it would tell a type checker that every name is there
 
     def __getattr__(name: str) -> object:
         if name == "__version__":
-            from importlib.metadata import version
+            from heavytop.version import version
 
-            return version("heavytop")
+            return version()
         if name not in _ROOM:
             raise AttributeError(f"module 'heavytop' has no attribute {name!r}")
         found = getattr(import_module(f"heavytop.{_ROOM[name]}"), name)

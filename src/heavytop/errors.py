@@ -29,6 +29,10 @@ class NotInClass(InputError):
     """A start outside the class of motions that a closed form covers; says which exact test failed and by how much."""
 
 
+class LevelNotDone(NotInClass):
+    """A start of a class, on or beside a degenerate level that its closed form does not cover; names the level."""
+
+
 class Contradiction(HeavyTopError):
     """Two sources that must agree exclude each other: one of them is wrong, and nothing may rest on either."""
 

@@ -230,7 +230,8 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     how: with proven values, with computed ones, with equations, or with none but its own first integrals.
     radius: decimal text, of the proven balls, or within which two computed runs agree.  certificates: the first start's
-    before that of all starts.  reason: why there is none.
+    before that of all starts.  reason: why there is none, or none that is proven.
+    until: decimal text; the time from which no digit of the format is left to compare.
     """
 
     how: Literal["proven", "computed", "equations", "none"]
@@ -239,6 +240,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     certificates: tuple[Certified, ...] = ()
     checked: Checked | None = None
     reason: str = ""
+    until: str = ""
 
     @property
     def text(self) -> str:
@@ -249,9 +251,25 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
             return self.method
         if self.how == "computed":
             agreed = f" agree within {self.radius}" if self.radius else ""
-            return f"computed, not proven: {self.method}{agreed}" + (f"; {self.checked.text}" if self.checked else "")
+            checked = f"; {self.checked.text}" if self.checked else ""
+            ends = f", and no digit is left from t = {self.until} on" if self.until else ""
+            why = f" ({self.reason})" if self.reason else ""
+            return f"computed, not proven: {self.method}{agreed}{ends}{checked}{why}"
         said = ", for the first start; ".join(each.text for each in self.certificates)
         return f"known: {self.method}, radius below {self.radius}; {said}"
+
+
+class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """The exact data of a motion, as text: integers, decimals or fractions.
+
+    omega, gamma: of its start; empty for an ensemble of starts.
+    """
+
+    inertia: tuple[str, ...]
+    weight: str
+    centre: tuple[str, ...]
+    omega: tuple[str, ...] = ()
+    gamma: tuple[str, ...] = ()
 
 
 class Row(msgspec.Struct, gc=False):
@@ -263,6 +281,7 @@ class Row(msgspec.Struct, gc=False):
     outcome, time_reached, steps, finite travel with every number.  seconds: timings, not compared.
     evaluations: of the field, where the integrator counts them.
     samples: how many times the largest values are over; 0 where that is not said.
+    data: of the top and its start, before any rounding; null where no motion is measured.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     """
 
@@ -291,6 +310,7 @@ class Row(msgspec.Struct, gc=False):
     laws: dict[str, Law] = {}
     seconds: dict[str, Seconds] = {}
     evaluations: Count | None = None
+    data: Data | None = None
 
     @property
     def identity(self) -> Identity:

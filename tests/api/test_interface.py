@@ -26,23 +26,6 @@ runs = [{ precision = "double", horizon = "5", samples = 5 }]
 """
 
 
-def blocks(page: str) -> list[str]:
-    return re.findall(r"```python\n(.*?)```", (ROOT / page).read_text("utf-8"), re.S)
-
-
-@pytest.mark.parametrize("page", ["docs/python.md", "README.md"])
-def test_the_code_of_the_documentation_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    assert blocks(page)
-    for block in blocks(page):
-        exec(compile(block, page, "exec"), names)
-    assert capsys.readouterr().out
-    tables = [each._repr_html_() for each in names.values() if hasattr(each, "_repr_html_")]
-    assert len(tables) >= 2
-    assert all(html.count("<table>") == html.count("</table>") == 1 for html in tables)
-
-
 def test_importing_loads_nothing_heavy_and_every_name_is_there() -> None:
     script = (
         "import sys, heavytop\n"

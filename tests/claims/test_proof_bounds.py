@@ -13,7 +13,7 @@ from heavytop.claims.judge import judge
 from heavytop.claims.proof import Region
 from heavytop.claims.prover import Prover
 from heavytop.claims.regularity import Regularity
-from heavytop.claims.signs import Sign
+from heavytop.claims.sign import Sign
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
 
 T, A = sympy.Symbol("t", real=True), sympy.Symbol("a", real=True)

@@ -13,7 +13,7 @@ from heavytop.claims.algebra import Assumptions, Field
 from heavytop.claims.conditions import is_exactly_zero
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.ideal import forces_zero
-from heavytop.claims.signs import PLUS, UNKNOWN, Sign, sum_of
+from heavytop.claims.sign import PLUS, UNKNOWN, Sign, sum_of
 from heavytop.claims.structure import sign_of
 
 T, A, B = sympy.Symbol("t", real=True), sympy.Symbol("a", positive=True), sympy.Symbol("b", positive=True)

@@ -9,10 +9,10 @@ import sympy
 
 from heavytop.claims.audit import audit_claim
 from heavytop.claims.conditions import is_exactly_zero
+from heavytop.claims.context import STATE
 from heavytop.claims.from_file import claim_from_table
 from heavytop.claims.real_zeros import conditions_for_zero
 from heavytop.claims.sample_search import states_on
-from heavytop.claims.user_claim import STATE
 from heavytop.top.equations import HEAVY_TOP
 
 AREA = "(4*Omega1*gamma1 + 4*Omega2*gamma2 + Omega3*gamma3)"

@@ -1,11 +1,12 @@
 """The catalogue finds every class, under every naming of the axes, and falls back to the enclosure."""
 
+import re
 from fractions import Fraction
 
 import pytest
 from proofs import assert_solves
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.axes import ALL, Renamed, renamed_state, renamed_top
 from heavytop.exact.bobylev_steklov import BobylevSteklov, bobylev_steklov_motion
 from heavytop.exact.catalogue import find, matches
@@ -102,6 +103,34 @@ def test_the_validated_enclosure_agrees_to_fifty_digits_at_ten(case):
 def test_a_generic_motion_is_left_to_the_enclosure():
     top, start = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
     assert kind(find(top, start)) is Validated
+
+
+UNIT_UP = F(2, 3), F(2, 3), F(1, 3)
+NOT_DONE = {
+    "both tend": ((F(1, 2), F(1, 3), 0), (0, 0, 1), r"Kovalevskaya: .*e = -13/36, e\^2 = k\^2, and both"),
+    "one rests": ((F(-5, 6), F(-1, 6), F(-1, 2)), UNIT_UP, r"Kovalevskaya: .*e = -7/18, .* rests at e, and the other"),
+    "too near": ((-1, F(1, 4), F(1, 4)), (F(2) / (10**12 + F(1, 10**12)), 0, 1), r"Kovalevskaya: .*but for .*e-1\d"),
+}
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (2, 1, 0)])
+@pytest.mark.parametrize("name", NOT_DONE)
+def test_a_level_that_is_not_done_is_named_by_its_enclosure_and_beyond_its_reach(name, axes):
+    omega, gamma, level = NOT_DONE[name]
+    top, start = HeavyTop((2, 2, 1), 1, (1, 0, 0)), State(omega, gamma)
+    found = find(renamed_top(top, axes), renamed_state(start, axes))
+    assert found.method.startswith("validated: Taylor enclosure")
+    assert re.search(level, found.method)
+    plain = Validated(found.top, found.start).state(F(1), 100)
+    assert all(a.overlaps(b) for a, b in zip(found.state(F(1), 100), plain, strict=True))
+    with pytest.raises(OutOfReach, match=level):
+        found.state(F(10**9), 100)
+
+
+def test_goryachev_chaplygins_degenerate_levels_are_named_too():
+    top = HeavyTop((4, 4, 1), 1, (1, 0, 0))
+    with pytest.raises(OutOfReach, match=r"GoryachevChaplygin: The level is degenerate"):
+        find(top, State((F(1, 10**30), F(1, 4), -3 * F(1, 10**30)), (F(3, 5), 0, F(4, 5)))).state(F(10**9), 60)
 
 
 def test_what_the_gyrostat_does_not_admit_is_an_input_error():

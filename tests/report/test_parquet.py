@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.records import Law, Metric
+from heavytop.records import Data, Law, Metric
 from heavytop.report import parquet
 from heavytop.report.parquet import COLUMNS, check_name, require_pyarrow, write
 from reports import Row
@@ -43,6 +43,14 @@ ROWS = [
         metrics={},
         laws={"energy": Law("t^0.5", 63, 0.497, 0.46, 0.53, "1", "1000", "1e-19", None)},
     ),
+    Row(
+        **SAME
+        | {
+            "case": "top",
+            "data": Data(("3", "2", "1"), "1e-400", ("0", "0", "1/3"), ("1/10", "0", "1e400"), ("0", "0", "-1")),
+        },
+        metrics={},
+    ),
     Row(**SAME | {"case": "generic", "outcome": "time_limit", "time_reached": "3", "finite": False}, metrics={}),
 ]
 
@@ -60,14 +68,14 @@ def test_pandas_reads_values_as_text_and_logarithms_as_numbers(file: Path) -> No
 
     table = pandas.read_parquet(file)
     assert list(table.columns) == list(COLUMNS)
-    assert len(table) == 5
+    assert len(table) == 6
     tiny = table.iloc[0]
     assert (tiny["value"], tiny["log10"], tiny["band"]) == ("1.25E-997", -996.90309, 0.25)
     assert table["log10"].dtype == "float64"
-    assert table["log10"].isna().tolist() == [False, True, True, True, True]
-    assert table["bits"].tolist() == [3400] * 5
+    assert table["log10"].isna().tolist() == [False, True, True, True, True, True]
+    assert table["bits"].tolist() == [3400] * 6
     assert table["bound"][1] == "1E-1000"
-    assert table["metric"].isna().tolist() == [False] * 4 + [True]
+    assert table["metric"].isna().tolist() == [False] * 4 + [True, True]
 
 
 def test_duckdb_reads_laws_and_rows_without_any_number(file: Path) -> None:
@@ -137,3 +145,26 @@ def test_without_pyarrow_and_under_another_name_it_is_refused(monkeypatch: pytes
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(InputError, match=r"heavytop\[parquet\]"):
         require_pyarrow()
+
+
+def test_the_top_and_the_start_stand_beside_every_number(file: Path) -> None:
+    import pandas
+
+    table = pandas.read_parquet(file)
+    (row,) = table[table.case == "top"].to_dict("records")
+    assert [row[f"inertia{i}"] for i in (1, 2, 3)] == [3.0, 2.0, 1.0]
+    assert (row["weight"], row["centre3"], row["omega1"], row["omega3"], row["gamma3"]) == (
+        0.0,
+        1 / 3,
+        0.1,
+        float("inf"),
+        -1,
+    )
+    assert (row["weight_exact"], row["centre_exact"], row["omega_exact"]) == ("1e-400", "0,0,1/3", "1/10,0,1e400")
+    assert table[table.case == "euler"][["inertia1", "gamma_exact"]].isna().all(axis=None)
+    floats = [
+        name
+        for name, kind in COLUMNS.items()
+        if name[:-1] in ("inertia", "centre", "omega", "gamma") or name == "weight"
+    ]
+    assert len(floats) == 13

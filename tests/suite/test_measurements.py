@@ -70,7 +70,7 @@ def test_the_verdict_on_the_claim_is_a_row() -> None:
 
 
 def test_a_run_that_fails_is_a_row_with_its_outcome() -> None:
-    given = task("drift kovalevskaya double")
+    given = task("drift lagrange double")
     assert given.case is not None
     wild = replace(given.case.start, omega=(Fraction(10) ** 140, Fraction(10) ** 140, Fraction(1)))
     row = measure(replace(given, case=replace(given.case, start=wild)))

@@ -48,7 +48,7 @@ def random_tops(random: Random, axes):
     yield f"spin{axes[2] + 1}", top((i1, i1, i3), (0, 0, c)), start
     yield "kovalevskaya", top((2 * i3, 2 * i3, i3), (a, b, 0)), start
     yield "moment_along_centre", top((i1, i1, i1), (a, b, c)), start
-    body = top((4 * i3, 4 * i3, i3), (a, 0, 0))
+    body = top((4 * i3, 4 * i3, i3), (a, b, 0))
     momentum = body.angular_momentum(start.omega)
     off = dot(momentum, start.gamma)
     omega = [w - off * g / m for w, g, m in zip(start.omega, start.gamma, body.inertia, strict=True)]

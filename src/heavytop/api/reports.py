@@ -99,16 +99,18 @@ def run(
     workers: int | None = None,
     scheduler: str | None = None,
     seed: int = 0,
+    integrator: str | None = None,
     parquet: bool = False,
 ) -> Report:
     """Run a plan of measurements, write its report and page, and return the report.
 
     Arguments:
-        plan: smoke, default, growth, long, peers, or the path of a TOML file (docs/plans.md).
+        plan: smoke, default, growth, long, peers, gate, or the path of a TOML file (docs/plans.md).
         out: a new folder; None for a new one under heavytop-results.
         resume: go on with the rows that ``out`` already holds.
         workers: local processes; None for as many as there are processors.  No main guard is needed.
         scheduler: the address of a Dask scheduler to run on instead.
+        integrator: the name of one that is measured beside heyoka, such as ``mine:name``.
         seed: measure the same motions with other roundings: 0 to 1000.
         parquet: write rows.parquet too.
 
@@ -126,6 +128,7 @@ def run(
         workers=arguments.count(workers, "workers"),
         scheduler=None if scheduler is None else arguments.text(scheduler, "scheduler"),
         seed=whole(seed, "seed"),
+        integrator="" if integrator is None else arguments.text(integrator, "integrator"),
         with_parquet=bool(arguments.flag(parquet, "parquet")),
     )
     for warning in asked.warnings:

@@ -11,13 +11,13 @@ from itertools import chain
 from pathlib import Path
 
 from msgspec.structs import replace
-from rich.console import RenderableType
 
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.precision import whole
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report import html, overview, parquet, store
+from heavytop.report.brief import brief
 from heavytop.report.environment import environment
 from heavytop.suite import checkpoint
 from heavytop.suite.checkpoint import Checkpoint, identity_of
@@ -35,7 +35,7 @@ MOST_ON_A_PAGE = 5000
 class Ended:
     """A run that is over: its summary for people, and whether no row failed."""
 
-    summary: RenderableType
+    summary: str
     good: bool
 
 
@@ -69,7 +69,7 @@ class Run:
         checkpoint.require_same(report.plan, self.identity, self.directory)
         if self.parquet:
             parquet.write(self.directory / parquet.FILE, report.rows, report.plan)
-        return Ended(overview.overview(report, report.rows, KINDS), overview.all_good(report.rows, KINDS))
+        return Ended(brief(report, report.rows, KINDS), overview.all_good(report.rows, KINDS))
 
     def measure(self, progress: Progress) -> Ended:
         """Measure what is not there yet, write the report and sum it up; ``progress`` hears of each finished task.
@@ -95,7 +95,7 @@ class Run:
         store.write(report, self.directory, rows())
         if len(self.tasks) <= MOST_ON_A_PAGE:
             html.write_report(replace(report, rows=list(rows())), self.directory / PAGE, KINDS)
-        return Ended(overview.overview(report, rows(), KINDS), overview.all_good(rows(), KINDS))
+        return Ended(brief(report, rows(), KINDS), overview.all_good(rows(), KINDS))
 
 
 def prepare(
@@ -108,6 +108,7 @@ def prepare(
     seed: int = 0,
     save_every: float = checkpoint.EVERY,
     with_parquet: bool = False,
+    integrator: str = "",
 ) -> Run:
     """The run of a plan into the folder ``out``, by default a new one under heavytop-results; nothing is written yet.
 
@@ -115,7 +116,7 @@ def prepare(
     """
     if with_parquet:
         parquet.require_pyarrow()
-    loaded, digest, tasks = read(plan, KINDS, seed)
+    loaded, digest, tasks = read(plan, KINDS, seed, integrator)
     if workers is not None and whole(workers, "--workers") < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     if workers is not None and scheduler is not None:
@@ -123,7 +124,7 @@ def prepare(
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
     run = Run(
-        {"name": loaded.name, "sha256": digest, "seed": str(seed)},
+        {"name": loaded.name, "sha256": digest, "seed": str(seed)} | ({"integrator": integrator} if integrator else {}),
         tasks,
         warnings(loaded),
         out or Path("heavytop-results") / f"{loaded.name}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}",

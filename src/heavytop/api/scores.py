@@ -14,8 +14,9 @@ from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.measure.drift import Drift
 from heavytop.precision import Precision
 from heavytop.records import Metric, Row
+from heavytop.report.diagnosis_text import diagnosis_text
 from heavytop.report.text import short
-from heavytop.suite.score import score as scored
+from heavytop.suite.score import Peer, assess
 from heavytop.suite.trajectory_file import of_arrays
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
@@ -46,6 +47,8 @@ class Score:
     it; empty without a reference.
     digits_kept: −log10 of the largest |error|/max(1, |value|) of Ω and γ over the samples; None without a reference.
     against: what it was compared with, and how well that is known.  row: the same as `heavytop score --json`.
+    of_digits: decimal digits of the format.  peer: heyoka's own run over the same times in the same format; None
+    without a reference, and where heyoka does not get there.  diagnosis: what explains the error, a sentence each.
     """
 
     outcome: str
@@ -54,15 +57,27 @@ class Score:
     digits_kept: float | None
     against: str
     row: Row = field(repr=False)
+    of_digits: int
+    peer: Peer | None
+    diagnosis: tuple[str, ...]
+
+    @property
+    def digits_right(self) -> float | None:
+        """The digits kept: how many are right at every sample."""
+        return self.digits_kept
 
     def _table(self) -> Table:
         row = self.row
-        kept = "no reference" if self.digits_kept is None else f"{digits_text(self.digits_kept)} digits kept"
+        kept = "no reference"
+        if self.digits_kept is not None:
+            kept = f"{digits_text(self.digits_kept)} of {self.of_digits} digits right"
+            if self.peer is not None:
+                kept += f" ({self.peer.integrator} keeps {digits_text(self.peer.digits_right)})"
         sizes = {_LABELS[part]: size for part, size in self.distance.items()}
         sizes |= {f"drift of {name}": size for name, size in self.drift.items()}
         lines = [[label, *(short(metric.value) for metric in size)] for label, size in sizes.items()]
         title = f"{row.case} in {row.precision}: {self.outcome}, {kept}"
-        return Table(title, ("", "largest", "rms", "final"), lines, [f"compared with {self.against}"])
+        return Table(title, ("", "largest", "rms", "final"), lines, [f"compared with {self.against}", *self.diagnosis])
 
     def __repr__(self) -> str:
         return self._table().text()
@@ -105,7 +120,8 @@ def score(
     about, instants = arguments.system(system), arguments.times(times)
     rows = _rows(states)
     names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
-    row = scored(of_arrays(body, state, about, instants, rows, form, *names))
+    found = assess(of_arrays(body, state, about, instants, rows, form, *names))
+    row = found.row
     return Score(
         row.outcome,
         _summaries(row.metrics, "drift_"),
@@ -113,6 +129,9 @@ def score(
         digits_kept(row),
         row.against,
         row,
+        found.of_digits,
+        found.peer,
+        tuple(diagnosis_text(each, row.system) for each in found.diagnoses),
     )
 
 

@@ -17,7 +17,7 @@ import sympy
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.ideal import forces_zero
 from heavytop.claims.rational import Quotient, Tower
-from heavytop.claims.signs import NUMBER_BITS, UNKNOWN, Sign, Unprovable, used
+from heavytop.claims.sign import NUMBER_BITS, UNKNOWN, Sign, Unprovable, used
 from heavytop.claims.transcendental import Refine, Transcendental
 
 _MAX_EXPONENT = 64

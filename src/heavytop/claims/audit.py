@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -57,22 +57,27 @@ def find_claim(name: str) -> Auditable:
     return read_claim(path)
 
 
-def audit(name: str, system_name: str = HEAVY_TOP.name) -> AuditReport:
+def audit(
+    name: str, system_name: str = HEAVY_TOP.name, progress: Callable[[int, int], None] = lambda done, of: None
+) -> AuditReport:
     """The audit of a claim of the paper, or of a TOML file, as a motion of that system.
 
+    progress: hears of a claim of the paper how many equations are judged, of how many.
     Raises InputError for an unknown claim or system and for a file that cannot be read.
     """
     about = system(system_name)
     claim = find_claim(name)
     if name in PAPER:
-        return audit_claim(claim, about)
+        return audit_claim(claim, about, progress)
     claim.statements(about)  # what cannot be stated is said at once
     return in_time(name, about.name)
 
 
-def audit_claim(claim: Auditable, about: System) -> AuditReport:
-    """The audit of a claim that is at hand, as a motion of ``about``."""
-    rows = judge(claim.statements(about), claim.setting)
+def audit_claim(
+    claim: Auditable, about: System, progress: Callable[[int, int], None] = lambda done, of: None
+) -> AuditReport:
+    """The audit of a claim that is at hand, as a motion of ``about``.  progress: as in :func:`audit`."""
+    rows = judge(claim.statements(about), claim.setting, progress)
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
     return AuditReport(claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind)

@@ -12,7 +12,7 @@ import sympy
 from flint import arb
 
 from heavytop.claims.evaluate import evaluate
-from heavytop.claims.signs import Sign, Unprovable
+from heavytop.claims.sign import Sign, Unprovable
 
 _LONGEST = 120
 _BITS = 512

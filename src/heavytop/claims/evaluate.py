@@ -9,7 +9,7 @@ from typing import Any
 import sympy
 from flint import arb
 
-from heavytop.claims.signs import Unprovable
+from heavytop.claims.sign import Unprovable
 from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 

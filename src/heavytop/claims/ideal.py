@@ -8,7 +8,7 @@ from typing import Any
 
 from flint import Ordering, fmpz_mpoly_ctx, fmpz_mpoly_vec
 
-from heavytop.claims.signs import used
+from heavytop.claims.sign import used
 
 # elements of the basis, terms and bits of each: more is given up, which leaves the verdict undecided
 _LIMITS = (60, 2_000, 4_096)

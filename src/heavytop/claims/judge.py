@@ -8,7 +8,7 @@ ball excludes 0; anything else is ``undecided`` with a bound at the sample point
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -22,7 +22,7 @@ from heavytop.claims.evaluate import evaluate
 from heavytop.claims.proof import Condition
 from heavytop.claims.prover import Prover
 from heavytop.claims.rational import Quotient
-from heavytop.claims.signs import Unprovable
+from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import Formulas, Setting, Statement
 from heavytop.exact.balls import radius as radius_of
 from heavytop.exact.balls import radius_text, value_text
@@ -125,11 +125,17 @@ class AuditReport:
         }
 
 
-def judge(statements: Sequence[Statement], setting: Setting) -> tuple[Row, ...]:
-    """The verdict on each statement, in their order."""
+def judge(
+    statements: Sequence[Statement], setting: Setting, progress: Callable[[int, int], None] = lambda done, of: None
+) -> tuple[Row, ...]:
+    """The verdict on each statement, in their order.  progress: hears after each how many are done, of how many."""
     statements = [s if s.formulas != Formulas() else _bare(s) for s in statements]
     prover = Prover(statements, setting)
-    return tuple(_judge_one(statement, setting, prover) for statement in statements)
+    rows = []
+    for statement in statements:
+        rows.append(_judge_one(statement, setting, prover))
+        progress(len(rows), len(statements))
+    return tuple(rows)
 
 
 def _bare(statement: Statement) -> Statement:

@@ -19,7 +19,7 @@ from heavytop.claims.evaluate import evaluate
 from heavytop.claims.rational import Quotient
 from heavytop.claims.real_zeros import on_conditions
 from heavytop.claims.regularity import Regularity
-from heavytop.claims.signs import NUMBER_BITS, Unprovable, used
+from heavytop.claims.sign import NUMBER_BITS, Unprovable, used
 from heavytop.claims.statement import Place, Setting, Statement
 from heavytop.claims.structure import sign_of
 from heavytop.exact.balls import working_precision

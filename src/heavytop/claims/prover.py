@@ -10,7 +10,7 @@ from heavytop.claims.algebra import Field
 from heavytop.claims.conditions import Kind, Need
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.proof import Condition, Region
-from heavytop.claims.signs import NUMBER_BITS, PLUS, Unprovable
+from heavytop.claims.sign import NUMBER_BITS, PLUS, Unprovable
 from heavytop.claims.statement import Domain, Place, Setting, Statement
 
 _CONTINUOUS = "the formulas are real and continuous all over the domain"

@@ -15,7 +15,8 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpz
 
-from heavytop.claims.signs import NUMBER_BITS, Sign, Signs, Unprovable, used
+from heavytop.claims.sign import NUMBER_BITS, Sign, Unprovable, used
+from heavytop.claims.signs import Signs
 from heavytop.exact.balls import working_precision
 
 SLOTS = 64
@@ -145,6 +146,13 @@ class Tower:
             rest = (*monomial[:index], 0, *monomial[index + 1 :])
             parts.setdefault(int(monomial[index]), {})[rest] = coefficient
         return {power: self.context.from_dict(terms) for power, terms in parts.items()}
+
+    def summands(self, argument: Quotient) -> list[Quotient]:
+        """The summands of the numerator, each over the denominator."""
+        return [
+            self.quotient(self.context.from_dict({monomial: coefficient}), argument.denominator)
+            for monomial, coefficient in argument.numerator.to_dict().items()
+        ]
 
     def quotient(self, numerator: Any, denominator: Any) -> Quotient:
         """Reduced, with no root left in the denominator; raises Unprovable where that is 0."""

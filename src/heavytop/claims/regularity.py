@@ -7,7 +7,7 @@ from typing import Any
 
 from heavytop.claims.algebra import Field
 from heavytop.claims.rational import Quotient
-from heavytop.claims.signs import Unprovable, used
+from heavytop.claims.sign import Unprovable, used
 
 _SHOWN = 100
 

@@ -5,14 +5,14 @@ Every rule here is a proof.  What no rule decides is unknown, and a condition th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import sympy
 from flint import arb, fmpq
 
-from heavytop.errors import HeavyTopError
+from heavytop.claims.sign import NUMBER_BITS, UNKNOWN, Sign, Unprovable, sum_of, used
 from heavytop.exact.balls import working_precision
 
 if TYPE_CHECKING:
@@ -25,26 +25,6 @@ _MAX_TERMS = 200
 # terms of what is taken apart further than into factors
 _MAX_PARTED = 40
 _MAX_DEGREE = 24
-NUMBER_BITS = 512
-
-
-class Unprovable(HeavyTopError):
-    """An expression that the exact algebra cannot carry: it leaves the verdict to the balls, and so undecided."""
-
-
-class Sign(NamedTuple):
-    """value: 1 for >= 0, -1 for <= 0, 0 for unknown.  strict: never 0 (also where the value is unknown)."""
-
-    value: int
-    strict: bool
-
-    def times(self, other: Sign) -> Sign:
-        """The sign of a product."""
-        return Sign(self.value * other.value, self.strict and other.strict)
-
-
-UNKNOWN = Sign(0, False)
-PLUS = Sign(1, True)
 
 
 class Signs:
@@ -366,19 +346,3 @@ class Signs:
                     if found.value:
                         return found
         return UNKNOWN
-
-
-def sum_of(signs: Iterable[Sign]) -> Sign:
-    """The sign of a sum: that of its parts where they have one and the same."""
-    values, strict = set(), False
-    for value, part_strict in signs:
-        values.add(value)
-        strict = strict or part_strict
-        if len(values) > 1 or value == 0:
-            return UNKNOWN
-    return Sign(values.pop(), strict) if values else Sign(1, False)
-
-
-def used(p: Any) -> set[int]:
-    """The generators that occur in a polynomial."""
-    return {index for index, degree in enumerate(p.degrees()) if degree > 0}

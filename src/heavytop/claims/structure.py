@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import sympy
 
-from heavytop.claims.signs import PLUS, UNKNOWN, Sign, sum_of
+from heavytop.claims.sign import PLUS, UNKNOWN, Sign, sum_of
 
 _BOUNDS = {"sin": Fraction(1), "cos": Fraction(1), "tanh": Fraction(1), "sech": Fraction(1), "atan": Fraction(11, 7)}
 

@@ -16,7 +16,7 @@ from flint import fmpz
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.inverse import is_below_quarter, same_as
 from heavytop.claims.rational import Quotient
-from heavytop.claims.signs import NUMBER_BITS, Sign, Unprovable, used
+from heavytop.claims.sign import NUMBER_BITS, Sign, Unprovable, used
 
 if TYPE_CHECKING:
     from heavytop.claims.algebra import Field
@@ -89,7 +89,7 @@ class Transcendental:
 
     def _in_parts(self, argument: Quotient) -> list[Quotient]:
         """What is constant in time apart from what moves; all terms apart where each is a multiple of a known base."""
-        terms = terms_of(argument, self._field)
+        terms = self._tower.summands(argument)
         still = [term for term in terms if self._field.is_constant(term)]
         if still and len(still) < len(terms):
             moving = [term for term in terms if not self._field.is_constant(term)]
@@ -160,7 +160,7 @@ class Transcendental:
         total: Circle = (t.number(0), t.number(1))
         if not argument.numerator:
             return total
-        for part in terms_of(argument, self._field):
+        for part in self._tower.summands(argument):
             total = self._turn(total, self._circle_of_term(part))
         return total
 
@@ -341,12 +341,3 @@ def _single(monomial: Any) -> int | None:
     """The generator that a monomial is, or None."""
     powers = [(index, int(power)) for index, power in enumerate(monomial) if power]
     return powers[0][0] if len(powers) == 1 and powers[0][1] == 1 else None
-
-
-def terms_of(argument: Quotient, field: Field) -> list[Quotient]:
-    """The summands of an argument; in one piece where it has a denominator."""
-    t = field.tower
-    return [
-        t.quotient(t.context.from_dict({monomial: coefficient}), argument.denominator)
-        for monomial, coefficient in argument.numerator.to_dict().items()
-    ]

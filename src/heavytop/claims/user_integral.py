@@ -7,20 +7,21 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import islice
+from typing import ClassVar
 
 import sympy
 
 from heavytop.claims.algebra import Assumptions, Field
 from heavytop.claims.conditions import Need, is_exactly_zero
+from heavytop.claims.context import STATE, TIME, FileClaim, needs_of, setting_of
 from heavytop.claims.expression import Formula, parse
-from heavytop.claims.from_file import ClaimFile, IntegralTable
+from heavytop.claims.from_file import IntegralTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
 from heavytop.claims.real_zeros import conditions_for_zero, on_conditions
 from heavytop.claims.sample_search import states_on
-from heavytop.claims.signs import Unprovable
+from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import ALL, Flow, Formulas, Place, Setting, Statement
 from heavytop.claims.structure import Names
-from heavytop.claims.user_claim import STATE, TIME, Ground, lay_ground, needs_of, setting_of
 from heavytop.precision import exact
 from heavytop.top.equations import GYROSTAT, System
 
@@ -31,20 +32,18 @@ _ENOUGH = 3
 
 
 @dataclass(frozen=True)
-class UserIntegral:
+class UserIntegral(FileClaim):
     """A first integral or an invariant relation claimed in a file."""
 
-    content: ClaimFile
-    ground: Ground = field(init=False)
     value: Formula = field(init=False)
     where: tuple[Formula, ...] = field(init=False)
+    variables: ClassVar[tuple[sympy.Symbol, ...]] = STATE
 
     def __post_init__(self) -> None:
-        ground = lay_ground(self.content, STATE)
+        FileClaim.__post_init__(self)
         table = self._table
-        object.__setattr__(self, "ground", ground)
-        object.__setattr__(self, "value", parse(table.value, ground.names, "integral.value"))
-        where = tuple(parse(text, ground.names, "integral.where") for text in table.where)
+        object.__setattr__(self, "value", parse(table.value, self.context.names, "integral.value"))
+        where = tuple(parse(text, self.context.names, "integral.where") for text in table.where)
         object.__setattr__(self, "where", where)
 
     @property
@@ -52,27 +51,12 @@ class UserIntegral:
         assert self.content.integral is not None
         return self.content.integral
 
-    @property
-    def name(self) -> str:
-        """As the file has it."""
-        return self.content.name
-
-    @property
-    def source(self) -> str:
-        """As the file has it."""
-        return self.content.source
-
-    @property
-    def kind(self) -> str:
-        """integral or relation."""
-        return self.content.kind
-
     @cached_property
     def setting(self) -> Setting:
         """The file's assumptions; the samples are its parameters at each of the states."""
-        base = setting_of(self.ground, TIME)
+        base = setting_of(self.context, TIME)
         conditions = [part for formula in self._zero for part in conditions_for_zero(formula.expression)]
-        samples = tuple({**row, **state} for row in self.ground.samples for state in self._states(conditions, row))
+        samples = tuple({**row, **state} for row in self.context.samples for state in self._states(conditions, row))
         return replace(base, samples=samples, relations=(*base.relations, *conditions))
 
     @property
@@ -98,14 +82,14 @@ class UserIntegral:
 
     def statements(self, system: System) -> list[Statement]:
         """dF/dt = 0 along the field of ``system``, on the conditions."""
-        rates = system.field(self.ground.parameters(system), STATE)
+        rates = system.field(self.context.parameters(system), STATE)
 
         def rate(value: sympy.Expr) -> sympy.Expr:
             return sum((sympy.diff(value, x) * dx for x, dx in zip(STATE, rates, strict=True)), sympy.Integer(0))
 
-        needs = needs_of([self.value, *self.where]) | self.ground.needs
+        needs = needs_of([self.value, *self.where]) | self.context.needs
         if system is GYROSTAT:
-            needs |= self.ground.rotor_needs
+            needs |= self.context.rotor_needs
         text = "dF/dt = 0 along the motion"
         if self.kind == "relation":
             text += ", where F = 0"
@@ -158,7 +142,7 @@ class UserIntegral:
 
     def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
         """No steps; the systems that keep it, by proof."""
-        found = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.ground.systems}
+        found = {s.name: rows if s is about else judge(self.statements(s), self.setting) for s in self.context.systems}
         return [], tuple(name for name, rows in found.items() if verdict_of(rows) == "holds")
 
 

@@ -17,10 +17,18 @@ from heavytop.errors import HeavyTopError
 from heavytop.cli import run, reports, motions, score, claims, selftest, listing  # noqa: F401
 
 
+_COMPLETE = "_HEAVYTOP_COMPLETE"
+"""Set by the scripts of `heavytop --completion SHELL`."""
+
+
 def run_command_line() -> int:
     """Run the command in sys.argv; returns or exits with its code.  Errors are printed as cause and remedy."""
+    if _COMPLETE in os.environ:
+        from typer import completion
+
+        completion.completion_init()  # type: ignore[attr-defined]
     try:
-        app()
+        app(prog_name="heavytop")
     except HeavyTopError as error:
         print(f"heavytop: {error}", file=sys.stderr)
         return error.exit_code

@@ -10,29 +10,52 @@ from typing import Annotated, Any
 
 import typer
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, quoted
 
 app = typer.Typer(
     help="Measure how wrong computed and claimed motions of a heavy top are, against references that are proven.",
     no_args_is_help=True,
+    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
 
 
+SHELLS = ("bash", "zsh", "fish")
+
+
 def _version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version
+        from heavytop.version import commit, version
 
-        print(f"heavytop {version('heavytop')}")
+        made_from = commit()
+        print(f"heavytop {version()}" + (f" (commit {made_from})" if made_from else ""))
+        raise typer.Exit
+
+
+def _completion(shell: str | None) -> None:
+    if shell is not None:
+        if shell not in SHELLS:
+            raise InputError(f"There is no completion for {quoted(shell)}.", f"Use {', '.join(SHELLS)}.")
+        from typer import completion
+
+        print(
+            completion.get_completion_script(  # type: ignore[attr-defined]
+                prog_name="heavytop", complete_var="_HEAVYTOP_COMPLETE", shell=shell
+            )
+        )
         raise typer.Exit
 
 
 @app.callback()
 def _common(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show version and commit, and exit.")
     ] = False,
+    completion: Annotated[
+        str | None,
+        typer.Option(callback=_completion, is_eager=True, metavar="SHELL", help="Print completion: bash, zsh or fish."),
+    ] = None,
 ) -> None:
     """What stands before a command."""
 

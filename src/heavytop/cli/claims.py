@@ -8,7 +8,11 @@ from typing import Annotated
 import typer
 
 from heavytop.cli.app import Json, command, print_json, require_new, show_on_terminal
+from heavytop.cli.progress import counted, followed, waiting
 from heavytop.errors import InputError
+
+_AUDIT_SECONDS, _FIGURE_SECONDS = 6.0, 1.0
+"""Expected, for the time left: of an audit, and of each figure."""
 
 
 @command
@@ -18,11 +22,21 @@ def audit(
     branch: Annotated[str | None, typer.Option(help="smooth or printed: that branch alone.")] = None,
     json: Json = False,
 ) -> int:
-    """Prove or refute a motion, equation by equation: exit 0 if all hold, 1 if one is refuted, 3 if undecided."""
-    from heavytop.claims.audit import audit as audit_named
-    from heavytop.claims.audit import only_branch
+    """Prove or refute a claimed motion, by equation.
 
-    report = audit_named(claim, system)
+    Exit 0 if all equations hold, 1 if one is refuted, 3 if none is refuted but one is undecided.  Takes 5 to 20
+    seconds.
+    """
+    from heavytop.claims.audit import PAPER, only_branch
+    from heavytop.claims.audit import audit as audit_named
+    from heavytop.claims.guard import SECONDS
+
+    if claim in PAPER:
+        with followed(f"audit of {claim}", "equations", _AUDIT_SECONDS) as progress:
+            report = audit_named(claim, system, progress)
+    else:
+        with waiting(f"audit of {claim}", SECONDS):
+            report = audit_named(claim, system)
     if branch is not None:
         report = only_branch(report, branch)
     if json:
@@ -39,7 +53,11 @@ def figures(
     out: Annotated[Path, typer.Option(help="Folder for the pictures.")],
     report: Annotated[Path | None, typer.Option(help="Draw work against precision of this report instead.")] = None,
 ) -> int:
-    """Draw Figs 2-8 of the paper, and the same with the true motion beside the claim, as SVG and PNG."""
+    """Draw Figs 2-8 of the paper, and the true motion.
+
+    The true motion beside the claim, all as SVG and PNG.  Takes about 20 seconds.
+    """
+    out = out.absolute()
     require_new(out)
     try:
         for file in _drawn(out, report):
@@ -51,10 +69,11 @@ def figures(
 
 def _drawn(out: Path, report: Path | None) -> list[Path]:
     if report is None:
-        from heavytop.measure.curves import drawings
+        from heavytop.measure.curves import FIGURES, drawings
         from heavytop.report.figures import draw_figures
 
-        return draw_figures(drawings(), out)
+        with counted("figures", FIGURES, "figures", _FIGURE_SECONDS) as advance:
+            return draw_figures(drawings(), out, advance)
     from heavytop.kinds import KINDS
     from heavytop.kinds.work_precision import NAME
     from heavytop.report import store

@@ -2,31 +2,77 @@
 
 from __future__ import annotations
 
-from heavytop.cli.app import command
+from typing import Annotated, Any
+
+import typer
+
+from heavytop.cli.app import Json, command, print_json
+
+_FORMS = {"command": "Command line", "toml": "TOML, in a plan", "json": "JSON, in a trajectory", "python": "Python"}
 
 
 @command
-def list_() -> int:
-    """List the cases, plans, systems, number formats and integrators that are there."""
-    from heavytop.integrate import peers
+def list_(
+    case: Annotated[str | None, typer.Option(help="Show the data of that case, ready to paste.")] = None,
+    json: Json = False,
+) -> int:
+    """List cases, plans, formats and integrators."""
+    if case is not None:
+        return _one_case(case, json)
+    listed = _everything()
+    if json:
+        print_json(listed)
+        return 0
+    print("Cases (--case NAME shows the data)")
+    for each in listed["cases"]:
+        print(f"  {each['name']:20} {each['system']:10} {each['about']}")
+    print(f"Plans\n  {', '.join(listed['plans'])}, or a TOML file")
+    print(f"Systems\n  {', '.join(listed['systems'])}")
+    print("Number formats")
+    for name, note in listed["formats"].items():
+        print(f"  {name:14} {note}")
+    print("Integrators")
+    for name, note in listed["integrators"].items():
+        print(f"  {name:16} {note}")
+    return 0
+
+
+def _everything() -> dict[str, Any]:
+    from heavytop.integrate import peers, registry
     from heavytop.precision import FORMATS, available
     from heavytop.suite.cases import CASES
     from heavytop.suite.plan import BUILT_IN
 
-    print("Cases")
-    for case in CASES.values():
-        print(f"  {case.name:20} {case.system.name:10} {case.about}")
-    print(f"Plans\n  {', '.join(BUILT_IN)}, or a TOML file")
-    print("Systems\n  heavy_top, gyrostat")
-    print("Number formats")
     notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
-    for name, reason in available().items():
-        label = "real:BITS" if name == "real" else name
-        note = notes[name]
-        print(f"  {label:10} {note if reason is None else f'not available: {reason}'}")
-    print("Integrators")
-    print("  heyoka           every format but double-double")
-    print("  words            every format, up to about 1000 bits")
-    for name, reason in peers.available().items():
-        print(f"  {name:16} {'installed' if reason is None else reason}")
+    own = {"heyoka": "every format but double-double", "words": "every format, up to about 1000 bits"}
+    assert own.keys() == registry.INTEGRATORS.keys()
+    others = {name: "installed" if reason is None else reason for name, reason in peers.available().items()}
+    return {
+        "cases": [{"name": case.name, "system": case.system.name, "about": case.about} for case in CASES.values()],
+        "plans": list(BUILT_IN),
+        "systems": ["heavy_top", "gyrostat"],
+        "formats": {
+            "real:BITS" if name == "real" else name: notes[name] if reason is None else f"not available: {reason}"
+            for name, reason in available().items()
+        },
+        # heyoka stands among the peers too
+        "integrators": own | {name: note for name, note in others.items() if name not in own},
+    }
+
+
+def _one_case(name: str, json: bool) -> int:
+    from heavytop.suite.case_text import case_data, forms
+    from heavytop.suite.cases import case as case_named
+
+    found = case_named(name)
+    if json:
+        print_json(
+            case_data(found)
+            | {"about": found.about}
+            | {key: forms(found)[key] for key in ("command", "toml", "python")}
+        )
+        return 0
+    print(f"{found.name}: {found.about}")
+    for form, text in forms(found).items():
+        print(f"\n{_FORMS[form]}\n{text}")
     return 0

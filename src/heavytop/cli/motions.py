@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal
+from heavytop.cli.progress import watched
 from heavytop.errors import InputError
 
 Inertia = Annotated[str, typer.Option(help="Principal moments A,B,C at the fixed point.")]
@@ -19,6 +20,8 @@ Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly
 SystemName = Annotated[str, typer.Option(help="heavy_top or gyrostat.")]
 Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]
 
+_REFERENCE_SECONDS = 30.0
+"""Expected of an enclosure, before anything is known of it."""
 _SLOW_BITS = 2000
 """From here on a single step takes seconds, and about 20 times as long with twice the bits."""
 
@@ -39,9 +42,10 @@ def propagate(
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
     json: Json = False,
 ) -> int:
-    """Integrate one motion of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ and print its states.
+    """Integrate one motion and print its states.
 
-    γ points up: the energy is ½ Ω·M + P r·γ.  Numbers are exact: 3, 0.25, 1e-3, -2/5.
+    The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up: the energy is ½ Ω·M + P r·γ.
+    Numbers are exact: 3, 0.25, 1e-3, -2/5.
     """
     from heavytop import precision as formats
     from heavytop.top.equations import system as system_named
@@ -86,16 +90,20 @@ def reference(
     normalize: Normalize = False,
     json: Json = False,
 ) -> int:
-    """Print proven states: a closed form where there is one, else a validated enclosure.
+    """Print proven states of one motion.
 
-    The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
+    By a closed form where there is one, at once; else by a validated enclosure: seconds up to t = 100, half a minute up
+    to t = 1000.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
     """
     from heavytop.measure.reference import reference as proven
     from heavytop.top.equations import system as system_named
     from heavytop.top.times import check_times
 
     top, start = _motion(inertia, weight, centre, omega, gamma, normalize, of_any_size=True)
-    found = proven(top, start, check_times(numbers(times)), digits, system_named(system), attitude=attitude)
+    instants = check_times(numbers(times))
+    watch = _Watch([abs(time) for time in instants])
+    with watched("reference", watch.fraction, _REFERENCE_SECONDS):
+        found = proven(top, start, instants, digits, system_named(system), watch.find, attitude)
     if json:
         print_json(found)
     else:
@@ -103,6 +111,26 @@ def reference(
 
         show_on_terminal(reference_text(found))
     return 0
+
+
+class _Watch:
+    """How far a reference has come: a closed form takes no time to speak of, an enclosure goes from 0 to each time."""
+
+    def __init__(self, spans: list[Any]) -> None:
+        self.last = max(spans)
+        self.solution: Any = None
+
+    def find(self, top: Any, start: Any, system: Any) -> Any:
+        """The known motion, which is watched from now on."""
+        from heavytop.exact.catalogue import find
+
+        self.solution = find(top, start, system)
+        return self.solution
+
+    def fraction(self) -> float:
+        """Part of the span that is enclosed."""
+        reached = getattr(self.solution, "reached", None)
+        return float(reached() / self.last) if reached is not None and self.last else 0.0
 
 
 def _motion(

@@ -1,38 +1,201 @@
-"""How far a run has come."""
+"""How far a command has come, on standard error, and only on a terminal."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from threading import Event, Thread
+from time import perf_counter
 from typing import Any
 
+_TRUST, _MEASURED = 0.05, 0.1
+"""The expected speed counts at first as much as a twentieth of the work, and no more when a tenth of it is done."""
+_EVERY = 0.5
+"""Seconds between two looks at work that does not report by itself."""
 
-class Progress:
-    """A bar with ETA on a terminal, nothing elsewhere; called with each finished task."""
 
-    def __init__(self, tasks: Any, kinds: Any) -> None:
+class Estimator:
+    """How long work of known weight will still take.
+
+    total: the sum of the weights of its parts.  expected: seconds for a weight of 1, before anything was measured.
+    clock: seconds from any moment on.
+
+    When a tenth is done, its speed alone counts.  Then the estimate is right within a factor of 2 if the weights of
+    what is done and of what is left are wrong by factors that differ by less than 2.
+    """
+
+    def __init__(self, total: float, expected: float = 1.0, clock: Callable[[], float] = perf_counter) -> None:
+        self.total = max(total, 0.0)
+        self.done = 0.0
+        self._expected = expected
+        self._clock = clock
+        self._began = self._last = clock()
+
+    def advance(self, weight: float) -> None:
+        """A part is done, now."""
+        self.done = min(self.total, self.done + weight)
+        self._last = self._clock()
+
+    def reach(self, done: float) -> None:
+        """So much in all is done, now; never less than before."""
+        if done > self.done:
+            self.advance(done - self.done)
+
+    @property
+    def fraction(self) -> float:
+        """How much of the work is done, 0 to 1."""
+        return self.done / self.total if self.total else 1.0
+
+    def seconds_left(self) -> float:
+        """An estimate; 0 when all is done."""
+        if self.done >= self.total:
+            return 0.0
+        trust = _TRUST * self.total * max(0.0, 1 - self.fraction / _MEASURED)
+        speed = (self._last - self._began + trust * self._expected) / (self.done + trust)
+        # since the last part ended, work went on that has not been counted
+        return max((self.total - self.done) * speed - (self._clock() - self._last), 0.0)
+
+
+def duration(seconds: float) -> str:
+    """A time to wait, as short as people say it: 8 s, 1:05, 2:03:00."""
+    whole = math.ceil(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    hours, rest = divmod(whole, 3600)
+    return f"{hours}:{rest // 60:02}:{rest % 60:02}" if hours else f"{rest // 60}:{rest % 60:02}"
+
+
+class Bar:
+    """A line on a terminal: what is done, of how many, per cent, time left.  Nothing elsewhere.
+
+    count: how many parts there are, named by ``unit``; 0 where they are not counted.
+    """
+
+    def __init__(self, estimator: Estimator, count: int = 0, unit: str = "rows", console: Any = None) -> None:
         from rich import progress
         from rich.console import Console
 
+        self.estimator, self.count, self.unit, self.finished = estimator, count, unit, 0
+        self.console = console or Console(stderr=True)
+        self.live = bool(self.console.is_terminal)
         columns = (
             progress.TextColumn("{task.description}"),
             progress.BarColumn(),
-            progress.TimeElapsedColumn(),
-            progress.TimeRemainingColumn(),
+            progress.TextColumn("{task.fields[said]}"),
         )
-        console = Console(stderr=True)
-        self.bar = progress.Progress(*columns, console=console, disable=not console.is_terminal, transient=True)
-        self.kinds = kinds
-        self.id = self.bar.add_task("starting", total=sum(map(self._cost, tasks)))
+        self.bar = progress.Progress(*columns, console=self.console, disable=not self.live, transient=True)
+        self.id = self.bar.add_task("starting", total=1.0, said=self.said())
 
-    def __enter__(self) -> Progress:
+    def said(self) -> str:
+        """Parts done of all, per cent, time left."""
+        percent = f"{100 * self.estimator.fraction:.0f} %"
+        left = f"about {duration(self.estimator.seconds_left())} left"
+        return ", ".join([*([f"{self.finished}/{self.count} {self.unit}"] if self.count else []), percent, left])
+
+    def show(self, label: str | None = None) -> None:
+        """Draw it as it is now."""
+        named = None if label is None else label[:40]
+        self.bar.update(self.id, completed=self.estimator.fraction, description=named, said=self.said())
+
+    def __enter__(self) -> Bar:
         self.bar.start()
         return self
 
+    def __exit__(self, *_: object) -> None:
+        self.bar.stop()
+
+
+class Progress:
+    """The bar of a run, called with each finished task.
+
+    kinds: of measurement, by name, which know what a task costs.  workers: how many tasks run at once.
+    """
+
+    def __init__(self, tasks: Sequence[Any], kinds: Any, workers: int = 1) -> None:
+        self.kinds = kinds
+        self.bar = Bar(Estimator(sum(map(self._cost, tasks)), 1 / max(workers, 1)), len(tasks))
+
+    def __enter__(self) -> Progress:
+        self.bar.__enter__()
+        return self
+
     def __call__(self, task: Any) -> None:
-        self.bar.update(self.id, advance=self._cost(task), description=task.label[:48])
+        self.bar.finished += 1
+        self.bar.estimator.advance(self._cost(task))
+        self.bar.show(task.label)
 
     def _cost(self, task: Any) -> float:
         cost: float = self.kinds[task.key.kind].cost(task)
         return cost
 
     def __exit__(self, *_: object) -> None:
-        self.bar.stop()
+        self.bar.__exit__()
+
+
+@contextmanager
+def counted(label: str, count: int, unit: str, expected: float) -> Iterator[Callable[[], None]]:
+    """A bar over ``count`` parts of equal weight; gives what to call after each.  expected: seconds of one."""
+    with Bar(Estimator(count, expected), count, unit) as bar, _watched(bar, label):
+
+        def advance() -> None:
+            # drawn by the thread that looks twice a second: there may be very many parts
+            bar.finished += 1
+            bar.estimator.advance(1)
+
+        yield advance
+
+
+@contextmanager
+def followed(label: str, unit: str, expected: float) -> Iterator[Callable[[int, int], None]]:
+    """A bar over parts whose number is found on the way; gives what to call with how many are done, of how many."""
+    with Bar(Estimator(1.0, expected), 0, unit) as bar, _watched(bar, label):
+
+        def advance(done: int, of: int) -> None:
+            bar.finished, bar.count = done, of
+            bar.estimator.reach(done / of)
+            bar.show(label)
+
+        yield advance
+
+
+@contextmanager
+def waiting(label: str, most: float) -> Iterator[None]:
+    """A line while something works that cannot say how far it is, and is stopped after ``most`` seconds."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if console.is_terminal:
+        with console.status(f"{label}, {duration(most)} at most"):
+            yield
+    else:
+        yield
+
+
+@contextmanager
+def watched(label: str, fraction: Callable[[], float], expected: float) -> Iterator[None]:
+    """A bar over work that does not report: ``fraction`` is asked how much of it is done, from another thread."""
+    with Bar(Estimator(1.0, expected)) as bar, _watched(bar, label, lambda: bar.estimator.reach(fraction())):
+        yield
+
+
+@contextmanager
+def _watched(bar: Bar, label: str, look: Callable[[], None] = lambda: None) -> Iterator[None]:
+    """Draw the bar twice a second, on a terminal."""
+    if not bar.live:
+        yield
+        return
+    stop = Event()
+
+    def draw() -> None:
+        while not stop.wait(_EVERY):
+            look()
+            bar.show(label)
+
+    thread = Thread(target=draw, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()

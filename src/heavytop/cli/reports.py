@@ -25,7 +25,10 @@ def compare(
     html: Annotated[Path | None, typer.Option(help="Write a page that draws both on the same axes.")] = None,
     json: Json = False,
 ) -> int:
-    """Compare two reports: exit 1 if anything is worse, 3 if anything is missing or incomparable, else 0."""
+    """Compare two reports; exit 1 if anything is worse.
+
+    Else exit 3 if anything is missing or incomparable, else 0.
+    """
     from heavytop.kinds import KINDS
     from heavytop.report import store
     from heavytop.report.compare import compare as compare_reports
@@ -70,7 +73,7 @@ def history(
     html: Annotated[Path | None, typer.Option(help="Write a page with a small chart a metric.")] = None,
     json: Json = False,
 ) -> int:
-    """Show metrics over two reports or more, with every step marked."""
+    """Show metrics over reports, with every step marked."""
     from heavytop.kinds import KINDS
     from heavytop.report import history as over
     from heavytop.report import store
@@ -125,11 +128,16 @@ def show(
     report: Annotated[Path, typer.Argument(help="Report or its folder.")],
     html: Annotated[Path | None, typer.Option(help="Write the report as a page to that file instead.")] = None,
     parquet: Annotated[Path | None, typer.Option(help="Write its rows to that file instead.")] = None,
+    full: Annotated[bool, typer.Option("--full", help="Print every row and law.")] = False,
 ) -> int:
-    """Print the summary of a report, or write it as one self-contained page, or its rows as a table."""
+    """Print the summary of a report, or write its page.
+
+    The page is one self-contained file; --parquet writes the rows as a table instead.
+    """
     from heavytop.kinds import KINDS
     from heavytop.report import overview, store, text
     from heavytop.report import parquet as tables
+    from heavytop.report.brief import brief
     from heavytop.suite.files import whole
 
     if parquet is not None:
@@ -137,11 +145,17 @@ def show(
         if html is not None and html.resolve() == parquet.resolve():
             raise InputError(f"{html} is named twice.", "Give each file a name of its own.")
     if html is None and parquet is None:
-        brief = store.read_brief(report, KINDS)
-        many = len(brief.rows) > overview.MOST_LISTED
-        hint = "Every row is in report.json; --parquet FILE writes all as a table."
-        shown = overview.worst(brief, brief.rows, hint) if many else text.summary(store.read(report, KINDS), KINDS)
-        show_on_terminal(shown)
+        if not full:
+            found = store.read(report, KINDS)
+            print(brief(found, found.rows, KINDS))
+            print(f"\nEvery row: heavytop show {report} --full")
+            return 0
+        streamed = store.read_brief(report, KINDS)
+        if len(streamed.rows) > overview.MOST_LISTED:
+            hint = "Every row is in report.json; --parquet FILE writes all as a table."
+            show_on_terminal(overview.worst(streamed, streamed.rows, hint))
+        else:
+            show_on_terminal(text.summary(store.read(report, KINDS), KINDS))
         return 0
     found = store.read(report, KINDS)
     with ExitStack() as stack:

@@ -9,37 +9,53 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, command, print_json, require_new, show_on_terminal
+from heavytop.cli.progress import counted
 from heavytop.errors import InputError
+
+_STATE_SECONDS = 1e-3
+"""Expected of comparing one state."""
 
 
 @command
 def score(
     trajectory: Annotated[Path, typer.Argument(help="A motion computed elsewhere: .json, .csv, or - to read it.")],
+    case: Annotated[str | None, typer.Option(help="Built-in case of its top and start.")] = None,
     out: Annotated[Path | None, typer.Option(help="New folder for a report with its row.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page about it to that file.")] = None,
     json: Json = False,
 ) -> int:
-    """Score a motion computed elsewhere like our own: drift, distance from the known motion, digits kept."""
-    from heavytop.suite.score import complete, digits_kept
-    from heavytop.suite.score import score as scored
+    """Say how many digits of your trajectory are right.
+
+    Digits right at every sample, beside heyoka's in the same format; distance from the known motion; drift of the
+    first integrals; what explains the error, where something does.  The file: docs/score.md.  Takes a few seconds.
+    """
+    from heavytop.suite.cases import case as case_named
+    from heavytop.suite.score import assess, complete
     from heavytop.suite.trajectory_file import read
 
     if out is not None:
+        out = out.absolute()
         require_new(out)
-    given = read(trajectory)
+    given = read(trajectory, None if case is None else case_named(case))
     for warning in given.warnings():
         print(f"heavytop: warning: {warning}", file=sys.stderr)
-    row = scored(given)
+    with counted("score", 2 * len(given.times), "states", _STATE_SECONDS) as advance:
+        found = assess(given, advance)
     if out is not None:
-        _write_report(row, given.sha256, out)
+        _write_report(found.row, given.sha256, out)
+    if html is not None:
+        _write_page(found, html.absolute())
     if json:
-        import msgspec
+        from heavytop.report.score_text import to_json
 
-        print_json(msgspec.to_builtins(row) | {"digits_kept": digits_kept(row)})
+        print_json(to_json(found))
     else:
         from heavytop.report.score_text import score_text
 
-        show_on_terminal(score_text(row))
-    return 0 if complete(row) else 3
+        show_on_terminal(score_text(found))
+        if html is not None:
+            print(f"\nPage: {html}")
+    return 0 if complete(found.row) else 3
 
 
 def _write_report(row: Any, sha256: str, out: Path) -> None:
@@ -54,3 +70,14 @@ def _write_report(row: Any, sha256: str, out: Path) -> None:
         store.write(Report(SCHEMA, plan, environment(), [row]), out)
     except OSError as error:
         raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None
+
+
+def _write_page(found: Any, path: Path) -> None:
+    from heavytop.report.environment import environment
+    from heavytop.report.score_page import score_page
+    from heavytop.suite.files import replace
+
+    try:
+        replace(path, score_page(found, environment()).encode())
+    except InputError as error:
+        raise InputError(error.cause, "Give a file in a writable folder.") from None

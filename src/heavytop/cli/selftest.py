@@ -17,15 +17,19 @@ def selftest(
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
     json: Json = False,
 ) -> int:
-    """Try the suite's detectors on broken integrators: exit 1 if a fault they should see slips through."""
+    """Try the detectors on integrators broken on purpose.
+
+    Exit 1 if a fault they should see slips through.  Takes about a minute on two cores.
+    """
     from heavytop.api import selftest as detectors
     from heavytop.kinds import KINDS
 
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     tasks = detectors.tasks()
-    with Progress(tasks, KINDS) as advance:
-        trials = detectors.trials(tasks, workers or os.cpu_count() or 1, advance)
+    at_once = workers or os.cpu_count() or 1
+    with Progress(tasks, KINDS, at_once) as advance:
+        trials = detectors.trials(tasks, at_once, advance)
     if json:
         print_json({"trials": [trial.to_json() for trial in trials]})
     else:

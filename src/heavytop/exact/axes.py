@@ -21,7 +21,7 @@ from typing import Any
 from flint import arb, arb_series
 
 from heavytop.errors import NotInClass, OutOfReach
-from heavytop.exact.attitude import turned_to_start
+from heavytop.exact.attitude import has_attitude, turned_to_start
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.solution import ExactSolution
 from heavytop.top.equations import System
@@ -81,7 +81,7 @@ class Renamed:
     @property
     def has_attitude(self) -> bool:
         """Whether the solution has one."""
-        return hasattr(self.solution, "attitude")
+        return has_attitude(self.solution)
 
     @property
     def system(self) -> System:

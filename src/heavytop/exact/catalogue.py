@@ -8,8 +8,12 @@ Each case class makes its own test: its constructor raises NotInClass, saying wh
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
 
-from heavytop.errors import NotInClass
+from flint import arb
+
+from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.axes import ALL, CYCLIC, Axes, Renamed, inverse, renamed_state, renamed_top
 from heavytop.exact.bobylev_steklov import BobylevSteklov
 from heavytop.exact.delone import Delone, DeloneHomoclinic
@@ -60,6 +64,34 @@ def _permanent_gyrostat(top: HeavyTop, start: State) -> ExactSolution:
     return Staude(top, start, GYROSTAT)
 
 
+@dataclass(frozen=True, slots=True)
+class OnLevel(Validated):
+    """The enclosure of a motion whose class does not cover its level; what it cannot reach is refused with ``level``.
+
+    level: the class, the level and the distance from it.
+    """
+
+    level: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "method", f"{self.method}, as no closed form covers the level ({self.level})")
+        Validated.__post_init__(self)
+
+    def state(self, time: Fraction, bits: int) -> list[arb]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+        return self._named(Validated.state, time, bits)
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """See :meth:`Validated.attitude`."""
+        return self._named(Validated.attitude, time, bits)
+
+    def _named(self, evaluate: Callable[[Validated, Fraction, int], list[arb]], time: Fraction, bits: int) -> list[arb]:
+        try:
+            return evaluate(self, time, bits)
+        except OutOfReach as error:
+            raise OutOfReach(f"{error.cause} {self.level}", error.remedy) from error
+
+
 # the case, and the namings of the axes under which it looks different
 _HEAVY_TOP: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (Staude, _KEEP),
@@ -88,12 +120,20 @@ def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator
 
     Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
+    yield from (found for found in _attempts(top, start, system) if not isinstance(found, LevelNotDone))
+
+
+def _attempts(top: HeavyTop, start: State, system: System) -> Iterator[ExactSolution | LevelNotDone]:
+    """:func:`matches`, and why there is none where a class has the motion but does not cover its level."""
     require_handy(top, start)
     system.parameters(top, start)
     for case, namings in _GYROSTAT if system is GYROSTAT else _HEAVY_TOP:
         for axes in namings:
             try:
                 found = case(renamed_top(top, axes), renamed_state(start, axes))
+            except LevelNotDone as error:
+                yield LevelNotDone(f"{getattr(case, '__name__', '')}: {error.cause}", error.remedy)
+                continue
             except NotInClass:
                 continue
             yield found if axes == _KEEP[0] else Renamed(found, inverse(axes))
@@ -103,6 +143,12 @@ def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator
 def find(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> ExactSolution:
     """The simplest closed form of this motion, or its validated enclosure.
 
+    The enclosure names the degenerate level where a class has the motion but not this level of it.
     Raises InputError where the system does not admit the top and start, OutOfReach for numbers of too many digits.
     """
-    return next(matches(top, start, system), None) or Validated(top, start, system)
+    level = ""
+    for found in _attempts(top, start, system):
+        if not isinstance(found, LevelNotDone):
+            return found
+        level = level or found.cause
+    return OnLevel(top, start, system, level=level) if level else Validated(top, start, system)

@@ -43,6 +43,7 @@ from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.integrals import kovalevskaya_xi
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +69,7 @@ class Delone(ClosedForm):
             raise NotInClass(
                 f"Delone needs P c = 0 and P r != 0, but P r = ({', '.join(map(shown, (n1, n2, n3)))}).", remedy
             )
-        (w1, w2, _), (g1, g2, _) = self.start.omega, self.start.gamma
-        xi = w1 * w1 - w2 * w2 - (n1 * g1 - n2 * g2) / i3, 2 * w1 * w2 - (n1 * g2 + n2 * g1) / i3
+        xi = kovalevskaya_xi(HEAVY_TOP.parameters(self.top, self.start), self.start.flat, (0, 1, 2))
         if any(xi):
             raise NotInClass(f"Delone needs xi = 0, but xi = {shown(xi[0])} + i ({shown(xi[1])}).", remedy)
 
@@ -78,7 +78,7 @@ class Delone(ClosedForm):
         length = current_length()
         with series_length(length + 1):
             cosine, sine = self._turn(time)
-            square, along, _, weight = (ball(value) for value in _constants(self))
+            square, along, _, weight = _prepared(self, current_precision())[1]
             # the component across r is −b': one more coefficient, then one less
             across = -square * (cosine * sine.derivative() - sine * cosine.derivative())
         n1, n2, _ = balls(self.top.moment)
@@ -98,10 +98,9 @@ class Delone(ClosedForm):
 
     def _turn(self, time: Fraction) -> tuple[Any, Any]:
         """cos b and sin b/|n|."""
-        motion = _prepared(self, current_precision())
+        motion, (square, *_) = _prepared(self, current_precision())
         point = motion.lattice.point(time, current_length())
         below, above = motion.denominator(point), motion.numerator(point)
-        square = ball(_constants(self)[0])
         total = below * below + square * (above * above)
         return (below * below - square * (above * above)) / total, 2 * (above * below) / total
 
@@ -114,7 +113,7 @@ def _constants(case: Delone) -> tuple[Fraction, Fraction, Fraction, Fraction]:
 
 
 @kept
-def _prepared(case: Delone, _bits: int) -> PreparedMotion:
+def _prepared(case: Delone, _bits: int) -> tuple[PreparedMotion, list[arb]]:
     square, along, across, weight = _constants(case)
     spin, lift = case.start.omega[2], case.start.gamma[2] / case.top.inertia[2]
     # (weight − 2 s lift y − s weight y²)(1 + s y²) − (along − spin s y − s along y²)²/s with s = |n|², over 4 s
@@ -126,7 +125,7 @@ def _prepared(case: Delone, _bits: int) -> PreparedMotion:
         -(square**2) * weight - square * along**2,
     )
     quartic = tuple(c / (4 * square) for c in coefficients)
-    return QuarticMotion(quartic, Fraction(0), -across / (2 * square)).prepared()
+    return QuarticMotion(quartic, Fraction(0), -across / (2 * square)).prepared(), balls(_constants(case))
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,12 @@
 All norms are maximum norms, and time is scaled so that a step goes over 0 ≤ τ ≤ 1: y' = h f(y).
 
 *The polynomial* p(τ) = Σ b_n τⁿ has whole numbers in units of 2^-p ("ulps") as coefficients, exactly:
-b_{n+1} is h f_n/(n + 1) rounded to nearest, f_n the coefficient of τⁿ in f(p).  No rounding error is estimated here:
-what p lacks to be a motion is its defect p' − h f(p) = Σ E_n τⁿ, and that is known.  For n < N, |E_n| ≤ (n + 1)/2 ulp;
-for n ≥ N, E_n = −h f_n with |f_n| ≤ q Σ_{j+k=n} β_j β_k + l β_n, β_j = |b_j|.  Hence the integral of |defect|
-from 0 to τ is at most
+b_{n+1} is h f_n/(n + 1) within ρ_n, f_n the coefficient of τⁿ in f(p): ρ_n is half an ulp where they are made of
+exact integers, and what :mod:`heavytop.words.proven` proves where they are made of words.  What p lacks to be a motion
+is its defect p' − h f(p) = Σ E_n τⁿ, and that is known.  For n < N, |E_n| ≤ (n + 1) ρ_n; for n ≥ N, E_n = −h f_n with
+|f_n| ≤ q Σ_{j+k=n} β_j β_k + l β_n, β_j = |b_j|.  Hence the integral of |defect| from 0 to τ is at most
 
-    D = N/2 ulp + Σ_{n ≥ N} h (q Σ_{j+k=n} β_j β_k + l β_n)/(n + 1).                                              (a)
+    D = Σ_{n < N} ρ_n + Σ_{n ≥ N} h (q Σ_{j+k=n} β_j β_k + l β_n)/(n + 1).                                        (a)
 
 *Theorem (tail).*  The motion y that starts at y(0) with w0 = y(0) − p(0) differs from p by w with
 w' = J w + h Q(w, w) − defect, J(τ) = h Df(p(τ)).  With |J| ≤ Λ' = h (2q Σ β_j + l), Λ = Λ' + h q c and
@@ -44,7 +44,10 @@ from flint import arb, fmpz
 from gmpy2 import mpz
 
 from heavytop.exact.quadratic import Matrix, Quadratic
-from heavytop.exact.recurrence import coefficients
+from heavytop.exact.step_series import StepSeries, Whole
+from heavytop.words.proven import Carrier
+from heavytop.words.variation import variation as variation_of
+from heavytop.words.whole_series import coefficients
 
 _UNIT = 2.0**-53
 # relative room for the rounding of every bound below: each is a sum or product of a few hundred terms of one sign
@@ -75,7 +78,7 @@ class Node:
     """The motion at ``time``: centre in ulps plus the set of errors; ``halvings``: the next step is 2^-halvings."""
 
     time: Fraction
-    centre: tuple[mpz, ...]
+    centre: tuple[int, ...]
     errors: Errors
     halvings: int
 
@@ -84,14 +87,16 @@ class Node:
 class Step:
     """The motion from a node on, for 0 ≤ τ ≤ 1.
 
-    coefficients: of each component, whole ulps of 2^-precision.  variation: V̂ by powers of τ.
+    series: the polynomial, in whole ulps of 2^-precision.  variation: V̂ by powers of τ.
+    powers: an upper bound of Σ |V̂_n|.
     variation_error: bound of |V − V̂|.  local: bound of |v| in ulps 2^errors.exponent.  widest: W, as a number.
     """
 
     node: Node
     precision: int
-    coefficients: list[list[mpz]]
+    series: StepSeries
     variation: Matrix
+    powers: float
     variation_error: float
     local: float
     widest: float
@@ -104,17 +109,17 @@ class Step:
     @property
     def order(self) -> int:
         """N."""
-        return len(self.coefficients[0]) - 1
+        return self.series.order
 
     @property
-    def _powers(self) -> float:
-        """An upper bound of Σ |V̂_n|."""
-        return float(np.abs(self.variation).sum(axis=2).max(axis=1).sum()) * _UP
+    def coefficients(self) -> list[list[int]]:
+        """b_n of each component."""
+        return self.series.values
 
     @property
     def _summed_error(self) -> float:
         """|V − V̂| with the rounding of the sum that V̂ is evaluated by."""
-        return self.variation_error + 8 * _VARIATIONAL_ORDER * _UNIT * self._powers
+        return self.variation_error + 8 * _VARIATIONAL_ORDER * _UNIT * self.powers
 
     def at(self, tau: Fraction) -> list[arb]:
         """The state at 0 ≤ τ ≤ 1, as balls."""
@@ -126,7 +131,7 @@ class Step:
         variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(self.variation))
         errors = self.node.errors
         # the second term: the rounding of the product below
-        spread = (slack + 64 * _UNIT * self._powers) * float(np.abs(errors.frame).sum(axis=1).max()) * _UP
+        spread = (slack + 64 * _UNIT * self.powers) * _norm(errors.frame) * _UP
         return np.asarray(errors.sizes(variation @ errors.frame, spread) + self.local)
 
     def around(self, tau: Fraction, radii: Matrix) -> list[arb]:
@@ -151,21 +156,19 @@ class Step:
         exponent = errors.exponent
         if radii.max() > 2.0**400:
             radii, exponent = np.ldexp(radii, -400), exponent + 400
-        centre = tuple(sum(component) for component in self.coefficients)
-        return Node(self.node.time + self.length, centre, Errors(frame, radii, exponent), self._halvings())
+        return Node(self.node.time + self.length, self.series.total, Errors(frame, radii, exponent), self._halvings())
 
     def _halvings(self) -> int:
-        """The next step: 2.1 to 3.8 bits a power of τ, about e^-2, cost least (N² multiplications of a step 1/h)."""
-        wanted = self.order / (self.precision + 16)
-        if wanted > 0.45:
+        """The next step: where the orders a bit are few it is doubled, where they are many it is halved."""
+        (few, many), wanted = self.series.thrifty, self.order / (self.precision + 16)
+        if wanted > many:
             return self.node.halvings + 1
-        slope = np.abs(self.variation[1]).sum(axis=1).max()
-        return self.node.halvings - int(wanted < 0.27 and slope < _LARGEST_SLOPE / 2)
+        return self.node.halvings - int(wanted < few and _norm(self.variation[1]) < _LARGEST_SLOPE / 2)
 
 
-def _horner(coefficients: list[mpz], tau: Fraction) -> mpz:
+def _horner(coefficients: list[int], tau: Fraction) -> mpz:
     if tau == 1:
-        return sum(coefficients, mpz(0))
+        return mpz(sum(coefficients))
     total = mpz(0)
     numerator, denominator = mpz(tau.numerator), mpz(tau.denominator)
     for value in reversed(coefficients):
@@ -180,13 +183,18 @@ def _new_frame(variation: Matrix, variation_error: float, errors: Errors) -> tup
     order = np.argsort(-np.linalg.norm(carried, axis=0) * errors.radii, kind="stable")
     frame = np.linalg.qr(carried[:, order])[0]
     rounding = 2 * (size + 4) * _UNIT
-    transposed, before = (float(np.abs(m).sum(axis=1).max()) for m in (frame.T, errors.frame))
-    product = (float(np.abs(variation).sum(axis=1).max()) + variation_error) * before
-    off = float(np.abs(frame.T @ frame - np.eye(size)).sum(axis=1).max()) + rounding * transposed * size
+    transposed, before = _norm(frame.T), _norm(errors.frame)
+    product = (_norm(variation) + variation_error) * before
+    off = _norm(frame.T @ frame - np.eye(size)) + rounding * transposed * size
     # (1 + F)^-1 differs from 1 by at most |F|/(1 − |F|)
     inverse = off / (1 - off) * transposed if off < 1 else inf
     slack = inverse * product + transposed * before * variation_error + 3 * rounding * transposed * product
     return frame, frame.T @ carried, max(slack, inverse) * _UP
+
+
+def _norm(matrix: Matrix) -> float:
+    """The largest row sum of absolute values."""
+    return float(max(np.abs(matrix).sum(axis=1).tolist()))
 
 
 def coefficient_bound(field: Quadratic, size: Fraction) -> Fraction:
@@ -209,12 +217,15 @@ def start_node(field: Quadratic, start: tuple[Fraction, ...], precision: int) ->
     return Node(Fraction(0), centre, Errors(np.eye(field.dimension), radii, 0), halvings)
 
 
-def step(field: Quadratic, node: Node, precision: int) -> Step | None:
-    """The proven step from ``node``; None where the errors have grown beyond what the theorem admits."""
+def step(field: Quadratic, node: Node, precision: int, carrier: Carrier | None = None) -> Step | None:
+    """The proven step from ``node``; None where the errors have grown beyond what the theorem admits.
+
+    carrier: of this motion on the grid of ``precision`` bits; None for coefficients in exact integers.
+    """
     halvings = node.halvings
     while halvings < node.halvings + 64:
         trial = Node(node.time, node.centre, node.errors, halvings)
-        series = coefficients(field, trial.centre, precision, halvings)
+        series = _series(field, trial, precision, carrier)
         found = None if series is None else _prove(field, trial, series, precision)
         if found is not None and isfinite(found.widest) and found.variation_error < CAP:
             return found if found.widest < CAP else None
@@ -222,79 +233,58 @@ def step(field: Quadratic, node: Node, precision: int) -> Step | None:
     return None
 
 
-def _prove(field: Quadratic, node: Node, series: list[list[mpz]], precision: int) -> Step | None:
+def _series(field: Quadratic, node: Node, precision: int, carrier: Carrier | None) -> StepSeries | None:
+    if carrier is not None:
+        return carrier.series(node.centre, node.halvings)
+    values = coefficients(field, node.centre, precision, node.halvings)
+    return None if values is None else Whole(values, precision)
+
+
+def _prove(field: Quadratic, node: Node, series: StepSeries, precision: int) -> Step | None:
     """The step with its bounds from the theorem; None where they are not finite."""
     h, q, slope = 2.0**-node.halvings, float(field.q) * _UP, float(field.l) * _UP
-    sizes = _absolute_sizes(series, precision)
+    sizes = series.sizes
     growth = h * (2 * q * float(sizes.sum()) + slope + q * CAP) * _UP
     if not growth < 4 * _LARGEST_SLOPE:
         return None
     factor = exp(growth) * _UP
     scale = node.errors.exponent
     defect = np.ldexp(_defect(series, precision, h * q, h * slope), -scale) + _TINY
-    variation, variation_error = _variation(field, series, precision, h, h * 2 * q * sizes)
+    variation, powers, variation_error = _variation(field, series, h, h * 2 * q * sizes)
     bound = (float(node.errors.sizes().max()) + defect) * factor * _UP
     square = np.ldexp(h * q * bound * bound, max(scale - precision, -2000)) + _TINY
     local = float(factor * (defect + square) * _UP)
     widest = float(np.ldexp(bound, min(scale - precision, 900)))
-    return Step(node, precision, series, variation, factor * variation_error * _UP, local, widest)
+    return Step(node, precision, series, variation, powers, factor * variation_error * _UP, local, widest)
 
 
-def _absolute_sizes(series: list[list[mpz]], precision: int) -> Matrix:
-    """Upper bounds of β_n."""
-    columns = list(zip(*series, strict=True))
-    lengths = [max(abs(value) for value in column).bit_length() - precision for column in columns]
-    bounds = np.ldexp(1.0, np.maximum(lengths, -200))
-    exact = np.abs(_floats(series, precision)).max(axis=0)
-    bounds[: exact.size] = exact * _UP + _TINY
-    return bounds
-
-
-def _floats(series: list[list[mpz]], precision: int) -> Matrix:
-    """The first series in binary64, within 2^-52 of themselves plus 2^-200."""
-    shift = max(0, precision - 200)
-    short = [[float(value >> shift) for value in component[: _VARIATIONAL_ORDER + 1]] for component in series]
-    return np.asarray(np.ldexp(np.array(short), shift - precision))
-
-
-def _defect(series: list[list[mpz]], precision: int, quadratic: float, linear: float) -> float:
+def _defect(series: StepSeries, precision: int, quadratic: float, linear: float) -> float:
     """D of (a) in ulps; ``quadratic`` and ``linear`` are h q and h l.
 
-    β_n is bounded by 2^length and multiplied by 2^(rate n), so that binary64 holds it at any precision.
+    β_n is multiplied by 2^(rate n), so that binary64 holds it at any precision.
     """
-    order = len(series[0]) - 1
+    order = series.order
     rate = precision // order
-    columns = zip(*series, strict=True)
-    lengths = np.array([max(abs(value) for value in column).bit_length() for column in columns])
-    scaled = np.ldexp(1.0, np.maximum(lengths - precision + rate * np.arange(order + 1), -900))
+    scaled = series.scaled(rate)
     products = np.convolve(scaled, scaled)[order:]
     n = np.arange(order, 2 * order + 1)
     beyond = float(np.sum(products * np.ldexp(quadratic, -rate * (n - order)) / (n + 1)))
     beyond += linear * float(scaled[-1]) / (order + 1)
-    return (order / 2 + float(np.ldexp(beyond, precision - rate * order))) * _UP
+    return (series.rounding + float(np.ldexp(beyond, precision - rate * order))) * _UP
 
 
-def _variation(
-    field: Quadratic, series: list[list[mpz]], precision: int, h: float, slopes: Matrix
-) -> tuple[Matrix, float]:
-    """V̂ by powers of τ, and a bound of the integral of its own defect over the step.
+def _variation(field: Quadratic, series: StepSeries, h: float, slopes: Matrix) -> tuple[Matrix, float, float]:
+    """V̂ by powers of τ, a bound of Σ |V̂_n|, and one of the integral of its own defect over the step.
 
     V̂_{n+1} = Σ_j J_j V̂_{n−j}/(n + 1), each a scalar product of at most ``terms`` numbers, wrong by at most terms
     units in the last place of the sum of the absolute values.  ``slopes``: upper bounds of |J_n| without l.
     """
     size, top = field.dimension, _VARIATIONAL_ORDER
-    values = _floats(series, precision)
-    order = values.shape[1] - 1
-    jacobians = np.tensordot(values, field.jacobian, axes=(0, 2))
+    values = series.rounded(top - 1)
+    jacobians = np.zeros((top, size, size))
+    jacobians[: len(values)] = (values @ field.jacobian.reshape(size * size, size).T).reshape(-1, size, size)
     jacobians[0] += field.slope
-    padded = np.zeros((top + 1, size, size))
-    padded[: order + 1] = h * jacobians
-    across = np.ascontiguousarray(padded.transpose(1, 0, 2)).reshape(size, -1)
-    reverse = np.zeros((top + 1, size, size))
-    reverse[top] = np.eye(size)
-    for n in range(top):
-        reverse[top - n - 1] = across[:, : size * (n + 1)] @ reverse[top - n :].reshape(-1, size) / (n + 1)
-    variation = reverse[::-1]
+    variation = variation_of(h * jacobians)
     norms = np.abs(variation).sum(axis=2).max(axis=1)
     rates = slopes.copy()
     rates[0] += h * float(field.l)
@@ -302,4 +292,4 @@ def _variation(
     rounding = (4 * terms * _UNIT * float(rates.sum()) + _TINY) * float(norms.sum())
     products = np.convolve(rates, norms)[top:]
     beyond = float(np.sum(products / np.arange(top + 1, top + 1 + products.size)))
-    return variation, (rounding + beyond) * _UP
+    return variation, float(norms.sum()) * _UP, (rounding + beyond) * _UP

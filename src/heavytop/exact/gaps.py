@@ -67,6 +67,12 @@ class Roots:
             product = product * ((v - x) * (v - x) + y * y) ** many
         return (-product if constant(product) < 0 else product).rsqrt()
 
+    def with_line(self, slope: arb) -> Roots:
+        """(slope v − 1)² g; not finite where ``slope`` may be 0, and is not."""
+        if slope.is_zero():
+            return self
+        return replace(self, lead=self.lead * slope * slope, real=(*self.real, (1 / slope, 2)))
+
     def scaled(self, factor: arb) -> Roots:
         """factor · g."""
         return replace(self, lead=self.lead * factor)
@@ -177,6 +183,7 @@ class FourierBound:
         with working_precision(_BOUND_BITS):
             heights = [(_cosh((b - middle) / reach), many) for b, many in rest.all()]
             nearest = min((height.lower() for height, _ in heights), default=arb(_FARTHEST))
+            self.distance = float(nearest - 1)
             self.width = (nearest.acosh() * _WIDTH).lower()
             square = rest.lead
             for height, many in heights:
@@ -193,7 +200,8 @@ class FourierBound:
         if not self.wanted <= most:
             many = f"{self.wanted:.3g}" if isfinite(self.wanted) else "countless"
             raise OutOfReach(
-                f"Abel's integrals need {many} Fourier terms, more than {most}: two roots all but coincide.",
+                f"Abel's integrals need {many} Fourier terms, more than {most}: the level is degenerate but for "
+                f"{self.distance:.2g}, the distance of a root to a gap.",
                 "Ask for fewer digits, or take a start farther from the degenerate motion.",
             )
         power = max(32, 1 << ceil(self.wanted).bit_length())

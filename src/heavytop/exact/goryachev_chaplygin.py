@@ -34,25 +34,23 @@ from typing import Any
 
 from flint import acb, arb, arb_series
 
-from heavytop.errors import NotInClass
-from heavytop.exact.abel import Inversion, Variable
-from heavytop.exact.asymptotic import Approach
-from heavytop.exact.balls import ball, working_precision
+from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.exact.abel import Variable
+from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm, constant, series_length
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
-from heavytop.exact.gaps import Gap, Roots, distance_of_others
+from heavytop.exact.gaps import MOST_TERMS, Roots, distance_of_others
 from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, roots, separated_start, size_of
 from heavytop.exact.motion import kept
 from heavytop.exact.reduced import Undecided
-from heavytop.exact.resting import Beside, Rest
+from heavytop.exact.resting import Rest
+from heavytop.exact.separated import REMEDY, Line, decide, require_plane_centre, variable_between
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
 
-_REMEDY = "The validated enclosure holds for every motion."
 _DISTANCE = 1e-5
 """cosh β − 1 (:mod:`heavytop.exact.gaps`) where the Fourier series take nearly 2^17 terms for 50 digits."""
-_DECISIONS = (64, 256, 1024, 4096)
 _MINUS, _PLUS = 0, 1
 """The factors au − X and au + X of f."""
 
@@ -71,23 +69,13 @@ class GoryachevChaplygin(ClosedForm):
     made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
-        if i1 != i2 or i1 != 4 * i3:
-            differences = f"I1 - I2 = {shown(i1 - i2)}, I1 - 4 I3 = {shown(i1 - 4 * i3)}"
-            raise NotInClass(f"Goryachev-Chaplygin needs I1 = I2 = 4 I3; {differences}.", "Rename the axes if need be.")
-        if n3 != 0 or n1 == n2 == 0:
-            raise NotInClass(
-                f"Goryachev-Chaplygin needs P c = 0 and P r != 0; P r = ({', '.join(map(shown, (n1, n2, n3)))}).",
-                "The centre of mass lies in the plane of the equal moments.",
-            )
+        require_plane_centre("Goryachev-Chaplygin", 4, self.top, self.start)
         area = dot(self.top.angular_momentum(self.start.omega), self.start.gamma)
         if area != 0:
             raise NotInClass(
                 f"Goryachev-Chaplygin needs M·gamma = 0, but M·gamma = {shown(area)}.",
                 "Only motions of zero area integral are solved: choose Omega3 so that it vanishes.",
             )
-        if not any(self.start.gamma):
-            raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
         _require_done(Level.of(self.top, self.start))
 
     def evaluate(self, time: Fraction) -> list[Any]:
@@ -107,8 +95,7 @@ def _motion(case: GoryachevChaplygin, _bits: int) -> Motion:
 class Motion:
     """The motion of a level at one working precision.
 
-    moment, size: c and a.  ends: numbers of the roots at both ends of each gap.  origin: G at t = 0.  direction:
-    of its last component in t.  sign: σ.
+    moment, size: c and a.  ends: numbers of the roots at both ends of each gap.  sign: σ.
     """
 
     level: Level
@@ -116,10 +103,7 @@ class Motion:
     size: arb
     curve: tuple[Root, ...]
     ends: tuple[tuple[int, int], ...]
-    gaps: tuple[Variable, ...]
-    inversion: Inversion
-    origin: tuple[arb, ...]
-    direction: int
+    line: Line
     sign: int
 
     @classmethod
@@ -137,16 +121,11 @@ class Motion:
         # du/dθ is −y1/√g1 and y2/√g2
         slopes = -speeds[0] * gaps[0].density(places[0]), speeds[1] * gaps[1].density(places[1])
         phases = [gap.phase(u, slope) for gap, u, slope in zip(gaps, places, slopes, strict=True)]
-        inversion, direction, moving = Inversion(gaps, (1, -1)), -1, phases
-        for k in (0, 1):
-            if isinstance(gaps[k], Rest):
-                inversion = Inversion((Beside(gaps[1 - k], gaps[k].middle),), (1,))
-                direction, moving = (1, -1)[k], [phases[1 - k]]
-        origin = tuple(inversion.values(moving))
+        line = Line.of(gaps, (1, -1), (0, -1), phases)
         with series_length(1):
             possible = []
             for sign in (1, -1):
-                motion = cls(level, c, a, tuple(curve), tuple(ends), gaps, inversion, origin, direction, sign)
+                motion = cls(level, c, a, tuple(curve), tuple(ends), line, sign)
                 found = motion._state([arb_series([phase], prec=1) for phase in phases], [0, 0])
                 if all(one[0].overlaps(other) for one, other in zip(found, turned, strict=True)):
                     possible.append(motion)
@@ -159,28 +138,17 @@ class Motion:
 
         Raises Undecided where the working precision does not prove the phases.
         """
-        own = self.direction * ball(time * self.level.rate)
-        phases, turns = self.inversion.phases([*self.origin[:-1], self.origin[-1] + own])
-        for k in (0, 1):
-            if isinstance(self.gaps[k], Rest):
-                phases.insert(k, arb(0))
-                turns.insert(k, 0)
-        if not all(phase.is_finite() for phase in phases):
-            raise Undecided
+        phases, turns = self.line.phases(ball(time * self.level.rate))
         with series_length(length):
-            return self.level.restored(self._state(self._moving(phases), turns), length)
+            moving = self.line.series(phases, self._rates)
+            return self.level.restored(self._state(moving, turns), length)
 
-    def _moving(self, phases: Sequence[arb]) -> list[Any]:
-        """The phases as power series in t, from their differential equations."""
-        moving = [arb_series([phase], prec=current_length()) for phase in phases]
-        for _ in range(current_length() - 1):
-            u1, u2 = (gap.position(x) for gap, x in zip(self.gaps, moving, strict=True))
-            rates = [
-                u * 0 if isinstance(gap, Rest) else -1 / ((u1 - u2) * gap.density(u))
-                for gap, u in zip(self.gaps, (u1, u2), strict=True)
-            ]
-            moving = [phase + rate.integral() for phase, rate in zip(phases, rates, strict=True)]
-        return moving
+    def _rates(self, u1: Any, u2: Any) -> list[Any]:
+        """θ1' and θ2'."""
+        return [
+            u * 0 if isinstance(gap, Rest) else -1 / ((u1 - u2) * gap.density(u))
+            for gap, u in zip(self.line.variables, (u1, u2), strict=True)
+        ]
 
     def _state(self, phases: Sequence[Any], turns: Sequence[int]) -> list[Any]:
         """The six components in the turned frame."""
@@ -200,7 +168,7 @@ class Motion:
 
     def _halves(self, variable: int, phase: Any, turns: int) -> tuple[Any, Any, Any]:
         """(u, α, β)."""
-        gap, (low, high) = self.gaps[variable], self.ends[variable]
+        gap, (low, high) = self.line.variables[variable], self.ends[variable]
         u, side = gap.position(phase), -1 if turns % 2 else 1
         at_end = dict(zip((low, high), gap.ends(phase), strict=True))
         found = []
@@ -232,9 +200,8 @@ def _variable(curve: Sequence[Root], ends: tuple[int, int]) -> Variable:
     if ends[0] == ends[1]:
         return Rest(low)
     rest = Roots.of(arb(1) / 4, [(root.value, root.multiplicity) for i, root in enumerate(curve) if i not in ends])
-    if curve[ends[0]].multiplicity > 1:
-        return Approach(high, low, rest)
-    return Approach(low, high, rest) if curve[ends[1]].multiplicity > 1 else Gap(low, high, rest)
+    double = curve[ends[0]].multiplicity > 1, curve[ends[1]].multiplicity > 1
+    return variable_between(low, high, double, rest, MOST_TERMS)
 
 
 def _passes(curve: Sequence[Root], ends: tuple[int, int], place: Fraction) -> bool:
@@ -247,21 +214,18 @@ def _require_done(level: Level) -> None:
     """Raises NotInClass on the levels that are not done here, and too near to them."""
     resting = level.resting()
     if resting == 0:
-        raise NotInClass("The level is degenerate: both separated variables rest, or one rests at 0.", _REMEDY)
-    for bits in _DECISIONS:
-        with working_precision(bits):
-            try:
-                curve = roots(level)
-                ends = gap_ends(level, curve, separated_start(level))
-            except Undecided:
-                continue
-            if any(curve[number].counts == (1, 1) for pair in ends for number in pair):
-                raise NotInClass("The level is degenerate: G = 0, and both separated variables tend to 0.", _REMEDY)
-            moving = [(low, high) for low, high in ends if low != high]
-            if resting is not None and all(_passes(curve, pair, resting) for pair in moving):
-                raise NotInClass("The level is degenerate: one variable rests, and the other passes it.", _REMEDY)
-            apart = min(distance_of_others([root.value for root in curve], pair) for pair in moving)
+        raise LevelNotDone("The level is degenerate: both separated variables rest, or one rests at 0.", REMEDY)
+
+    def test() -> None:
+        curve = roots(level)
+        ends = gap_ends(level, curve, separated_start(level))
+        if any(curve[number].counts == (1, 1) for pair in ends for number in pair):
+            raise LevelNotDone("The level is degenerate: G = 0, and both separated variables tend to 0.", REMEDY)
+        moving = [(low, high) for low, high in ends if low != high]
+        if resting is not None and all(_passes(curve, pair, resting) for pair in moving):
+            raise LevelNotDone("The level is degenerate: one variable rests, and the other passes it.", REMEDY)
+        apart = min(distance_of_others([root.value for root in curve], pair) for pair in moving)
         if apart < _DISTANCE:
-            raise NotInClass(f"The level is degenerate but for {apart:.2g}, the distance of a root to a gap.", _REMEDY)
-        return
-    raise NotInClass("The start is too near to a degenerate level to tell on which side.", _REMEDY)
+            raise LevelNotDone(f"The level is degenerate but for {apart:.2g}, the distance of a root to a gap.", REMEDY)
+
+    decide(test)

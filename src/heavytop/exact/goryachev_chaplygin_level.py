@@ -15,6 +15,8 @@ from flint import acb, arb, fmpq_poly
 
 from heavytop.exact.balls import ball, midpoint
 from heavytop.exact.reduced import Reduced, Undecided, polynomial
+from heavytop.top.equations import Parameters
+from heavytop.top.integrals import goryachev_chaplygin
 
 
 class Level(Reduced):
@@ -31,8 +33,8 @@ class Level(Reduced):
     @property
     def third(self) -> Fraction:
         """G, Goryachev and Chaplygin's integral."""
-        w1, w2, w3 = self.omega
-        return w3 * (w1 * w1 + w2 * w2) - self.along(self.omega) * self.gamma[2]
+        one = Parameters((4, 4, 1), (*self.moment, 0), 0)
+        return Fraction(goryachev_chaplygin(one, (*self.omega, *self.gamma), (0, 1, 2)))
 
     def sextic(self) -> fmpq_poly:
         """f."""

@@ -26,11 +26,12 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
-from flint import arb, arb_series
+from flint import arb
 
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.flint_context import require_undisturbed
-from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
+from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.flint_context import current_length, current_precision, require_undisturbed
+from heavytop.exact.motion import initial_xi, kept, rotate, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.second_kind import Winding
 from heavytop.exact.weierstrass import Point, imag, real
@@ -42,7 +43,7 @@ _UNITS: tuple[Vector, ...] = ((_ONE, _ZERO, _ZERO), (_ZERO, _ONE, _ZERO), (_ZERO
 
 
 @dataclass(frozen=True, slots=True)
-class Gyrostat:
+class Gyrostat(ClosedForm):
     """The motion of the gyrostat with rotor λ = ``rotor`` from any start, γ of any length and direction."""
 
     top: HeavyTop
@@ -78,13 +79,10 @@ class Gyrostat:
         """Whether M is at rest in the body: ω ∥ M, or nothing moves."""
         return not any(cross(self.momentum, self.angular_velocity))
 
-    def state(self, time: Fraction, bits: int) -> list[arb]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
-
-    def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return series_at(lambda working, count: self._evaluate(time, count, working), length, bits, time)
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        length = current_length()
+        return self._evaluate(time, length if length > 1 else 0, current_precision())
 
     def attitude(self, time: Fraction, bits: int, xi: Vector | None = None) -> list[arb]:
         """ξ at ``time``; at t = 0 it is ``xi`` (any vector fixed in space) or the default one ⟂ γ."""

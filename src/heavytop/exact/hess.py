@@ -30,7 +30,7 @@ from typing import Any
 
 from flint import acb, arb, arb_mat, arb_series
 
-from heavytop.errors import NotInClass, OutOfReach
+from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.abel import Inversion
 from heavytop.exact.azimuth import Azimuth, Bearing
 from heavytop.exact.balls import ball, to_bits, working_precision
@@ -71,7 +71,7 @@ class Hess(ClosedForm):
             raise NotInClass("M·gamma = 0: the motion is elementary.", "Use HessPendulum.")
         cubic = level.cubic()
         if cubic.gcd(cubic.derivative()).degree() > 0:
-            raise NotInClass("The level is degenerate: P r·gamma rests at a double root.", _REMEDY)
+            raise LevelNotDone("The level is degenerate: P r·gamma rests at a double root.", _REMEDY)
         _require_reach(level)
 
     def own_time(self, time: Fraction) -> Fraction:
@@ -123,9 +123,9 @@ def _require_reach(level: Level) -> None:
             except Undecided:
                 continue
             except OutOfReach as error:
-                raise NotInClass(f"The level is all but degenerate: {error.cause}", _REMEDY) from error
+                raise LevelNotDone(f"The level is all but degenerate: {error.cause}", _REMEDY) from error
             return
-    raise NotInClass("The level is all but degenerate: two roots of the cubic are not told apart.", _REMEDY)
+    raise LevelNotDone("The level is all but degenerate: two roots of the cubic are not told apart.", _REMEDY)
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,16 +29,19 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import NotInClass, OutOfReach
+from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
+from heavytop.exact.azimuth import Bearing
 from heavytop.exact.balls import to_bits, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.kovalevskaya_abel import AbelMotion
+from heavytop.exact.kovalevskaya_attitude import KovalevskayaAttitude
 from heavytop.exact.kovalevskaya_gaps import Interval, intervals, ordered, pole
 from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
-from heavytop.exact.motion import kept
+from heavytop.exact.motion import initial_xi, kept
 from heavytop.exact.reduced import Undecided
+from heavytop.exact.separated import REMEDY, decide, require_plane_centre
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -48,8 +51,7 @@ SEPARATION = 2.0**-27
 """Where two roots are nearer than this, over the largest, the periods are not integrated."""
 _DISTANCE = 3e-4
 """cosh β − 1 of :func:`pole` where the Fourier series take :data:`MOST_TERMS` terms for 50 digits."""
-_REMEDY = "The validated enclosure holds for every motion."
-_DECISIONS = (64, 256, 1024, 4096)
+_ATTITUDE_BITS = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,20 +68,12 @@ class Kovalevskaya(ClosedForm):
     made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
-        if i1 != i2 or i1 != 2 * i3:
-            raise NotInClass(
-                f"Kovalevskaya needs I1 = I2 = 2 I3; I1 - I2 = {shown(i1 - i2)}, I1 - 2 I3 = {shown(i1 - 2 * i3)}.",
-                "Rename the axes if need be.",
-            )
-        if n3 != 0 or n1 == n2 == 0:
-            raise NotInClass(
-                f"Kovalevskaya needs P c = 0 and P r != 0, but P r = ({', '.join(map(shown, (n1, n2, n3)))}).",
-                "The centre of mass lies in the plane of the equal moments.",
-            )
-        if not any(self.start.gamma):
-            raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
+        require_plane_centre("Kovalevskaya", 2, self.top, self.start)
         _require_done(Level.of(self.top, self.start))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Without what was made: balls do not go from process to process."""
+        return type(self), (self.top, self.start)
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -87,6 +81,26 @@ class Kovalevskaya(ClosedForm):
             return _motion(self, current_precision()).at(time, current_length())
         except Undecided:
             return [arb("nan")] * 6
+
+    @property
+    def has_attitude(self) -> bool:
+        """Whether :meth:`attitude` holds: not where a variable rests, nor very near M·γ = 0 and degenerate levels."""
+        return _has_attitude(self)
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 :func:`initial_xi` of γ.
+
+        Raises OutOfReach where a variable rests, and where the Fourier series need too many terms.
+        """
+
+        def evaluate(working: int) -> list[arb]:
+            try:
+                azimuth, began = _attitude(self, working)
+                return azimuth.bearing(time).carried(began, initial_xi(self.start.gamma))
+            except Undecided:
+                return [arb("nan")] * 3
+
+        return to_bits(evaluate, bits, time)
 
     def exponent(self, bits: int) -> arb:
         """The rate λ of an asymptotic motion, > 0: its distance from the motion that it tends to goes like e^(−λ|t|).
@@ -134,6 +148,27 @@ def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion | ThetaMotion:
     return ThetaMotion.of(level)
 
 
+@whole_evaluation
+def _has_attitude(case: Kovalevskaya) -> bool:
+    with working_precision(_ATTITUDE_BITS):
+        try:
+            _attitude(case, _ATTITUDE_BITS)
+        except Undecided:
+            return True
+        except OutOfReach:
+            return False
+    return True
+
+
+@kept
+def _attitude(case: Kovalevskaya, bits: int) -> tuple[KovalevskayaAttitude, Bearing]:
+    motion = _motion(case, bits)
+    if isinstance(motion, ThetaMotion):
+        motion = AbelMotion.of(motion.level, 8 * MOST_TERMS)
+    azimuth = KovalevskayaAttitude.of(motion, 8 * MOST_TERMS)
+    return azimuth, azimuth.bearing(Fraction(0))
+
+
 @kept
 def _thetas(case: Kovalevskaya, _bits: int) -> ThetaMotion:
     return ThetaMotion.of(Level.of(case.top, case.start))
@@ -152,32 +187,28 @@ def _require_done(level: Level) -> None:
     if level.fourth == 0:
         raise NotInClass("k = 0: the motion is in Delone's class.", "Use that class: its motions are elliptic.")
     if cubic.gcd(cubic.derivative()).degree() > 0:
-        raise NotInClass("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", _REMEDY)
+        raise LevelNotDone("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", REMEDY)
     name = "The level is degenerate"
     if double * double == level.fourth:
         name = f"{name}: l^2 = 2 |gamma|^2 (h + e) with e = {shown(double)}, e^2 = k^2"
-    for bits in _DECISIONS:
-        with working_precision(bits):
-            try:
-                curve = roots(level)
-                ends = intervals(level, curve, start_of(level))
-                _require_apart(curve, ends, name)
-            except Undecided:
-                continue
-        return
-    raise NotInClass("The motion is too near to one on a degenerate level to tell them apart.", _REMEDY)
+
+    def test() -> None:
+        curve = roots(level)
+        _require_apart(curve, intervals(level, curve, start_of(level)), name)
+
+    decide(test)
 
 
 def _require_apart(curve: Sequence[Root], ends: Sequence[Interval], name: str) -> None:
     """Raises NotInClass where neither of the two forms evaluates the motion."""
     limits = [number for pair in ends if pair[0] != pair[1] for number in pair]
     if sum(curve[number - 1].multiplicity > 1 for number in limits if number) > 1:
-        raise NotInClass(f"{name}, and both separated variables tend to e.", _REMEDY)
+        raise LevelNotDone(f"{name}, and both separated variables tend to e.", REMEDY)
     order = [0, *(number + 1 for number in ordered(curve))]
     for low, high in ends:
         resting = [one for one, other in ends if one == other and low != high]
         if resting and order.index(high) < order.index(resting[0]) < order.index(low):
-            raise NotInClass(f"{name}, one separated variable rests at e, and the other passes it.", _REMEDY)
+            raise LevelNotDone(f"{name}, one separated variable rests at e, and the other passes it.", REMEDY)
     nearest = separation([root.value for root in curve])
     if nearest < SEPARATION and pole(curve, ends)[1] < _DISTANCE:
-        raise NotInClass(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", _REMEDY)
+        raise LevelNotDone(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", REMEDY)

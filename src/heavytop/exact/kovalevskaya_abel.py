@@ -36,16 +36,17 @@ from typing import Any
 
 from flint import acb, acb_series, arb, arb_series
 
-from heavytop.exact.abel import Inversion, Variable
+from heavytop.exact.abel import Variable
 from heavytop.exact.asymptotic import Approach
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import series_length
-from heavytop.exact.flint_context import coefficient, current_length
-from heavytop.exact.gaps import Gap, Roots
+from heavytop.exact.flint_context import coefficient
+from heavytop.exact.gaps import Roots
 from heavytop.exact.kovalevskaya_gaps import Interval, intervals, pole
 from heavytop.exact.kovalevskaya_level import ORDERS, Level, Root, Start, linear, real_part, roots, start_of
 from heavytop.exact.reduced import Undecided
-from heavytop.exact.resting import Beside, Rest
+from heavytop.exact.resting import Rest
+from heavytop.exact.separated import Line, variable_between
 
 _UNITS = (acb(1), acb(0, 1), acb(-1), acb(0, -1))
 
@@ -54,17 +55,16 @@ _UNITS = (acb(1), acb(0, 1), acb(-1), acb(0, -1))
 class AbelMotion:
     """The motion of a level at one working precision.
 
-    branch: the branch points in v, number 0 is 0.  cubic: the numbers of the three e_j, and μ − e_j.  ends: of the
-    gaps.  rows: the rows of 𝓜^−1 for Y and Z, times κ_j.  origin: G at t = 0.
+    pole: μ.  branch: the branch points in v, number 0 is 0.  ends: of the gaps.  cubic: numbers of
+    the three e_j.  rows: the rows of 𝓜^−1 for Y and Z, times κ_j.
     """
 
     level: Level
     start: Start
+    pole: arb
     branch: tuple[acb, ...]
     ends: tuple[Interval, Interval]
-    variables: tuple[Variable, ...]
-    inversion: Inversion
-    origin: tuple[arb, ...]
+    line: Line
     cubic: tuple[int, ...]
     rows: tuple[tuple[acb, ...], tuple[acb, ...]]
 
@@ -83,14 +83,9 @@ class AbelMotion:
             lead *= abs(mu - root.value) ** root.multiplicity
         gaps = tuple(_variable(branch, curve, interval, lead, most) for interval in ends)
         phases = start_phases(start, mu, gaps)
-        inversion, moving = Inversion(gaps, (1, 1)), phases
-        for k in (0, 1):
-            if isinstance(gaps[k], Rest):
-                inversion = Inversion((Beside(gaps[1 - k], gaps[k].middle),), (1,))
-                moving = [phases[1 - k]]
-        origin = tuple(inversion.values(moving))
+        line = Line.of(gaps, (1, 1), (-1, 0), phases)
         cubic = tuple(i for i, root in enumerate(curve, 1) if root.cubic)
-        plain = cls(level, start, branch, ends, gaps, inversion, origin, cubic, ((), ()))
+        plain = cls(level, start, mu, branch, ends, line, cubic, ((), ()))
         return plain._with_factors(curve, mu, phases)
 
     def at(self, time: Fraction, length: int) -> list[Any]:
@@ -98,25 +93,43 @@ class AbelMotion:
 
         Raises Undecided where the working precision does not prove the phases.
         """
-        phases, turns = self._phases(ball(time * self.level.rate))
-        if not all(phase.is_finite() for phase in phases):
-            raise Undecided
+        return self.level.restored(self.reduced(*self.phases(time), length), length)
+
+    def phases(self, time: Fraction) -> tuple[list[arb], list[int]]:
+        """The phases at ``time`` in the first turns, and whole turns; see :meth:`Line.phases`."""
+        return self.line.phases(ball(time * self.level.rate))
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """v1 and v2."""
+        return self.line.variables
+
+    def reduced(self, phases: Sequence[arb], turns: Sequence[int], length: int) -> tuple[Any, ...]:
+        """The six components there in the turned frame, series in t' of that length or longer."""
         with series_length(length + 1):
-            velocity = self._velocity(self._moving(phases), turns)
-        return self.level.restored(self.start.state(velocity, length), length)
+            velocity = self._velocity(self.moving(phases), turns)
+        return self.start.state(velocity, length)
 
     def exponents(self) -> list[arb]:
         """The mean rate of X of a variable that tends to a double root, in a list of its own; else nothing."""
         open_ones = [k for k, variable in enumerate(self.variables) if isinstance(variable, Approach)]
-        return [abs(self.inversion.mean_rates([arb(-1), arb(0)])[k]) * ball(self.level.rate) for k in open_ones]
+        return [abs(self.line.mean_rates()[k]) * ball(self.level.rate) for k in open_ones]
 
-    def _phases(self, time: arb) -> tuple[list[arb], list[int]]:
-        """The phases in the first turns, and whole turns."""
-        for k in (0, 1):
-            if isinstance(self.variables[k], Rest):
-                (phase,), (turns,) = self.inversion.phases([self.origin[0] + self.variables[k].middle * time])
-                return ([arb(0), phase], [0, turns]) if k == 0 else ([phase, arb(0)], [turns, 0])
-        return self.inversion.phases([self.origin[0] - time, self.origin[1]])
+    def approach(self, phases: Sequence[arb], turns: Sequence[int]) -> arb | None:
+        """(log q √((w1 − e)(w2 − e)))' in t' where one variable tends to a double root e; None where none does.
+
+        The number under the logarithm goes to 0, its rate of change is as exact as the phases.
+        """
+        for variable, (low, high) in zip(self.variables, self.ends, strict=True):
+            if not isinstance(variable, Approach):
+                continue
+            number = high if variable.length > 0 else low
+            with series_length(2):
+                first, second = (self.halves(k, x, turns[k]) for k, x in enumerate(self.moving(phases)))
+                below = sum((a * (first[i] * second[i]) for a, i in zip(self.rows[1], self.cubic, strict=True)), acb(0))
+                value = first[number] * second[number] / below
+                return arb((coefficient(value, 1) / coefficient(value, 0)).real)
+        return None
 
     def _speeds(self, v1: Any, v2: Any) -> tuple[Any, Any]:
         """θ1'/v2 and −θ2'/v1."""
@@ -126,17 +139,16 @@ class AbelMotion:
         )
         return first, second
 
-    def _moving(self, phases: Sequence[arb]) -> list[Any]:
-        """The phases as power series in t, from their differential equations."""
-        moving = [arb_series([phase], prec=current_length()) for phase in phases]
-        for _ in range(current_length() - 1):
-            v1, v2 = (g.position(x) for g, x in zip(self.variables, moving, strict=True))
-            first, second = self._speeds(v1, v2)
-            rates = v2 * first, -v1 * second
-            moving = [phase + rate.integral() for phase, rate in zip(phases, rates, strict=True)]
-        return moving
+    def _rates(self, v1: Any, v2: Any) -> tuple[Any, Any]:
+        """θ1' and θ2'."""
+        first, second = self._speeds(v1, v2)
+        return v2 * first, -v1 * second
 
-    def _halves(self, variable: int, phase: Any, turns: int) -> list[Any]:
+    def moving(self, phases: Sequence[arb]) -> list[Any]:
+        """The phases as power series in t."""
+        return self.line.series(phases, self._rates)
+
+    def halves(self, variable: int, phase: Any, turns: int) -> list[Any]:
         """h_kb at every branch point."""
         gap, ends = self.variables[variable], self.ends[variable]
         low, high = gap.ends(phase)
@@ -161,7 +173,7 @@ class AbelMotion:
 
     def _velocity(self, phases: Sequence[Any], turns: Sequence[int]) -> tuple[Any, Any, Any]:
         """(p, q, r) from series of the phases."""
-        first, second = (self._halves(k, phases[k], turns[k]) for k in (0, 1))
+        first, second = (self.halves(k, phases[k], turns[k]) for k in (0, 1))
         products = [first[i] * second[i] for i in self.cubic]
         above, below = (sum((a * h for a, h in zip(row, products, strict=True)), acb_series([0])) for row in self.rows)
         half = 1 / (2 * below)
@@ -206,7 +218,7 @@ class AbelMotion:
         alphas, betas, inverse = linear(start, values)
         with series_length(ORDERS):
             p, q = (arb_series(x) for x in start.motion[:2])
-            halves = [self._halves(k, phase, 0) for k, phase in enumerate(self._moving(phases))]
+            halves = [self.halves(k, phase, 0) for k, phase in enumerate(self.moving(phases))]
             ends = halves[0][0] * halves[1][0]
             kappas = []
             for i, a, b, e in zip(self.cubic, alphas, betas, values, strict=True):
@@ -252,10 +264,6 @@ def _variable(branch: Sequence[acb], curve: Sequence[Root], interval: Interval, 
     low, high = (branch[number].real for number in interval)
     if interval[0] == interval[1]:
         return Rest(low)
-    if not low < high:
-        raise Undecided
     many = [1, *(root.multiplicity for root in curve)]
     rest = Roots.of(lead, [(b, many[i]) for i, b in enumerate(branch) if i not in interval])
-    if many[interval[0]] > 1:
-        return Approach(high, low, rest, most=most)
-    return Approach(low, high, rest, most=most) if many[interval[1]] > 1 else Gap(low, high, rest, most=most)
+    return variable_between(low, high, (many[interval[0]] > 1, many[interval[1]] > 1), rest, most)

@@ -28,6 +28,7 @@ from heavytop.exact.closed_form import series_length
 from heavytop.exact.flint_context import coefficient, current_length
 from heavytop.exact.reduced import Reduced, Undecided, polynomial
 from heavytop.top.equations import Parameters, heavy_top
+from heavytop.top.integrals import kovalevskaya
 
 ORDERS = 5
 """Length of the power series in t at the start that fixes phases and signs: zeros there have an order of up to 4."""
@@ -53,9 +54,8 @@ class Level(Reduced):
     @property
     def fourth(self) -> Fraction:
         """k², Kovalevskaya's integral."""
-        (n1, n2), (w1, w2, _), (g1, g2, _) = self.moment, self.omega, self.gamma
-        real, imaginary = w1 * w1 - w2 * w2 - n1 * g1 + n2 * g2, 2 * w1 * w2 - n1 * g2 - n2 * g1
-        return real * real + imaginary * imaginary
+        one = Parameters((2, 2, 1), (*self.moment, 0), 0)
+        return Fraction(kovalevskaya(one, (*self.omega, *self.gamma), (0, 1, 2)))
 
     @property
     def weight(self) -> Fraction:

@@ -31,8 +31,9 @@ from flint import acb, arb, arb_series
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.flint_context import coefficient, require_undisturbed
-from heavytop.exact.motion import initial_xi, kept, rotate, series_at, taylor, turned
+from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.flint_context import coefficient, current_length, current_precision, require_undisturbed
+from heavytop.exact.motion import initial_xi, kept, rotate, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.second_kind import Winding
 from heavytop.exact.weierstrass import imag, real
@@ -44,7 +45,7 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 
 
 @dataclass(frozen=True, slots=True)
-class Lagrange:
+class Lagrange(ClosedForm):
     """The motion of Lagrange's top about axis 3 from any start, γ of any length.
 
     Raises NotInClass unless I1 = I2 and P a = P b = 0.
@@ -74,13 +75,10 @@ class Lagrange:
         """The parameters of the field."""
         return Parameters(self.top.inertia, self.top.moment, _ZERO)
 
-    def state(self, time: Fraction, bits: int) -> list[arb]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return to_bits(lambda working: self._evaluate(time, 0, working), bits, time)
-
-    def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return series_at(lambda working, count: self._evaluate(time, count, working), length, bits, time)
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        length = current_length()
+        return self._evaluate(time, length if length > 1 else 0, current_precision())
 
     def _evaluate(self, time: Fraction, length: int, bits: int) -> list[Any]:
         prepared = _prepared(self, bits)

@@ -8,16 +8,16 @@ from functools import wraps
 from math import factorial, isqrt
 from typing import Any, TypeVar
 
-from flint import arb, arb_series, fmpq, fmpq_series
+from flint import arb, fmpq, fmpq_series
 
 from heavytop.errors import InputError
-from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.balls import ball
 from heavytop.exact.flint_context import coefficient, require_undisturbed, series_length
 from heavytop.exact.quartic import Pair
 from heavytop.exact.second_kind import Winding
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import Parameters
-from heavytop.top.heavy_top import Vector, dot
+from heavytop.top.heavy_top import Vector, cross, dot
 
 Made = TypeVar("Made")
 
@@ -40,20 +40,6 @@ def kept(make: Callable[[Any, int], Made]) -> Callable[[Any, int], Made]:
             return found
 
     return look_up
-
-
-def series_at(
-    evaluate: Callable[[int, int], list[arb_series]], length: int, bits: int, time: Fraction
-) -> list[arb_series]:
-    """``evaluate(working bits, length)`` with the ε^0 coefficients certain to ``bits`` bits (:func:`to_bits`)."""
-    found: list[list[arb_series]] = []
-
-    def leading(working: int) -> list[arb]:
-        found.append(evaluate(working, length))
-        return [component[0] for component in found[-1]]
-
-    to_bits(leading, bits, time, length)
-    return found[-1]
 
 
 def taylor(
@@ -101,14 +87,9 @@ def rotate(vector: Vector, omega: Vector, time: Any) -> list[Any]:
     size = ball(square).sqrt()
     share = dot(vector, omega) / square
     sine, cosine = (time * size).sin_cos()
-    crossed = (
-        vector[1] * omega[2] - vector[2] * omega[1],
-        vector[2] * omega[0] - vector[0] * omega[2],
-        vector[0] * omega[1] - vector[1] * omega[0],
-    )
     return [
         cosine * ball(v - share * w) + sine * (ball(c) / size) + ball(share * w)
-        for v, w, c in zip(vector, omega, crossed, strict=True)
+        for v, w, c in zip(vector, omega, cross(vector, omega), strict=True)
     ]
 
 

@@ -15,20 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heavytop.words.whole_series import Row
+
 Matrix = NDArray[np.float64]
 Field = Callable[[tuple[Fraction, ...]], Sequence[Any]]
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One component of the field, (Σ c y_j y_k + Σ c y_j) / denominator with whole numbers c.
-
-    products: (c, index of the pair (j, k)).  linear: (c, j).
-    """
-
-    denominator: int
-    products: tuple[tuple[int, int], ...]
-    linear: tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,13 +71,17 @@ class Reduced:
             found += [ball(self.along(vector)) / c, ball(self.across(vector)) / c, ball(vector[2])]
         return found
 
+    def in_body(self, vector: Sequence[Any]) -> list[Any]:
+        """A vector of the turned frame in the top's own axes."""
+        c = ball(self.moment_square).sqrt()
+        cosine, sine = (ball(n) / c for n in self.moment)
+        x, y, z = vector
+        return [cosine * x - sine * y, sine * x + cosine * y, z]
+
     def restored(self, motion: Sequence[Any], length: int) -> list[Any]:
         """Six series in t', in the turned frame, as numbers or series in t of that length, in the top's own units."""
-        c, rate, size = ball(self.moment_square).sqrt(), ball(self.rate), ball(self.size)
-        cosine, sine = (ball(n) / c for n in self.moment)
-        p, q, r, a, b, g = motion
-        omega = [cosine * p - sine * q, sine * p + cosine * q, r]
-        gamma = [cosine * a - sine * b, sine * a + cosine * b, g]
+        rate, size = ball(self.rate), ball(self.size)
+        omega, gamma = self.in_body(motion[:3]), self.in_body(motion[3:])
         rows = [[rate ** (n + 1) * x[n] for x in omega] + [rate**n * size * x[n] for x in gamma] for n in range(length)]
         return rows[0] if length == 1 else [arb_series(list(row), prec=length) for row in zip(*rows, strict=True)]
 

@@ -20,7 +20,7 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import InputError, NotInClass, OutOfReach
+from heavytop.errors import InputError, LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.azimuth import Azimuth, Bearing
 from heavytop.exact.balls import ball, to_bits, working_precision
 from heavytop.exact.closed_form import ClosedForm
@@ -119,9 +119,11 @@ def _require_reach(case: Steklov) -> None:
             except Undecided:
                 continue
             except OutOfReach as error:
-                raise NotInClass(f"Two moments of inertia all but satisfy an equality: {error.cause}", _LEFT) from error
+                raise LevelNotDone(
+                    f"Two moments of inertia all but satisfy an equality: {error.cause}", _LEFT
+                ) from error
             return
-    raise NotInClass("The start is too near to a turning point to tell on which side of it.", _LEFT)
+    raise LevelNotDone("The start is too near to a turning point to tell on which side of it.", _LEFT)
 
 
 def _units(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:

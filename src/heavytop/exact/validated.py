@@ -1,17 +1,18 @@
 """Enclosure of any motion of either system, by Taylor series with a proven tail: no closed form is needed.
 
-A motion of very fast or slow rates is enclosed in its own unit of time, a power of two: with Ω = s ω, τ = s t and
-P r = s² n the equations of ω, γ, n are the same (:func:`unit_of_time`).
+A motion is enclosed in its own units, powers of two, in which |ω| ≤ 4 at all times
+(:class:`heavytop.words.scaled.Scaled`).
 
-The step and its theorem are in :mod:`heavytop.exact.enclosure`.  Here the working precision is chosen so that the asked
+The step and its theorem are in :mod:`heavytop.exact.enclosure`.  Its coefficients are computed in words
+(:mod:`heavytop.words.proven`), as far as there are words, or in exact integers where a few steps would not be worth the
+machine code.  Here the working precision is chosen so that the asked
 bits come out: the bits that the motion loses are measured on a short pilot run, and carried on linearly to the time
 asked for.  Precisions come from a ladder and steps depend on the node that they start from alone, so a ball does not
 depend on what was asked before; what was computed before is only found faster.
 
-Reach on the generic top of the tests (I = (3, 2, 1), P r = (1/2, 1/3, 1/5)), seconds of one core:
-60 digits at t = 8 in 0.1 s; 30 digits at t = 100 in 1.5 s, t = 300 in 6 s, t = 1000 in 31 s; about 0.17 bits are lost
-a unit of time, so that t = 10,000 would need some 1,900 bits and is refused by default.
-
+Reach on the generic top of the tests (I = (3, 2, 1), P r = (1/2, 1/3, 1/5)), seconds of one core that was shared:
+60 digits at t = 8 in 0.04 s; 30 digits at t = 100 in 0.25 s, at t = 1000 in 3 s; about 0.17 bits are lost a unit of
+time, so that t = 10,000 would need some 1,900 bits, more than there are words for, and is refused by default.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import ceil, log2, log10
+from math import inf, log2, log10
 from typing import NamedTuple
 
 from flint import arb, arb_series
@@ -28,12 +29,14 @@ from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, relative_bits, working_precision
 from heavytop.exact.enclosure import Node, Step, coefficient_bound, start_node, step
 from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.quadratic import Matrix, Quadratic, quadratic
+from heavytop.exact.quadratic import Matrix, Quadratic
+from heavytop.exact.scaled_motion import ScaledMotion
 from heavytop.exact.scales import exponent, require_handy, unit_of_time
 from heavytop.precision import decimal_text
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector
+from heavytop.words.proven import Carrier
 
 _PILOT_BITS = 128
 _PILOT_STEPS = 1000
@@ -54,6 +57,7 @@ class Run:
     motion: Quadratic
     precision: int
     nodes: tuple[Node, ...]
+    carrier: Carrier | None = None
     stride: int = 1
     lost_at: Fraction | None = None
     _last: Step | None = None
@@ -66,7 +70,7 @@ class Run:
             if self.lost_at is not None and node.time >= self.lost_at:
                 return None
             if found is None:
-                found = self._last = step(self.motion, node, self.precision)
+                found = self._last = step(self.motion, node, self.precision, self.carrier)
             if found is None:
                 self.lost_at = node.time
                 return None
@@ -98,16 +102,9 @@ class Run:
         self.nodes = nodes
 
 
-def _ladder(bits: float) -> int:
-    """The working precision at or above ``bits``: multiples of an eighth of the power of two below."""
-    whole = max(64, ceil(bits))
-    unit = 1 << max(4, whole.bit_length() - 4)
-    return -(-whole // unit) * unit
-
-
-def _seconds_a_step(precision: int) -> float:
+def _seconds_a_step(precision: int, in_words: bool) -> float:
     """A model of the cost, not a measurement: what is refused must not depend on how busy the machine is."""
-    return 1e-3 + 6e-8 * precision**2
+    return 4e-4 + 1.2e-11 * precision**3 if in_words else 1e-3 + 6e-8 * precision**2
 
 
 class _Ahead(NamedTuple):
@@ -126,6 +123,8 @@ class Pilot:
     """
 
     motion: Quadratic
+    precision: int
+    carrier: Carrier | None
     ahead: _Ahead
 
     def forecast(self, span: Fraction, effort: float) -> tuple[float, float]:
@@ -135,11 +134,12 @@ class Pilot:
         """
         node, known, bits = self.ahead
         times, losses = list(known), list(bits)
+        a_step = _seconds_a_step(self.precision, self.carrier is not None)
         while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
-            forecast = len(times) * _times_as_far(span, times[-1]) * _seconds_a_step(_PILOT_BITS) if times else 0.0
+            forecast = len(times) * _times_as_far(span, times[-1]) * a_step if times else 0.0
             if len(times) >= _HOPELESS and forecast > _HOPELESS * effort:
                 break
-            found = step(self.motion, node, _PILOT_BITS)
+            found = step(self.motion, node, self.precision, self.carrier)
             if found is None:
                 break
             node = found.end()
@@ -148,10 +148,19 @@ class Pilot:
         if len(times) > len(known):
             self.ahead = _Ahead(node, tuple(times), tuple(losses))
         if not times:
-            return float(_PILOT_BITS), 64 * float(min(span, _FAR))
+            return float(self.precision), 64 * float(min(span, _FAR))
         index = min(bisect_left(times, span), len(times) - 1)
-        more = _times_as_far(span, times[index])
-        return 16 + losses[index] * more, (index + 1) * more
+        return 16 + _carried_on(times, losses, index, span), (index + 1) * _times_as_far(span, times[index])
+
+
+def _carried_on(times: list[Fraction], losses: list[float], index: int, span: Fraction) -> float:
+    """The bits lost by ``span``: by the step ``index``, and from there as by the later half of the steps before it."""
+    later = min(span, _FAR * times[index]) - times[index]
+    if later <= 0:
+        return losses[index]
+    middle = index // 2
+    slope = (losses[index] - losses[middle]) / float(times[index] - times[middle]) if index else 1.0
+    return losses[index] + max(0.0, slope) * float(later)
 
 
 def _times_as_far(span: Fraction, reached: Fraction) -> float:
@@ -166,7 +175,7 @@ class Validated:
     top, start, system: any.  rotor: λ of the gyrostat where the start is rounded and (2.1) no longer holds exactly;
     None for P b/(M·γ).  xi: the attitude vector at time 0; None for :func:`heavytop.top.angles.perpendicular`.
     effort: what a request may cost, in seconds of the cost model; beyond it the request is refused.
-    unit: the unit of time of the enclosure is 2^-unit (:func:`heavytop.exact.scales.unit_of_time`).
+    unit: the motion changes at about the rate 2^unit (:func:`heavytop.exact.scales.unit_of_time`).
     Raises InputError where the system does not admit the top and start, OutOfReach where they are too large.
     """
 
@@ -178,14 +187,15 @@ class Validated:
     effort: float = 900.0
     method: str = "validated: Taylor enclosure"
     unit: int = field(default=0, init=False, repr=False, compare=False)
-    _runs: dict[tuple[int, int, int], Run] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _runs: dict[tuple[int, int, bool, int], Run] = field(default_factory=dict, init=False, repr=False, compare=False)
     _pilots: dict[tuple[int, int], Pilot] = field(default_factory=dict, init=False, repr=False, compare=False)
-    _fields: dict[tuple[int, int], Quadratic] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _motions: dict[tuple[int, int], ScaledMotion] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         require_handy(self.top, self.start)
         object.__setattr__(self, "unit", unit_of_time(self.parameters, self.start.flat))
-        rate = coefficient_bound(self._field(1, 6), max(map(abs, self._scaled(self.start.flat))))
+        motion = self._motion(1, self.start.flat)
+        rate = coefficient_bound(motion.field, max(map(abs, motion.scaled.state)))
         if rate > _LARGEST_RATE:
             raise OutOfReach(
                 f"The motion may change 2^{exponent(rate)} times as fast as it turns.",
@@ -199,17 +209,26 @@ class Validated:
             return Parameters(self.top.inertia, self.top.moment, self.rotor)
         return self.system.parameters(self.top, self.start)
 
-    def _scaled(self, start: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
-        """Ω and whatever follows it, with Ω in the motion's own unit of time."""
-        factor = Fraction(2) ** -self.unit
-        return (*(factor * w for w in start[:3]), *start[3:])
-
     def state(self, time: Fraction, bits: int) -> list[arb]:
         """See :class:`heavytop.exact.solution.ExactSolution`; ``time`` of either sign.
 
         Raises OutOfReach, with the digits that could be reached, where the model of the cost exceeds ``effort``.
         """
         return self._enclosure(time, bits, self.start.flat)
+
+    def cost(self, time: Fraction, bits: int) -> float:
+        """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock."""
+        if time == 0:
+            return 0.0
+        direction, start = (1 if time > 0 else -1), self.start.flat
+        motion = self._motion(direction, start)
+        loss, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start)
+        return steps * _seconds_a_step(*motion.precision(bits + loss + 8, steps))
+
+    def reached(self) -> Fraction:
+        """The |t| up to which the latest enclosure has come, for those who wait; any thread may ask."""
+        latest = next(reversed(list(self._runs.values())), None)
+        return Fraction(0) if latest is None else latest.nodes[-1].time / Fraction(2) ** self.unit
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
         """ξ: three balls.  Raises InputError where |γ| is not 1 exactly and no ``xi`` was given."""
@@ -225,58 +244,54 @@ class Validated:
 
     @whole_evaluation
     def _extended(self, values: list[arb], length: int, bits: int) -> list[arb_series]:
-        motion = self._field(1, 6)
-        with working_precision(bits + 4 * length + 32 + abs(self.unit), length):
-            unit = arb(2) ** self.unit
-            y = [[value / unit] for value in values[:3]] + [[value] for value in values[3:]]
+        motion = self._motion(1, self.start.flat)
+        pairs, rows, sizes, rate = motion.field.pairs, motion.field.rows, motion.scaled.sizes, motion.scaled.rate
+        with working_precision(bits + 4 * length + 32 + abs(exponent(rate)), length):
+            y = [[value / ball(size)] for value, size in zip(values, sizes, strict=True)]
             for n in range(length - 1):
-                sums = [sum((y[j][m] * y[k][n - m] for m in range(n + 1)), arb(0)) for j, k in motion.pairs]
+                sums = [sum((y[j][m] * y[k][n - m] for m in range(n + 1)), arb(0)) for j, k in pairs]
                 last = [component[n] for component in y]
-                for component, row in zip(y, motion.rows, strict=True):
+                for component, row in zip(y, rows, strict=True):
                     total = sum((c * sums[pair] for c, pair in row.products), arb(0))
                     total += sum((c * last[j] for c, j in row.linear), arb(0))
                     component.append(total / (row.denominator * (n + 1)))
-            # in the unit of time given, ε^n counts unit^n, and Ω once more
+            # in the unit of time given, ε^n counts rate^n
+            unit = ball(rate)
             return [
-                arb_series([c * unit ** (n + (axis < 3)) for n, c in enumerate(component)], prec=length)
-                for axis, component in enumerate(y)
+                arb_series([c * ball(size) * unit**n for n, c in enumerate(component)], prec=length)
+                for component, size in zip(y, sizes, strict=True)
             ]
 
-    def _field(self, direction: int, dimension: int) -> Quadratic:
-        """The field of y, or of y and ξ; backwards in time with its sign changed."""
-        if (direction, dimension) not in self._fields:
-            given, factor = self.parameters, Fraction(2) ** -self.unit
-            p = Parameters(given.inertia, [factor * factor * n for n in given.moment], factor * Fraction(given.rotor))
+    def _motion(self, direction: int, start: tuple[Fraction, ...]) -> ScaledMotion:
+        """That of ``start``: of y, or of y and ξ."""
+        key = (direction, len(start))
+        if key not in self._motions:
+            self._motions[key] = ScaledMotion.of(self.system, self.parameters, start, direction > 0)
+        return self._motions[key]
 
-            def rates(y: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
-                found = self.system.field(p, y[:6])
-                if dimension > 6:
-                    found = (*found, *self.system.attitude(p, y[:6], y[6:]))
-                return tuple(direction * rate for rate in found)
-
-            self._fields[direction, dimension] = quadratic(rates, dimension)
-        return self._fields[direction, dimension]
-
-    def _run(self, direction: int, precision: int, start: tuple[Fraction, ...]) -> Run:
-        key = (direction, precision, len(start))
+    def _run(self, direction: int, start: tuple[Fraction, ...], precision: int, in_words: bool) -> Run:
+        key = (direction, precision, in_words, len(start))
         if key not in self._runs:
-            motion = self._field(direction, len(start))
-            self._runs[key] = Run(motion, precision, (start_node(motion, start, precision),))
+            motion = self._motion(direction, start)
+            carrier = motion.carrier(precision) if in_words else None
+            node = start_node(motion.field, motion.scaled.state, precision)
+            self._runs[key] = Run(motion.field, precision, (node,), carrier)
         return self._runs[key]
 
     def _enclosure(self, time: Fraction, bits: int, start: tuple[Fraction, ...]) -> list[arb]:
         if time == 0:
             return _rounded(start, bits + 8)
-        unit = Fraction(2) ** self.unit
-        direction, span, scaled = (1 if time > 0 else -1), abs(time) * unit, self._scaled(start)
-        loss, steps = self._forecast(direction, span, scaled)
+        direction = 1 if time > 0 else -1
+        motion = self._motion(direction, start)
+        span, sizes = abs(time) * motion.scaled.rate, motion.scaled.sizes
+        loss, steps = self._forecast(direction, span, start)
         for _ in range(_ATTEMPTS):
-            precision = _ladder(bits + loss + 8)
-            self._require_reach(time, bits, loss, steps, precision)
-            run = self._run(direction, precision, scaled)
+            precision, in_words = motion.precision(bits + loss + 8, steps)
+            self._require_reach(time, bits, loss, steps, precision, in_words)
+            run = self._run(direction, start, precision, in_words)
             found = run.at(span)
             if found is not None:
-                values = _evaluated(*found, found[0].radii(found[1]), precision + 64, unit)
+                values = _evaluated(*found, found[0].radii(found[1]), precision + 64, sizes)
                 reached = min(map(relative_bits, values))
                 if reached >= bits:
                     return values
@@ -289,15 +304,20 @@ class Validated:
         """(bits that will be lost, steps that will be taken) up to ``span``."""
         key = (direction, len(start))
         if key not in self._pilots:
-            motion = self._field(*key)
-            self._pilots[key] = Pilot(motion, _Ahead(start_node(motion, start, _PILOT_BITS)))
+            motion = self._motion(direction, start)
+            precision, in_words = motion.precision(_PILOT_BITS, inf)
+            carrier = motion.carrier(precision) if in_words else None
+            ahead = _Ahead(start_node(motion.field, motion.scaled.state, precision))
+            self._pilots[key] = Pilot(motion.field, precision, carrier, ahead)
         return self._pilots[key].forecast(span, self.effort)
 
-    def _require_reach(self, time: Fraction, bits: int, loss: float, steps: float, precision: int) -> None:
-        if steps * _seconds_a_step(precision) <= self.effort:
+    def _require_reach(
+        self, time: Fraction, bits: int, loss: float, steps: float, precision: int, in_words: bool
+    ) -> None:
+        if steps * _seconds_a_step(precision, in_words) <= self.effort:
             return
         affordable = precision
-        while affordable > 0 and steps * _seconds_a_step(affordable) > self.effort:
+        while affordable > 0 and steps * _seconds_a_step(affordable, in_words) > self.effort:
             affordable = affordable * 15 // 16
         raise self._refusal(time, max(0, affordable - loss))
 
@@ -320,9 +340,9 @@ def _rounded(start: tuple[Fraction, ...], bits: int) -> list[arb]:
 
 
 @whole_evaluation
-def _evaluated(found: Step, tau: Fraction, radii: Matrix, bits: int, unit: Fraction) -> list[arb]:
-    """The state at ``tau`` with Ω in the unit of time given."""
+def _evaluated(found: Step, tau: Fraction, radii: Matrix, bits: int, sizes: tuple[Fraction, ...]) -> list[arb]:
+    """The state at ``tau`` in the units given."""
     # numpy would let other threads in amid the balls: the radii are there already
     with working_precision(bits):
         values = found.around(tau, radii)
-        return [value * ball(unit) for value in values[:3]] + values[3:]
+        return [value * ball(size) for value, size in zip(values, sizes, strict=True)]

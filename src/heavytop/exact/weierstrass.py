@@ -112,29 +112,6 @@ class Lattice:
         root, ratios = self.roots[0].real, (1, raised, three, four)
         return Point(scale, scale * scale, raised, raised * raised, slope, root, ratios, u, angles)
 
-    def p(self, u: acb) -> acb:
-        """℘(u)."""
-        z, _ = self.reduced(u)
-        return z.elliptic_p(self.ratio) / (2 * self.half_period) ** 2
-
-    def p_prime(self, u: acb) -> acb:
-        """℘'(u), from −2 θ2 θ3 θ4/(θ2(0) θ3(0) θ4(0) T³)."""
-        z, _ = self.reduced(u)
-        one, two, three, four = thetas(z, self.ratio)
-        scale = 2 * self.half_period * one / self.zero[0]
-        return acb(-2 * (two * three * four) / (self.zero[1] * self.zero[2] * self.zero[3] * scale**3))
-
-    def zeta(self, u: acb) -> acb:
-        """ζ(u), with ζ(u + 2ω) = ζ(u) + 2η."""
-        z, turns = self.reduced(u)
-        return z.elliptic_zeta(self.ratio) / (2 * self.half_period) + 2 * turns * self.quasi_period
-
-    def sigma(self, u: acb) -> acb:
-        """σ(u) = T exp(η u²/(2ω)); entire."""
-        z, turns = self.reduced(u)
-        scale = 2 * self.half_period * thetas(z, self.ratio)[0] / self.zero[0]
-        return acb((-scale if turns % 2 else scale) * (self.quasi_period * u * u / (2 * self.half_period)).exp())
-
 
 @dataclass(frozen=True, slots=True)
 class DegenerateLattice:
@@ -170,24 +147,6 @@ class DegenerateLattice:
         scale, cosine = self.functions(u)
         one = u * 0 + 1
         return Point(scale, scale * scale, one, one, cosine * -2, self.double, (), u, u)
-
-    def p(self, u: acb) -> acb:
-        """℘(u)."""
-        return acb(as_ball(self.double) + self.functions(u)[0] ** -2)
-
-    def p_prime(self, u: acb) -> acb:
-        """℘'(u)."""
-        scale, cosine = self.functions(u)
-        return acb(-2 * cosine / scale**3)
-
-    def zeta(self, u: acb) -> acb:
-        """ζ(u) = κ coth(κu) − d u."""
-        scale, cosine = self.functions(u)
-        return acb(cosine / scale - as_ball(self.double) * u)
-
-    def sigma(self, u: acb) -> acb:
-        """σ(u) = exp(−d u²/2) sinh(κu)/κ."""
-        return acb((-as_ball(self.double) * u * u / 2).exp() * self.functions(u)[0])
 
 
 AnyLattice = Lattice | DegenerateLattice

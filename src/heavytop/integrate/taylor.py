@@ -7,7 +7,6 @@ from fractions import Fraction
 from time import perf_counter
 from typing import Any
 
-from heavytop.errors import InputError
 from heavytop.integrate.engines import Compiled, compiled, load
 from heavytop.integrate.stepper import Stepper, far
 from heavytop.integrate.trajectory import Outcome, Place, Problem, TaylorStep, Trajectory
@@ -77,7 +76,7 @@ def follow(
     kept_states: list[Any] = []
     outcome, done, began = Outcome.SUCCESS, 0, perf_counter()
     if place is not None:
-        _require_same(place.flags, tool.flags)
+        place.require_same(tool.flags)
         stepper.begin(place)
         done, began = place.samples, began - place.seconds
         kept_times = [exact(target) for target in targets[:done]]
@@ -155,14 +154,3 @@ def first_steps(
         {"compile": tool.seconds, "run": perf_counter() - began},
         tool.flags,
     ), steps
-
-
-def _require_same(there: dict[str, str], here: dict[str, str]) -> None:
-    different = [name for name in sorted(there.keys() | here.keys()) if there.get(name) != here.get(name)]
-    if different:
-        raise InputError(
-            "The run that is to go on was integrated with "
-            + ", ".join(f"{name} = {there.get(name)} (now {here.get(name)})" for name in different)
-            + ".",
-            "Go on with the program and machine that began it, or start anew in another folder.",
-        )

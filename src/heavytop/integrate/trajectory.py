@@ -117,6 +117,18 @@ class Place:
     flags: dict[str, str]
     words: tuple[str, ...] = ()
 
+    def require_same(self, flags: dict[str, str]) -> None:
+        """Raises InputError where the run that goes on has other flags."""
+        names = sorted(self.flags.keys() | flags.keys())
+        different = [name for name in names if self.flags.get(name) != flags.get(name)]
+        if different:
+            raise InputError(
+                "The run that is to go on was integrated with "
+                + ", ".join(f"{name} = {self.flags.get(name)} (now {flags.get(name)})" for name in different)
+                + ".",
+                "Go on with the program and machine that began it, or start anew in another folder.",
+            )
+
     def content(self, precision: Precision) -> dict[str, Any]:
         """As plain text and integers, exact."""
 

@@ -49,8 +49,7 @@ def propagate_words(
     tolerance: the local error aimed at, relative to the state; None for what the format can show.
     The other arguments and what is raised: as in :func:`heavytop.integrate.taylor.propagate`.
 
-    Raises InputError for a tolerance that is not positive and below 1, and for formats and data that need more words
-    than there are.  A failed run is an outcome, not an exception.
+    Raises InputError for a tolerance that is not positive and below 1.  A failed run is an outcome, not an exception.
     """
     problem = Problem.of(top, start, require(precision), system, xi)
     targets = [number(time, precision) for time in check_times(times)]
@@ -82,7 +81,7 @@ def follow(
     kept_states: list[Any] = []
     outcome, done = Outcome.SUCCESS, 0
     if place is not None:
-        _require_same(place.flags, flags)
+        place.require_same(flags)
         done, began = place.samples, began - place.seconds
         kept_times = [exact(target) for target in targets[:done]]
         pace.take_up(place, kept_times[-1])
@@ -199,14 +198,3 @@ class _Pace:
         if place.words:
             self.run.restore(place.words, place.steps)
             self.reach(covered)
-
-
-def _require_same(there: dict[str, str], here: dict[str, str]) -> None:
-    different = [name for name in sorted(there.keys() | here.keys()) if there.get(name) != here.get(name)]
-    if different:
-        raise InputError(
-            "The run that is to go on was integrated with "
-            + ", ".join(f"{name} = {there.get(name)} (now {here.get(name)})" for name in different)
-            + ".",
-            "Go on with the program that began it, or start anew in another folder.",
-        )

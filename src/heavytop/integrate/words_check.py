@@ -9,7 +9,7 @@ from math import factorial
 from heavytop.errors import Contradiction
 from heavytop.integrate.selfcheck import GAMMA, OMEGA, PARAMETERS, XI, derivatives
 from heavytop.top.equations import Parameters, System
-from heavytop.words.run import Run, Status
+from heavytop.words.run import Status, Steps
 from heavytop.words.scaled import Scaled
 
 _MOST_ORDERS = 100
@@ -17,7 +17,7 @@ _GUARD_BITS = 8
 _LATER = Fraction(7, 11)
 
 
-def check(system: System, attitude: bool, begin: Callable[[Scaled], Run], bits: int, bounded: bool = False) -> None:
+def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits: int, bounded: bool = False) -> None:
     """One step against the exact series of a known motion: coefficients, the new state, and a sample inside the step.
 
     begin: a run of a problem at its start.  bits: of its arithmetic.  bounded: the units it wants.

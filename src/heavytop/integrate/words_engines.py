@@ -13,12 +13,13 @@ from heavytop.integrate.words_check import check
 from heavytop.precision import DOUBLE, decimal_text
 from heavytop.top.equations import System
 from heavytop.words import eight, fixed, floating
-from heavytop.words.digits import MOST_WORDS, grid_for, grid_of
+from heavytop.words.digits import grid_for
 from heavytop.words.fixed import Fixed
 from heavytop.words.floating import FALL_IN_LANES, Floating, Ladder
 from heavytop.words.kernels import Grid
 from heavytop.words.run import Run
 from heavytop.words.scaled import Scaled
+from heavytop.words.whole import Whole
 
 LOOSEST = Fraction(1, 10**6)
 _SPARE_BITS, _SPARE_BITS_OF_DOUBLE = 8, 15
@@ -91,6 +92,8 @@ _FULL = Ladder(38, _REACH, -1000.0)
 _PLAIN = Ladder(24, _REACH, 1000.0)
 _ALLOWED = Ladder(38, _REACH, 1000.0)
 _PLAIN_BITS = 53
+_CHECKED_BITS = 128
+_STEP_OF_BITS = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,12 +122,36 @@ class Words(Arithmetic):
         return made.seconds
 
 
+@dataclass(frozen=True, slots=True)
+class WholeNumbers(Arithmetic):
+    """Whole numbers of ``bits`` bits, where there are no words for so many."""
+
+    tolerance: Fraction
+    bits: int
+
+    @property
+    def flags(self) -> dict[str, str]:
+        return {
+            "arithmetic": "whole numbers",
+            "bits": str(self.bits),
+            "tolerance": decimal_text(self.tolerance, 6),
+            "step_rule": "powers of two, by the number of orders",
+        }
+
+    def begin(self, scaled: Scaled, forwards: bool) -> Run:
+        return Whole(scaled, self.bits, forwards)
+
+    def make(self, system: System, attitude: bool) -> float:
+        check(system, attitude, lambda scaled: Whole(scaled, _CHECKED_BITS, True), _CHECKED_BITS, bounded=True)
+        return 0.0
+
+
 def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Scaled]:
     """The arithmetic for a format, or for the tolerance where one is given, and the problem in its units.
 
     A grid is as fine as the smallest component of the start needs it: what an unstable axis amplifies must be there.
 
-    Raises InputError for a tolerance outside 1e-6 to the format's own, and where more words are needed than there are.
+    Raises InputError for a tolerance outside 1e-6 to the format's own.
     """
     precision = problem.precision
     most = _SPARE_BITS_OF_DOUBLE if precision.bits <= DOUBLE.bits else _SPARE_BITS
@@ -145,11 +172,7 @@ def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Sc
     bits = asked + _GUARD_BITS + fixed.spread(scaled) + fixed.excess(scaled)
     grid = grid_for(bits)
     if grid is None:
-        raise InputError(
-            f"{precision.name} from this start needs {bits} bits, more than the {grid_of(MOST_WORDS).total} that "
-            "the integrator words has.",
-            "Use fewer bits, or --integrator heyoka.",
-        )
+        return WholeNumbers(wanted, -(-bits // _STEP_OF_BITS) * _STEP_OF_BITS), scaled
     return Words(wanted, grid), scaled
 
 

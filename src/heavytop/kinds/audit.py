@@ -12,6 +12,7 @@ from heavytop.claims.audit import audit as audit_of
 from heavytop.kinds.base import Kind
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.records import Against, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.brief import wrapped
 from heavytop.report.printable import printable
 from heavytop.report.section import Card, Line, clip
 from heavytop.report.text import title
@@ -73,6 +74,14 @@ class Audit(Kind):
             line.append(f"; refuted on the smooth branch: {', '.join(smooth_ones)})" if smooth_ones else ")")
             parts.append(line)
         return parts
+
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """The verdict on each claim for each system."""
+        found: dict[tuple[str, str], list[str]] = {}
+        for row in rows:
+            found.setdefault((_verdict(row)[0], row.system), []).append(row.case)
+        said = (f"{', '.join(claims)}: {verdict} for {system}" for (verdict, system), claims in found.items())
+        return [line for sentence in said for line in wrapped(f"Claims {sentence}.")]
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
         """Whether the claims are motions of the heavy top."""

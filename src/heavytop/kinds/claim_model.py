@@ -24,6 +24,7 @@ from heavytop.measure.parting import CLAIM_XI, parting, true_solution
 from heavytop.measure.scalar import largest, metric, text
 from heavytop.precision import exact
 from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
+from heavytop.report.brief import wrapped
 from heavytop.report.printable import printable
 from heavytop.report.section import Card, Line, clip
 from heavytop.report.text import both, short, table, title
@@ -130,6 +131,15 @@ class ClaimModel(Kind):
             table(["case", "branch", *heads, "Ω off 1 % of α at |t|"], both(lines)),
             *(Text(printable(f"  {case}: truth is {text}"), style="dim") for case, text in truths.items()),
         ]
+
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """When each claim is off by 1 %."""
+        found: dict[str, dict[str, str]] = {}
+        for row in rows:
+            if PARTS.text in row.metrics and row.key.direction != "backward":
+                found.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
+        said = ((case, ", ".join(f"{t} ({branch})" for branch, t in times.items())) for case, times in found.items())
+        return [line for case, times in said for line in wrapped(f"{case}: Ω off by 1 % of α from |t| = {times} on")]
 
     def cards(self, rows: Sequence[Row]) -> list[Card]:
         """How wrong the claim is, forward in time, and in full on the smooth branch, where there are several."""

@@ -17,6 +17,7 @@ from heavytop.measure.reruns import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.precision import DOUBLE, exact, number, parse
 from heavytop.records import Row, RowKey
+from heavytop.report.brief import digits_lines
 from heavytop.report.plots import digits, growth
 from heavytop.report.text import DIGITS, NOISE, largest_over, motions, title
 from heavytop.suite.checkpoint import Saved
@@ -117,3 +118,7 @@ class Drift(Kind):
             Text(f"  {NOISE}"),
             motions(rows),
         ]
+
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """Digits right, a line a motion."""
+        return digits_lines(rows, "Digits right, to |t|")

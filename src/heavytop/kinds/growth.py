@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from textwrap import wrap
 from time import perf_counter
 from typing import Any
 
@@ -21,8 +22,10 @@ from heavytop.measure.ensemble_reference import Reference, Texts, Wider, referen
 from heavytop.measure.integrator import HEYOKA, require
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import Scorer
+from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import decimal_text, exact, number, parse, physical, usable_tolerance
 from heavytop.records import Law, Metric, Quantity, Row, RowKey, by_name
+from heavytop.report.brief import named, wrapped
 from heavytop.report.names import computed_by
 from heavytop.report.plots import digits
 from heavytop.report.plots import growth as over_time
@@ -36,6 +39,15 @@ from heavytop.suite.task import Task, computed
 
 NAME = "growth"
 FAILED = Quantity("starts_failed")
+_MEANS = {
+    "t^0.5": "less than rounding noise that adds up",
+    "t": "a wrong coefficient, or a method that keeps its first integrals within bounds",
+    "t^1.5": "rounding noise alone, the least there is",
+    "t^2": "every step errs in the same way, as by truncation; a smaller step or tolerance helps",
+    "exponential": "the motion amplifies every error",
+}
+"""Laws of the error along the flow."""
+_SUMMED_UP = ("integrals", "along", "across")
 _MOST_BITS = 900
 """Errors of more bits underflow in the floats that laws of growth are fitted with."""
 _LIMITS = {"starts": range(1, 100_001), "samples": range(4, 1001), "decades": range(1, 13)}
@@ -190,6 +202,44 @@ class Growth(Kind):
             *([Text("  Rate: the median over the starts of their finite-time rates.")] if chaotic else []),
             table([*columns, "lost at |t|"], lines),
         ]
+
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """The laws, those of all first integrals as one; motions with the same laws together."""
+        found: dict[tuple[str, ...], list[str]] = {}
+        names = named(rows)
+        for row in rows:
+            laws: dict[str, dict[str, None]] = {}
+            for law in row.laws.values():
+                quantity = law.quantity or Quantity("")
+                what = "integrals" if quantity.name == DRIFT else quantity.component
+                if what in _SUMMED_UP and (law.growth, law.exponent) != ("bounded", None):  # exactly 0
+                    laws.setdefault(what, {})[law.growth] = None
+            growths = (" or ".join(laws.get(what, {"-": None})) for what in _SUMMED_UP)
+            found.setdefault((row.precision, row.key.subject.variant, *growths), []).append(names(row))
+        if not found:
+            return []
+        printed = [_columns("Grows like", "integrals", "error along", "across")]
+        for (precision, variant, *said), cases in found.items():
+            name = f"  {precision} {variant}".rstrip() + f": {', '.join(cases)}"
+            first, *rest = wrap(name, 35, subsequent_indent="    ")
+            printed += [_columns(first, *said), *rest]
+        others = [row for row in rows if row.key.subject.name != HEYOKA]
+        return printed + [line for row in others for line in wrapped(_meaning(row))]
+
+
+def _meaning(row: Row) -> str:
+    """What the law of an integrator of others says about it."""
+    law = row.laws.get(Quantity(SOLUTION_ERROR, "along").text)
+    growth = "unresolved" if law is None else law.growth
+    grows = "follows no law that these starts tell" if growth == "unresolved" else f"grows like {growth}"
+    if growth in ("bounded", "exponential"):
+        grows = f"is {growth}" if growth == "bounded" else "grows exponentially"
+    means = f": {_MEANS[growth]}" if growth in _MEANS else ""
+    return f"{row.key.case}: the error of {row.key.subject.name} along the flow {grows}{means}."
+
+
+def _columns(name: str, integrals: str, along: str, across: str) -> str:
+    return f"{name:37}{integrals:17}{along:13}{across}"
 
 
 def _biased(problem: Problem, bias: str | None) -> Problem:

@@ -24,7 +24,8 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import DOUBLE, exact, parse
 from heavytop.records import Direction, Metric, Quantity, Row, RowKey, by_name
-from heavytop.report.text import NOISE, both, table, title, with_noise
+from heavytop.report.brief import named, wrapped
+from heavytop.report.text import NOISE, both, short, table, title, with_noise
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
@@ -141,6 +142,19 @@ class Homoclinic(Kind):
             Text(f"  all significant digits are lost. {NOISE}"),
             table(["case", "format", "Ω error", "escape |t|", "outcome"], both(lines)),
         ]
+
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """The escape times of each case, a format after the other."""
+        found: dict[str, dict[str, str]] = {}
+        names = named(rows)
+        for row in rows:
+            if row.key.direction != "backward" and ESCAPE.text in row.metrics:
+                found.setdefault(names(row), {})[row.precision] = short(row.metrics[ESCAPE.text].value)
+        formats = list(dict.fromkeys(name for times in found.values() for name in times))
+        lines = [f"  {case}: {', '.join(times.get(name, '-') for name in formats)}" for case, times in found.items()]
+        if not lines:
+            return []
+        return [*wrapped(f"Escape from a homoclinic motion at |t|, {', '.join(formats)}:"), *lines]
 
 
 def _end(case: Case, bits: int) -> float:

@@ -50,6 +50,10 @@ class LocalErrorTable(Table, tag=NAME):
             for precision in self.precisions
         ]
 
+    def beside(self, integrator: str) -> Table | None:
+        """Nothing: other integrators do not hand over their single steps."""
+        return None
+
 
 class LocalError(Kind):
     """Errors of steps in units of eps times the largest component of the state."""
@@ -72,6 +76,15 @@ class LocalError(Kind):
         for time, step in zip(run.times, steps, strict=True):
             error(time, step)
         return computed_row(task, run, error.metrics(), {}, _AGAINST)
+
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """The largest error of a step, a line a motion and format."""
+        largest = local_error.LOCAL_ERROR.over("max").text
+        return [
+            f"{row.case} in {row.precision}: a step is off by {short(row.metrics[largest].value)} eps at most"
+            for row in rows
+            if largest in row.metrics
+        ]
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line a row."""

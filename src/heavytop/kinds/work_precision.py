@@ -27,12 +27,13 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import exact, number, parse, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.brief import wrapped
 from heavytop.report.consistency import CLOSE, bound, ended, size_of, sizes
 from heavytop.report.method_growth import method_growth
 from heavytop.report.printable import printable
 from heavytop.report.text import table, title
 from heavytop.report.work_plots import work_precision
-from heavytop.report.work_precision import CONSTANTS, LANES, OURS, leads, panels
+from heavytop.report.work_precision import CONSTANTS, LANES, OURS, beside_ours, leads, panels
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import computed_row, time_text
@@ -104,6 +105,12 @@ class WorkPrecisionTable(Table, tag=NAME):
             for case in map(find, self.cases)
             for precision, subject in rungs
         ]
+
+    def beside(self, integrator: str) -> Table | None:
+        """Its finest rung in each format that heyoka has a ladder in."""
+        formats = dict.fromkeys(each.precision for each in self.ladders if each.integrator == OURS)
+        ladders = [Ladder(integrator, precision, [FINEST]) for precision in formats]
+        return msgspec.structs.replace(self, ladders=ladders) if ladders else None
 
 
 class WorkPrecision(Kind):
@@ -189,6 +196,12 @@ class WorkPrecision(Kind):
             columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "gave up"]
             parts += [table(columns, cells), Text()]
         return parts + [Text(printable(f"  {lead.text}"), style="bold") for lead in leads(rows)]
+
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """How heyoka compares, a sentence a case."""
+        if beside := beside_ours(rows):
+            return [line for sentence in beside for line in wrapped(f"{sentence}.")]
+        return [line for lead in leads(rows) if lead.short for line in wrapped(f"{lead.case}: {lead.short}.")]
 
 
 def _missing() -> Metric:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from types import SimpleNamespace
@@ -115,14 +116,17 @@ class Portrait:
 class Drawings:
     """All that the figures draw."""
 
-    papers: list[PaperCurve]
-    comparisons: list[Compared]
-    portrait: Portrait
+    papers: Iterator[PaperCurve]
+    comparisons: Iterator[Compared]
+    portrait: Iterator[Portrait]
+
+
+FIGURES = len(PAPER_FIGURES) + len(RATIOS) + 1
 
 
 def drawings() -> Drawings:
-    """Figs 2-8, the comparisons for I1/I3 = 2 and 6, the momentum sphere."""
-    return Drawings([_paper(each) for each in PAPER_FIGURES], [_compared(ratio) for ratio in RATIOS], _portrait())
+    """Figs 2-8, the comparisons for I1/I3 = 2 and 6, the momentum sphere; each is worked out when it is asked for."""
+    return Drawings(map(_paper, PAPER_FIGURES), map(_compared, RATIOS), (_portrait() for _ in range(1)))
 
 
 def _paper(figure: PaperFigure) -> PaperCurve:

@@ -48,3 +48,8 @@ def digits_kept(row: Measured) -> float | None:
 def digits_text(kept: float) -> str:
     """Digits kept, for people: to one place, and none where the error is larger than the value."""
     return f"{max(kept, 0.0):.1f}"
+
+
+def digits_of(bits: int) -> int:
+    """Decimal digits of a format with so many bits: 16 in double, 34 in quad."""
+    return round(bits * math.log10(2))

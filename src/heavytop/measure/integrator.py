@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate import peers, registry, taylor
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
@@ -65,7 +65,10 @@ class Integrator:
             call = registry.propagator(self.name, {})
             run: Trajectory = call(top, start, times, precision, system=system, observer=observer, **going_on)
             return run
-        run = peers.ready(self.name)(top, start, times, precision, system=system)
+        try:
+            run = peers.ready(self.name)(top, start, times, precision, system=system)
+        except InputError as error:  # what a peer of this program cannot be asked for is one row's failure too
+            raise PeerFailed(error.cause.removesuffix(".")) from None
         if observer is not None:
             for time, state in zip(run.times, run.states, strict=True):
                 observer(time, state)

@@ -20,7 +20,7 @@ from heavytop.top.equations import GYROSTAT
 
 _DIGITS_A_BIT = Fraction(30103, 100000)
 _VALIDATED_HORIZON = 100
-"""Beyond this time the validated enclosure of a motion without a closed form is not even tried."""
+"""Up to this time a motion without a closed form is enclosed as far as that is in reach at all."""
 _SPARE_DIGITS = 3
 _EFFORT = 1.0
 """Seconds that a second source at the horizon itself may cost; beyond, it is held near 0 and near the horizon."""
@@ -70,8 +70,10 @@ def closed_form(problem: Problem) -> ExactSolution | None:
     return next(matches(problem.top, problem.start), None)
 
 
-def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
+def known_motion(problem: Problem, horizon: Fraction, effort_beyond: float = 0.0) -> Known | str:
     """The closed form of a rounded problem, or up to |t| = 100 its enclosure; why not, where there is neither.
+
+    effort_beyond: seconds of the model of the cost that the enclosure may take beyond |t| = 100.
 
     Certified at ``horizon`` for the bits of the format and its guard bits.  Raises Contradiction where the second
     source excludes it: then something is wrong with this program.
@@ -79,9 +81,12 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
     bits = problem.precision.bits + GUARD_BITS
     try:
         found = closed_form(problem)
-        if found is None and abs(horizon) > _VALIDATED_HORIZON:
-            return f"no closed form, and no enclosure beyond |t| = {_VALIDATED_HORIZON}"
-        known = certified(found or Validated(problem.top, problem.start, problem.system), horizon, bits)
+        if found is None:
+            found = Validated(problem.top, problem.start, problem.system)
+            far = abs(horizon) > _VALIDATED_HORIZON
+            if far and (effort_beyond == 0 or found.cost(horizon, bits) > effort_beyond):
+                return f"no closed form, and no enclosure beyond |t| = {_VALIDATED_HORIZON}"
+        known = certified(found, horizon, bits)
     except OutOfReach as error:
         return error.cause
     return known or "certified to fewer digits than the format has"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 import re
-import subprocess
 from importlib import metadata
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
@@ -12,10 +11,11 @@ from typing import Any
 
 from heavytop.precision import available
 from heavytop.suite.workers import versions
+from heavytop.version import commit
 
 
 def environment() -> dict[str, Any]:
-    """Versions, processor, formats; ``commit`` where the program runs from a git checkout."""
+    """Versions, processor, formats; ``commit`` of the checkout or of the wheel, where one is known."""
     import flint
     import heyoka
     import numpy
@@ -23,7 +23,7 @@ def environment() -> dict[str, Any]:
     return {
         "packages": versions(),
         "flint": str(flint.__FLINT_VERSION__),
-        "commit": _commit(),
+        "commit": commit(),
         "python": platform.python_version(),
         "implementation": platform.python_implementation(),
         "system": platform.system(),
@@ -71,20 +71,3 @@ def _processor() -> str:
     except OSError:
         pass
     return platform.processor() or "unknown"
-
-
-def _commit() -> str | None:
-    here = Path(__file__).resolve().parent
-    try:
-        done = subprocess.run(
-            ["git", "-C", str(here), "describe", "--always", "--dirty", "--abbrev=40", "--match="],
-            capture_output=True,
-            text=True,
-            timeout=5,
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    # an installed copy may lie inside somebody else's repository
-    tracked = (here.parents[2] / "pyproject.toml").exists() and done.returncode == 0
-    return done.stdout.strip() if tracked else None

@@ -5,7 +5,7 @@ matplotlib is drawn without a display and without a date, so that the same progr
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -29,17 +29,28 @@ _BRANCHES: dict[Branch, str] = {"printed": "as printed", "smooth": "smooth branc
 _LINES: dict[Branch, tuple[str, Any]] = {"printed": (VERMILION, (0, (1, 1))), "smooth": (GREEN, "-.")}
 
 
-def draw_figures(drawings: Drawings, directory: Path) -> list[Path]:
-    """The files written into ``directory``: each figure as SVG and as PNG (at least 800 px wide)."""
+def draw_figures(drawings: Drawings, directory: Path, progress: Callable[[], None] = lambda: None) -> list[Path]:
+    """The files written into ``directory``: each figure as SVG and as PNG (at least 800 px wide).
+
+    progress: called after each figure.
+    """
     directory.mkdir(parents=True, exist_ok=True)
     files: list[Path] = []
     with _quiet_style():
-        for paper in drawings.papers:
-            files += _save(_paper_figure(paper), directory / f"fig{paper.figure.number}")
-        for compared in drawings.comparisons:
-            files += _save(_comparison(compared), directory / f"truth-ratio{compared.ratio}")
-        files += _save(_portrait(drawings.portrait), directory / "momentum-sphere")
+        for name, figure in _figures(drawings):
+            files += _save(figure, directory / name)
+            progress()
     return files
+
+
+def _figures(drawings: Drawings) -> Iterator[tuple[str, Any]]:
+    """The name of each file and what it shows."""
+    for paper in drawings.papers:
+        yield f"fig{paper.figure.number}", _paper_figure(paper)
+    for compared in drawings.comparisons:
+        yield f"truth-ratio{compared.ratio}", _comparison(compared)
+    for portrait in drawings.portrait:
+        yield "momentum-sphere", _portrait(portrait)
 
 
 @contextmanager

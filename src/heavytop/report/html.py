@@ -140,6 +140,7 @@ def commands(report: Report) -> list[str]:
 
 
 def render(template: str, **context: Any) -> str:
+    """A template of this room as text, everything escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(

@@ -61,6 +61,10 @@ class Kind(Protocol):
         """Its part of the summary for a terminal, from rows that were measured."""
         return []
 
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """The same in a few lines of 80 columns, for the end of a run."""
+        return []
+
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
         """A word (refuted, holds, undecided) and the sentence that opens the page; None where it has nothing to say."""
         return None

@@ -1,38 +1,22 @@
-"""The summary of a run of any number of rows, of which only the first are held."""
+"""The summary of a report with more rows than anybody reads."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from itertools import chain, islice
 from math import inf
 
-from msgspec import structs
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from heavytop.measure.digits import digits_kept, digits_text
-from heavytop.records import Metric, Report, Row
+from heavytop.records import Metric, Row
 from heavytop.report.kind import Kinds
 from heavytop.report.store import AnyReport
-from heavytop.report.text import failed, head, summary, table, title, with_noise
+from heavytop.report.text import failed, head, table, title, with_noise
 
-MOST_ROWS = 200
-"""More rows than these are summed up after a run, not listed."""
 MOST_LISTED = 5000
 """More rows than these nobody reads: `show` sums them up too."""
-
-
-def overview(report: Report, rows: Iterable[Row], kinds: Kinds) -> RenderableType:
-    """The summary of ``report`` with these rows; where they are too many to read, the worst for each measure.
-
-    The rows may be a stream of any length: none is held but the first.
-    """
-    stream = iter(rows)
-    first = list(islice(stream, MOST_ROWS + 1))
-    if len(first) <= MOST_ROWS:
-        return summary(structs.replace(report, rows=first), kinds)
-    return worst(report, chain(first, stream), f"`heavytop show` lists up to {MOST_LISTED} rows.")
 
 
 def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:

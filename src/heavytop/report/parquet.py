@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 from itertools import islice
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError
+from heavytop.precision import exact
 from heavytop.records import SCHEMA, Row
 from heavytop.suite.files import whole
 
@@ -42,9 +44,20 @@ _OF_LAW = {
     "detects": "string",
     "lost_at": "string",
 }
-COLUMNS = _OF_ROW | {"metric": "string"} | _OF_METRIC | _OF_LAW
+_OF_DATA = {"inertia": 3, "weight": 0, "centre": 3, "omega": 3, "gamma": 3}
+"""How many components each has; 0 for a number."""
+_DATA = [f"{name}{i}" for name, count in _OF_DATA.items() for i in (range(1, count + 1) if count else ("",))]
+COLUMNS = (
+    _OF_ROW
+    | {"metric": "string"}
+    | _OF_METRIC
+    | _OF_LAW
+    | dict.fromkeys(_DATA, "float64")
+    | {f"{name}_exact": "string" for name in _OF_DATA}
+)
 """Column -> type.  Numbers that measure something are text, as in the report, with log10 beside them.
 
+inertia1 to gamma3 are the top and the start as floats, and inertia_exact to gamma_exact the same as exact text.
 A growth law is a line of kind "law" whose metric is the name of its series and whose value is its class; a row that has
 neither metric nor law is one line without them.
 """
@@ -85,10 +98,32 @@ def lines(rows: Iterable[Row]) -> Iterator[tuple[Any, ...]]:
     no_metric, no_law = [None] * len(_OF_METRIC), [None] * len(_OF_LAW)
     for row in rows:
         *same, starts = (getattr(row, name) for name in _OF_ROW)
+        data = _data(row)
         for name, metric in row.metrics.items():
-            yield *same, starts, name, *(getattr(metric, each) for each in _OF_METRIC), *no_law
+            yield *same, starts, name, *(getattr(metric, each) for each in _OF_METRIC), *no_law, *data
         for name, law in row.laws.items():
             as_metric = "law", law.growth, None, None, None
-            yield *same, law.starts, name, *as_metric, *(getattr(law, each) for each in _OF_LAW)
+            yield *same, law.starts, name, *as_metric, *(getattr(law, each) for each in _OF_LAW), *data
         if not (row.metrics or row.laws):
-            yield *same, starts, None, *no_metric, *no_law
+            yield *same, starts, None, *no_metric, *no_law, *data
+
+
+def _float(text: str) -> float:
+    """The nearest double of exact text, infinite beyond their range."""
+    number = exact(text)
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
+
+
+def _data(row: Row) -> list[float | str | None]:
+    """The top and the start as floats, infinite beyond their range, then as text; None for what there is not."""
+    floats: list[float | None] = []
+    texts: list[str | None] = []
+    for name, count in _OF_DATA.items():
+        found: Any = None if row.data is None else getattr(row.data, name)
+        parts = [] if not found else list(found) if count else [found]
+        floats += [_float(part) for part in parts] or [None] * max(count, 1)
+        texts.append(",".join(parts) or None)
+    return [*floats, *texts]

@@ -1,35 +1,118 @@
-"""The score of one trajectory, for people."""
+"""How good one trajectory is, for people: the answer in its first lines."""
 
 from __future__ import annotations
 
-from rich.console import Group, RenderableType
+import textwrap
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+import msgspec
+from rich.console import Console, ConsoleOptions, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.measure.digits import digits_kept, digits_text
+from heavytop.measure.digits import digits_text
 from heavytop.records import Row
+from heavytop.report.diagnosis_text import diagnosis_text
 from heavytop.report.text import short
+from heavytop.suite.score import Assessment
 
+WIDTH = 80
 _PARTS = {"omega": "Ω", "gamma": "γ", "along": "along the flow", "across": "across the flow"}
+_DIRECTIONS = {
+    "along": "The error is mostly along the flow, that is in phase.",
+    "across": "The error is mostly across the flow.",
+    "both": "The error is along and across the flow alike.",
+}
 
 
-def score_text(row: Row) -> RenderableType:
-    """Digits kept, distance from the known motion, drift of every first integral."""
-    head = f"{row.case}: {row.integrator}, {row.system} in {row.precision} ({row.bits} bits): {row.outcome}"
+def answer(found: Assessment) -> list[str]:
+    """The sentences that say how good it is; the first may be longer than a line, and can be broken behind its ";"."""
+    row, digits = found.row, found.digits_right
+    lines = []
     if row.outcome != "success":
-        head += f", scored up to t = {row.time_reached} of {row.horizon}"
-    digits = digits_kept(row)
-    kept = (
-        "unknown: no reference" if digits is None else f"{digits_text(digits)} (at the worst of {row.samples} samples)"
-    )
-    table = Table(box=None, header_style="dim")
-    for index, column in enumerate(("", f"largest over {row.samples} samples", "rms", "final")):
-        table.add_column(column, justify="right" if index else "left")
+        lines.append(f"The run ended early ({row.outcome}), at t = {row.time_reached} of {row.horizon}.")
+    if digits is None:
+        return [*lines, _without_digits(row)]
+    where = "every sample up to" if row.samples > 1 else "its one sample,"
+    said = f"{digits_text(digits)} of {found.of_digits} digits right at {where} T = {row.time_reached}"
+    if found.peer is not None:
+        said += f"; {found.peer.integrator} in {found.peer.precision} keeps {digits_text(found.peer.digits_right)}"
+    lines.append(f"{said}.")
+    if found.direction is not None:
+        lines.append(_DIRECTIONS[found.direction])
+    return lines
+
+
+def _without_digits(row: Row) -> str:
+    if not row.samples:
+        return "No digit can be counted: the first state is not finite."
+    return "How many digits are right is not known: there is no reference. Drift is measured."
+
+
+def guessed(found: Assessment) -> str | None:
+    """That the format was not named, and what it was taken for."""
+    if not found.format_guessed:
+        return None
+    return f"No format is named; {found.row.precision} is the narrowest that holds the digits written."
+
+
+def told(found: Assessment) -> list[str]:
+    """What explains the error, and what was guessed."""
+    said = [diagnosis_text(each, found.row.system) for each in found.diagnoses]
+    note = guessed(found)
+    return [*said, *([note] if note else [])]
+
+
+def to_json(found: Assessment) -> dict[str, Any]:
+    """The row, and beside it what `score --json` says more."""
+    peer = None if found.peer is None else asdict(found.peer)
+    said = [asdict(each) | {"sentence": diagnosis_text(each, found.row.system)} for each in found.diagnoses]
+    answers = {"digits_kept": found.digits_right, "digits_right": found.digits_right, "of_digits": found.of_digits}
+    more = {"peer": peer, "mostly": found.direction, "format_guessed": found.format_guessed, "diagnosis": said}
+    row: dict[str, Any] = msgspec.to_builtins(found.row)
+    return row | answers | more
+
+
+def sizes(row: Row) -> list[list[str]]:
+    """Label, largest, root mean square and final value of each error and of the drift of each first integral."""
     names = {f"solution_error_{key}": f"error, {label}" for key, label in _PARTS.items()}
     names |= {name[:-4]: f"drift, {name[6:-4]}" for name in row.metrics if name[:6] == "drift_" and name[-4:] == "_max"}
-    for name, label in names.items():
-        if f"{name}_max" in row.metrics:
-            table.add_row(
-                label, *(Text(short(row.metrics[f"{name}_{part}"].value)) for part in ("max", "rms", "final"))
-            )
-    return Group(Text(head), Text(f"Digits kept: {kept}"), Text(), table, Text(), Text(f"Held against {row.against}"))
+    return [
+        [label, *(short(row.metrics[f"{name}_{part}"].value) for part in ("max", "rms", "final"))]
+        for name, label in names.items()
+        if f"{name}_max" in row.metrics
+    ]
+
+
+def score_text(found: Assessment) -> RenderableType:
+    """Digits right, distance from the known motion, drift of every first integral, what explains the error."""
+    row = found.row
+    table = Table(box=None, header_style="dim")
+    for index, column in enumerate(("", f"largest over {row.samples} samples", "rms", "final")):
+        table.add_column(column, justify="right" if index else "left", no_wrap=True)
+    for line in sizes(row):
+        table.add_row(*map(Text, line))
+    about = f"{row.case}: {row.integrator}, {row.system} in {row.precision} ({row.bits} bits)"
+    parts: list[RenderableType] = [_Sentence(line) for line in answer(found)]
+    parts += [Text(), table, Text(), *_wrapped(about), *_wrapped(f"Compared with {row.against}.")]
+    explained = told(found)
+    if explained:
+        parts += [Text(), *(line for each in explained for line in _wrapped(each))]
+    return Group(*parts)
+
+
+class _Sentence:
+    """A sentence that is broken behind a semicolon where the console is too narrow for it."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+        fits = len(self.text) <= options.max_width
+        yield Text(self.text if fits else self.text.replace("; ", ";\n"))
+
+
+def _wrapped(text: str) -> list[Text]:
+    return [Text(line) for line in textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False)]

@@ -73,7 +73,7 @@ def summary(report: Report, kinds: Kinds) -> RenderableType:
         parts += [Text(), Text(printable(said))]
     if failures := [row for row in report.rows if failed(row, kinds)]:
         parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
-        parts += [Text(printable(_failure(row))) for row in failures]
+        parts += [Text(printable(failure(row))) for row in failures]
     return Group(*parts)
 
 
@@ -82,7 +82,8 @@ def failed(row: Row, kinds: Kinds) -> bool:
     return row.outcome in UNMEASURED or (row.outcome != "success" and not kind_of(row, kinds).may_give_up)
 
 
-def _failure(row: Row) -> str:
+def failure(row: Row) -> str:
+    """A run that did not reach its horizon, and why."""
     if row.outcome == FAILED:
         return f"  {row.reference.reason} in {row.precision}"
     if row.outcome in UNMEASURED:

@@ -143,6 +143,22 @@ def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Lin
     return {case: list(lines.values()) for case, lines in found.items()}
 
 
+def beside_ours(rows: Sequence[Row]) -> list[str]:
+    """Of each integrator that is measured at one setting alone: its error, its seconds, and heyoka's for that error."""
+    said = []
+    for case, lines in panels(rows).items():
+        ours = [line for line in lines if line.integrator == OURS]
+        for line in lines:
+            if line.integrator in (OURS, CONSTANTS, LANES) or len(line.points) != 1 or not ours:
+                continue
+            (point,) = line.points
+            seconds, _ = _quickest([each for each in ours if each.precision == line.precision], point.log10)
+            needs = "does not get there" if seconds is None else f"takes {_time(seconds)} for that"
+            text = f"{case}: {line.label} is off by {10**point.log10:.1e} at most after {_time(point.seconds)}"
+            said.append(f"{text}; {OURS} {needs}")
+    return said
+
+
 def leads(rows: Sequence[Row]) -> list[Lead]:
     """heyoka's best scalar line against the best peer, for each case that has both and an error that one of them
     reaches: in double at 1e-10, and beyond extended at 1e-30.

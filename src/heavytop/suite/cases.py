@@ -12,6 +12,7 @@ from heavytop.exact.chaplygin import chaplygin_motion
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.goryachev import goryachev_motion
+from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.kowalewski import kowalewski_motion
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
@@ -22,8 +23,8 @@ class Case:
     """A top with a start.
 
     claim: the data of the paper's partial case where the case is one.
-    homoclinic: the closed form where the motion is homoclinic to a saddle; its data are dyadic, so that every format
-    takes them exactly.
+    homoclinic: the closed form where the motion tends to a saddle, a permanent rotation or a periodic motion; its data
+    are dyadic, so that every format takes them exactly.
     """
 
     name: str
@@ -32,13 +33,18 @@ class Case:
     top: HeavyTop
     start: State
     claim: PartialCase | None = None
-    homoclinic: ErshkovPartial | DeloneHomoclinic | None = None
+    homoclinic: ErshkovPartial | DeloneHomoclinic | Kovalevskaya | None = None
 
     @property
     def alpha(self) -> Fraction:
-        """The angular velocity α of the permanent rotation that a homoclinic case tends to."""
+        """The unit of errors of Ω: the angular velocity α of the permanent rotation that a homoclinic case tends to.
+
+        For one that tends to a periodic motion, the largest component of Ω at the start.
+        """
         if self.homoclinic is None:
             raise InputError(f"The case {self.name} is not homoclinic.", "Use a case such as ershkov-partial-2.")
+        if isinstance(self.homoclinic, Kovalevskaya):
+            return max(map(abs, self.start.omega))
         return self.homoclinic.alpha
 
     @property
@@ -46,6 +52,8 @@ class Case:
         """The exponent at which a homoclinic case approaches its saddle, and errors leave it."""
         if isinstance(self.homoclinic, ErshkovPartial):
             return float(self.homoclinic.rate) / 2
+        if isinstance(self.homoclinic, Kovalevskaya):
+            return float(self.homoclinic.exponent(64))
         return float(self.alpha) / 2**0.5
 
 
@@ -61,6 +69,18 @@ def _delone() -> Case:
     return Case(
         "delone",
         "homoclinic Delone motion of the Kovalevskaya top, alpha = 5/4",
+        HEAVY_TOP,
+        known.top,
+        known.start,
+        homoclinic=known,
+    )
+
+
+def _asymptotic() -> Case:
+    known = Kovalevskaya(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((-1, "1/4", "1/4"), (0, 0, 1)))
+    return Case(
+        "kovalevskaya-asymptotic",
+        "Kovalevskaya's top on a degenerate level: it tends to a periodic motion, a saddle",
         HEAVY_TOP,
         known.top,
         known.start,
@@ -102,6 +122,7 @@ CASES: dict[str, Case] = {
             HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0)),
             State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5")),
         ),
+        _asymptotic(),
         Case(
             "generic",
             "asymmetric top without a further integral",

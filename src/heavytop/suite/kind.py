@@ -7,6 +7,7 @@ from typing import Protocol
 
 import msgspec
 
+from heavytop.measure.integrator import HEYOKA
 from heavytop.records import Row
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
@@ -22,6 +23,12 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
     def tasks(self, find: Find) -> list[Task]:
         """One a row; raises InputError for an impossible value."""
         raise NotImplementedError
+
+    def beside(self, integrator: str) -> Table | None:
+        """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
+        if getattr(self, "integrator", None) != HEYOKA:
+            return None
+        return msgspec.structs.replace(self, integrator=integrator)
 
 
 class Kind(Protocol):

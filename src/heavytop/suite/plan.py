@@ -20,6 +20,8 @@ import msgspec
 
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Problem
+from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.integrator import require as require_integrator
 from heavytop.measure.rounding_noise import MOST_SEEDS
 from heavytop.precision import exact, number, require
 from heavytop.records import RowKey
@@ -33,7 +35,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
-BUILT_IN = ("smoke", "default", "growth", "long", "peers", "selftest")
+BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "selftest")
 
 
 class Top(msgspec.Struct, forbid_unknown_fields=True):
@@ -57,13 +59,16 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     sweep: list[Sweep] = []
 
 
-def read(name: str, kinds: Kinds, seed: int = 0) -> tuple[Plan, str, Sequence[Task]]:
+def read(name: str, kinds: Kinds, seed: int = 0, integrator: str = "") -> tuple[Plan, str, Sequence[Task]]:
     """The plan of that name or file, the hash of its text, and its measurements with the roundings of a seed.
 
-    Raises InputError, which names the file, where :func:`load` or :func:`expand` does.
+    integrator: measures whatever heyoka does too.
+    Raises InputError, which names the file, where :func:`load`, :func:`expand` or :func:`beside` does.
     """
     plan, digest = load(name, kinds)
     try:
+        if integrator:
+            plan = beside(plan, integrator)
         return plan, digest, expand(plan, seed)
     except InputError as error:
         if name in BUILT_IN:
@@ -95,6 +100,20 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
     except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise InputError(f"The plan {name} is not valid: {error}.", "The plans that ship show every key.") from None
     return plan, hashlib.sha256(text.encode()).hexdigest()
+
+
+def beside(plan: Plan, integrator: str) -> Plan:
+    """The plan with the same measurements of another integrator after heyoka's.
+
+    Raises InputError for an unknown integrator, for heyoka itself and for a plan that measures no integrator.
+    """
+    if integrator == HEYOKA:
+        raise InputError(f"{HEYOKA} is what others are compared with.", "Name another with --integrator, or none.")
+    require_integrator(integrator)
+    added = [other for table in plan.measure if (other := table.beside(integrator)) is not None]
+    if not added:
+        raise InputError(f"The plan {plan.name} does not measure {HEYOKA}.", "Use --plan gate.")
+    return msgspec.structs.replace(plan, measure=[*plan.measure, *added])
 
 
 def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:

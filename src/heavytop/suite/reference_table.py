@@ -15,9 +15,12 @@ import msgspec
 
 from heavytop.exact.bobylev_steklov import bobylev_steklov_motion
 from heavytop.exact.catalogue import find
+from heavytop.exact.chaplygin import chaplygin_motion
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.exact.goryachev import goryachev_motion
 from heavytop.exact.grioli import grioli_motion
+from heavytop.exact.kowalewski import kowalewski_motion
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.staude import staude_motion
 from heavytop.exact.validated import Validated
@@ -75,7 +78,7 @@ def _of(name: str, known: ExactSolution) -> Case:
 
 
 def cases() -> Iterator[Case]:
-    """The motions of the table: each class of the catalogue, and four that have no closed form in it."""
+    """The motions of the table: each class of the catalogue, and five that have no closed form in it."""
     f, tilted, upright = Fraction, ("3/5", 0, "4/5"), (0, 0, 1)
     free = (0, 0, 0)
     yield Case("euler", HeavyTop((1, 2, 3), 1, free), State(("1/10", 1, "1/5"), tilted))
@@ -103,12 +106,22 @@ def cases() -> Iterator[Case]:
     generic = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
     yield Case("generic asymmetric", generic, State(("1/10", "2/5", "9/10"), tilted))
     yield Case("kovalevskaya", HeavyTop((2, 2, 1), 1, (0, 1, 0)), State(("1/10", "1/5", "9/10"), tilted))
+    kovalevskaya = HeavyTop((2, 2, 1), 1, (1, 0, 0))
+    yield Case("kovalevskaya, asymptotic", kovalevskaya, State((-1, "1/4", "1/4"), upright))
+    yield Case("kovalevskaya, one variable at rest", kovalevskaya, State(("-1/2", 0, "-4/3"), tilted))
     goryachev = HeavyTop((4, 4, 1), 1, (1, 0, 0))
     yield Case("goryachev-chaplygin", goryachev, State(("1/2", "1/4", "-3/4"), (0, "3/5", "4/5")))
     hess = HeavyTop((8, 6, 3), 1, (1, 0, 2))
     yield Case("hess", hess, State(("3/4", "1/2", -1), (0, 1, 0)))
     yield Case("hess, M·gamma = 0", hess, State(("3/4", 0, -1), (0, 1, 0)))
     yield Case("steklov", HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)), State((0, 4, 2), (-1, 0, 0)))
+    # rational data beside motions whose starts are algebraic, rounded to 53 bits
+    for name, beside in (
+        ("goryachev", goryachev_motion(f(39, 64), f(-1), f(1, 4))),
+        ("kowalewski", kowalewski_motion(f(5, 8), f(1))),
+        ("chaplygin", chaplygin_motion(f(49, 32), f(1), f(1, 2))),
+    ):
+        yield Case(f"beside {name}", *beside.rounded(53))
     yield Case("paper data, I1/I3 = 6", HeavyTop((6, 6, 1), 1, (0, 15, 0)), State((0, 0, 6), upright))
 
 

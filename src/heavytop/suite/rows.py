@@ -14,6 +14,7 @@ from heavytop.records import (
     FAILED,
     OUT_OF_REACH,
     Against,
+    Data,
     Metric,
     MetricKind,
     Row,
@@ -35,6 +36,15 @@ def time_text(time: Fraction) -> str:
 def time_metric(time: Fraction | None, kind: MetricKind) -> Metric:
     """A time as a metric; None is never."""
     return Metric("never", None, kind) if time is None else of_fraction(abs(time), kind, time_text(abs(time)))
+
+
+def data_of(task: Task, starts: int) -> Data | None:
+    """The exact data of what the task measures."""
+    if task.case is None:
+        return None
+    top, start = task.case.top, task.case.start
+    alone = (tuple(map(str, part)) for part in ((start.omega, start.gamma) if starts == 1 else ()))
+    return Data(tuple(map(str, top.inertia)), str(top.weight), tuple(map(str, top.centre)), *alone)
 
 
 def exact_row(

@@ -1,24 +1,93 @@
-"""A motion computed elsewhere, scored like our own."""
+"""A motion computed elsewhere, scored like our own, beside heyoka's, and with what explains its error."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
+from typing import Any
 
 import msgspec
 
+from heavytop.errors import HeavyTopError
+from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.measure.digits import digits_kept
+from heavytop.measure.diagnosis import Diagnosis, diagnose
+from heavytop.measure.digits import RELATIVE, digits_kept, digits_of
 from heavytop.measure.known import known_motion
 from heavytop.measure.scorer import Scorer
-from heavytop.precision import round_to
-from heavytop.records import Row, RowKey, Subject
+from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
+from heavytop.precision import DOUBLE_DOUBLE, exact, round_to
+from heavytop.records import Metric, Row, RowKey, Subject
 from heavytop.suite.cases import Case
 from heavytop.suite.rows import computed_row, time_text
 from heavytop.suite.sampling import log_spaced
-from heavytop.suite.task import Task
+from heavytop.suite.task import Task, seconds_a_step
 from heavytop.suite.trajectory_file import Given
 
-__all__ = ["complete", "digits_kept", "score"]
+__all__ = ["Assessment", "Peer", "assess", "complete", "digits_kept", "score"]
+
+Progress = Callable[[], None]
+PEER = "heyoka"
+_EFFORT = 20.0
+"""Seconds that the run of heyoka beside the scored one may take, roughly."""
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """The same motion at the same times in the same format by heyoka: its digits right."""
+
+    integrator: str
+    precision: str
+    digits_right: float
+    steps: int
+
+
+@dataclass(frozen=True, slots=True)
+class Assessment:
+    """How good a motion is.
+
+    row: what was measured.  peer: heyoka's run; None without a reference, and where heyoka does not get there.
+    diagnoses: what explains the error; empty where nothing does.  format_guessed: whether the format is not named in
+    the file, but read off the digits written.
+    """
+
+    row: Row
+    peer: Peer | None
+    diagnoses: list[Diagnosis]
+    format_guessed: bool = False
+
+    @property
+    def digits_right(self) -> float | None:
+        """Digits that are right at every sample; None without a reference."""
+        return digits_kept(self.row)
+
+    @property
+    def of_digits(self) -> int:
+        """Decimal digits of the format."""
+        return digits_of(self.row.bits)
+
+    @property
+    def direction(self) -> str | None:
+        """Where most of the error lies: "along" the flow, "across" it, "both"; None where neither is a number."""
+        along, across = (self.row.metric(SOLUTION_ERROR, part, "max") for part in ("along", "across"))
+        if along is None or across is None or not (_is_number(along) and _is_number(across)):
+            return None
+        sizes = [exact(along.value), exact(across.value)]
+        if not any(sizes):
+            return None
+        if sizes[0] > _MOSTLY * sizes[1]:
+            return "along"
+        return "across" if sizes[1] > _MOSTLY * sizes[0] else "both"
+
+
+_MOSTLY = 2
+"""One part of an error is most of it if it is so many times as large as the other."""
+
+
+def _is_number(metric: Metric) -> bool:
+    return metric.log10 is not None or metric.value == "0"
 
 
 def score(given: Given) -> Row:
@@ -27,20 +96,39 @@ def score(given: Given) -> Row:
     The data are rounded to the trajectory's format first, as a run of that format would be given them.  States from
     the first that is not finite on are not scored; the outcome says so.
     """
+    return _scored(given)[0]
+
+
+def assess(given: Given, progress: Progress = lambda: None) -> Assessment:
+    """The row of :func:`score`, heyoka beside it, and what explains the error.
+
+    progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
+    """
+    row, scorer = _scored(given, progress)
+    states = _finite(given)
+    times = given.times[: len(states)]
+    diagnoses = diagnose(given.top, given.start, given.system, times, states, given.precision, _size(row))
+    return Assessment(row, _peer(given, scorer, len(states), progress), diagnoses, given.format_guessed)
+
+
+def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Scorer]:
     precision = given.precision
     problem = Problem.of(given.top, given.start, precision, given.system)
-    count = next((i for i, state in enumerate(given.states) if state is None), len(given.states))
+    states = _finite(given)
+    count = len(states)
     times = [round_to(time, precision.bits) for time in given.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
     scorer = Scorer(problem, known_motion(problem, times[-1]), keep)
-    for time, state in zip(times[:count], given.states, strict=False):
-        assert state is not None
+    if scorer.error is not None:
+        scorer.error.known = _Remembering(scorer.error.known)
+    for time, state in zip(times, states, strict=False):
         scorer(time, state)
+        progress()
     run = Trajectory(
         problem,
         given.integrator,
         tuple(times[:count]),
-        tuple(given.states[:count]),
+        tuple(states),
         given.outcome,
         times[count - 1] if count else Fraction(0),
         given.steps,
@@ -53,7 +141,61 @@ def score(given: Given) -> Row:
     task = Task(key, given.name, given.integrator, case, tuple(times), tuple(keep))
     row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
     reached = time_text(run.time_reached)
-    return msgspec.structs.replace(row, measured=f"given: {given.integrator}", order=None, time_reached=reached)
+    row = msgspec.structs.replace(row, measured=f"given: {given.integrator}", order=None, time_reached=reached)
+    return row, scorer
+
+
+def _finite(given: Given) -> list[tuple[Fraction, ...]]:
+    """The states before the first that is not finite."""
+    count = next((i for i, state in enumerate(given.states) if state is None), len(given.states))
+    return [state for state in given.states[:count] if state is not None]
+
+
+class _Remembering:
+    """A known motion that works out each state once."""
+
+    def __init__(self, known: Any) -> None:
+        self.state = cache(known.state)
+
+
+def _size(row: Row) -> float | None:
+    metric = row.metrics.get(RELATIVE.text)
+    if metric is None or not (_is_number(metric) or metric.bound is not None):
+        return None
+    return float(metric)
+
+
+@dataclass(slots=True)
+class _Measured:
+    """As much of a row as its digits need."""
+
+    bits: int
+    metrics: dict[str, Metric]
+
+
+def _peer(given: Given, scorer: Scorer, count: int, progress: Progress) -> Peer | None:
+    """heyoka's own run over the same times, compared with the same known motion."""
+    precision = given.precision
+    if scorer.error is None or not count or precision == DOUBLE_DOUBLE:
+        return None
+    error = SolutionError(Problem.of(given.top, given.start, precision, given.system), scorer.error.known)
+    limit = max(1, int(_EFFORT / seconds_a_step(precision.bits)))
+    times = given.times[:count]
+
+    def observe(time: Fraction, state: Any) -> None:
+        error(time, state)
+        progress()
+
+    try:
+        run = propagate(
+            given.top, given.start, times, precision, system=given.system, step_limit=limit, observer=observe
+        )
+    except HeavyTopError:  # a format that this platform lacks, or numbers outside its range
+        return None
+    digits = digits_kept(_Measured(precision.bits, error.metrics()))
+    if run.outcome is not Outcome.SUCCESS or digits is None:
+        return None
+    return Peer(PEER, precision.name, digits, run.steps)
 
 
 def complete(row: Row) -> bool:

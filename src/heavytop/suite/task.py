@@ -78,11 +78,14 @@ class Task:
     @property
     def run_seconds(self) -> float:
         """Seconds that heyoka takes for such a motion, roughly."""
-        bits = self.precision.bits
-        per_step = 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5
-        return float(abs(self.times[-1])) * 4 * per_step + len(self.times) * 1e-4
+        return float(abs(self.times[-1])) * 4 * seconds_a_step(self.precision.bits) + len(self.times) * 1e-4
 
 
 def computed(name: str, **setting: Any) -> Subject:
     """The integrator of that name with a setting as a subject."""
     return Subject("computed", name, **setting)
+
+
+def seconds_a_step(bits: int) -> float:
+    """Seconds that one step of heyoka takes in a format of so many bits, roughly."""
+    return 1e-6 if bits <= 53 else 5e-6 if bits <= 64 else 5e-4 * (bits / 113) ** 2.5

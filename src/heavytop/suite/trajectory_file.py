@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
-import math
-import re
 import sys
 from dataclasses import dataclass
 from decimal import Decimal
-from difflib import get_close_matches
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -26,39 +22,39 @@ from heavytop.precision import (
     Precision,
     decimal_text,
     exact,
+    exact_text,
     number,
     parse,
     real,
     round_to,
     shown,
 )
+from heavytop.suite import written_numbers
+from heavytop.suite.cases import Case
 from heavytop.suite.files import read_whole, without_repeats
+from heavytop.suite.trajectory_case import require_case
+from heavytop.suite.trajectory_table import REMEDY, VECTORS, Table, unknown
 from heavytop.top.equations import VARIABLES, System, system
 from heavytop.top.heavy_top import HeavyTop, State, dot, require_physical
 from heavytop.top.times import check_times
 
-_REMEDY = "docs/score.md shows both forms of the file."
-_HEX = re.compile(r"([+-]?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)\.?([0-9a-fA-F]*)(?:[pP]([+-]?[0-9]{1,6}))?")
-_NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
-_COLUMNS = ("t", *VARIABLES)
-_VECTORS = ("inertia", "centre", "omega", "gamma")
 _FLAGS = ("language", "tolerance", "step")
-_KEYS = {*_VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
+_KEYS = {*VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
 _KEYS |= {"outcome", "steps"}
 _NOT_READ = {"time_reached", "order", "flags", "seconds", "metrics", "attitude", "angles"}
 """What else `heavytop propagate --json` writes."""
-_LIKE = 0.75
-"""A key is a misspelling of another if so large a part of them is alike."""
 _ODD_GAMMA = Fraction(1, 10)
 """A state whose |γ|² is off 1 by more is no rounding, and seldom a method."""
 _NAME = 200
 _MOST = 100_000
-_WIDEST = 20_000
-"""Exponents of 2 in a file, up to that: quad has 16,384, and powers of what is larger take minutes."""
 _FITS_ANYWHERE = 1 << 1023
 """Every format holds numbers below that."""
+_SMALLEST, _LARGEST = Fraction(1, 1 << 1000), 1 << 1000
+"""Between them a double has all its bits."""
 _SLACK = 8
 """γ may be off the unit sphere by so many bits of rounding."""
+_ROW_SLACK = Fraction(1, 100)
+"""γ of a row t = 0 may be off by so much: it is written with the digits of the other rows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +63,7 @@ class Given:
 
     times: exact, as written.  states: six exact numbers each, rounded to the format; None for a state that is not
     finite.  name, integrator: as the row will call them.  flags: what else the file says.  sha256: of the file.
+    format_guessed: whether the format was read off the digits written.  notes: what reading the file took for granted.
     """
 
     name: str
@@ -81,10 +78,12 @@ class Given:
     steps: int
     flags: dict[str, str]
     sha256: str
+    format_guessed: bool = False
+    notes: tuple[str, ...] = ()
 
     def warnings(self) -> list[str]:
         """What no rigid body can have, and a γ so far off the unit sphere that the columns may be in another order."""
-        found = self.top.warnings()
+        found = [*self.notes, *self.top.warnings()]
         for time, state in zip(self.times, self.states, strict=True):
             if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
                 found.append(
@@ -95,27 +94,37 @@ class Given:
         return found
 
 
-def read(path: Path) -> Given:
-    """The trajectory in a ``.json`` or ``.csv`` file, or ``-`` for either on standard input.
+def read(path: Path, case: Case | None = None) -> Given:
+    """The trajectory in a ``.json`` or ``.csv`` file (or ``.tsv``, ``.dat``), or ``-`` for standard input.
 
+    case: gives top, start and system where the file does not.
     Raises InputError for a file that cannot be read or is neither, for a key or column that is missing or unknown, a
-    number that is none, times out of order, states of another shape or count, and data that no heavy top has.
+    number that is none, times out of order, states of another shape or count, data that no heavy top has, and data
+    that are not those of the case.
     """
     shown_path = str(path)[:_NAME]
     piped = str(path) == "-"
-    if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in (".json", ".csv"):
-        raise InputError(f"{shown_path} is neither .json nor .csv.", _REMEDY)
+    if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in _SUFFIXES:
+        raise InputError(f"{shown_path} is neither .json nor .csv.", REMEDY)
     try:
         content = sys.stdin.buffer.read() if piped else read_whole(path)
-        text = content.decode("utf-8-sig")
+        text = _decoded(content)
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"The trajectory {shown_path} cannot be read: {error}.", _REMEDY) from None
-    suffix = (".json" if text.lstrip().startswith("{") else ".csv") if piped else path.suffix.lower()
+        raise InputError(f"The trajectory {shown_path} cannot be read: {error}.", REMEDY) from None
+    is_json = text.lstrip().startswith("{") if piped else path.suffix.lower() == ".json"
     try:
-        document = _json(text) if suffix == ".json" else _csv(text)
-        return _given(document, "given" if piped else path.stem, hashlib.sha256(content).hexdigest())
+        document, notes = (_json(text), []) if is_json else _table(text)
+        name = "given" if piped else path.stem
+        return _given(document, name, hashlib.sha256(content).hexdigest(), case, notes)
     except InputError as error:
-        raise InputError(f"{shown_path}: {error.cause}", error.remedy or _REMEDY) from None
+        raise InputError(f"{shown_path}: {error.cause}", error.remedy or REMEDY) from None
+
+
+_SUFFIXES = (".json", ".csv", ".tsv", ".dat")
+
+
+def _decoded(content: bytes) -> str:
+    return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
 
 
 def _json(text: str) -> dict[str, Any]:
@@ -125,71 +134,54 @@ def _json(text: str) -> dict[str, Any]:
             text, parse_float=str, parse_int=str, parse_constant=str, object_pairs_hook=without_repeats
         )
     except (ValueError, RecursionError) as error:
-        raise InputError(f"This is not JSON: {error}.", _REMEDY) from None
+        raise InputError(f"This is not JSON: {error}.", REMEDY) from None
     if not isinstance(document, dict):
-        raise InputError("The document is not an object.", _REMEDY)
+        raise InputError("The document is not an object.", REMEDY)
     for key in document.keys() - _KEYS - _NOT_READ:
-        raise _unknown(key)
+        raise unknown(key, sorted(_KEYS))
     return document
 
 
-def _nearest(key: str) -> str:
-    """The known key that an unknown one is a misspelling of, or nothing."""
-    return next(iter(get_close_matches(key.lower(), sorted(_KEYS), 1, _LIKE)), "")
+def _table(text: str) -> tuple[dict[str, Any], list[str]]:
+    """The comments and columns of a text table, as the JSON document would hold them, and what was noticed."""
+    if "\0" in text:
+        raise InputError("This is no text: it holds a byte 0.", REMEDY)
+    if text.count("\n") > 2 * _MOST:
+        raise _too_many(text.count("\n"))
+    table = Table(text, sorted(_KEYS - {"times", "states"}))
+    return table.keys | {
+        "times": [row[0] for row in table.rows],
+        "states": [row[1:] for row in table.rows],
+    }, table.notes
 
 
-def _unknown(key: str) -> InputError:
-    near = _nearest(key)
-    return InputError(f"Unknown key {key[:60]!r}.", f"Did you mean {near}?" if near else _REMEDY)
-
-
-def _csv(text: str) -> dict[str, Any]:
-    """The comment lines ``# key: value`` and the columns, as the JSON document would hold them."""
-    lines = text.splitlines()
-    document: dict[str, Any] = {}
-    for line in lines:
-        if line.startswith("#"):
-            key, _, value = line[1:].partition(":")
-            key, value = key.strip(), value.strip()
-            # other comments may say what they like
-            if value and key not in _KEYS and _nearest(key):
-                raise _unknown(key)
-            if key in _KEYS and key in document:
-                raise InputError(f"The key {key} stands twice.", "Give each key once.")
-            document[key] = [part.strip() for part in value.split(",")] if key in _VECTORS else value
-    body = [line for line in lines if line.strip() and not line.startswith("#")]
-    try:
-        rows = list(csv.reader(body))
-    except csv.Error as error:
-        raise InputError(f"This is not CSV: {error}.", _REMEDY) from None
-    if not rows or tuple(name.strip() for name in rows[0]) != _COLUMNS:
-        raise InputError(f"The first line is not {','.join(_COLUMNS)}.", _REMEDY)
-    for index, row in enumerate(rows[1:], 1):
-        if len(row) != len(_COLUMNS):
-            raise InputError(f"Row {index} has {len(row)} columns, not {len(_COLUMNS)}.", _REMEDY)
-    return document | {"times": [row[0] for row in rows[1:]], "states": [row[1:] for row in rows[1:]]}
-
-
-def _given(document: dict[str, Any], stem: str, sha256: str) -> Given:
-    vectors = {key: _list(document, key, 3) for key in _VECTORS}
-    top = HeavyTop(vectors["inertia"], _text(document, "weight"), vectors["centre"])
-    start = State(vectors["omega"], vectors["gamma"])
+def _given(document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str]) -> Given:
+    if isinstance(document.get("times"), list) and len(document["times"]) > _MOST:
+        raise _too_many(len(document["times"]))
+    which = system(_text(document, "system", "heavy_top" if case is None else case.system.name))
+    top, at_start = _top(document, case), _row_of_start(document)
+    start = _start(document, case, at_start)
+    times = check_times([written_numbers.finite(value, "a time") for value in _list(document, "times")])
+    if not any(times):
+        raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
+    if case is not None:
+        require_case(case, top, start, which, at_start)
     require_physical(top, start)
-    which = system(_text(document, "system", "heavy_top"))
-    which.parameters(top, start)
-    times = check_times([_finite(value, "a time") for value in _list(document, "times")])
     rows = _list(document, "states")
     _require_states(times, rows)
     texts = [_list({"state": row}, "state", 6) for row in rows]
     precision = _precision(document, texts)
-    start.require_unit_gamma(2**_SLACK * precision.eps, "Give it in full.")
-    states = [_state([_number(value, "a component of a state") for value in row], precision) for row in texts]
+    from_row = at_start is not None and start == at_start
+    slack = _ROW_SLACK if from_row and "gamma" not in document else 2**_SLACK * precision.eps
+    start.require_unit_gamma(slack, "Give it in full.")
+    which.parameters(top, start)
+    states = [_state([written_numbers.number(v, "a component of a state") for v in row], precision) for row in texts]
     word = _text(document, "outcome", "success")
     if word not in [outcome.value for outcome in Outcome]:
         raise InputError(f"Unknown outcome {word[:60]!r}.", f"Use {', '.join(outcome.value for outcome in Outcome)}.")
     steps = _integer(document.get("steps", "0"), "steps")
     return Given(
-        _name(_text(document, "name", stem), "name"),
+        _name(_text(document, "name", stem if case is None else case.name), "name"),
         _name(_text(document, "integrator", "given"), "integrator"),
         top,
         start,
@@ -201,7 +193,48 @@ def _given(document: dict[str, Any], stem: str, sha256: str) -> Given:
         steps,
         {key: _name(_text(document, key), key) for key in _FLAGS if key in document},
         sha256,
+        "precision" not in document and "bits" not in document,
+        tuple(notes),
     )
+
+
+def _top(document: dict[str, Any], case: Case | None) -> HeavyTop:
+    """The top of the file, or of the case as far as the file does not say."""
+    inertia, centre = (_vector(document, key, case) for key in ("inertia", "centre"))
+    weight = _text(document, "weight", None if case is None else exact_text(case.top.weight))
+    return HeavyTop(inertia, weight, centre)
+
+
+def _start(document: dict[str, Any], case: Case | None, at_start: State | None) -> State:
+    """The start of the file, else that of the case, else its row t = 0."""
+    if case is None and at_start is not None and not {"omega", "gamma"} & document.keys():
+        return at_start
+    if case is None and not {"omega", "gamma"} <= document.keys():
+        missing = "omega" if "omega" not in document else "gamma"
+        raise InputError(
+            f"The key {missing} is missing, and there is no row t = 0 that gives the start.",
+            "Give omega and gamma at t = 0, or the row t = 0, or --case NAME.",
+        )
+    return State(*(_vector(document, key, case) for key in ("omega", "gamma")))
+
+
+def _vector(document: dict[str, Any], key: str, case: Case | None) -> list[Any]:
+    if case is not None and key not in document:
+        owner = case.top if key in ("inertia", "centre") else case.start
+        return list(getattr(owner, key))
+    return _list(document, key, 3)
+
+
+def _row_of_start(document: dict[str, Any]) -> State | None:
+    """The state of the first row if its time is 0 and it is finite."""
+    times, rows = document.get("times"), document.get("states")
+    if not (isinstance(times, list) and isinstance(rows, list) and times and rows and isinstance(rows[0], list)):
+        return None
+    if len(rows[0]) != 6 or written_numbers.number(times[0], "a time") != 0:
+        return None
+    values = [written_numbers.number(value, "a component of a state") for value in rows[0]]
+    found = [value for value in values if value is not None]
+    return State(found[:3], found[3:]) if len(found) == 6 else None
 
 
 def of_arrays(
@@ -220,7 +253,7 @@ def of_arrays(
     Raises InputError for what is no number, and as :func:`read` for times, counts and names.
     """
     _require_states(times, rows)
-    form = precision or _of_bits(max(_bits_of(value) for row in rows for value in row))
+    form = precision or written_numbers.of_bits(max(_bits_of(value) for row in rows for value in row))
     states = [_state([_component(value) for value in row], form) for row in rows]
     outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
     named = _name(name, "name"), _name(integrator, "integrator")
@@ -232,13 +265,20 @@ def _require_states(times: list[Fraction], rows: list[Any]) -> None:
     if len(rows) != len(times):
         raise InputError(f"There are {len(times)} times and {len(rows)} states.", "Give one state for each time.")
     if len(times) > _MOST:
-        raise InputError(f"{len(times)} states are too many to score.", f"Give at most {_MOST} of them.")
+        raise _too_many(len(times))
+
+
+def _too_many(count: int) -> InputError:
+    every = -(-count // _MOST)
+    return InputError(
+        f"{count} states are too many to score.", f"Give at most {_MOST} of them, such as one row in {every}."
+    )
 
 
 def _component(value: Any) -> Fraction | None:
     """An exact number out of a number of any format or text; None for NaN and infinities."""
     if isinstance(value, str):
-        return _number(value, "a component of a state")
+        return written_numbers.number(value, "a component of a state")
     try:
         return exact(value)
     except InputError:
@@ -253,13 +293,13 @@ def _bits_of(value: Any) -> int:
     if kind in ("real128", "longdouble", "real"):
         return {"real128": QUAD.bits, "longdouble": EXTENDED.bits}.get(kind) or int(value.prec)
     exactly = isinstance(value, str | int | Fraction | Decimal) and not isinstance(value, bool)
-    return _bits(str(value)) if exactly else DOUBLE.bits
+    return written_numbers.bits_of(str(value)) if exactly else DOUBLE.bits
 
 
 def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:
     value = document.get(key)
     if value is None:
-        raise InputError(f"The key {key} is missing.", _REMEDY)
+        raise InputError(f"The key {key} is missing.", REMEDY)
     if not isinstance(value, list) or (count is not None and len(value) != count):
         what = f"has {len(value)} numbers" if isinstance(value, list) else "is not a list"
         raise InputError(f"{key} {what}.", f"Give {count} numbers." if count else "Give a list.")
@@ -269,7 +309,7 @@ def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[
 def _text(document: dict[str, Any], key: str, default: str | None = None) -> str:
     value = document.get(key, default)
     if value is None:
-        raise InputError(f"The key {key} is missing.", _REMEDY)
+        raise InputError(f"The key {key} is missing.", REMEDY)
     if not isinstance(value, str):
         raise InputError(f"{key} is a {type(value).__name__}.", "Give text or a number.")
     return value
@@ -283,33 +323,8 @@ def _name(text: str, what: str) -> str:
     return text
 
 
-def _number(value: Any, what: str) -> Fraction | None:
-    """An exact number out of decimal or hexadecimal text; None for NaN and infinities; InputError for anything else."""
-    if not isinstance(value, str):
-        raise InputError(f"{what} is a {type(value).__name__}, not a number.", _REMEDY)
-    text = value.strip()
-    if _NOT_FINITE.fullmatch(text):
-        return None
-    hexadecimal = _HEX.fullmatch(text)
-    if hexadecimal is None:
-        number = exact(text)
-    else:
-        sign, whole, part, power = hexadecimal.groups()
-        number = Fraction(int(f"{sign}{whole}{part}", 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
-    if number and abs(number.numerator.bit_length() - number.denominator.bit_length()) > _WIDEST:
-        raise InputError(f"{what} is {text[:60]!r}.", f"Sizes go from 2^-{_WIDEST} to 2^{_WIDEST}.")
-    return number
-
-
-def _finite(value: Any, what: str) -> Fraction:
-    number = _number(value, what)
-    if number is None:
-        raise InputError(f"{what} is {value.strip()}.", "Give a finite number.")
-    return number
-
-
 def _integer(value: Any, what: str) -> int:
-    number = _finite(value, what)
+    number = written_numbers.finite(value, what)
     if number < 0 or number.denominator != 1 or number >= 1 << 63:
         raise InputError(f"{what} = {shown(number)} is not a count.", "Give an integer from 0 to 2^63 - 1.")
     return int(number)
@@ -317,9 +332,16 @@ def _integer(value: Any, what: str) -> int:
 
 def _state(values: list[Fraction | None], precision: Precision) -> tuple[Fraction, ...] | None:
     """The numbers rounded to the format; None where one is not finite there, as 1e400 in double."""
-    found = tuple(round_to(value, precision.bits) for value in values if value is not None)
+    found = tuple(_rounded(value, precision) for value in values if value is not None)
     finite = len(found) == len(values) and all(_fits(value, precision) for value in found)
     return found if finite else None
+
+
+def _rounded(value: Fraction, precision: Precision) -> Fraction:
+    """As :func:`heavytop.precision.round_to`; the processor's own rounding where it does the same."""
+    if precision is DOUBLE and _SMALLEST <= abs(value) < _LARGEST:
+        return Fraction(float(value))
+    return round_to(value, precision.bits)
 
 
 def _fits(value: Fraction, precision: Precision) -> bool:
@@ -345,20 +367,4 @@ def _precision(document: dict[str, Any], rows: list[list[Any]]) -> Precision:
     if "bits" in document:
         bits = _integer(document["bits"], "bits")
         return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits == form.bits), None) or real(bits)
-    return _of_bits(max(_bits(str(value)) for row in rows for value in row))
-
-
-def _of_bits(bits: int) -> Precision:
-    """The narrowest format with as many bits."""
-    return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits <= form.bits), None) or real(bits)
-
-
-def _bits(text: str) -> int:
-    """Bits that a number was written from: its own if it is hexadecimal, else as many as its decimal digits name."""
-    value = _number(text, "a component of a state")
-    if _HEX.fullmatch(text.strip()) and value:
-        return (value.numerator // (value.numerator & -value.numerator)).bit_length()
-    digits = len(re.sub(r"[eE].*|[^0-9]", "", text).lstrip("0"))
-    return next((form.bits for form in (DOUBLE, EXTENDED, QUAD) if digits <= form.digits), 0) or int(
-        (digits - 1) / math.log10(2)
-    )
+    return written_numbers.format_of(str(value) for row in rows for value in row)

@@ -175,10 +175,12 @@ def _windowed(
 
 def _measure(kind: Kind, task: Task, saved: Saved) -> Row:
     """The row of ``task``, also where it cannot be known; raises InputError with its name for impossible data."""
-    from heavytop.suite.rows import failed, unmeasured
+    from heavytop.suite.rows import data_of, failed, unmeasured
 
     try:
-        return kind.measure(task, saved)
+        row = kind.measure(task, saved)
+        row.data = data_of(task, row.starts)
+        return row
     except PeerFailed as error:
         return failed(task, error.cause)
     except (OutOfReach, Contradiction) as error:

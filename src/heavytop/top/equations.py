@@ -98,7 +98,7 @@ def rotor(top: HeavyTop, start: State) -> Any:
     if top.weight != 0 and (a != 0 or c != 0):
         raise InputError(
             f"The gyrostat needs the centre of mass on axis 2, but a = {shown(a)}, c = {shown(c)}.",
-            "Give --centre 0,b,0: the paper assumes a = c = 0.",
+            "Give a centre of mass (0, b, 0): the paper assumes a = c = 0.",
         )
     momentum = top.angular_momentum(start.omega)
     area = dot(momentum, start.gamma)

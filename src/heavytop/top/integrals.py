@@ -69,19 +69,26 @@ def spin(p: Parameters, y: Any, axes: Axes) -> Any:
     return y[axes[2]]
 
 
-def kovalevskaya(p: Parameters, y: Any, axes: Axes) -> Any:
-    """|ξ|² with ξ = (Ω1 + iΩ2)² − (n1 + i n2)(γ1 + iγ2), n = P r/I3, the small moment on axis ``axes[2]``."""
+def kovalevskaya_xi(p: Parameters, y: Any, axes: Axes) -> tuple[Any, Any]:
+    """ξ = (Ω1 + iΩ2)² − (n1 + i n2)(γ1 + iγ2), n = P r/I3, the small moment on axis ``axes[2]``: (real, imaginary)."""
     i, j, k = axes
     a, b = p.moment[i], p.moment[j]
     real = y[i] * y[i] - y[j] * y[j] - (a * y[3 + i] - b * y[3 + j]) / p.inertia[k]
     imaginary = y[i] * y[j] + y[i] * y[j] - (a * y[3 + j] + b * y[3 + i]) / p.inertia[k]
+    return real, imaginary
+
+
+def kovalevskaya(p: Parameters, y: Any, axes: Axes) -> Any:
+    """|ξ|² of :func:`kovalevskaya_xi`."""
+    real, imaginary = kovalevskaya_xi(p, y, axes)
     return real * real + imaginary * imaginary
 
 
 def goryachev_chaplygin(p: Parameters, y: Any, axes: Axes) -> Any:
-    """Ω3 (Ω1² + Ω2²) − (P a/I3) Ω1 γ3, conserved on C0 = 0; centre of mass on axis ``axes[0]``."""
+    """Ω3 (Ω1² + Ω2²) − (n1 Ω1 + n2 Ω2) γ3, n = P r/I3, conserved on C0 = 0; the small moment on axis ``axes[2]``."""
     i, j, k = axes
-    return y[k] * (y[i] * y[i] + y[j] * y[j]) - p.moment[i] * y[i] * y[3 + k] / p.inertia[k]
+    along = p.moment[i] * y[i] + p.moment[j] * y[j]
+    return y[k] * (y[i] * y[i] + y[j] * y[j]) - along * y[3 + k] / p.inertia[k]
 
 
 def hess(p: Parameters, y: Any, axes: Axes) -> Any:
@@ -132,7 +139,7 @@ def _of_heavy_top(p: Parameters, y: tuple[Any, ...]) -> Iterator[Integral]:
                 yield Integral(f"spin{k + 1}", partial(spin, axes=axes), f"Lagrange about axis {k + 1}")
             if i1 == 2 * i3 and n[k] == 0:
                 yield Integral("kovalevskaya", partial(kovalevskaya, axes=axes), f"Kovalevskaya about axis {k + 1}")
-        if i1 == i2 == 4 * i3 and n[j] == n[k] == 0 and any(n) and on_zero_area:
+        if i < j and i1 == i2 == 4 * i3 and n[k] == 0 and any(n) and on_zero_area:
             yield Integral(
                 "goryachev_chaplygin",
                 partial(goryachev_chaplygin, axes=axes),

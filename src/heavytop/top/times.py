@@ -15,7 +15,7 @@ def check_times(times: Iterable[Any]) -> list[Fraction]:
     """Exact times; raises InputError unless they are of one sign and strictly monotone away from 0."""
     values = [physical(exact(time), "a time") for time in ordered(times, "times", "Give a list such as [1, 2, 5].")]
     if not values:
-        raise InputError("No times were given.", "Give at least one, such as --times 1,2,5.")
+        raise InputError("No times were given.", "Give at least one, such as 1, 2, 5.")
     for earlier, later in zip([Fraction(0), *values], values, strict=False):
         if earlier * later < 0:
             raise InputError(

@@ -20,6 +20,7 @@ from heavytop.words.lanes import turned
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
 from heavytop.words.pairs import add, log2, multiply, power_of_two, times
 from heavytop.words.recurrence import Layout, Recurrence
+from heavytop.words.stepping import Stepping
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, POINTER, Index, Pair, function
 
 TIME, TIME_LOW, TARGET, TARGET_LOW, BEGAN, BEGAN_LOW, SIGN, ROOM, REACH, CLOCK = range(10)
@@ -78,61 +79,34 @@ def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:
     code.builder.ret_void()
 
 
-class _Step:
+class _Step(Stepping):
     """Writes ``advance``."""
 
     def __init__(self, module: ir.Module, layout: Layout, system: System) -> None:
         arguments = [POINTER, POINTER, INT_POINTER, POINTER, POINTER, INT]
-        made, self.code = function(module, "advance", INT, arguments)
-        self.state, self.clock, self.counts, table, scratch, self.most = made.args
+        made, code = function(module, "advance", INT, arguments)
+        self.state, clock, counts, table, scratch, most = made.args
+        super().__init__(code, clock, counts, most, STATUS)
         self.layout = layout
         self.series = Recurrence(self.code, layout, system, table, scratch)
 
-    def _time(self, place: int) -> Any:
-        return self.code.builder.load(self.code.address(self.clock, place))
-
-    def _count(self, place: int) -> Any:
-        return self.code.builder.load(self.code.address(self.counts, place))
-
-    def _set_count(self, value: Index, place: int) -> None:
-        self.code.builder.store(self.code.integer(value), self.code.address(self.counts, place))
-
-    def write(self) -> None:
-        """The loop of steps."""
-        code, b = self.code, self.code.builder
-        head, body, out = (b.append_basic_block(name) for name in ("steps", "step", "out"))
-        entry = b.block
-        b.branch(head)
-        b.position_at_end(head)
-        taken = b.phi(INT)
-        taken.add_incoming(code.integer(0), entry)
-        running = b.icmp_signed("==", self._count(STATUS), code.integer(FINE))
-        wanted = b.and_(b.icmp_signed("<", taken, self.most), b.not_(self._covered()))
-        b.cbranch(b.and_(running, wanted), body, out)
-        b.position_at_end(body)
-        good = self._write_step()
-        taken.add_incoming(b.add(taken, b.zext(good, INT)), b.block)
-        b.branch(head)
-        b.position_at_end(out)
-        b.ret(taken)
-
-    def _covered(self) -> Any:
+    def covered(self) -> Any:
         b = self.code.builder
-        time, low, target, target_low = (self._time(k) for k in (TIME, TIME_LOW, TARGET, TARGET_LOW))
+        time, low, target, target_low = (self.time(k) for k in (TIME, TIME_LOW, TARGET, TARGET_LOW))
         level = b.and_(b.fcmp_ordered("==", time, target), b.fcmp_ordered(">=", low, target_low))
         return b.or_(b.fcmp_ordered(">", time, target), level)
 
-    def _write_step(self) -> Any:
+    def write_step(self) -> Any:
         """One step; whether it stands."""
         series, vectors = self.series, self.series.vectors
-        order, low_order = self._count(ORDER), self._count(LOW_ORDER)
+        order, low_order = self.count(ORDER), self.count(LOW_ORDER)
         first = [series.pair(self.state, 16 * v) for v in vectors]
         series.put(0, first)
         words = series.orders_in_pairs(first, low_order)
         series.plain_orders(low_order, order, [words[2 * v] for v in vectors])
         start = log2(self.code, self._norm(0))
         length = self._length(order, start)
-        result = self._sum(order, low_order, self.code.builder.fmul(length, self._time(SIGN)))
+        result = self._sum(order, low_order, self.code.builder.fmul(length, self.time(SIGN)))
         good = self._judge(length, low_order, start, result)
         self._accept(good, length, low_order, result)
         return good
@@ -152,7 +126,7 @@ class _Step:
 
         one, two = radius(order), radius(b.sub(order, self.code.integer(1)))
         least = b.select(b.fcmp_ordered("<", one, two), one, two)
-        return power_of_two(self.code, b.fadd(least, self._time(REACH)), LARGEST_STEP, STEP_BITS)
+        return power_of_two(self.code, b.fadd(least, self.time(REACH)), LARGEST_STEP, STEP_BITS)
 
     def _sum(self, order: Any, low_order: Any, step: Any) -> list[Pair]:
         """Σ y_n h^n: four sums in h^4 side by side, each from its highest order, then those of h^2 and h."""
@@ -193,22 +167,22 @@ class _Step:
     def _judge(self, length: Any, low_order: Any, start: Any, result: list[Pair]) -> Any:
         """Whether the step stands; sets the status, and the n0 of what comes next."""
         code, b, one = self.code, self.code.builder, self.code.integer(1)
-        time, room = self._time(TIME), self._time(ROOM)
+        time, room = self.time(TIME), self.time(ROOM)
         finite = ir.Constant(ir.IntType(1), 1)
         for pair in result:
             finite = b.and_(finite, b.and_(code.finite(pair[0]), code.finite(pair[1])))
         moves = b.fcmp_ordered(">", b.fadd(time, length), time)
         status = b.select(moves, code.integer(FINE), code.integer(TOO_SMALL))
         status = b.select(finite, status, code.integer(NON_FINITE))
-        self._set_count(status, STATUS)
+        self.set_count(status, STATUS)
         above = self._rounding(b.add(low_order, one), length, start)
         below = self._rounding(low_order, length, start)
-        can_rise = b.icmp_signed("<", low_order, self._count(MOST))
-        can_fall = b.icmp_signed(">", low_order, self._count(LEAST))
+        can_rise = b.icmp_signed("<", low_order, self.count(MOST))
+        can_fall = b.icmp_signed(">", low_order, self.count(LEAST))
         rise = b.and_(b.fcmp_ordered(">", above, room), can_rise)
         fall = b.and_(b.fcmp_ordered("<", below, b.fsub(room, ir.Constant(DOUBLE, _HYSTERESIS))), can_fall)
         following = b.select(rise, b.add(low_order, one), b.select(fall, b.sub(low_order, one), low_order))
-        self._set_count(following, LOW_ORDER)
+        self.set_count(following, LOW_ORDER)
         again = b.and_(b.fcmp_ordered(">", above, b.fadd(room, ir.Constant(DOUBLE, _TOLERATED))), can_rise)
         return b.and_(b.not_(again), b.icmp_signed("==", status, code.integer(FINE)))
 
@@ -220,7 +194,7 @@ class _Step:
 
     def _accept(self, good: Any, length: Any, low_order: Any, result: list[Pair]) -> None:
         code, b = self.code, self.code.builder
-        time, low = self._time(TIME), self._time(TIME_LOW)
+        time, low = self.time(TIME), self.time(TIME_LOW)
         with b.if_then(good):
             for vector, pair in enumerate(result):
                 for word in range(2):
@@ -229,4 +203,4 @@ class _Step:
             total, rest = code.quick_two_sum(total, code.add(error, low))
             for value, place in ((time, BEGAN), (low, BEGAN_LOW), (total, TIME), (rest, TIME_LOW)):
                 b.store(value, code.address(self.clock, place))
-            self._set_count(low_order, USED)
+            self.set_count(low_order, USED)

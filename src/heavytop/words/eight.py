@@ -13,7 +13,7 @@ from heavytop.words import lane_steps as steps
 from heavytop.words.floating import LARGEST_TIME, Ladder
 from heavytop.words.machine import Doubles, Machine, Processor, doubles, pointer
 from heavytop.words.pairs import split
-from heavytop.words.run import Run, Status
+from heavytop.words.run import Status, Steps
 from heavytop.words.scaled import Scaled
 from heavytop.words.vector import LANES
 
@@ -131,7 +131,7 @@ def _exact_lane(words: Doubles, lane: int) -> tuple[Fraction, ...]:
     return tuple(Fraction(float(words[16 * i + lane])) + Fraction(float(words[16 * i + 8 + lane])) for i in range(6))
 
 
-class OneOfEight(Run):
+class OneOfEight(Steps):
     """One step of a motion that is in all eight lanes, for the check of their machine code."""
 
     def __init__(self, problem: Scaled, ladder: Ladder, low_order: int) -> None:
@@ -164,9 +164,3 @@ class OneOfEight(Run):
 
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
         return tuple(value * self.time**n for value in self.eight.coefficients(0, n))
-
-    def place(self) -> tuple[str, ...]:
-        raise NotImplementedError("one step is not taken up again")
-
-    def restore(self, place: tuple[str, ...], steps: int) -> None:
-        raise NotImplementedError("one step is not taken up again")

@@ -44,6 +44,25 @@ def excess(problem: Scaled) -> int:
     return found
 
 
+def constants(problem: Scaled, grid: Grid, over: int, factor: Fraction = Fraction(1)) -> Doubles:
+    """The words of the coefficients times ``factor``, over 2^over."""
+    flat = [row for vector in problem.coefficients.vectors for row in vector]
+    found = doubles(8 * grid.words * len(flat))
+    table = found.reshape(len(flat), grid.words, 8)
+    for index, row in enumerate(flat):
+        for lane, c in enumerate(row):
+            if c:
+                table[index, :, lane] = digits(c * factor / 2**over, grid)
+    return found
+
+
+def inverses(grid: Grid) -> Doubles:
+    """1/(n + 1) for every order that a step may take."""
+    found = doubles(most_orders(grid) + 1)
+    found[:] = 1 / numpy.arange(1, most_orders(grid) + 2)
+    return found
+
+
 def spread(problem: Scaled) -> int:
     """How many bits the smallest component that is not 0 lies below 1."""
     least = min((abs(value) for value in problem.state if value), default=Fraction(1))
@@ -63,15 +82,14 @@ class Fixed(Run):
         self.words, self.result = doubles(size), doubles(2 * size)
         for place, value in zip(self._places, problem.state, strict=True):
             self.words[place : place + 8 * grid.words : 8] = digits(value, grid)
-        self.inverses = doubles(orders + 1)
-        self.inverses[:] = 1 / numpy.arange(1, orders + 2)
+        self.inverses = inverses(grid)
         self.rows, self.sums, self.seen = doubles(row * (orders + 2)), doubles(8 * grid.words), doubles(8)
         self.places = numpy.zeros(grid.words + 2, numpy.int64)
         self.clock, self.counts = doubles(steps.CLOCK), numpy.zeros(steps.COUNTS, numpy.int64)
         self.clock[steps.SIGN] = 1.0 if forwards else -1.0
         self.counts[steps.EXCESS] = self.excess
         self.counts[[steps.HALVINGS, steps.FEWEST, steps.MOST]] = _FIRST_HALVINGS, _FEWEST_HALVINGS, _MOST_HALVINGS
-        self.constants = self._constants(Fraction(1))
+        self.constants = constants(problem, grid, self.excess)
         self._row = row
 
     @property
@@ -79,17 +97,6 @@ class Fixed(Run):
         """Where the first word of each component is."""
         second = 8 * self.grid.words
         return [*range(6), *(second + lane for lane in range(3, 6))][: len(self.problem.state)]
-
-    def _constants(self, factor: Fraction) -> Doubles:
-        """The words of the coefficients times ``factor``, over 2^excess."""
-        flat = [row for vector in self.problem.coefficients.vectors for row in vector]
-        found = doubles(8 * self.grid.words * len(flat))
-        table = found.reshape(len(flat), self.grid.words, 8)
-        for index, row in enumerate(flat):
-            for lane, c in enumerate(row):
-                if c:
-                    table[index, :, lane] = digits(c * factor / 2**self.excess, self.grid)
-        return found
 
     @property
     def order(self) -> int:
@@ -129,7 +136,7 @@ class Fixed(Run):
     def _moved(self, words: Doubles, span: Fraction, halvings: int) -> Doubles | None:
         """The words after a time ``span``: one series; where a sum leaves its range, two of half the length."""
         found, rows = doubles(len(words)), doubles(len(self.rows))
-        arrays = [words, *self._scratch(self._constants(span), rows)]
+        arrays = [words, *self._scratch(constants(self.problem, self.grid, self.excess, span), rows)]
         factor, raises = steps.raises_of(self.excess)
         call = [*[pointer(array) for array in arrays], factor * float(self.clock[steps.SIGN]), raises, pointer(found)]
         orders = self.machine.functions["series"](*call)

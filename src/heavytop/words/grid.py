@@ -16,7 +16,8 @@ from heavytop.top.equations import System
 from heavytop.words.grid_series import Series
 from heavytop.words.kernels import Grid
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
-from heavytop.words.vector import DOUBLE, INT, INT_POINTER, POINTER, Code, Index, function
+from heavytop.words.stepping import Stepping
+from heavytop.words.vector import DOUBLE, INT, INT_POINTER, POINTER, Code, function
 
 TIME, TARGET, BEGAN, SIGN, CLOCK = range(5)
 """Places of the clock, doubles: |time|, its target, the beginning of the last step; the direction."""
@@ -50,57 +51,33 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
     return machine, series.row
 
 
-class _Advance:
+class _Advance(Stepping):
     """Writes ``advance``."""
 
     def __init__(self, module: ir.Module, grid: Grid, vectors: int, series: Any) -> None:
         arguments = [POINTER] * 5 + [INT_POINTER, POINTER, POINTER, POINTER, INT_POINTER, INT]
-        made, self.code = function(module, "advance", INT, arguments)
+        made, code = function(module, "advance", INT, arguments)
         self.scratch, self.result = made.args[:7], made.args[7]
-        self.clock, self.counts, self.most = made.args[8:]
+        clock, counts, most = made.args[8:]
+        super().__init__(code, clock, counts, most, STATUS)
         self.grid, self.size, self.series = grid, grid.words * vectors, series
 
-    def _time(self, place: int) -> Any:
-        return self.code.builder.load(self.code.address(self.clock, place))
+    def covered(self) -> Any:
+        return self.code.builder.fcmp_ordered(">=", self.time(TIME), self.time(TARGET))
 
-    def _count(self, place: int) -> Any:
-        return self.code.builder.load(self.code.address(self.counts, place))
-
-    def _set_count(self, value: Index, place: int) -> None:
-        self.code.builder.store(self.code.integer(value), self.code.address(self.counts, place))
-
-    def write(self) -> None:
-        """The loop of steps."""
-        code, b = self.code, self.code.builder
-        head, body, out = (b.append_basic_block(name) for name in ("steps", "step", "out"))
-        entry = b.block
-        b.branch(head)
-        b.position_at_end(head)
-        taken = b.phi(INT)
-        taken.add_incoming(code.integer(0), entry)
-        running = b.icmp_signed("==", self._count(STATUS), code.integer(FINE))
-        short = b.fcmp_ordered("<", self._time(TIME), self._time(TARGET))
-        b.cbranch(b.and_(running, b.and_(short, b.icmp_signed("<", taken, self.most))), body, out)
-        b.position_at_end(body)
-        good = self._step()
-        taken.add_incoming(b.add(taken, b.zext(good, INT)), b.block)
-        b.branch(head)
-        b.position_at_end(out)
-        b.ret(taken)
-
-    def _step(self) -> Any:
+    def write_step(self) -> Any:
         """One step; whether it stands."""
         code, b = self.code, self.code.builder
-        halvings = self._count(HALVINGS)
+        halvings = self.count(HALVINGS)
         length = _power(code, halvings)
-        exponent = b.sub(self._count(EXCESS), halvings)
+        exponent = b.sub(self.count(EXCESS), halvings)
         raises = b.ashr(b.add(exponent, code.integer(3)), code.integer(2))
         raises = b.select(b.icmp_signed(">", raises, code.integer(0)), raises, code.integer(0))
         rest = b.sub(b.shl(raises, code.integer(2)), exponent)
-        factor = b.fmul(self._time(SIGN), _power(code, rest))
+        factor = b.fmul(self.time(SIGN), _power(code, rest))
         orders = b.call(self.series, [*self.scratch, factor, raises, self.result])
         good = b.icmp_signed(">=", orders, code.integer(0))
-        time = self._time(TIME)
+        time = self.time(TIME)
         after = b.fadd(time, length)
         moves = b.fcmp_ordered("==", b.fsub(after, time), length)
         good = b.and_(good, moves)
@@ -110,12 +87,12 @@ class _Advance:
                 code.store(code.load(self.result, 8 * k), self.scratch[0], 8 * k)
             b.store(time, code.address(self.clock, BEGAN))
             b.store(after, code.address(self.clock, TIME))
-            self._set_count(orders, ORDERS)
+            self.set_count(orders, ORDERS)
         with b.if_then(b.not_(good)):
-            self._set_count(b.add(self._count(REDONE), code.integer(1)), REDONE)
-            exhausted = b.icmp_signed(">=", halvings, self._count(MOST))
+            self.set_count(b.add(self.count(REDONE), code.integer(1)), REDONE)
+            exhausted = b.icmp_signed(">=", halvings, self.count(MOST))
             status = b.select(exhausted, code.integer(CAPACITY), code.integer(FINE))
-            self._set_count(b.select(moves, status, code.integer(TOO_SMALL)), STATUS)
+            self.set_count(b.select(moves, status, code.integer(TOO_SMALL)), STATUS)
         self._set_length(good, orders, halvings, length)
         return good
 
@@ -123,14 +100,14 @@ class _Advance:
         code, b, one = self.code, self.code.builder, self.code.integer(1)
         few, many = (code.integer(int(share * self.grid.total)) for share in (_FEW_ORDERS, _MANY_ORDERS))
         doubled = b.fadd(length, length)
-        quotient = b.fdiv(self._time(TIME), doubled)
+        quotient = b.fdiv(self.time(TIME), doubled)
         whole = b.sitofp(b.fptosi(quotient, INT), DOUBLE)
         aligned = b.fcmp_ordered("==", quotient, whole)
         longer = b.and_(b.and_(good, aligned), b.icmp_signed("<=", orders, few))
-        longer = b.and_(longer, b.icmp_signed(">", halvings, self._count(FEWEST)))
+        longer = b.and_(longer, b.icmp_signed(">", halvings, self.count(FEWEST)))
         shorter = b.or_(b.not_(good), b.icmp_signed(">", orders, many))
         following = b.select(shorter, b.add(halvings, one), halvings)
-        self._set_count(b.select(longer, b.sub(halvings, one), following), HALVINGS)
+        self.set_count(b.select(longer, b.sub(halvings, one), following), HALVINGS)
 
 
 def raises_of(exponent: int) -> tuple[float, int]:

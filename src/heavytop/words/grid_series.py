@@ -20,6 +20,8 @@ from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER,
 FIRED, UNSETTLED = -1, -2
 """What ``series`` gives in place of its number of orders: a sum left its range; no convergence."""
 _FAR = 1 << 40
+_WIDEST, _WIDEST_DIVIDEND = 51, 53
+"""Bits of a word whose sums and quotients are on the grid; of one that is divided, behind the first."""
 
 
 def most_orders(grid: Grid) -> int:
@@ -137,12 +139,12 @@ class Series:
         return code.largest(largest)
 
     def _order(self, n: Any, zeros: Any, wide: Any, y: list[Any]) -> tuple[list[Any], Any, Any]:
-        """y_(n+1), the number of its words that are 0 from now on, and the largest word over what a double holds."""
+        """y_(n+1), the number of its words that are 0 from now on, and the largest word over its limit."""
         words, code = self.grid.words, self.code
         found: list[Any] = []
         for v in range(self.vectors):
             products = self._products(n, zeros, v)
-            rates = self._rates(v, products, y[words * v : words * (v + 1)])
+            rates, wide = self._rates(v, products, y[words * v : words * (v + 1)], wide)
             raised, wide = self._raised(rates, wide)
             quotient, wide = self._divided(n, self._times(raised), wide)
             found += quotient
@@ -211,8 +213,8 @@ class Series:
             b.branch(end)
         b.position_at_end(end)
 
-    def _rates(self, vector: int, sums: list[Any], y: list[Any]) -> list[Any]:
-        """A ∘ gathered S + Σ B ∘ permuted y."""
+    def _rates(self, vector: int, sums: list[Any], y: list[Any], wide: Any) -> tuple[list[Any], Any]:
+        """A ∘ gathered S + Σ B ∘ permuted y, and the largest word."""
         code, b, grid = self.code, self.code.builder, self.grid
         constants, seen = self.made.args[1], self.made.args[6]
         words, linear = grid.words, turned(self.system)
@@ -223,15 +225,16 @@ class Series:
             code, grid, [code.subtract(s, c) for s, c in zip(sums, centred(code, grid, words), strict=True)]
         )
         sources = [self._gathered(total)]
+        wide = self._watch(wide, sources[0][0], 0)
         sources += [[code.shuffle(word, code.zero, lanes) for word in y] for lanes in linear]
         result = Accumulator(code, grid, 0, centred(code, grid, words), watched.seen)
         for k, source in enumerate(sources):
             place = 8 * words * ((1 + len(linear)) * vector + k)
-            result.add_product([code.load(constants, place + 8 * i) for i in range(words)], source)
+            result.add_product([code.load(constants, place + 8 * i) for i in range(words)], source, each=True)
         result.look_at_all()
         code.store(b.bitcast(result.seen, VECTOR), seen, 0)
         parts = zip(result.sums, centred(code, grid, words), strict=True)
-        return carried(code, grid, [code.subtract(total, centre) for total, centre in parts])
+        return carried(code, grid, [code.subtract(total, centre) for total, centre in parts]), wide
 
     def _gathered(self, total: list[Any]) -> list[Any]:
         code = self.code
@@ -279,16 +282,16 @@ class Series:
         found, rest = [], None
         for k, word in enumerate(words):
             value = word if rest is None else code.add(word, rest)
-            wide = self._watch(wide, value, k)
+            wide = self._watch(wide, value, k, _WIDEST_DIVIDEND if k else _WIDEST)
             big = code.constant(self.grid.centre(k))
             quotient = code.subtract(code.fma(value, inverse, big), big)
             rest = code.fma(code.negative(quotient), divisor, value)
             found.append(quotient)
         return found, wide
 
-    def _watch(self, wide: Any, value: Any, k: int) -> Any:
-        """The largest word so far, over what a double holds in multiples of its unit."""
-        share = self.code.multiply(self.code.absolute(value), self.code.constant(2.0**-53 / self.grid.unit(k)))
+    def _watch(self, wide: Any, value: Any, k: int, bits: int = _WIDEST) -> Any:
+        """The largest word so far, over 2^bits of its unit."""
+        share = self.code.multiply(self.code.absolute(value), self.code.constant(2.0**-bits / self.grid.unit(k)))
         return self.code.larger(share, wide)
 
     def _leading_zeros(self, y: list[Any], before: Any) -> Any:

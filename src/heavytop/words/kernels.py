@@ -59,8 +59,11 @@ class Accumulator:
     sums: list[Any]
     seen: Any
 
-    def add_product(self, a: list[Any], b: list[Any]) -> None:
-        """Add a b, of words numbered from 0 that count from level ``base`` on."""
+    def add_product(self, a: list[Any], b: list[Any], each: bool = False) -> None:
+        """Add a b, of words numbered from 0 that count from level ``base`` on.
+
+        each: look at a sum after each of its products, not only where low parts are added to it.
+        """
         code, count = self.code, len(self.sums)
         for k in range(count):
             lows = []
@@ -70,8 +73,8 @@ class Accumulator:
                     part = code.subtract(total, self.sums[k])
                     lows.append(code.fma(a[i], b[k - i], code.negative(part)))
                 self.sums[k] = total
-            if self.base == k == 0:
-                self.look(0)
+                if k == 0 or each:
+                    self.look(k)
             if lows:
                 self.look(k + 1)
                 self.sums[k + 1] = code.add(self.sums[k + 1], _total(code, lows))

@@ -16,7 +16,7 @@ class Status(Enum):
     CAPACITY = 3
 
 
-class Run(ABC):
+class Steps(ABC):
     """One motion on its way, in scaled units; its time is |τ|.
 
     steps: taken so far.  forwards: whether time is positive.
@@ -51,6 +51,10 @@ class Run(ABC):
     @abstractmethod
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
         """y_n h^n of the last step, exactly as it was computed."""
+
+
+class Run(Steps):
+    """One that can be taken up again where it was left."""
 
     @abstractmethod
     def place(self) -> tuple[str, ...]:

@@ -34,6 +34,7 @@ BUILT_IN = {
     "heyoka": f"{HERE}.heyoka_taylor:heyoka",
     "heyoka:constants": f"{HERE}.heyoka_taylor:constants",
     "heyoka:lanes": f"{HERE}.heyoka_taylor:lanes",
+    "words": "heavytop.integrate.words:propagate_words",
     "scipy:DOP853": f"{HERE}.scipy_ivp:dop853",
     "scipy:LSODA": f"{HERE}.scipy_ivp:lsoda",
     "scipy:Radau": f"{HERE}.scipy_ivp:radau",

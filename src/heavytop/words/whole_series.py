@@ -8,24 +8,48 @@ don't be too lazy", 2002).  All sums are exact, so the coefficients do not depen
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from operator import mul
+from typing import Protocol
 
 from flint import fmpz_poly
 from gmpy2 import mpz
 
-from heavytop.exact.quadratic import Quadratic
-
 _BLOCK = 64
 
 
-def coefficients(motion: Quadratic, centre: tuple[mpz, ...], precision: int, halvings: int) -> list[list[mpz]] | None:
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One component of a field of degree two, (Σ c y_j y_k + Σ c y_j) / denominator with whole numbers c.
+
+    products: (c, index of the pair (j, k)).  linear: (c, j).
+    """
+
+    denominator: int
+    products: tuple[tuple[int, int], ...]
+    linear: tuple[tuple[int, int], ...]
+
+
+class Field(Protocol):
+    """A field of degree two without a constant part."""
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """The products y_j y_k that occur."""
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """The components."""
+
+
+def coefficients(motion: Field, centre: Sequence[int], precision: int, halvings: int) -> list[list[mpz]] | None:
     """b_0, b_1, ... of each component, up to two in a row that are within 2 units; None where they do not come to that.
 
     They should within 0.45 orders a bit; a step twice too long is given up at half an order a bit.
     """
     longest = max(abs(value) for value in centre).bit_length() // 2 + 32
-    series = _Series(motion, precision, precision + halvings, longest, [[value] for value in centre])
+    series = _Series(motion, precision, precision + halvings, longest, [[mpz(value)] for value in centre])
     size = _BLOCK
     while size < longest:
         size *= 2
@@ -37,7 +61,7 @@ def coefficients(motion: Quadratic, centre: tuple[mpz, ...], precision: int, hal
 class _Series:
     """values: what is known of each component.  between: of each row, the products that are already summed."""
 
-    motion: Quadratic
+    motion: Field
     precision: int
     shift: int
     longest: int

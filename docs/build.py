@@ -1,0 +1,88 @@
+"""Build the site into docs/_build/html: ``python docs/build.py``.
+
+Every warning is an error, pictures and notebooks are executed, nothing is fetched.  Then every link inside the site is
+followed, and the words of pages, docstrings and messages are looked up among common misspellings.  Exit code 1 where
+anything was found.  ``--fresh`` executes notebooks again that have not changed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from time import perf_counter
+from urllib.parse import unquote, urlsplit
+
+DOCS = Path(__file__).resolve().parent
+OUT = DOCS / "_build" / "html"
+ROOT = DOCS.parent
+SPELLED = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "results", "examples", "src", "benchmarks"]
+
+
+class Page(HTMLParser):
+    """The anchors of a page and what it links to."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.anchors: set[str] = set()
+        self.links: list[str] = []
+        self.feed(path.read_text("utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Called by HTMLParser."""
+        for key, value in attrs:
+            if key in ("id", "name") and value:
+                self.anchors.add(value)
+            if key in ("href", "src") and value:
+                self.links.append(value)
+
+
+def broken_links(site: Path) -> list[str]:
+    """Links of the site to a file or an anchor of it that is not there."""
+    pages = {path.resolve(): Page(path) for path in site.rglob("*.html")}
+    found = []
+    for path, page in pages.items():
+        for link in page.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            missing = not target.exists() or (
+                parts.fragment and target in pages and unquote(parts.fragment) not in pages[target].anchors
+            )
+            if missing:
+                found.append(f"{path.relative_to(site)}: {link}")
+    return found
+
+
+def misspelt() -> list[str]:
+    """Common misspellings, by codespell; ``docs/words.txt`` lists the words that are right here."""
+    command = [sys.executable, "-m", "codespell_lib", "--ignore-words", str(DOCS / "words.txt")]
+    skip = "--skip=*.svg,*.html,*.json,*.jsonl,*.css,*.sha256,_build,__pycache__"
+    done = subprocess.run([*command, skip, *SPELLED], cwd=ROOT, capture_output=True, text=True, check=False)
+    return (done.stdout + done.stderr).splitlines()
+
+
+def main() -> int:
+    """Build and check; returns the exit code."""
+    parser = argparse.ArgumentParser(description="Build the site and check its links and spelling.")
+    parser.add_argument("--fresh", action="store_true", help="execute everything again")
+    if parser.parse_args().fresh:
+        shutil.rmtree(DOCS / "_build", ignore_errors=True)
+    began = perf_counter()
+    sphinx = [sys.executable, "-m", "sphinx", "-q", "-E", "-W", "--keep-going", "-n", "-b", "html", str(DOCS), str(OUT)]
+    built = subprocess.run(sphinx, stderr=subprocess.PIPE, text=True, check=False)
+    # the kernels of notebooks talk over the loopback device, and say so each time
+    print(*[line for line in built.stderr.splitlines() if not line.startswith("[IPKernelApp]")], sep="\n")
+    if built.returncode:
+        return built.returncode
+    found = [*broken_links(OUT.resolve()), *misspelt()]
+    print("\n".join([*found, f"site: {OUT.relative_to(ROOT)}/index.html, {perf_counter() - began:.0f} s"]))
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,73 @@
+"""How Sphinx builds the site; ``python docs/build.py`` calls it, with every warning an error."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from pygments.lexers.special import TextLexer
+
+import heavytop
+
+HERE = Path(__file__).parent
+
+project = "heavytop"
+author = copyright = "The heavytop authors"
+version = release = heavytop.__version__
+
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_nb"]
+exclude_patterns = ["_build", "**.ipynb_checkpoints"]
+toc_object_entries = False
+html_theme = "furo"
+html_title = "heavytop"
+html_theme_options = {"navigation_with_keys": True}
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_copyright = False
+html_copy_source = False
+default_role = "code"
+smartquotes = False
+pygments_style = "default"
+
+myst_enable_extensions = ["deflist", "colon_fence", "attrs_block"]
+myst_heading_anchors = 3
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(HERE / "_build" / "notebooks")
+nb_execution_timeout = 60
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+nb_execution_show_tb = True
+
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented_params"
+autodoc_typehints_format = "short"
+autodoc_member_order = "bysource"
+autodoc_class_signature = "mixed"
+autodoc_preserve_defaults = True
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_custom_sections = [("Source", "notes_style")]
+
+nitpicky = True
+# of other packages no inventory is at hand offline; of the inner rooms the pages show none
+nitpick_ignore_regex = [
+    ("py:.*", r"(fractions|decimal|collections|os|pathlib|typing|enum|numpy|np|pandas|msgspec|NDArray)\b.*"),
+    ("py:.*", r"(Any|Callable|Iterable|Sequence|Fraction|Decimal|Path|PathLike|Enum|TypeAlias|SupportsIndex|Struct)"),
+    ("py:.*", r"heavytop\.[a-z_]+\..*"),
+]
+
+_MARKUP = re.compile(r"(``.*?``|`[^`]*`)")
+
+
+def plain_bars(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """The bars of |γ| are no markup."""
+    for place, line in enumerate(lines):
+        parts = _MARKUP.split(line)
+        lines[place] = "".join(part if part.startswith("`") else part.replace("|", "\\|") for part in parts)
+
+
+def setup(app: Any) -> None:
+    """Called by Sphinx; before napoleon, whose own markup has bars."""
+    app.connect("autodoc-process-docstring", plain_bars, priority=100)
+    app.add_lexer("csv", TextLexer)

@@ -1,0 +1,27 @@
+"""An integrator of one's own behind the call of heavytop: the classical Runge-Kutta method with fixed steps."""
+
+from heavytop.integrate.peers.double import Solved, double_peer
+
+
+def _solve(given):
+    """From what is given (start and times as arrays, the field, the step) to what was solved."""
+
+    def field(y):
+        return [float(value) for value in given.system.field(given.parameters, y)]
+
+    y, time, steps, states = [float(value) for value in given.start], 0.0, 0, []
+    for end in given.times:
+        count = max(1, round(abs(end - time) / given.setting))
+        h = (end - time) / count
+        for _ in range(count):
+            k1 = field(y)
+            k2 = field([a + h / 2 * b for a, b in zip(y, k1, strict=True)])
+            k3 = field([a + h / 2 * b for a, b in zip(y, k2, strict=True)])
+            k4 = field([a + h * b for a, b in zip(y, k3, strict=True)])
+            y = [a + h / 6 * (p + 2 * q + 2 * r + s) for a, p, q, r, s in zip(y, k1, k2, k3, k4, strict=True)]
+        time, steps = end, steps + count
+        states.append(y)
+    return Solved(states, time, steps, 4 * steps)
+
+
+rk4 = double_peer("mine:rk4", 4, _solve, "step")

@@ -1,0 +1,168 @@
+"""What every kind of claim in a file shares: its names, assumptions and samples, and the top that it is about."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import ClassVar
+
+import sympy
+from flint import arb
+
+from heavytop.claims.assume import Assumed, assume, comparison
+from heavytop.claims.conditions import Need, condition, is_exactly_zero
+from heavytop.claims.evaluate import evaluate
+from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
+from heavytop.claims.expression import Formula, parse, symbol
+from heavytop.claims.from_file import ClaimFile, sample_rows
+from heavytop.claims.real_zeros import conditions_for_zero
+from heavytop.claims.sign import Unprovable
+from heavytop.claims.statement import Setting
+from heavytop.claims.statements import SYSTEMS
+from heavytop.errors import InputError
+from heavytop.precision import exact
+from heavytop.top.equations import GYROSTAT, Parameters, System
+
+TIME = sympy.Symbol("t", real=True)
+STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
+_RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
+_SAMPLE_BITS = 512
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What every kind of claim shares: names, assumptions, samples, and the top they are about."""
+
+    names: dict[str, Formula]
+    symbols: dict[str, sympy.Symbol]
+    assumed: Assumed
+    samples: tuple[dict[sympy.Symbol, Fraction], ...]
+    relations: tuple[sympy.Expr, ...]
+    top: Parameters
+    rotor: sympy.Expr | None
+    needs: frozenset[Need]
+    rotor_needs: frozenset[Need]
+
+    @property
+    def systems(self) -> tuple[System, ...]:
+        """The systems that the claim says something about."""
+        return tuple(system for system in SYSTEMS if system is not GYROSTAT or self.rotor is not None)
+
+    def parameters(self, system: System) -> Parameters:
+        """Parameters of the field; raises InputError where `gyrostat` is asked for and the file gives no rotor."""
+        if system is GYROSTAT and self.rotor is None:
+            raise InputError("The file gives no rotor, so it says nothing about gyrostat.", "Add rotor to [top].")
+        return self.top._replace(rotor=sympy.Integer(0) if self.rotor is None else self.rotor)
+
+
+def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Context:
+    """Parsed parameters, assumptions, definitions and top; raises InputError for what cannot be understood."""
+    for name in (*content.parameters, *content.definitions):
+        if name in _RESERVED or (name in content.parameters and name in content.definitions):
+            raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(_RESERVED))}.")
+    above = [comparison(text) for text in content.assume]
+    # the principal moments of a top are positive, said or not
+    positive = {left for left, right in above if right == "0"} | {text.strip() for text in content.top.inertia}
+    symbols = {
+        name: sympy.Symbol(name, positive=True) if name in positive else sympy.Symbol(name, real=True)
+        for name in content.parameters
+    }
+    names = {name: symbol(value) for name, value in symbols.items()}
+    names |= {"pi": symbol(sympy.pi), **{str(variable): symbol(variable) for variable in variables}}
+    for name, text in content.definitions.items():
+        names[name] = parse(text, names, f"definition of {name}")
+    bounds = [
+        (parse(left, names, "assume").expression, parse(right, names, "assume").expression) for left, right in above
+    ]
+    top = content.top
+    moments = three(top.inertia, names, "top.inertia")
+    arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
+    rotor = None if top.rotor is None else parse(top.rotor, names, "top.rotor")
+    relations = [parse(text, names, "relations") for text in content.relations]
+    weight = arm.pop()
+    inertia, centre = (tuple(part.expression for part in parts) for parts in (moments, arm))
+    context = Context(
+        names,
+        symbols,
+        assume(bounds, inertia, symbols.values()),
+        tuple({symbols[name]: exact(value) for name, value in row.items()} for row in sample_rows(content.parameters)),
+        tuple(relation.expression for relation in relations),
+        Parameters(inertia, tuple(weight.expression * part for part in centre), sympy.Integer(0)),
+        None if rotor is None else rotor.expression,
+        needs_of([*moments, *arm, weight, *relations]).union(*(condition("/", (part,)) for part in inertia)),
+        frozenset() if rotor is None else rotor.needs,
+    )
+    _check_samples(context, bounds)
+    return context
+
+
+def needs_of(formulas: Iterable[Formula]) -> frozenset[Need]:
+    """What all of them need."""
+    return frozenset().union(*(formula.needs for formula in formulas))
+
+
+def three(texts: Iterable[str], names: dict[str, Formula], where: str) -> tuple[Formula, Formula, Formula]:
+    """The formulas of three texts."""
+    first, second, third = (parse(text, names, f"{where}[{index}]") for index, text in enumerate(texts))
+    return first, second, third
+
+
+def _check_samples(context: Context, bounds: list[tuple[sympy.Expr, sympy.Expr]]) -> None:
+    """Samples that break the claim's own assumptions would be false witnesses: raises InputError."""
+    for sample in context.samples:
+        shown = ", ".join(f"{name} = {value}" for name, value in sample.items())
+        for left, right in bounds:
+            if not _at(left - right, sample) > 0:
+                raise InputError(f"The sample {shown} breaks the assumption {left} > {right}.", "Change the sample.")
+        for relation in context.relations:
+            if is_exactly_zero(relation, sample) is False:
+                raise InputError(f"The sample {shown} breaks the relation {relation} = 0.", "Change the sample.")
+        for index, moment in enumerate(context.top.inertia, 1):
+            if not _at(moment, sample) > 0:
+                raise InputError(f"The sample {shown} makes I{index} not positive.", "Change the sample.")
+
+
+def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
+    try:
+        return evaluate(expression, sample, _SAMPLE_BITS)
+    except (KeyError, Unprovable):
+        raise InputError(
+            f"{str(expression)[:80]} is not a number at a sample.", "It may hold parameters only."
+        ) from None
+
+
+def setting_of(context: Context, variable: sympy.Symbol) -> Setting:
+    """The setting of a claim in this context."""
+    a = context.assumed
+    relations = tuple(part for relation in context.relations for part in conditions_for_zero(relation))
+    return Setting(
+        variable, a.positive, context.samples, a.greater, relations=relations, facts=a.facts, ranges=a.ranges
+    )
+
+
+@dataclass(frozen=True)
+class FileClaim:
+    """A claim of a file; variables: what its formulas may hold beside its parameters."""
+
+    content: ClaimFile
+    context: Context = field(init=False)
+    variables: ClassVar[tuple[sympy.Symbol, ...]] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "context", parse_context(self.content, self.variables))
+
+    @property
+    def name(self) -> str:
+        """As the file has it."""
+        return self.content.name
+
+    @property
+    def source(self) -> str:
+        """As the file has it."""
+        return self.content.source
+
+    @property
+    def kind(self) -> str:
+        """motion, integral or relation."""
+        return self.content.kind

@@ -1,0 +1,260 @@
+"""A top or a start other than the ones that were given: the sign of γ or P, axes of the top renamed, another P, another
+start, another top.
+
+Numbers are fitted to the first integrals, which are linear in them: with M = IΩ and n = P r, neither M·γ nor
+½ Ω·M + n·γ may change from the start to any sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import permutations, product
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy
+
+from heavytop.errors import InputError
+from heavytop.measure.suspects import ALIKE, Suspect, motion
+from heavytop.precision import decimal_text
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State
+
+if TYPE_CHECKING:
+    from heavytop.measure.suspects import Array
+
+_SINGULAR = 1e-4
+"""The integrals name one top if the smallest singular value is smaller than this part of the next."""
+_NEAR = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10)
+"""Widths, relative to the data, within which a fitted number may be rounded; the first that does no harm is taken."""
+_MOST_CHANGED = 3
+_NOTABLE = 0.02
+"""A fitted number must be off by this part or be a short decimal: methods have small biases of their own."""
+_MARGIN = 30.0
+"""How many errors of the samples a fitted number may be off."""
+_SHORT = 4
+_DIGITS = range(1, _SHORT + 1), range(_SHORT + 1, 13)
+"""Digits of a short decimal, and of a longer one."""
+_SMALL = 100
+"""Denominators of small fractions."""
+_LATER = 2
+"""The last sample must be so many times as late as the first for a start to be told from the method's own errors."""
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """What the data may be: the kind of mistake, and the numbers that fit by the name of what they replace.
+
+    fitted: whether they were fitted.  required: how far the error must fall, where more than usual.
+    """
+
+    kind: str
+    numbers: tuple[tuple[str, str], ...] = ()
+    fitted: bool = False
+    required: float = 0.0
+
+
+Found = tuple[Data, float]
+
+
+def without_numbers(given: Suspect) -> Iterator[Found]:
+    """Suppositions that need no fitted number, the likeliest first."""
+    top, start = given.top, given.start
+    yield _tried(given, "weight_sign", HeavyTop(top.inertia, -top.weight, top.centre))
+    yield _tried(given, "start_gamma_sign", start=State(start.omega, [-g for g in start.gamma]))
+    yield _tried(given, "start_omega_sign", start=State([-w for w in start.omega], start.gamma))
+    momentum = State([w / i for w, i in zip(start.omega, top.inertia, strict=True)], start.gamma)
+    yield _tried(given, "start_momentum", start=momentum)
+    yield _as_momentum(given, momentum)
+    yield _in_degrees(given)
+    other = HEAVY_TOP if given.system is GYROSTAT else GYROSTAT
+    yield _tried(replace(given, system=other), "system")
+    for a, b, c in list(permutations(range(3)))[1:]:
+        axes = (("axes", f"{a + 1}{b + 1}{c + 1}"),)
+        inertia = [top.inertia[i] for i in (a, b, c)]
+        centre = [top.centre[i] for i in (a, b, c)]
+        yield _tried(given, "inertia_axes", HeavyTop(inertia, top.weight, top.centre), numbers=axes)
+        yield _tried(given, "centre_axes", HeavyTop(top.inertia, top.weight, centre), numbers=axes)
+        yield _tried(given, "top_axes", HeavyTop(inertia, top.weight, centre), numbers=axes)
+    for signs in list(product((1, -1), repeat=3))[1:-1]:
+        centre = [s * r for s, r in zip(signs, top.centre, strict=True)]
+        numbers = (("centre", ", ".join(map(str, centre))),)
+        yield _tried(given, "centre_signs", HeavyTop(top.inertia, top.weight, centre), numbers=numbers)
+
+
+def _tried(
+    given: Suspect,
+    kind: str,
+    top: HeavyTop | None = None,
+    start: State | None = None,
+    numbers: tuple[tuple[str, str], ...] = (),
+) -> Found:
+    same = (top or given.top).moment == given.top.moment and (top or given.top).inertia == given.top.inertia
+    if same and (start is None or start == given.start) and kind != "system":
+        return Data(kind), float("inf")
+    return Data(kind, numbers), given.error(given.supposed(given.times, top, start))
+
+
+def _as_momentum(given: Suspect, start: State) -> Found:
+    """Start and states give M in place of Ω."""
+    truth = given.supposed(given.times, start=start)
+    if truth is not None:
+        truth = truth * numpy.array([*map(float, given.top.inertia), 1, 1, 1])
+    return Data("all_momentum"), given.error(truth)
+
+
+def _in_degrees(given: Suspect) -> Found:
+    """Start and states give Ω in degrees."""
+    degrees = 180 / numpy.pi
+    start = State([w / Fraction(degrees) for w in given.start.omega], given.start.gamma)
+    truth = given.supposed(given.times, start=start)
+    return Data("all_in_degrees"), given.error(None if truth is None else truth * ([degrees] * 3 + [1.0] * 3))
+
+
+def another_weight(given: Suspect) -> Found | None:
+    """P from the energy: ½ Ω·M may change only by what P r·γ loses."""
+    inertia, moment = _floats(given.top.inertia), _floats(given.top.moment)
+    start, old = _floats(given.start.flat), given.top.weight
+    kinetic = 0.5 * ((given.states[:, :3] ** 2 - start[:3] ** 2) @ inertia)
+    height = (given.states[:, 3:] - start[3:]) @ moment
+    square = float(height @ height)
+    if not square:
+        return None
+    fitted = -float(kinetic @ height) / square * float(old)
+    candidates = [_named(fitted, near * abs(float(old))) for near in _NEAR]
+    tried = [(weight, _with(given, given.top.inertia, [weight * r for r in given.top.centre])) for weight in candidates]
+    weight, error = _roundest(tried)
+    if not _notable(weight, old):
+        return None
+    return Data("weight", (("P", _text(weight * given.units.moment)),), fitted=True), error
+
+
+def another_start(given: Suspect) -> Found | None:
+    """The start from the first sample, carried back to t = 0, and checked on samples that are much later.
+
+    The error must fall by more than the motion itself magnifies it from the start to the first sample: where
+    neighbouring motions part quickly, the errors of a method look like those of a start.
+    """
+    times = given.times
+    if len(times) < 3 or not times[0] or abs(times[-1]) < _LATER * abs(times[0]):
+        return None
+    first = _as_state(given.states[0])
+    back = motion(given.top, first, given.system, [-times[0]])
+    truth = given.supposed(times[:1])
+    if back is None or truth is None:
+        return None
+    start = _as_state(back[0])
+    error = given.error(given.supposed(times, start=start))
+    off = numpy.abs(back[0] - _floats(given.start.flat))
+    magnified = float(numpy.abs(given.states[0] - truth[0]).max() / (off.max() or 1.0))
+    names = ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3")
+    sizes = [max(given.rate, numpy.abs(back[0, :3]).max())] * 3 + [1.0] * 3
+    units = [given.units.time] * 3 + [Fraction(1)] * 3
+    noise = _MARGIN * max(error, 1e-12)
+    numbers = tuple(
+        (name, _text(_named(float(value), noise * size) / unit))
+        for name, value, change, size, unit in zip(names, back[0], off, sizes, units, strict=True)
+        if change > noise * size
+    )
+    return Data("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error
+
+
+def another_top(given: Suspect) -> Found | None:
+    """The moments and n = P r, up to a common factor, that keep both integrals from the start to every sample."""
+    direction = _conserving(given) if given.system is HEAVY_TOP and len(given.rows) >= 3 else None
+    if direction is None:
+        return None
+    before = [*given.top.inertia, *given.top.moment]
+    scaled = [_scaled(direction, before, near) for near in _NEAR]
+    tried = [(numbers, _with(given, numbers[:3], numbers[3:])) for numbers in scaled]
+    numbers, error = _roundest(tried)
+    units = [given.units.inertia] * 3 + [given.units.moment] * 3
+    named = zip(_NAMES, before, numbers, units, strict=True)
+    changed = [(name, _text(new * unit)) for name, old, new, unit in named if new != old]
+    notable = any(_notable(new, old) for old, new in zip(before, numbers, strict=True) if new != old)
+    if not notable or len(changed) > _MOST_CHANGED:
+        return None
+    return Data("top", tuple(changed), fitted=True), error
+
+
+_NAMES = ("I1", "I2", "I3", "P a", "P b", "P c")
+
+
+def _conserving(given: Suspect) -> Array | None:
+    """The one direction of (I, n) along which M·γ and the energy keep their values; None where there is not one."""
+    start = _floats(given.start.flat)
+    omega, gamma = given.states[:, :3], given.states[:, 3:]
+    area = omega * gamma - start[:3] * start[3:]
+    energy = numpy.hstack([0.5 * (omega**2 - start[:3] ** 2), gamma - start[3:]])
+    size = given.rate or 1.0
+    units = numpy.array([size**2] * 3 + [1.0] * 3)
+    rows = numpy.vstack([numpy.hstack([area * size, numpy.zeros_like(area)]), energy]) / units
+    _, values, directions = numpy.linalg.svd(rows)
+    if len(values) < 6 or values[5] > _SINGULAR * values[4]:
+        return None
+    found: Array = directions[5] / units
+    return found
+
+
+def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[Fraction]:
+    """The direction with the factor by which most numbers stay what they are, within ``near`` of the largest."""
+    old = _floats(before)
+    sizes = numpy.repeat([numpy.abs(old[:3]).max(), numpy.abs(old[3:]).max() or numpy.abs(old[:3]).max()], 3)
+    factors = [o / d for o, d in zip(old, direction, strict=True) if o and d]
+    scaled = max((direction * f for f in factors), key=lambda new: int((numpy.abs(new - old) <= near * sizes).sum()))
+    return [
+        o if abs(value - float(o)) <= near * size else _named(float(value), near * size)
+        for value, o, size in zip(scaled, before, sizes, strict=True)
+    ]
+
+
+def _with(given: Suspect, inertia: Sequence[Fraction], moment: Sequence[Fraction]) -> float:
+    """The error with that top."""
+    try:
+        top = HeavyTop(inertia, 1, moment)
+    except InputError:  # a moment that is not positive
+        return float("inf")
+    return given.error(given.supposed(given.times, top))
+
+
+_Numbers = TypeVar("_Numbers")
+
+
+def _roundest(tried: Sequence[tuple[_Numbers, float]]) -> tuple[_Numbers, float]:
+    """The first, that is the most rounded, whose error is about as small as any."""
+    best = min(error for _, error in tried)
+    return next(pair for pair in tried if pair[1] <= ALIKE * best)
+
+
+def _named(value: float, near: float) -> Fraction:
+    """0, a short decimal, a small fraction or the shortest decimal within ``near``, or the value itself."""
+    if abs(value) <= near:
+        return Fraction(0)
+    short, longer = ([Fraction(decimal_text(Fraction(value), digits)) for digits in some] for some in _DIGITS)
+    for candidate in (*short, Fraction(value).limit_denominator(_SMALL), *longer):
+        if abs(float(candidate) - value) <= near:
+            return candidate
+    return Fraction(value)
+
+
+def _notable(new: Fraction, old: Fraction) -> bool:
+    """Whether a number is off by much, or is a short decimal or a small fraction: neither is the bias of a method."""
+    off = abs(new - old) > Fraction(_NOTABLE) * max(abs(new), abs(old))
+    return off or new.denominator <= _SMALL or new == Fraction(decimal_text(new, _SHORT))
+
+
+def _as_state(values: Array) -> State:
+    return State([Fraction(v) for v in values[:3]], [Fraction(v) for v in values[3:]])
+
+
+def _floats(values: object) -> Array:
+    return numpy.array([float(value) for value in values])  # type: ignore[attr-defined]
+
+
+def _text(value: Fraction) -> str:
+    """A short decimal, a small fraction, or eight digits."""
+    decimal = decimal_text(value, _SHORT + 2)
+    if Fraction(decimal) == value or value.denominator > _SMALL:
+        return decimal if Fraction(decimal) == value else decimal_text(value, 8)
+    return str(value)

@@ -1,0 +1,113 @@
+"""What explains the error of a motion, in a sentence each."""
+
+from __future__ import annotations
+
+from heavytop.measure.diagnosis import Diagnosis
+from heavytop.measure.suspects import FLOOR
+from heavytop.report.text import short
+
+_SENTENCES = {
+    "gamma_down": "γ points down in these states: with −γ they fit",
+    "omega_reversed": "Ω has the other sign in these states: with −Ω they fit",
+    "both_reversed": "Ω and γ both have the other sign in these states: with −Ω and −γ they fit",
+    "momentum": "The first three columns are the angular momentum M = (I1Ω1, I2Ω2, I3Ω3), not Ω",
+    "momentum_gamma_down": "The first three columns are the angular momentum M, not Ω, and γ points down",
+    "omega_in_degrees": "Ω is in degrees per time unit in these states, not in radians",
+    "omega_in_turns": "Ω is in turns per time unit in these states, not in radians",
+    "columns_swapped": "γ stands before Ω in these states",
+    "weight_sign": "The states fit a top whose weight P has the other sign, as where γ points down in start and states",
+    "start_gamma_sign": "The states fit a start with −γ: γ of the start has the other sign",
+    "start_omega_sign": "The states fit a start with −Ω: Ω of the start has the other sign",
+    "start_momentum": "The start gives the angular momentum M in place of Ω",
+    "all_momentum": "Start and states give the angular momentum M in place of Ω",
+    "all_in_degrees": "Start and states give Ω in degrees per time unit, not in radians",
+    "time_reversed": "The states are those of the times with the other sign",
+    "start_row_missing": "The first state is the start: the states are one row late, and the row t = 0 is missing",
+    "rows_off_by_one": "Each state is that of the next time: the states are one row early",
+    "rows_reversed": "The states are listed from the last time to the first",
+}
+"""Of the kinds that need no number."""
+_SYSTEM = {"heavy_top": "gyrostat", "gyrostat": "heavy_top"}
+_OWNERS = {"inertia_axes": "moments of inertia", "centre_axes": "centre of mass", "top_axes": "top"}
+
+
+def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
+    """One or two sentences: what fits, and how far the error falls with it."""
+    said = _said(found, system)
+    if found.left is None or found.error is None:
+        return said
+    fall = f"the largest error relative to the size of Ω and γ falls from {_size(found.error)} to {_size(found.left)}"
+    return f"{said}; {fall}."
+
+
+def _size(value: float) -> str:
+    return short(f"{value:.2e}", 2) if value >= FLOOR else f"less than {FLOOR:.0e}"
+
+
+def _said(found: Diagnosis, system: str) -> str:
+    numbers = found.numbers
+    if found.kind in _SENTENCES:
+        return _SENTENCES[found.kind]
+    named = ", ".join(f"{name} = {value}" for name, value in numbers.items())
+    match found.kind:
+        case "axes_permuted":
+            return f"The axes are in another order or reversed: {_columns(numbers)}"
+        case "columns":
+            return f"The columns mean something else: {_columns(numbers)}"
+        case "inertia_axes" | "centre_axes" | "top_axes":
+            what = _OWNERS[found.kind]
+            order = ", ".join(numbers["axes"])
+            return f"The axes of the {what} are in another order: the states fit with those of axes {order} as 1, 2, 3"
+        case "centre_signs":
+            return f"The states fit a centre of mass at ({numbers['centre']})"
+        case "system":
+            return f"The states fit the system {_SYSTEM[system]}, not {system}"
+        case "times_shifted":
+            return f"The times are shifted: the state given at t is that at t {_signed(numbers['shift'])}"
+        case "time_unit":
+            return f"The time has another unit: the state given at t is that at {numbers['factor']}·t"
+        case "weight":
+            return f"The states fit another weight: {named}"
+        case "start":
+            return f"The states fit another start: {named or 'one that differs by less than can be told'}"
+        case "top":
+            return f"The states fit another top: {named}"
+        case "one_state":
+            return f"Only the state at t = {numbers['t']} is off; without it"
+        case "rounded":
+            return _rounded(numbers)
+    return _integrals_off(numbers)
+
+
+def _signed(shift: str) -> str:
+    return f"− {shift[1:]}" if shift.startswith("-") else f"+ {shift}"
+
+
+def _columns(numbers: dict[str, str]) -> str:
+    parts = []
+    if "meaning" in numbers:
+        parts.append(_SENTENCES[numbers["meaning"]].partition(":")[0].replace(" in these states", ""))
+    if "order" in numbers:
+        parts.append("γ stands before Ω")
+    if "axes" in numbers:
+        vectors = {"both": "Ω and γ", "omega": "Ω", "gamma": "γ"}[numbers["of"]]
+        axes = ", ".join(axis.replace("-", "−") for axis in numbers["axes"].split(","))
+        parts.append(f"columns 1, 2, 3 of {vectors} are axes {axes}")
+    return "; ".join(parts)
+
+
+def _rounded(numbers: dict[str, str]) -> str:
+    to = {
+        "significant": f"{numbers['digits']} significant digits",
+        "decimals": f"{numbers['digits']} decimals",
+        "single": "single precision (24 bits)",
+    }[numbers["to"]]
+    return f"The states are rounded to {to}, which explains the error: written in full they may be better."
+
+
+def _integrals_off(numbers: dict[str, str]) -> str:
+    named = ", ".join(f"{name} {value}" for name, value in numbers.items())
+    return (
+        "The first integrals are constant, but not those of the start, from the first sample on "
+        f"({named}): another start or another top, but none that was tried fits."
+    )

@@ -1,0 +1,74 @@
+"""The data of a case, ready to paste: as options of the command line, TOML of a plan, JSON of a trajectory, Python."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from heavytop.precision import exact_text
+from heavytop.suite.cases import Case
+
+_TIMES = ("1", "5", "10")
+
+
+def case_data(case: Case) -> dict[str, Any]:
+    """Exact data as text, by the keys of a trajectory file."""
+    return {
+        "name": case.name,
+        "system": case.system.name,
+        "inertia": _texts(case.top.inertia),
+        "weight": exact_text(case.top.weight),
+        "centre": _texts(case.top.centre),
+        "omega": _texts(case.start.omega),
+        "gamma": _texts(case.start.gamma),
+    }
+
+
+def forms(case: Case) -> dict[str, str]:
+    """The data of a case in each form: ``command`` (line), ``toml``, ``json`` and ``python``."""
+    data = case_data(case)
+    return {"command": _command(data), "toml": _toml(data), "json": _json(data), "python": _python(data)}
+
+
+def _texts(values: Sequence[Fraction]) -> list[str]:
+    return [exact_text(value) for value in values]
+
+
+def _command(data: dict[str, Any]) -> str:
+    system = "" if data["system"] == "heavy_top" else f" --system {data['system']}"
+    options = " ".join(f"--{key} {_joined(data[key])}" for key in ("inertia", "weight", "centre", "omega", "gamma"))
+    return f"heavytop propagate {options}{system} --times {','.join(_TIMES)}"
+
+
+def _joined(value: str | list[str]) -> str:
+    return value if isinstance(value, str) else ",".join(value)
+
+
+def _toml(data: dict[str, Any]) -> str:
+    # a plan's own top may not have the name of a case
+    named = data | {"name": f"my-{data['name']}"}
+    return "\n".join(["[[top]]", *(f"{key} = {json.dumps(value)}" for key, value in named.items())])
+
+
+def _json(data: dict[str, Any]) -> str:
+    lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items()]
+    return "\n".join(["{", ",\n".join(lines), "}"])
+
+
+def _python(data: dict[str, Any]) -> str:
+    def numbers(key: str) -> str:
+        return "(" + ", ".join(value if value.lstrip("-").isdigit() else f'"{value}"' for value in data[key]) + ")"
+
+    weight = data["weight"] if data["weight"].lstrip("-").isdigit() else f'"{data["weight"]}"'
+    system = "" if data["system"] == "heavy_top" else f', system="{data["system"]}"'
+    return "\n".join(
+        [
+            "import heavytop as ht",
+            "",
+            f"top = ht.HeavyTop(inertia={numbers('inertia')}, weight={weight}, centre={numbers('centre')})",
+            f"start = ht.State(omega={numbers('omega')}, gamma={numbers('gamma')})",
+            f"run = ht.propagate(top, start, [{', '.join(_TIMES)}], ht.DOUBLE{system})",
+        ]
+    )

@@ -1,0 +1,111 @@
+"""Numbers as other programs write them, read exactly, and the format that they were written from."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from fractions import Fraction
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.precision import (
+    DOUBLE,
+    EXTENDED,
+    QUAD,
+    Precision,
+    decimal_text,
+    exact,
+    real,
+    round_to,
+)
+
+_HEX = re.compile(r"([+-]?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)\.?([0-9a-fA-F]*)(?:[pP]([+-]?[0-9]{1,6}))?")
+_NOT_FINITE = re.compile(r"[+-]?(nan(\([^)]*\))?|inf|infinity|1\.?#(inf|ind|qnan|snan)\d*)", re.IGNORECASE)
+_FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[dDqQ]|(?=[+-]\d{3,}$))([+-]?\d+)")
+"""1.5D+00, 1.5Q+00, and 1.5-101, where there was no room for the letter."""
+_PLAIN = re.compile(r"[+-]?\d{1,40}(\.\d{0,40})?([eE][+-]?\d{1,3})?")
+"""Most numbers; none of them is beyond what is read."""
+_WIDEST = 20_000
+"""Exponents of 2 in a file, up to that: quad has 16,384, and powers of what is larger take minutes."""
+_REMEDY = "docs/score.md shows both forms of the file."
+_ASKED = 600
+"""Numbers that are looked at for what format they were written from."""
+
+
+def number(value: Any, what: str) -> Fraction | None:
+    """An exact number out of decimal or hexadecimal text; None for NaN and infinities; InputError for anything else."""
+    if not isinstance(value, str):
+        raise InputError(f"{what} is a {type(value).__name__}, not a number.", _REMEDY)
+    text = value.strip()
+    if _PLAIN.fullmatch(text):
+        return exact(text)
+    if _NOT_FINITE.fullmatch(text):
+        return None
+    hexadecimal, fortran = _HEX.fullmatch(text), _FORTRAN.fullmatch(text)
+    if hexadecimal is not None:
+        sign, whole, part, power = hexadecimal.groups()
+        found = Fraction(int(f"{sign}{whole}{part}", 16)) * Fraction(2) ** (int(power or 0) - 4 * len(part))
+    else:
+        found = exact(f"{fortran[1]}e{fortran[2]}" if fortran else text)
+    if found and abs(found.numerator.bit_length() - found.denominator.bit_length()) > _WIDEST:
+        raise InputError(f"{what} is {text[:60]!r}.", f"Sizes go from 2^-{_WIDEST} to 2^{_WIDEST}.")
+    return found
+
+
+def finite(value: Any, what: str) -> Fraction:
+    """The same; raises InputError also for NaN and infinities."""
+    found = number(value, what)
+    if found is None:
+        raise InputError(f"{what} is {value.strip()}.", "Give a finite number.")
+    return found
+
+
+def format_of(texts: Iterable[str]) -> Precision:
+    """The narrowest format that holds every number as it is written.
+
+    A program may write more digits than its format has: 0.1000000000000000056 is a double in 19 digits, because the
+    double nearest to it has just these digits.
+    """
+    every = list(texts)
+    bits = max((_bits(text) for text in every), default=0)
+    some = every[:: max(1, len(every) // _ASKED)]
+    for form in (DOUBLE, EXTENDED, QUAD):
+        if bits <= form.bits or all(_is_printed_from(text, form) for text in some):
+            return form
+    return real(bits)
+
+
+def of_bits(bits: int) -> Precision:
+    """The narrowest format with as many bits."""
+    return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits <= form.bits), None) or real(bits)
+
+
+def bits_of(text: str) -> int:
+    """Bits that a number was written from: its own if it is hexadecimal, else as many as its decimal digits name."""
+    return _bits(text)
+
+
+def _bits(text: str) -> int:
+    if _HEX.fullmatch(text.strip()):
+        value = number(text, "a component of a state") or Fraction(0)
+        return (value.numerator // (value.numerator & -value.numerator)).bit_length() if value else 0
+    digits = digits_written(text)
+    return next((form.bits for form in (DOUBLE, EXTENDED, QUAD) if digits <= form.digits), 0) or int(
+        (digits - 1) / math.log10(2)
+    )
+
+
+def digits_written(text: str) -> int:
+    """Significant digits of a decimal number."""
+    return len(re.sub(r"[eEdDqQ].*|(?<=[\d.])[+-].*|[^0-9]", "", text).lstrip("0"))
+
+
+def _is_printed_from(text: str, form: Precision) -> bool:
+    """Whether the number, rounded to the format and written with as many digits, is the same text."""
+    value = number(text, "a component of a state")
+    if not value:
+        return True
+    if _HEX.fullmatch(text.strip()) or "/" in text:
+        return round_to(value, form.bits) == value
+    return Fraction(decimal_text(round_to(value, form.bits), max(digits_written(text), 1))) == value

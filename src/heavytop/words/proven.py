@@ -1,0 +1,258 @@
+"""Taylor coefficients of a step on a grid of K words, with a proven bound of what they lack.
+
+g_k = 2^(−b(k + 1)) is the unit of word k, g = g_(K−1) the last.  The code of :mod:`heavytop.words.grid_series` gives
+b_0, …, b_N, whole multiples of g that stand for y_n h^n.  Let f_n be the coefficient of τ^n in f(Σ b_n τ^n), exactly.
+
+*Theorem.*  Where no exponent bit was set, no word was too wide and (1) holds,
+
+    |b_(n+1) − h f_n/(n + 1)| ≤ (H (2 ε_n + ε' + κ) + ½ g)/(n + 1) + ¾ g,   H = h 2^e,                            (2)
+
+where the coefficients of the field are kept over 2^e.  ε_n, ε', κ are given below; with T = n + 1 terms ε_n is of the
+order T K ulp.  The sum of (2) over n < N bounds the integral of the defect over the step: :attr:`Series.rounding`.
+
+*Sums of products.*  Let l_i and r_j bound the words L_i and R_j of all orders in a lane, and m_ij = l_i r_j.  A sum for
+level k begins at C_k and takes in, product by product, x → s = fl(x + a b), d = fl(s − x), l = fl(a b − d); then lows.
+Suppose, for all k < K − 1,
+
+    Σ_(i+j=k) m_ij + 3 max_(i+j=k) m_ij ≤ 2^52 (1 − 2^-20) g_k.                                                  (1)
+
+Between two looks at a sum it takes in the products of one level of one term, and one more at most, where its level is
+the first of the next kernel.  It was in [2^52, 2^53) g_k when it was looked at, so x ≥ 2 |a b| by (1); hence
+x/2 ≤ s ≤ 2 x and d is exact (Sterbenz).  a b is a multiple of g_i g_j = g_(k+1), and so is l, the rounding of x + a b,
+with |l| ≤ g_k = 2^b g_(k+1).  So l is exact, and so is the sum of K of them.  Lows are added between two looks: the sum
+is a multiple of g_(k+1) before and at most 2^53 g_(k+1) after, so it is exact.  Nothing is lost but in the last level,
+which no one looks at.  With T terms its sum stays below
+
+    B = 1.5 2^52 g + T (Σ_(i+j=K−1) m_ij + K 2^b g);
+
+each of its T (K + 1) roundings is at most 2^-53 B, and so is that of taking C away, and T products with i + j ≥ K are
+left out.  So the error is at most ε(T) = T ((K + 1) 2^-53 B + Σ_(i+j≥K) m_ij) + 2^-53 B, and ε_n = ε(n + 1).
+
+*The coefficients of the field.*  Each sum is looked at after each product.  Two numbers of [2^52, 2^53) g_k differ by a
+multiple of g_k below 2^52 g_k, so d is exact without (1).  ε' is ε(T) for T sources.  The coefficients are at most 1,
+rounded to nearest: l_0 = 2^b g_0, l_k = 2^(b−1) g_k.  The sources are y, with words that are looked at afterwards, and
+the gathered sums, whose first word is below 2^51 g_0 (it is watched) and whose others are, after their carries, at most
+4 (2^(b−1) + 1 + 2^-b B/g) g_k, where B ≤ 2^(b+16) g.  Up to four sums are gathered in a lane, and there A = ½: hence
+2 ε_n.  The coefficients are wrong by g/2 at most, the sources below 2^51 g_0 (1 + 2^(1−b)): κ = 1.01 T 2^(50−b) g.
+
+*The rest.*  Carries, gathering and multiplication by 16 are exact for words below 2^51 units, which is watched for the
+first.  Multiplication by the power of two that is left passes what is below a unit on to the next word, exactly where
+that power is 2^-b at least, and drops g/2 at most in the last.  The division passes on the exact remainder: a quotient
+is right to ½ unit and 2^-53 of itself, that is ¾ of a unit, and the last remainder is dropped.  Dividends behind the
+first word are below 2^53 units (watched), so that from n = 3 on their quotients are below 2^51; before that they are at
+most (1.01 + (n + 1)/2 + ¼) 2^b units.  Words that count as 0 are added to the next, exactly for sums below 2^51 units.
+The sum of all b_n is exact where Σ |word k of b_n| ≤ 2^52 g_k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from math import ldexp, log
+from threading import local
+from typing import Any, cast
+
+import numpy
+from numpy.typing import NDArray
+
+from heavytop.words import fixed
+from heavytop.words.grid import raises_of
+from heavytop.words.grid_series import most_orders
+from heavytop.words.kernels import Grid
+from heavytop.words.lanes import turned
+from heavytop.words.machine import Doubles, Integers, Processor, doubles, pointer
+from heavytop.words.scaled import Scaled
+
+_UP = 1 + 2.0**-40
+_ROOM = 1 - 2.0**-20
+
+
+@dataclass(frozen=True)
+class Series:
+    """b_0, …, b_N of six or nine components, in words.
+
+    words: shape (components, N + 1, K).  total: Σ b_n, whole ulps.  rounding: Σ_(n < N) of (2) in ulps, which bounds
+    the integral of the defect of all orders below N.
+    """
+
+    grid: Grid
+    words: Doubles
+    total: tuple[int, ...]
+    rounding: float
+
+    @property
+    def thrifty(self) -> tuple[float, float]:
+        """Orders a bit between which a unit of time costs least: a step costs more than its products."""
+        return 0.4, 0.58
+
+    @property
+    def order(self) -> int:
+        """N."""
+        return int(self.words.shape[1]) - 1
+
+    @cached_property
+    def values(self) -> list[list[int]]:
+        """The coefficients of each component, whole ulps."""
+        return [[_whole(words, self.grid) for words in component] for component in self.words.tolist()]
+
+    @cached_property
+    def sizes(self) -> Doubles:
+        """Upper bounds of |b_n|, shape (N + 1,)."""
+        return numpy.asarray(numpy.abs(self.words).sum(axis=2).max(axis=0) * _UP)
+
+    def scaled(self, rate: int) -> Doubles:
+        """Upper bounds of 2^(rate n) |b_n|, shape (N + 1,)."""
+        return numpy.ldexp(self.sizes, rate * numpy.arange(len(self.sizes)))
+
+    def rounded(self, orders: int) -> Doubles:
+        """b_0 to b_orders, as many as there are, within 2^-50 of their ``sizes``; shape (orders + 1, components)."""
+        return numpy.asarray(self.words[:, : orders + 1].sum(axis=2).T)
+
+
+class Carrier:
+    """Taylor coefficients of one motion on one grid; any thread may ask.
+
+    problem: so that |ω| ≤ 4 (:meth:`heavytop.words.scaled.Scaled.of` with ``bounded``).
+    """
+
+    def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:
+        self.vectors = 1 if len(problem.state) == 6 else 2
+        self.machine, self.row = fixed.machine(grid, problem.system, self.vectors == 2, processor)
+        self.grid, self.sign = grid, 1.0 if forwards else -1.0
+        self.excess = fixed.excess(problem)
+        self.constants, self.inverses = fixed.constants(problem, grid, self.excess), fixed.inverses(grid)
+        self._own = (problem, grid, forwards, processor)
+        self._sources = 1 + len(turned(problem.system))
+        self._of_constants = self._error_of_constants()
+        self._exponents = grid.bits * numpy.arange(1, grid.words + 1)
+        self._threads = local()
+        second = 8 * grid.words
+        self._lanes = [*range(6), *(second + lane for lane in range(3, 6))][: 3 + 3 * self.vectors]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Carrier, self._own)
+
+    def series(self, centre: Sequence[int], halvings: int) -> Series | None:
+        """From ``centre``, whole ulps 2^-(K b), with h = 2^-halvings; None where that is too long or words overflow."""
+        words, exponent = self.grid.words, self.excess - halvings
+        factor, raises = raises_of(exponent)
+        if not -self.grid.bits <= exponent < 64:
+            return None
+        scratch = self._scratch()
+        for lane, value in zip(self._lanes, centre, strict=True):
+            scratch.state[lane : lane + 8 * words : 8] = _words(value, self.grid)
+        orders = self.machine.functions["series"](*scratch.pointers, self.sign * factor, raises, scratch.found)
+        if orders < 0:
+            return None
+        table = scratch.rows[: self.row * (orders + 1)].reshape(orders + 1, 1 + self.vectors, words, 8)
+        components = self._components(table)
+        rounding = self._rounding(table, components, ldexp(1.0, exponent))
+        if rounding is None:
+            return None
+        total = tuple(_whole(scratch.result[lane : lane + 8 * words : 8].tolist(), self.grid) for lane in self._lanes)
+        return Series(self.grid, components, total, rounding)
+
+    def _scratch(self) -> _Scratch:
+        """This thread's."""
+        if not hasattr(self._threads, "scratch"):
+            self._threads.scratch = _Scratch(self)
+        return cast("_Scratch", self._threads.scratch)
+
+    def _components(self, table: Doubles) -> Doubles:
+        """The words of y out of those of L, exactly: L holds Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2."""
+        found = numpy.empty((3 + 3 * self.vectors, len(table), self.grid.words))
+        for k, lane in enumerate((2, 0, 1)):
+            found[k] = table[:, 1, :, lane]
+        for vector in range(self.vectors):
+            left, first = table[:, 1 + vector], 3 + 3 * vector
+            middle = left[:, :, 5] / 2
+            found[first], found[first + 1], found[first + 2] = left[:, :, 4] - middle, middle, left[:, :, 3] - middle
+        return found
+
+    def _rounding(self, table: Doubles, components: Doubles, scale: float) -> float | None:
+        """The sum of (2) over n < N in ulps, with H = ``scale``; None where what is assumed does not hold."""
+        grid, orders = self.grid, len(table) - 1
+        widest = numpy.ldexp(numpy.abs(table).max(axis=0), self._exponents[:, None])
+        one, products = _levels(grid, widest[0], widest[1:].max(axis=0))
+        sums = products[: grid.words - 1] + 3 * one[: grid.words - 1]
+        added = numpy.ldexp(numpy.abs(components).sum(axis=1).max(axis=0), self._exponents)
+        # γ1 and γ3 are differences of L's
+        state = 1.5 * widest[1:].max(axis=(0, 2))
+        term, once = _error(grid, products, orders)
+        limits = (
+            (float(sums.max()), 2.0**52 * _ROOM),
+            (float(added.max()), 2.0**52),
+            (float(state[0]), 2.0**51),
+            (float(state[1:].max()), 2.0 ** (grid.bits + 2)),
+            (once, 2.0 ** (grid.bits + 16 - 53)),
+        )
+        if not all(found <= limit for found, limit in limits):
+            return None
+        harmonic = 1 + log(max(1, orders))
+        alone = (2 * once + self._of_constants) * harmonic
+        return (scale * (2 * term * orders + alone) + harmonic / 2 + 0.75 * orders) * _UP
+
+    def _error_of_constants(self) -> float:
+        """ε' + κ in ulps."""
+        grid = self.grid
+        constants = numpy.full((grid.words, 1), 2.0 ** (grid.bits - 1))
+        constants[0] = 2.0**grid.bits
+        sources = numpy.full((grid.words, 1), 4 * (2.0 ** (grid.bits - 1) + 1 + 2.0**16))
+        sources[0] = 2.0**51
+        each, once = _error(grid, _levels(grid, constants, sources)[1], self._sources)
+        return self._sources * (each + 2.0 ** (50 - grid.bits) * 1.01) + once
+
+
+class _Scratch:
+    """What one thread computes with."""
+
+    def __init__(self, carrier: Carrier) -> None:
+        words, vectors = carrier.grid.words, carrier.vectors
+        self.state, self.result = doubles(8 * words * vectors), doubles(8 * words * vectors)
+        self.rows = doubles(carrier.row * (most_orders(carrier.grid) + 2))
+        kept = [self.state, carrier.constants, carrier.inverses, self.rows]
+        places = numpy.zeros(words + 2, numpy.int64)
+        self._kept: list[Doubles | Integers] = [*kept, doubles(8 * words), places, doubles(8)]
+        self.pointers, self.found = [pointer(array) for array in self._kept], pointer(self.result)
+
+
+def _levels(grid: Grid, left: Doubles, right: Doubles) -> tuple[Doubles, Doubles]:
+    """The largest product of level k and the sum of all, over g_k, for k = 0 to 2K − 2; from words over their units."""
+    products = (left[:, None, :] * right[None, :, :]).max(axis=2).ravel() * 2.0**-grid.bits
+    table = _antidiagonals(grid.words)
+    return (table * products).max(axis=1), table @ products * _UP
+
+
+@lru_cache(maxsize=32)
+def _antidiagonals(words: int) -> NDArray[numpy.float64]:
+    i, j = numpy.divmod(numpy.arange(words * words), words)
+    return numpy.asarray((i + j == numpy.arange(2 * words - 1)[:, None]).astype(float))
+
+
+def _error(grid: Grid, products: Doubles, terms: int) -> tuple[float, float]:
+    """ε(T) as (a, c) with a T + c for T ≤ ``terms``, in ulps."""
+    words = grid.words
+    largest = 1.5 * 2.0**52 + terms * (float(products[words - 1]) + words * 2.0**grid.bits)
+    dropped = float(products[words:] @ 2.0 ** (-grid.bits * numpy.arange(1.0, words))) * _UP
+    rounding = 2.0**-53 * largest * _UP
+    return (words + 1) * rounding + dropped, rounding
+
+
+def _words(value: int, grid: Grid) -> list[float]:
+    """A whole number of ulps as words, exactly."""
+    found = []
+    for k in range(grid.words - 1):
+        shift = grid.bits * (grid.words - 1 - k)
+        digit = (value + (1 << (shift - 1))) >> shift
+        value -= digit << shift
+        found.append(ldexp(float(digit), -grid.bits * (k + 1)))
+    return [*found, ldexp(float(value), -grid.total)]
+
+
+def _whole(words: Sequence[float], grid: Grid) -> int:
+    """What words add to, in ulps."""
+    total = 0
+    for k, word in enumerate(words):
+        total = (total << grid.bits) + int(ldexp(word, grid.bits * (k + 1)))
+    return total

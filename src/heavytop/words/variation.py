@@ -1,0 +1,76 @@
+"""The variational equation by powers of time, in machine code: V' = J(τ) V, V(0) = 1, in double."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import lru_cache
+from threading import Lock
+from typing import Any
+
+import numpy
+from llvmlite import ir
+
+from heavytop.words.machine import DOUBLES, Doubles, Machine, compiled, doubles, pointer
+from heavytop.words.vector import DOUBLE, INT, LANES, POINTER, Code, function
+
+_making = Lock()
+
+
+def variation(slopes: Doubles) -> Doubles:
+    """V_0, …, V_T with (n + 1) V_(n+1) = Σ_(m ≤ n) J_m V_(n−m), each a scalar product in double.
+
+    slopes: J_0, …, J_(T−1), shape (T, size, size).  The result has shape (T + 1, size, size).
+    """
+    orders, size, _ = slopes.shape
+    width = _width(size)
+    with _making:
+        made = _machine(size)
+    given, found = doubles(slopes.size), doubles((orders + 1) * size * width)
+    given[:] = slopes.ravel()
+    table = found.reshape(orders + 1, size, width)
+    table[0, :, :size] = numpy.eye(size)
+    made.functions["variation"](pointer(given), pointer(found), orders)
+    return table[:, :, :size]
+
+
+def _width(size: int) -> int:
+    """Doubles of a row of V."""
+    return -(-size // LANES) * LANES
+
+
+@lru_cache(maxsize=4)
+def _machine(size: int) -> Machine:
+    """variation(slopes, powers, orders) for matrices of ``size`` rows."""
+    module = ir.Module("variation")
+    made, code = function(module, "variation", ir.VoidType(), [POINTER, POINTER, INT])
+    slopes, powers, orders = made.args
+    b, width = code.builder, _width(size)
+
+    def order(n: Any, _: list[Any]) -> None:
+        after = b.add(n, code.integer(1))
+        zeros = [code.zero] * (size * width // LANES)
+        sums = code.loop(0, after, lambda m, values: _product(code, size, (slopes, powers), (m, n), values), zeros)
+        divisor = code.spread(b.sitofp(after, DOUBLE))
+        place = code.address(powers, b.mul(after, code.integer(size * width)))
+        for k, total in enumerate(sums):
+            code.store(b.fdiv(total, divisor), place, LANES * k)
+
+    code.loop(0, orders, order, [])
+    b.ret_void()
+    return compiled(module, {"variation": (None, [DOUBLES, DOUBLES, ctypes.c_int64])})
+
+
+def _product(code: Code, size: int, tables: tuple[Any, Any], at: tuple[Any, Any], sums: list[Any]) -> list[Any]:
+    """``sums`` + J_m V_(n−m)."""
+    b, width, (m, n) = code.builder, _width(size), at
+    slope = code.address(tables[0], b.mul(m, code.integer(size * size)))
+    power = code.address(tables[1], b.mul(b.sub(n, m), code.integer(size * width)))
+    parts = width // LANES
+    rows = [code.load(power, LANES * k) for k in range(size * parts)]
+    found = list(sums)
+    for i in range(size):
+        for j in range(size):
+            factor = code.spread(b.load(code.address(slope, size * i + j)))
+            for part in range(parts):
+                found[parts * i + part] = code.fma(factor, rows[parts * j + part], found[parts * i + part])
+    return found

@@ -1,0 +1,160 @@
+"""One motion in whole numbers of any length: what goes on where the words of a double end.
+
+A number of p bits is a whole number of ulps 2^-p; coefficients are made by :mod:`heavytop.words.whole_series`, and h is
+a power of two, halved and doubled by the number of orders that a step takes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import lcm
+
+from gmpy2 import mpz
+
+from heavytop.words.lanes import ZERO, turned
+from heavytop.words.run import Run, Status
+from heavytop.words.scaled import Scaled
+from heavytop.words.whole_series import Row, coefficients
+
+_MANY_ORDERS, _FEW_ORDERS = 0.45, 0.27
+_FIRST_HALVINGS = 2
+_MOST_HALVINGS = 64
+_PAIRS = ((1, 2), (2, 0), (0, 1))
+
+
+@dataclass(frozen=True, slots=True)
+class _Field:
+    """pairs, rows: see :class:`heavytop.words.whole_series.Field`."""
+
+    pairs: tuple[tuple[int, int], ...]
+    rows: tuple[Row, ...]
+
+
+def field_of(problem: Scaled, forwards: bool) -> _Field:
+    """The field of a scaled problem, with its sign changed backwards in time.
+
+    Products: ω_j ω_k in the rate of ω_i with the coefficients of the lanes, and γ × ω, ξ × ω.
+    """
+    sign = 1 if forwards else -1
+    vectors = 1 + (len(problem.state) - 3) // 3
+    turning = [
+        (3 * v + j, k) for v in range(1, vectors) for j, k in (pair for a, b in _PAIRS for pair in ((a, b), (b, a)))
+    ]
+    pairs = (*_PAIRS, *turning)
+    rows = []
+    for component in range(len(problem.state)):
+        vector, axis = divmod(component, 3)
+        j, k = _PAIRS[axis]
+        products: dict[int, Fraction] = {}
+        if vector == 0:
+            products[axis] = problem.coefficients.vectors[0][0][axis]
+        else:
+            products[pairs.index((3 * vector + j, k))] = Fraction(1)
+            products[pairs.index((3 * vector + k, j))] = Fraction(-1)
+        rows.append(_row(products, _linear(problem, component), sign))
+    return _Field(pairs, tuple(rows))
+
+
+def _linear(problem: Scaled, component: int) -> dict[int, Fraction]:
+    """Component -> coefficient, of the linear part of one component's rate."""
+    first = component < 6
+    lane, own = (component, 0) if first else (component - 3, 3)
+    found: dict[int, Fraction] = {}
+    table = problem.coefficients.vectors[0 if first else 1][1:]
+    for row, permutation in zip(table, turned(problem.system), strict=True):
+        source, c = permutation[lane], row[lane]
+        if c and source != ZERO:
+            found[source + own] = found.get(source + own, Fraction(0)) + c
+    return found
+
+
+def _row(products: dict[int, Fraction], linear: dict[int, Fraction], sign: int) -> Row:
+    common = lcm(*(c.denominator for c in (*products.values(), *linear.values())))
+    return Row(
+        common,
+        tuple((int(sign * c * common), pair) for pair, c in products.items() if c),
+        tuple((int(sign * c * common), j) for j, c in linear.items()),
+    )
+
+
+class Whole(Run):
+    """A motion that advances in whole numbers of ``bits`` bits; the problem is scaled so that |ω| ≤ 4."""
+
+    def __init__(self, problem: Scaled, bits: int, forwards: bool) -> None:
+        self.problem, self.bits, self.forwards = problem, bits, forwards
+        self.field = field_of(problem, forwards)
+        self.steps, self.redone = 0, 0
+        self._state = [mpz(round(value * 2**bits)) for value in problem.state]
+        self._series = [[value] for value in self._state]
+        self._time = self._began = Fraction(0)
+        self._halvings, self._taken = _FIRST_HALVINGS, _FIRST_HALVINGS
+
+    @property
+    def order(self) -> int:
+        return len(self._series[0]) - 1
+
+    @property
+    def time(self) -> Fraction:
+        return self._time
+
+    @property
+    def state(self) -> tuple[Fraction, ...]:
+        return self._exact(self._state)
+
+    def _exact(self, values: list[mpz]) -> tuple[Fraction, ...]:
+        return tuple(Fraction(int(value), 1 << self.bits) for value in values)
+
+    def advance(self, target: Fraction, steps: int) -> Status:
+        for _ in range(steps):
+            if self._time >= target:
+                break
+            if not self._step():
+                return Status.TOO_SMALL
+        return Status.FINE
+
+    def _step(self) -> bool:
+        """One step; False where no length will do."""
+        for halvings in range(self._halvings, _MOST_HALVINGS):
+            series = coefficients(self.field, self._state, self.bits, halvings)
+            if series is not None:
+                break
+            self.redone += 1
+        else:
+            return False
+        self._series, self._taken, self._began = series, halvings, self._time
+        self._state = [sum(component, mpz(0)) for component in series]
+        self._time += Fraction(1, 2) ** halvings
+        self.steps += 1
+        doubled = 2 * Fraction(1, 2) ** halvings
+        if self.order > _MANY_ORDERS * self.bits:
+            halvings += 1
+        elif self.order < _FEW_ORDERS * self.bits and self._time % doubled == 0:
+            halvings -= 1
+        self._halvings = halvings
+        return True
+
+    def sample(self, time: Fraction) -> tuple[Fraction, ...]:
+        behind = (time - self._began) * Fraction(2) ** self._taken
+        return self._exact([_value(component, behind) for component in self._series])
+
+    def coefficients(self, n: int) -> tuple[Fraction, ...]:
+        return self._exact([component[n] for component in self._series])
+
+    def place(self) -> tuple[str, ...]:
+        before = (component[0] for component in self._series)
+        return (str(self._taken), str(self._began), *(f"{int(value):x}" for value in before))
+
+    def restore(self, place: tuple[str, ...], steps: int) -> None:
+        self._halvings = int(place[0])
+        self._time = Fraction(place[1])
+        self._state = [mpz(int(text, 16)) for text in place[2:]]
+        self.steps = steps
+
+
+def _value(coefficients: list[mpz], at: Fraction) -> mpz:
+    """Σ c_n atⁿ for 0 ≤ at ≤ 1, rounded to nearest in every step."""
+    total, numerator, denominator = mpz(0), mpz(at.numerator), mpz(at.denominator)
+    for value in reversed(coefficients):
+        total = value + (2 * total * numerator + denominator) // (2 * denominator)
+    return total

@@ -1,0 +1,156 @@
+"""Enclosures in words hold the motion: against exact integers of more bits, over systems, scales and threads."""
+
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from random import Random
+
+import pytest
+
+from heavytop.errors import Contradiction
+from heavytop.exact import scaled_motion
+from heavytop.exact.balls import midpoint, radius, relative_bits
+from heavytop.exact.enclosure import start_node, step
+from heavytop.exact.scaled_motion import ScaledMotion
+from heavytop.exact.validated import Validated
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.words import fixed
+from heavytop.words.proven import Carrier, Series
+
+TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
+START = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+XI = (Fraction(0), Fraction(1), Fraction(0))
+
+
+def in_integers(monkeypatch, solution, time, bits):
+    """The same by exact integers, with more bits: its own pilot, steps and roundings."""
+    with monkeypatch.context() as m:
+        m.setattr(scaled_motion, "_GRIDS", ())
+        return solution.state(time, bits + 64)
+
+
+def require_inside(balls, true):
+    for ball, value in zip(balls, true, strict=True):
+        assert abs(midpoint(ball) - midpoint(value)) <= radius(ball) + radius(value)
+
+
+def used_words(solution):
+    return any(in_words for _, _, in_words, _ in solution._runs)
+
+
+def solved(system, unit=Fraction(1), moments=(3, 2, 1), omega=START.omega, moment=("1/2", "1/3", "1/5")):
+    """A motion whose rates are ``unit`` times as fast."""
+    top = HeavyTop(moments, 1, [Fraction(r) * unit**2 for r in moment])
+    start = State([Fraction(w) * unit for w in omega], START.gamma)
+    return Validated(top, start, system, rotor=Fraction(2, 3) * unit if system is GYROSTAT else None)
+
+
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize("unit", [0, 100, -100, 7])
+def test_balls_hold_what_exact_integers_find(system, unit, monkeypatch):
+    size = Fraction(10) ** unit
+    # Ω is absolute below 1: what is so slow has its own bits
+    bits, times = (360, (-25,)) if unit < 0 else (120, (Fraction(37, 3), -11))
+    for time in (t / size for t in times):
+        one, other = (solved(system, size) for _ in range(2))
+        balls = one.state(time, bits)
+        assert used_words(one)
+        assert min(map(relative_bits, balls)) >= bits
+        require_inside(balls, in_integers(monkeypatch, other, time, bits))
+        assert not used_words(other)
+
+
+DEGENERATE = {
+    "sphere": {"moments": (1, 1, 1)},
+    "two equal": {"moments": (2, 2, 1), "moment": (0, 1, 0)},
+    "no weight": {"moment": (0, 0, 0)},
+    "flat": {"moments": (3, 2, 1), "omega": (0, 0, 0)},
+    "next to an unstable axis": {"omega": (Fraction(1, 2**90), 1, 0), "moment": (0, 0, 0)},
+    "a fast spin": {"omega": (Fraction(1, 10), 0, 12)},
+    "nearly equal": {"moments": (1, 1 + Fraction(1, 2**60), 1)},
+    "renamed": {"moments": (1, 3, 2)},
+}
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_degenerate_motions_are_held_too(name, monkeypatch):
+    one, other = (solved(HEAVY_TOP, **DEGENERATE[name]) for _ in range(2))
+    time = Fraction(13, 2)
+    balls = one.state(time, 110)
+    assert used_words(one)
+    require_inside(balls, in_integers(monkeypatch, other, time, 110))
+
+
+def test_random_motions_with_their_attitude_are_held(monkeypatch):
+    random = Random(15)
+    for _ in range(3):
+        top = HeavyTop([random.randint(20, 30) for _ in range(3)], 1, [random.randint(-9, 9) for _ in range(3)])
+        omega, gamma = ([Fraction(random.randint(-9, 9), 7) for _ in range(3)] for _ in range(2))
+        one, other = (Validated(top, State(omega, gamma), xi=XI) for _ in range(2))
+        time = Fraction(random.randint(70, 99), 7)
+        balls = one.attitude(time, 100)
+        with monkeypatch.context() as m:
+            m.setattr(scaled_motion, "_GRIDS", ())
+            require_inside(balls, other.attitude(time, 200))
+        assert used_words(one)
+        assert not used_words(other)
+
+
+def test_threads_find_the_same_balls():
+    times = [Fraction(n, 3) for n in range(20, 32)]
+
+    def found(time):
+        return [(midpoint(b), radius(b)) for b in Validated(TOP, START).state(time, 100)]
+
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(found, times))
+    assert together == [found(time) for time in times]
+    shared = Validated(TOP, START)
+    with ThreadPoolExecutor(4) as pool:
+        at_once = list(pool.map(lambda time: [(midpoint(b), radius(b)) for b in shared.state(time, 100)], times))
+    assert at_once == together
+
+
+def test_a_field_that_the_lanes_do_not_compute_goes_to_integers():
+    """The plan of lanes is compared with the field itself, coefficient by coefficient."""
+
+    def turned_back(p, y):
+        return (*HEAVY_TOP.field(p, y)[:3], *(-rate for rate in HEAVY_TOP.field(p, y)[3:]))
+
+    p = HEAVY_TOP.parameters(TOP, START)
+    assert ScaledMotion.of(HEAVY_TOP, p, START.flat, forwards=True).in_words
+    other = System("heavy_top", turned_back, HEAVY_TOP.angular_velocity)
+    assert not ScaledMotion.of(other, p, START.flat, forwards=True).in_words
+
+
+def test_moments_of_no_body_go_to_integers_where_their_ratio_is_large():
+    p = Parameters((Fraction(1), Fraction(1, 2**20), Fraction(3)), (Fraction(0),) * 3, Fraction(0))
+    assert not ScaledMotion.of(HEAVY_TOP, p, START.flat, forwards=True).in_words
+
+
+def test_machine_code_that_is_wrong_is_caught_before_it_is_used(monkeypatch):
+    """Constants that are off in the last word by 2^20 units: nothing but the exact comparison could tell."""
+    true = fixed.constants
+
+    def damaged(problem, grid, over, factor=Fraction(1)):
+        found = true(problem, grid, over, factor)
+        found[8 * (grid.words - 1)] += 2.0**20 * grid.unit(grid.words - 1)
+        return found
+
+    monkeypatch.setattr(scaled_motion, "_seen_right", set())
+    monkeypatch.setattr(fixed, "constants", damaged)
+    with pytest.raises(Contradiction, match="Machine code in 138 bits"):
+        Validated(TOP, START).state(Fraction(8), 60)
+
+
+def test_a_step_that_words_cannot_hold_is_shortened():
+    """Where the series does not converge or a sum leaves its range there is a shorter step, never a wrong one."""
+    motion = ScaledMotion.of(HEAVY_TOP, HEAVY_TOP.parameters(TOP, START), START.flat, forwards=True)
+    carrier = motion.carrier(138)
+    node = start_node(motion.field, motion.scaled.state, 138)
+    assert carrier.series(node.centre, -3) is None
+    found = step(motion.field, type(node)(node.time, node.centre, node.errors, -3), 138, carrier)
+    assert found is not None
+    assert found.node.halvings > -3
+    assert isinstance(found.series, Series)
+    assert isinstance(carrier, Carrier)

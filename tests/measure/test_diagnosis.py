@@ -1,0 +1,212 @@
+"""What explains a motion that is off: planted mistakes are named, honest methods and near misses are not accused."""
+
+import random
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from heavytop.measure.diagnosis import diagnose
+from heavytop.measure.suspects import motion
+from heavytop.measure.written import rounding
+from heavytop.precision import DOUBLE
+from heavytop.report.diagnosis_text import diagnosis_text
+from heavytop.suite.cases import CASES
+from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
+from heavytop.top.heavy_top import HeavyTop, State
+
+SHIFT = Fraction(1, 7)
+
+
+def number(source: random.Random, low: int, high: int, denominator: int) -> Fraction:
+    return Fraction(source.randint(low * denominator, high * denominator), denominator)
+
+
+def problem(seed: int) -> tuple[HeavyTop, State, list[Fraction]]:
+    """A top without symmetry, a start, and 12 times up to some turns."""
+    source = random.Random(seed)
+    inertia = source.sample([Fraction(n, 12) for n in range(12, 48, 3)], 3)
+    centre = [number(source, 1, 2, 7) * source.choice((1, -1)) / 2 for _ in range(3)]
+    omega = [number(source, 1, 3, 10) * source.choice((1, -1)) / 2 for _ in range(3)]
+    start = State(omega, [number(source, -1, 1, 9) + Fraction(1, 50) for _ in range(3)]).normalized(16)
+    step = source.choice((Fraction(1, 4), Fraction(1, 2), Fraction(3, 4)))
+    return HeavyTop(inertia, number(source, 1, 4, 12), centre), start, [step * k for k in range(1, 13)]
+
+
+def runge_kutta(top: HeavyTop, start: State, times: list[Fraction], step: float = 0.02) -> np.ndarray:
+    """The states by the classical method of order 4: an honest motion, off by its own error."""
+    given = Parameters([float(v) for v in top.inertia], [float(v) for v in top.moment], 0)
+
+    def slope(y: np.ndarray) -> np.ndarray:
+        return np.array(heavy_top(given, y))
+
+    state, at, found = np.array([float(v) for v in start.flat]), 0.0, []
+    for time in times:
+        count = max(1, round(abs(float(time) - at) / step))
+        h = (float(time) - at) / count
+        for _ in range(count):
+            a = slope(state)
+            b = slope(state + h / 2 * a)
+            c = slope(state + h / 2 * b)
+            state = state + h / 6 * (a + 2 * b + 2 * c + slope(state + h * c))
+        at = float(time)
+        found.append(state)
+    return np.array(found)
+
+
+def midpoint(top: HeavyTop, start: State, times: list[Fraction], step: float) -> np.ndarray:
+    """The same by the implicit midpoint rule, which is symplectic: its error is a lag in time."""
+    given = Parameters([float(v) for v in top.inertia], [float(v) for v in top.moment], 0)
+    state, at, found = np.array([float(v) for v in start.flat]), 0.0, []
+    for time in times:
+        count = max(1, round((float(time) - at) / step))
+        h = (float(time) - at) / count
+        for _ in range(count):
+            after = state
+            for _ in range(15):
+                after = state + h * np.array(heavy_top(given, (state + after) / 2))
+            state = after
+        at = float(time)
+        found.append(state)
+    return np.array(found)
+
+
+def found(top: HeavyTop, start: State, times: list[Fraction], states: np.ndarray, error: float | None = None) -> list:
+    rows = [tuple(Fraction(value) for value in state) for state in states]
+    return diagnose(top, start, HEAVY_TOP, times, rows, DOUBLE, error)
+
+
+PLANTED = {
+    "gamma_down": lambda top, start, times, y: (top, start, times, y * [1, 1, 1, -1, -1, -1]),
+    "momentum": lambda top, start, times, y: (top, start, times, y * [*map(float, top.inertia), 1, 1, 1]),
+    "omega_in_degrees": lambda top, start, times, y: (top, start, times, y * ([180 / np.pi] * 3 + [1] * 3)),
+    "columns_swapped": lambda top, start, times, y: (top, start, times, y[:, [3, 4, 5, 0, 1, 2]]),
+    "axes_permuted": lambda top, start, times, y: (top, start, times, y[:, [1, 2, 0, 4, 5, 3]]),
+    "weight_sign": lambda top, start, times, y: (HeavyTop(top.inertia, -top.weight, top.centre), start, times, y),
+    "start_gamma_sign": lambda top, start, times, y: (top, State(start.omega, [-g for g in start.gamma]), times, y),
+    "weight": lambda top, start, times, y: (HeavyTop(top.inertia, top.weight * SHIFT * 6, top.centre), start, times, y),
+    "inertia_axes": lambda top, start, times, y: (
+        HeavyTop([top.inertia[i] for i in (1, 0, 2)], top.weight, top.centre), start, times, y),
+    "start": lambda top, start, times, y: (
+        top, State([start.omega[0] + Fraction(1, 10), *start.omega[1:]], start.gamma), times, y),
+    "top": lambda top, start, times, y: (
+        HeavyTop([*top.inertia[:2], top.inertia[2] + Fraction(1, 2)], top.weight, top.centre), start, times, y),
+    "times_shifted": lambda top, start, times, y: (top, start, [t + SHIFT for t in times], y),
+    "time_unit": lambda top, start, times, y: (top, start, [t * 1000 for t in times], y),
+    "time_reversed": lambda top, start, times, y: (top, start, [-t for t in times], y),
+    "start_row_missing": lambda top, start, times, y: (
+        top, start, times, np.vstack([[float(v) for v in start.flat], y[:-1]])),
+    "rows_reversed": lambda top, start, times, y: (top, start, times, y[::-1]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("seed", "kind"), list(enumerate(PLANTED, 20)))
+def test_a_planted_mistake_is_named(kind: str, seed: int) -> None:
+    top, start, times = problem(seed)
+    states = runge_kutta(top, start, times)
+    (told,) = found(*PLANTED[kind](top, start, times, states))
+    assert told.kind == kind
+    assert told.left is not None
+    assert told.left < 0.01 * told.error
+    expected = {
+        "weight": {"P": top.weight},
+        "start": {"Ω1": start.omega[0]},
+        "top": {"I3": top.inertia[2]},
+        "times_shifted": {"shift": -SHIFT},
+        "time_unit": {"factor": Fraction(1, 1000)},
+    }.get(kind, {})
+    for name, value in expected.items():
+        assert float(Fraction(told.numbers[name])) == pytest.approx(float(value), rel=1e-4)
+    assert set(told.numbers) == set(expected) | ({"axes", "of"} if kind == "axes_permuted" else set()) | (
+        {"axes"} if kind == "inertia_axes" else set()
+    )
+    sentence = diagnosis_text(told)
+    assert sentence.endswith(".")
+    assert len(sentence) < 240
+
+
+@pytest.mark.parametrize(("seed", "step"), [(3, 0.3), (4, 0.05)])
+def test_an_honest_method_is_not_accused(seed: int, step: float) -> None:
+    top, start, times = problem(seed)
+    assert found(top, start, times, runge_kutta(top, start, times, step)) == []
+    assert found(top, start, times, midpoint(top, start, times, step)) == []
+
+
+@pytest.mark.parametrize("case", ["pendulum", "delone", "lagrange", "hess-pendulum"])
+def test_a_lag_and_a_saddle_are_no_mistakes(case: str) -> None:
+    given = CASES[case]
+    times = [Fraction(5, 2) * k for k in range(1, 9)]
+    assert found(given.top, given.start, times, midpoint(given.top, given.start, times, 0.1)) == []
+
+
+def test_small_oscillations_lag_as_any_clock_would() -> None:
+    top, start = HeavyTop((3, 2, 1), 1, (0, 0, -1)), State((Fraction(1, 1000), 0, 0), (0, 0, 1))
+    for times in ([Fraction(k, 2) for k in range(1, 31)], [Fraction(5 * k) for k in range(1, 7)]):
+        assert found(top, start, times, midpoint(top, start, times, 0.1)) == []
+
+
+@pytest.mark.parametrize("seed", [6, 7])
+def test_near_misses_stay_silent(seed: int) -> None:
+    top, start, times = problem(seed)
+    y = runge_kutta(top, start, times)
+    noise = np.random.default_rng(seed).normal(size=y.shape)
+    # γ down, but with an error that hides it; one vector shifted in time and the other not; states of nothing
+    assert found(top, start, times, y * [1, 1, 1, -1, -1, -1] + 0.1 * noise) == []
+    later = runge_kutta(top, start, [t + SHIFT for t in times])
+    assert found(top, start, times, np.hstack([y[:, :3], later[:, 3:]])) == []
+    assert found(top, start, times, noise) == []
+    # a drifting mean: the start alone does not explain it
+    assert found(top, start, times, y + 0.01 * np.outer([float(t) for t in times], [1, 0, 0, 0, 0, 0])) == []
+
+
+def test_one_state_that_is_off_is_pointed_at() -> None:
+    top, start, times = problem(8)
+    y = runge_kutta(top, start, times)
+    y[4] += 0.1
+    (told,) = found(top, start, times, y)
+    assert (told.kind, float(told.numbers["t"])) == ("one_state", float(times[4]))
+
+
+@pytest.mark.parametrize(("digits", "kind"), [(5, "decimals"), (7, "significant"), (24, "single")])
+def test_rounded_states_are_told_where_rounding_is_the_error(digits: int, kind: str) -> None:
+    top, start, times = problem(9)
+    y = motion(top, start, HEAVY_TOP, times)
+    assert y is not None
+    match kind:
+        case "decimals":
+            spoilt = np.round(y, digits)
+        case "significant":
+            spoilt = np.array([[float(f"{v:.{digits}g}") for v in row] for row in y])
+        case _:
+            spoilt = y.astype(np.float32).astype(float)
+    error = float((np.abs(spoilt - y) / np.maximum(1, np.abs(y))).max())
+    (told,) = found(top, start, times, spoilt, error)
+    assert (told.kind, told.numbers) == ("rounded", {"to": kind, "digits": str(digits)})
+    # an error that rounding does not explain
+    assert found(top, start, times, spoilt, 100 * error) == []
+    rows = [tuple(Fraction(v) for v in row) for row in y]
+    assert rounding(rows, DOUBLE) is None
+
+
+@pytest.mark.parametrize("power", [-60, 60])
+def test_units_of_any_size_do_not_matter(power: int) -> None:
+    top, start, times = problem(10)
+    size = Fraction(10) ** power
+    slow = State([w / size for w in start.omega], start.gamma)
+    heavy = HeavyTop([i * size for i in top.inertia], top.weight / size, top.centre)
+    late = [t * size for t in times]
+    y = runge_kutta(top, start, times) * ([float(1 / size)] * 3 + [1] * 3)
+    assert found(heavy, slow, late, y) == []
+    (told,) = found(heavy, slow, late, y[:, [1, 2, 0, 4, 5, 3]])
+    assert (told.kind, told.numbers["axes"]) == ("axes_permuted", "2,3,1")
+
+
+def test_times_and_numbers_that_no_double_holds_are_left_alone() -> None:
+    top, start, times = problem(11)
+    y = runge_kutta(top, start, times)
+    assert found(top, start, [t * 10**300 for t in times], y) == []
+    huge = HeavyTop([i * 10**400 for i in top.inertia], top.weight, top.centre)
+    (told,) = found(huge, start, times, y)
+    assert (told.kind, set(told.numbers)) == ("top", {"P a", "P b", "P c"})
+    assert diagnose(top, start, HEAVY_TOP, [], [], DOUBLE, None) == []
+    assert found(top, start, times[:1], y[:1]) == []

@@ -1,0 +1,103 @@
+"""Another integrator beside heyoka: in any plan, in the gate, and in every kind of measurement."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.kinds import KINDS
+from heavytop.suite.plan import read
+from reports import measure
+
+PLAN = """
+name = "mine"
+[[measure]]
+kind = "drift"
+cases = ["euler"]
+runs = [{ precision = "double", horizon = "4", samples = 8 }]
+[[measure]]
+kind = "homoclinic"
+cases = ["delone"]
+precisions = ["double"]
+directions = ["forward"]
+[[measure]]
+kind = "local_error"
+cases = ["euler"]
+precisions = ["double"]
+horizon = "2"
+[[measure]]
+kind = "work_precision"
+cases = ["euler"]
+horizon = "4"
+samples = 4
+ladders = [{ integrator = "heyoka", tolerances = ["1e-6", "eps"] }, { integrator = "splitting:2", steps = ["1/9"] }]
+[[measure]]
+kind = "growth"
+cases = ["euler"]
+runs = [{ precision = "double", horizon = "4", starts = 8, samples = 4, decades = 1 }]
+"""
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> str:
+    (tmp_path / "mine.toml").write_text(PLAN)
+    return str(tmp_path / "mine.toml")
+
+
+def labels(name: str, integrator: str = "") -> list[tuple[str, str, str]]:
+    subjects = [(task.key.kind, task.key.subject) for task in read(name, KINDS, integrator=integrator)[2]]
+    return [(kind, subject.name, subject.setting) for kind, subject in subjects]
+
+
+def test_whatever_heyoka_measures_is_measured_beside_it(plan: str) -> None:
+    before, after = labels(plan), labels(plan, "words")
+    assert after[: len(before)] == before
+    assert after[len(before) :] == [
+        ("drift", "words", ""),
+        ("homoclinic", "words", ""),
+        ("work_precision", "words", "tolerance=eps"),
+        ("growth", "words", ""),
+    ]
+
+
+@pytest.mark.parametrize("integrator", ["words", "splitting:8"])
+def test_its_rows_are_scored_like_those_of_heyoka(plan: str, integrator: str) -> None:
+    tasks = read(plan, KINDS, integrator=integrator)[2]
+    rows = [measure(task) for task in tasks if task.key.subject.name == integrator]
+    assert [row.outcome for row in rows] == ["success"] * 4
+    assert all(row.finite and row.reference.how == "proven" for row in rows)
+    assert all(row.integrator.startswith(integrator) for row in rows)
+    kept = float(rows[0].metrics["solution_error_relative_max"])
+    assert kept < (1e-15 if integrator == "words" else 1e-8)
+
+
+def test_what_it_cannot_do_is_a_row_that_failed(tmp_path: Path) -> None:
+    (tmp_path / "quad.toml").write_text(
+        'name = "q"\n[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "quad", horizon = "1" }]\n'
+    )
+    _, theirs = read(str(tmp_path / "quad.toml"), KINDS, integrator="scipy:DOP853")[2]
+    from heavytop.errors import PeerFailed
+
+    with pytest.raises(PeerFailed, match="scipy:DOP853 has no quad"):
+        measure(theirs)
+
+
+def test_the_gate_measures_every_thing_that_a_gate_asks() -> None:
+    kinds = {kind for kind, name, _ in labels("gate", "splitting:4") if name == "splitting:4"}
+    assert kinds == {"drift", "homoclinic", "work_precision", "growth"}
+
+
+def test_who_stands_beside_heyoka_is_another_that_is_known(plan: str, tmp_path: Path) -> None:
+    (tmp_path / "claims.toml").write_text(
+        'name = "c"\n[[measure]]\nkind = "audit"\nclaims = ["ershkov-partial"]\nsystems = ["gyrostat"]\n'
+    )
+    for name, integrator, cause in (
+        (plan, "heyoka", "what others are compared with"),
+        (plan, "rk4", "Unknown integrator"),
+        (str(tmp_path / "claims.toml"), "words", "does not measure heyoka"),
+    ):
+        with pytest.raises(InputError, match=cause) as caught:
+            read(name, KINDS, integrator=integrator)
+        assert caught.value.remedy

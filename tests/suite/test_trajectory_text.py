@@ -1,0 +1,141 @@
+"""Tables as other programs write them, cases that fill in what a file leaves out, the format read off the digits."""
+
+import codecs
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.integrate.taylor import propagate
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text
+from heavytop.suite.cases import CASES
+from heavytop.suite.trajectory_file import read
+from heavytop.suite.written_numbers import format_of, number
+
+CASE = CASES["lagrange"]
+TIMES = [Fraction(k, 2) for k in range(5)]
+STATES = propagate(CASE.top, CASE.start, TIMES, DOUBLE, system=CASE.system).to_numpy()
+HEADER = "t,Ω1,Ω2,Ω3,γ1,γ2,γ3"
+
+
+def table(header: str | None = HEADER, separator: str = ",", form: str = "%r", order=range(7), rows=None) -> str:
+    columns = [[float(t), *state] for t, state in zip(TIMES, STATES, strict=True)] if rows is None else rows
+    lines = [separator.join(form % float(row[place]) for place in order) for row in columns]
+    return "\n".join([*([header] if header is not None else []), *lines]) + "\n"
+
+
+def scored(tmp_path: Path, text: str | bytes, name: str = "a.csv", case=CASE):
+    file = tmp_path / name
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read(file, case)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        table(),
+        codecs.BOM_UTF8 + table().encode(),
+        table().encode("utf-16"),
+        table().replace("\n", "\r\n"),
+        table("time [s];w_x;w_y;w_z;g_x;g_y;g_z", ";"),
+        table("T;OMEGA_1;OMEGA_2;OMEGA_3;GAMMA_1;GAMMA_2;GAMMA_3", ";").replace(".", ","),
+        table("t\tp\tq\tr\tγ₁\tγ₂\tγ₃", "\t"),
+        table('"t" "\\Omega_{1}" "\\Omega_{2}" "\\Omega_{3}" "\\gamma_{1}" "\\gamma_{2}" "\\gamma_{3}"', " "),
+        table("# t omega0 omega1 omega2 gamma0 gamma1 gamma2", "   ", "%.18e"),
+        table(
+            "% made by another program\nt gamma1 gamma2 gamma3 omega1 omega2 omega3", " ", order=(0, 4, 5, 6, 1, 2, 3)
+        ),
+        table(HEADER, ", ", "%.17E").replace("E", "D"),
+        table(HEADER + ",energy", order=(*range(7), 1)),
+        table("// t, omega (rad/s)\n" + HEADER) + "\n\n",
+    ],
+    ids=range(13),
+)
+def test_a_table_of_another_program_is_read_as_it_was_meant(text: str | bytes, tmp_path: Path) -> None:
+    given = scored(tmp_path, text)
+    assert given.times == TIMES
+    assert (given.precision, given.format_guessed, given.name) == (DOUBLE, True, "lagrange")
+    np.testing.assert_array_equal(np.array(given.states, float), STATES)
+    assert (given.top, given.start) == (CASE.top, CASE.start)
+
+
+def test_hexadecimal_tables_and_columns_without_a_header_are_read(tmp_path: Path) -> None:
+    rows = [[float(t).hex(), *(float(v).hex() for v in s)] for t, s in zip(TIMES, STATES, strict=True)]
+    given = scored(tmp_path, "\n".join(" ".join(row) for row in rows), "a.dat")
+    assert given.notes == ("there is no header; the columns are taken as t omega1 omega2 omega3 gamma1 gamma2 gamma3",)
+    np.testing.assert_array_equal(np.array(given.states, float), STATES)
+
+
+def test_the_row_of_time_0_is_the_start_where_nothing_else_says_it(tmp_path: Path) -> None:
+    data = "# inertia = 5/2 5/2 3/2\n# weight: 2\n# centre: [0; 0; 3/4]\n"
+    given = scored(tmp_path, data + table(), case=None)
+    assert given.start.flat == tuple(Fraction(repr(float(value))) for value in STATES[0])
+    assert given.top == CASE.top
+    rows = [[float(t), *state] for t, state in zip(TIMES, STATES, strict=True)][1:]
+    with pytest.raises(InputError, match="omega is missing, and there is no row t = 0") as caught:
+        scored(tmp_path, data + table(rows=rows), case=None)
+    assert "--case" in caught.value.remedy
+    with pytest.raises(InputError, match="The only time is 0"):
+        scored(tmp_path, table(rows=[[0.0, *STATES[0]]]))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("# weight: 3\n" + table(), "The file says weight = 3, but in the case lagrange it is 2"),
+        ("# inertia: 3/2, 5/2, 5/2\n" + table(), "The file says I1 = 3/2"),
+        ("# system: gyrostat\n" + table(), "The file says system = gyrostat"),
+        ("# gamma: 2/7, 3/7, -6/7\n" + table(), "The file says γ3 = -6/7, but in the case lagrange it is 6/7"),
+        (table(order=(0, 4, 5, 6, 1, 2, 3)), "Ω1 of the row t = 0 = 0.285714, but in the case lagrange it is 1/5"),
+        ("# wieght: 3\n" + table(), "Unknown key 'wieght'"),
+        (table("t,w1,w2,w3,w3,g2,g3"), "The column omega3 stands twice"),
+        (table("t,a,b,c,d,e,f"), "The first line is not t,omega1.*: omega1, omega2"),
+        (table(None, order=range(3)), "there is no header, and Row 1 has 3 columns, not 7"),
+        (table() + "1,2\n", "Row 6 has 2 columns, not 7"),
+        (table() + "2,1,1,1,0,0,1\n", "does not come after"),
+        (table() + "3,1,1,1,0,0,abc\n", "'abc' is not a finite number"),
+        (HEADER + "\n" + "1,2,3,4,5,6,7\n" * 300_000, "300001 states are too many.*"),
+        (b"t,\0", "holds a byte 0"),
+    ],
+)
+def test_a_table_that_cannot_be_meant_is_refused(text: str | bytes, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        scored(tmp_path, text)
+    assert caught.value.remedy
+    assert len(caught.value.cause) < 400
+
+
+def test_rounded_data_of_a_case_are_still_that_case(tmp_path: Path) -> None:
+    text = "# gamma: 0.2857142857142857, 0.4285714285714286, 0.8571428571428571\n" + table(form="%.6f")
+    given = scored(tmp_path, text)
+    assert given.top == CASE.top
+    assert given.times == TIMES
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1.5D+00", "3/2"), ("-2.5d-3", "-1/400"), ("1.25Q1", "12.5"), ("1.5-101", "1.5e-101"), ("1.5+101", "1.5e101"),
+        ("0x1.8p+1", "3"), (" 7 ", "7"), ("1e5", "100000"),
+    ],
+)  # fmt: skip
+def test_numbers_of_fortran_and_c_are_read(text: str, value: str) -> None:
+    assert number(text, "it") == Fraction(value)
+
+
+@pytest.mark.parametrize(
+    "text", ["NaN", "-nan", "nan(ind)", "-nan(0x7)", "Infinity", "-inf", "1.#INF", "-1.#IND", "1.#QNAN0"]
+)
+def test_what_other_programs_write_for_no_number_is_none(text: str) -> None:
+    assert number(text, "it") is None
+
+
+@pytest.mark.parametrize("form", [DOUBLE, EXTENDED, QUAD], ids=lambda form: form.name)
+@pytest.mark.parametrize("more", [0, 2, 9])
+def test_digits_beyond_those_of_a_format_do_not_make_it_wider(form, more: int) -> None:
+    from heavytop.precision import round_to
+
+    values = [round_to(Fraction(k, 7), form.bits) for k in range(1, 40)]
+    assert format_of(decimal_text(value, form.digits + more) for value in values) == form

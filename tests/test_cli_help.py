@@ -1,0 +1,69 @@
+"""Help that fits 80 columns, and completion for three shells."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+import typer
+
+from heavytop.cli import app
+from heavytop.cli.app import SHELLS
+
+COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+MOST = 55
+
+
+def heavytop(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-m", "heavytop", *arguments]
+    return subprocess.run(line, capture_output=True, text=True, check=False, timeout=60, env=os.environ | more)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_first_line_of_each_command_is_a_short_sentence(name: str) -> None:
+    first = COMMANDS[name].help.partition("\n\n")[0]
+    assert len(first) <= MOST
+    assert first.endswith(".")
+    assert "\n" not in first
+
+
+def test_nothing_is_cut_at_80_columns() -> None:
+    done = heavytop("--help", COLUMNS="80", TERMINAL_WIDTH="80")
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("Usage: heavytop ")
+    assert max(map(len, lines)) <= 80
+    assert "..." not in done.stdout.partition("Commands:")[2]
+    for name in COMMANDS:
+        assert COMMANDS[name].help.partition("\n\n")[0] in done.stdout
+
+
+LONG = {"run": "minutes", "selftest": "minutes"} | dict.fromkeys(("figures", "audit", "reference", "score"), "seconds")
+
+
+@pytest.mark.parametrize(("name", "words"), list(LONG.items()))
+def test_what_takes_long_says_how_long(name: str, words: str) -> None:
+    assert words in " ".join(COMMANDS[name].help.split())
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_the_completion_script_is_printed_and_completes(shell: str) -> None:
+    script = heavytop("--completion", shell)
+    assert script.returncode == 0
+    assert f"complete_{shell}" in script.stdout
+    assert "_HEAVYTOP_COMPLETE" in script.stdout
+    asked = {
+        "bash": {"COMP_WORDS": "heavytop sco", "COMP_CWORD": "1"},
+        "zsh": {"_TYPER_COMPLETE_ARGS": "heavytop sco"},
+        "fish": {"_TYPER_COMPLETE_ARGS": "heavytop sco", "_TYPER_COMPLETE_FISH_ACTION": "get-args"},
+    }[shell]
+    done = heavytop(_HEAVYTOP_COMPLETE=f"complete_{shell}", **asked)
+    assert "score" in done.stdout
+    assert "selftest" not in done.stdout
+
+
+def test_bash_reads_its_script_and_another_shell_is_refused() -> None:
+    script = heavytop("--completion", "bash").stdout
+    checked = subprocess.run(["bash", "-n"], input=script, text=True, capture_output=True, check=False)
+    assert checked.returncode == 0, checked.stderr
+    refused = heavytop("--completion", "tcsh")
+    assert (refused.returncode, "bash, zsh, fish" in refused.stderr) == (2, True)

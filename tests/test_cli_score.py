@@ -1,0 +1,166 @@
+"""`score` and `list --case`: the answer in the first lines, the page, the data of a case ready to paste."""
+
+import json
+import re
+import shlex
+import tomllib
+from fractions import Fraction
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+import heavytop as ht
+from heavytop.cli import app
+from heavytop.precision import DOUBLE
+from heavytop.report.score_page import score_page
+from heavytop.report.score_text import score_text
+from heavytop.suite.cases import CASES
+from heavytop.suite.plan import read
+from heavytop.suite.score import assess
+from heavytop.suite.trajectory_file import Given, of_arrays
+
+CASE = CASES["lagrange"]
+TIMES = [Fraction(k) for k in range(1, 9)]
+
+
+def command(*arguments: str) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, list(arguments), catch_exceptions=False)
+    return done.exit_code, done.stdout, done.stderr
+
+
+def given(case=CASE, times=TIMES, spoilt=lambda i, state: state, precision=DOUBLE) -> Given:
+    run = ht.propagate(case.top, case.start, times, precision, system=case.system)
+    rows = [spoilt(i, list(state)) for i, state in enumerate(run.states)]
+    return of_arrays(case.top, case.start, case.system, times, rows, precision, "mine", "rk4")
+
+
+def printed(found, width: int = 80) -> list[str]:
+    console = Console(width=width, file=StringIO(), record=True)
+    console.print(score_text(found))
+    return [line.rstrip() for line in console.export_text().splitlines()]
+
+
+def across(i: int, state: list) -> list:
+    # Ω3 is constant, so an error in it lies across the flow
+    return [*state[:2], state[2] + 2e-9, *state[3:]]
+
+
+def test_the_first_lines_say_how_good_it_is() -> None:
+    found = assess(given(spoilt=across))
+    lines = printed(found)
+    assert re.fullmatch(
+        r"8\.9 of 16 digits right at every sample up to T = 8; heyoka in double keeps 1\d\.\d\.", lines[0]
+    )
+    narrow = printed(found, 79)
+    assert narrow[0] == "8.9 of 16 digits right at every sample up to T = 8;"
+    assert re.fullmatch(r"heyoka in double keeps 1\d\.\d\.", narrow[1])
+    assert "The error is mostly across the flow." in lines[:3]
+    assert max(map(len, lines)) <= 80
+    assert found.peer is not None
+    assert found.peer.digits_right == assess(given()).digits_right
+
+
+@pytest.mark.parametrize("name", ["double-double", "real:600"])
+def test_there_is_no_sentence_about_heyoka_where_it_did_not_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("heavytop.suite.score._EFFORT", 1e-6)
+    values = given().states
+    rows = [list(state) for state in values]
+    found = assess(of_arrays(CASE.top, CASE.start, CASE.system, TIMES, rows, ht.precision.parse(name), "a", "b"))
+    assert found.peer is None
+    assert not any("heyoka" in line for line in printed(found)[:3])
+
+
+def test_without_a_reference_and_without_a_sample_no_digits_are_said() -> None:
+    case = CASES["generic"]
+    found = assess(given(case, [Fraction(150)]))
+    assert (found.digits_right, found.peer, found.direction) == (None, None, None)
+    assert printed(found)[0].startswith("How many digits are right is not known")
+    lost = assess(given(spoilt=lambda i, state: [float("nan")] * 6))
+    assert printed(lost)[:2] == [
+        "The run ended early (non_finite), at t = 0 of 8.",
+        "No digit can be counted: the first state is not finite.",
+    ]
+
+
+def test_the_command_takes_a_case_and_writes_json_and_a_page(tmp_path: Path) -> None:
+    run = ht.propagate(CASE.top, CASE.start, TIMES, DOUBLE)
+    states = [[repr(float(v) * (-1 if i > 2 else 1)) for i, v in enumerate(state)] for state in run.states]
+    rows = [",".join([str(time), *state]) for time, state in zip(TIMES, states, strict=True)]
+    file, page = tmp_path / "mine.csv", tmp_path / "page.html"
+    file.write_text("\n".join(["t,Ω1,Ω2,Ω3,γ1,γ2,γ3", *rows]), "utf-8")
+    code, out, _ = command("score", str(file), "--case", "lagrange", "--json", "--html", str(page))
+    assert code == 0
+    said = json.loads(out)
+    assert said["digits_right"] == said["digits_kept"] < 1
+    assert (said["of_digits"], said["format_guessed"], said["precision"], said["case"]) == (
+        16,
+        True,
+        "double",
+        "lagrange",
+    )
+    assert said["peer"]["digits_right"] > 14
+    (diagnosis,) = said["diagnosis"]
+    assert diagnosis["kind"] == "gamma_down"
+    assert diagnosis["sentence"].startswith("γ points down in these states")
+    text = page.read_text("utf-8")
+    assert re.search(r"<h2 id=\"verdict-heading\">0\.0 of 16 digits right at every sample up to T = 8", text)
+    assert diagnosis["sentence"].split(";")[0] in text
+    assert "Digits lost over time" in text
+
+
+def test_the_page_draws_both_parts_and_is_the_same_every_time() -> None:
+    found = assess(given(spoilt=across))
+    page = score_page(found, {"commit": "x"})
+    assert page == score_page(found, {"commit": "x"})
+    assert page.count("<svg") >= 1
+    assert "along the flow (phase)" in page
+    no_reference = assess(given(CASES["generic"], [Fraction(150)]))
+    assert "Digits lost over time" not in score_page(no_reference, {})
+
+
+@pytest.mark.parametrize("name", ["lagrange", "gyrostat", "goryachev"])
+def test_the_data_of_a_case_can_be_pasted_everywhere(name: str, tmp_path: Path) -> None:
+    case = CASES[name]
+    _, out, _ = command("list", "--case", name, "--json")
+    data = json.loads(out)
+    # the command line
+    line = shlex.split(data["command"])[1:]
+    code, out, _ = command(*line, "--json")
+    made = json.loads(out)
+    assert code == 0
+    assert tuple(map(Fraction, made["inertia"])) == case.top.inertia
+    assert tuple(map(Fraction, made["omega"] + made["gamma"])) == case.start.flat
+    # TOML
+    plan = tmp_path / "plan.toml"
+    measure = f'[[measure]]\nkind = "local_error"\ncases = ["my-{name}"]\nprecisions = ["double"]\nhorizon = "1"\n'
+    plan.write_text(f'name = "mine"\n{data["toml"]}\n{measure}')
+    (top,) = read(str(plan))[0].top
+    assert (tuple(map(Fraction, top.inertia)), top.system) == (case.top.inertia, case.system.name)
+    # Python
+    names: dict = {}
+    exec(data["python"], names)
+    assert (names["top"], names["start"]) == (case.top, case.start)
+    # JSON
+    _, text, _ = command("list", "--case", name)
+    pasted = json.loads(re.search(r"^\{.*?^\}", text, re.S | re.M)[0])
+    pasted |= {key: made[key] for key in ("times", "states")}
+    (tmp_path / "a.json").write_text(json.dumps(pasted))
+    from heavytop.suite.trajectory_file import read as read_trajectory
+
+    assert read_trajectory(tmp_path / "a.json").start == case.start
+    assert tomllib.loads(data["toml"])
+
+
+def test_list_names_everything_once() -> None:
+    _, text, _ = command("list")
+    names = [line.split()[0] for line in text.splitlines() if line.startswith("  ")]
+    assert len(names) == len(set(names))
+    _, out, _ = command("list", "--json")
+    listed = json.loads(out)
+    assert listed["integrators"]["heyoka"] == "every format but double-double"
+    assert {case["name"] for case in listed["cases"]} == set(CASES)
+    with pytest.raises(ht.InputError, match="Unknown case"):
+        command("list", "--case", "nothing")

@@ -1,0 +1,190 @@
+"""Every code block of README and docs runs, and the pages of the site keep to their own rules."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import pytest
+import typer
+
+import heavytop as ht
+from documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
+from heavytop.cli import app
+from heavytop.report import policy
+from heavytop.suite import plan
+
+NOT_CODE = {"text", "{eval-rst}", "{toctree}", "{image}", "{figure}", "{note}", "{include} ../CHANGELOG.md"}
+CELL = "{code-cell} ipython3"
+MOST_LINES = 10
+"""Of a picture in the gallery."""
+DOCS = ROOT / "docs"
+
+
+def name(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_the_code_of_a_page_runs(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    environment = folder_like_a_checkout(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    names: dict[str, object] = {"__name__": "page"}
+    for block in to_run(page):
+        where = f"{name(page)}:{block.line}"
+        if block.file:
+            (tmp_path / block.file).write_text(block.text, "utf-8")
+        if block.language == "python":
+            exec(compile(block.text, where, "exec"), names)
+        elif block.language == "sh":
+            done = run_shell(block.text, tmp_path, environment)
+            assert done.returncode == 0, f"{where}\n{done.stdout}\n{done.stderr}"
+        elif block.language == "toml":
+            read_toml(block.text, tmp_path)
+        else:
+            (tmp_path / f"motion.{block.language}").write_text(block.text, "utf-8")
+            done = run_shell(f"heavytop score motion.{block.language}", tmp_path, environment)
+            assert done.returncode == 0, f"{where}\n{done.stderr}"
+    if any(block.language == "python" and "print(" in block.text for block in to_run(page)):
+        assert capsys.readouterr().out
+    tables = [each._repr_html_() for each in names.values() if isinstance(each, TABLES)]
+    assert all(html.count("<table>") == html.count("</table>") == 1 for html in tables)
+
+
+TABLES = (ht.Trajectory, ht.Reference, ht.Score, ht.Report, ht.Comparison, ht.Audit)
+
+
+def to_run(page: Path) -> list[Block]:
+    """The blocks of code without a reason not to run them.
+
+    Not here: the two commands of the README, which .ci/run runs, and cells, which run when the site is built.
+    """
+    found = [block for block in blocks(page) if block.language not in NOT_CODE | {CELL} and not block.not_run]
+    return [block for block in found if block.language or page.name != "README.md"]
+
+
+def without_options(cell: str) -> str:
+    """A cell of a notebook page without its options, ``:tags: [...]``."""
+    return re.sub(r"^:[a-z-]+:.*$", "", cell, flags=re.M)
+
+
+def read_toml(text: str, folder: Path) -> None:
+    """A plan, a policy, a claim or the entry points of a package, read as the program reads it."""
+    content, file = tomllib.loads(text), folder / "block.toml"
+    file.write_text(text, "utf-8")
+    if "measure" in content:
+        assert list(plan.expand(plan.load(str(file))[0]))
+    elif "project" in content:
+        info = folder / "block-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: block\nVersion: 1.0\n")
+        points = content["project"]["entry-points"]["heavytop.peers"]
+        lines = [f"{key} = {value}" for key, value in points.items()]
+        (info / "entry_points.txt").write_text("\n".join(["[heavytop.peers]", *lines]))
+    elif "kind" in content:
+        assert ht.audit(file).verdict in ("holds", "refuted")
+    else:
+        assert policy.load(file) != policy.Policy()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_every_block_says_what_it_is_and_why_it_is_not_run(page: Path) -> None:
+    known = {"sh", "python", CELL, "toml", "json", "csv", *NOT_CODE}
+    for block in blocks(page):
+        two_commands = page.name == "README.md" and "&& .venv/bin/heavytop run\n" in block.text
+        assert two_commands or block.language in known, f"{name(page)}:{block.line}: {block.language!r}"
+        assert not block.not_run or len(block.not_run) > 15, "a reason"
+    for line in page.read_text("utf-8").splitlines():
+        assert not re.match(r"    (heavytop|pip|python|\.venv/)", line), f"{line!r} belongs into a fence"
+
+
+def commands(text: str) -> list[str]:
+    """Lines that start with the program, without what belongs to the shell."""
+    lines = [line.strip().removeprefix(".venv/bin/") for line in text.splitlines()]
+    return [SHELL.split(line)[0].strip() for line in lines if re.match("heavytop [a-z]", line)]
+
+
+SHELL = re.compile(r"\|\||&&|;|>|&$|\s#\s")
+NOT_RUN = [command for page in PAGES for block in blocks(page) if block.not_run for command in commands(block.text)]
+
+
+@pytest.mark.parametrize("command", NOT_RUN)
+def test_the_program_understands_what_is_too_long_to_run(command: str) -> None:
+    asked, *arguments = shlex.split(command)[1:]
+    known = typer.main.get_command(app).commands
+    assert asked in known
+    known[asked].make_context(asked, arguments)
+
+
+def test_commands_are_found_and_wrong_ones_refused() -> None:
+    assert len(NOT_RUN) > 3
+    known = typer.main.get_command(app).commands
+    with pytest.raises(Exception, match="No such option"):
+        known["compare"].make_context("compare", ["a", "b", "--no-such-option"])
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_a_page_links_to_what_is_there(page: Path) -> None:
+    for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text("utf-8")):
+        assert "://" in link or (page.parent / link).exists(), link
+
+
+def test_a_block_that_fails_is_seen(tmp_path: Path) -> None:
+    environment = folder_like_a_checkout(tmp_path)
+    assert run_shell("false # exit code 1: as said\ntrue\n", tmp_path, environment).returncode == 0
+    for text in ("false\ntrue\n", "true # exit code 1\n", "false | true\n", "heavytop audit none.toml # exit code 3\n"):
+        assert run_shell(text, tmp_path, environment).returncode != 0
+    page = tmp_path / "page.md"
+    page.write_text(
+        "<!-- not run: why -->\n~~~sh\na\n```\n~~~\n<!-- file: b.py -->\n\n```python\nc\n```\n```\nd\n```\n"
+    )
+    assert blocks(page) == [
+        Block(2, "sh", "a\n```\n", "why", ""),
+        Block(8, "python", "c\n", "", "b.py"),
+        Block(11, "", "d\n", "", ""),
+    ]
+
+
+def test_every_public_name_is_in_the_reference_once() -> None:
+    told = re.findall(r"^\.\. (?:auto|py:)\w+:: (\w+)$", (DOCS / "api.md").read_text("utf-8"), re.M)
+    assert sorted(told) == sorted(ht.__all__)
+
+
+def test_a_picture_of_the_gallery_is_a_few_lines_of_code() -> None:
+    pictures = [block for block in blocks(DOCS / "gallery.md") if block.language == CELL and "plt.show()" in block.text]
+    assert len(pictures) >= 8
+    for block in pictures:
+        lines = [line for line in without_options(block.text).splitlines() if line.strip()]
+        assert len(lines) <= MOST_LINES, f"line {block.line}: {len(lines)} lines"
+
+
+def test_the_tutorial_shows_the_example_as_it_is() -> None:
+    shown = [block.text for block in blocks(DOCS / "tutorials" / "gate-my-integrator.md")]
+    for file in ("mine.py", "gate.toml"):
+        assert (ROOT / "examples" / "mine" / file).read_text("utf-8") in shown
+
+
+def test_every_page_is_in_a_table_of_contents() -> None:
+    listed: set[Path] = {DOCS / "index.md"}
+    for page in PAGES:
+        for block in blocks(page):
+            if block.language == "{toctree}":
+                entries = [line for line in block.text.splitlines() if not line.startswith(":")]
+                listed |= {found for entry in entries for found in page.parent.glob(f"{entry}.*")}
+    there = [*(page for page in PAGES if DOCS in page.parents), *DOCS.glob("notebooks/*.ipynb")]
+    assert [page for page in there if page not in listed] == []
+
+
+def test_the_notebooks_are_without_outputs() -> None:
+    notebooks = sorted((DOCS / "notebooks").glob("*.ipynb"))
+    assert len(notebooks) >= 3
+    for file in notebooks:
+        cells = json.loads(file.read_text("utf-8"))["cells"]
+        assert cells[0]["cell_type"] == "markdown"
+        assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells), file.name

@@ -1,0 +1,138 @@
+"""The time left: right within 2 after a fifth of the way, on synthetic schedules; bars on terminals alone."""
+
+import os
+import pty
+import random
+import subprocess
+import sys
+from dataclasses import dataclass
+from io import StringIO
+
+import pytest
+from rich.console import Console
+
+from heavytop.cli.progress import Bar, Estimator, Progress, counted, duration, watched
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def ratios(weights: list[float], seconds: list[float], workers: int, expected: float) -> list[float]:
+    """Estimated over true time left, at each end of a part, from a fifth to nine tenths of the way on."""
+    free, order = [0.0] * workers, []
+    for weight, took in sorted(zip(weights, seconds, strict=True), key=lambda pair: -pair[0]):
+        first = free.index(min(free))
+        free[first] += took
+        order.append((free[first], weight))
+    clock, end, found = Clock(), max(free), []
+    estimator = Estimator(sum(weights), expected, clock)
+    for at, weight in sorted(order):
+        clock.now = 100 + at
+        estimator.advance(weight)
+        if 0.2 * end <= at <= 0.9 * end:
+            found.append(estimator.seconds_left() / (end - at))
+    return found
+
+
+@pytest.mark.parametrize("workers", [1, 2, 8])
+@pytest.mark.parametrize("speed", [0.1, 1.0, 20.0])
+def test_the_time_left_is_right_within_2_after_a_fifth(workers: int, speed: float) -> None:
+    source = random.Random(workers)
+    for _ in range(40):
+        count = source.randint(20 * workers, 200)
+        weights = [source.choice((1.0, 3.0, 10.0)) * source.uniform(0.5, 2) for _ in range(count)]
+        # each part takes as long as its weight says within a third, on a machine of any speed
+        seconds = [weight * speed * source.uniform(0.75, 1.33) for weight in weights]
+        found = ratios(weights, seconds, workers, 1 / workers)
+        assert found
+        assert all(0.5 < ratio < 2 for ratio in found)
+
+
+def test_an_even_schedule_is_told_exactly_and_the_end_is_0() -> None:
+    clock = Clock()
+    estimator = Estimator(10, 2.0, clock)
+    assert estimator.seconds_left() == 20
+    for k in range(1, 11):
+        clock.now = 100 + 2 * k
+        estimator.advance(1)
+        assert estimator.seconds_left() == pytest.approx(2 * (10 - k))
+        assert estimator.fraction == k / 10
+    estimator.advance(5)
+    assert (estimator.done, estimator.seconds_left()) == (10, 0)
+
+
+def test_waiting_between_two_parts_counts_and_never_below_0() -> None:
+    clock = Clock()
+    estimator = Estimator(2, 10.0, clock)
+    clock.now += 10
+    estimator.advance(1)
+    clock.now += 4
+    assert estimator.seconds_left() == pytest.approx(6)
+    clock.now += 40
+    assert estimator.seconds_left() == 0
+    estimator.reach(0.5)
+    assert estimator.done == 1
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.2, "1 s"), (59, "59 s"), (61, "1:01"), (3661.5, "1:01:02"), (0, "0 s")]
+)
+def test_durations_are_short(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
+
+
+@dataclass
+class Part:
+    label: str
+    cost: float
+
+
+def test_a_bar_says_rows_per_cent_and_time_left() -> None:
+    console = Console(file=StringIO(), force_terminal=True, width=100)
+    clock = Clock()
+    bar = Bar(Estimator(4, 1.0, clock), 4, "rows", console)
+    with bar:
+        clock.now += 30
+        bar.estimator.advance(1)
+        bar.finished = 1
+        bar.show("drift lagrange")
+        assert bar.said() == "1/4 rows, 25 %, about 1:30 left"
+    assert "1/4 rows" in console.file.getvalue()
+
+
+def test_nothing_is_written_where_there_is_no_terminal(capfd: pytest.CaptureFixture[str]) -> None:
+    with Progress([Part("a", 1.0), Part("b", 2.0)], 2) as advance:
+        advance(Part("a", 1.0))
+    with counted("figures", 2, "figures", 1.0) as step:
+        step()
+    with watched("reference", lambda: 0.5, 1.0):
+        pass
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_reference_reports_on_a_terminal_and_its_output_stays_clean() -> None:
+    master, slave = pty.openpty()
+    line = [sys.executable, "-m", "heavytop", "reference", "--inertia", "3,5/2,3/2", "--weight", "3/2"]
+    line += ["--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10", "--gamma", "3/5,0,4/5", "--times", "100"]
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": "100"}
+    line += ["--digits", "20", "--json"]
+    done = subprocess.run(line, stdout=subprocess.PIPE, stderr=slave, env=environment, timeout=120, check=True)
+    os.close(slave)
+    written = b""
+    while True:
+        try:
+            part = os.read(master, 65536)
+        except OSError:
+            break
+        written += part
+        if not part:
+            break
+    os.close(master)
+    assert done.stdout.lstrip().startswith(b"{")
+    assert b" %" in written
+    assert b"left" in written

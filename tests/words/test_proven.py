@@ -1,0 +1,123 @@
+"""The proven bound of coefficients in words, attacked with exact integers."""
+
+import pickle
+from fractions import Fraction
+from random import Random
+
+import pytest
+from words_helpers import LEVELS
+
+from heavytop.exact.scaled_motion import ScaledMotion
+from heavytop.exact.step_series import lacking
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.words.digits import grid_of
+from heavytop.words.kernels import Grid
+from heavytop.words.proven import Carrier
+
+
+def some_motion(random: Random, system=HEAVY_TOP, attitude: bool = False, decades: int = 0) -> ScaledMotion:
+    """A top that a rigid body can have, with speeds and weights over so many decades."""
+
+    def size() -> Fraction:
+        return Fraction(10) ** random.randint(-decades, decades)
+
+    while True:
+        moments = [Fraction(random.randint(32, 288), 96) for _ in range(3)]
+        if 2 * max(moments) <= sum(moments):
+            break
+    weight, speed = size(), size()
+    p = Parameters(
+        tuple(moments),
+        tuple(weight * Fraction(random.randint(-4096, 4096), 4096) for _ in range(3)),
+        speed * Fraction(random.randint(-99, 99), 70),
+    )
+    y = [speed * Fraction(random.randint(-7000, 7000), 4096) for _ in range(3)]
+    y += [Fraction(random.randint(-2300, 2300), 4096) for _ in range(6 if attitude else 3)]
+    return ScaledMotion.of(system, p, tuple(y), random.random() < 0.5)
+
+
+def extreme_centre(random: Random, grid: Grid, size: int) -> list[int]:
+    """|ω| = 4 and |γ| = √3, as large as they come, with every word as large too, all of one sign or alternating."""
+    found = []
+    for axis in range(size):
+        first = random.choice([-1, 1]) * int(2.0**grid.bits * (2.309 if axis < 3 else 0.999))
+        alternating = random.random() < 0.5
+        value = first
+        for k in range(1, grid.words):
+            sign = -1 if alternating and k % 2 else 1
+            value = (value << grid.bits) + sign * ((1 << (grid.bits - 1)) - 1)
+        found.append(value)
+    return found
+
+
+def rounded(motion: ScaledMotion, grid: Grid) -> list[int]:
+    return [round(value * 2**grid.total) for value in motion.scaled.state]
+
+
+def used(motion: ScaledMotion, carrier: Carrier, centre: list[int], halvings: int) -> float | None:
+    """How much of the bound is used; None where there is no series."""
+    series = carrier.series(centre, halvings)
+    if series is None:
+        return None
+    true = lacking(motion.field, series, carrier.grid.total, halvings)
+    assert [sum(component) for component in series.values] == list(series.total)
+    assert [component[0] for component in series.values] == centre
+    for n, column in enumerate(zip(*series.values, strict=True)):
+        assert max(map(abs, column)) <= Fraction(series.sizes[n]) * 2**carrier.grid.total
+    return float(sum(true) / Fraction(series.rounding))
+
+
+@pytest.mark.parametrize(
+    ("words", "system", "attitude"),
+    [(3, HEAVY_TOP, False), (4, GYROSTAT, False), (6, HEAVY_TOP, True), (3, GYROSTAT, True), (12, HEAVY_TOP, False)],
+    ids=lambda value: getattr(value, "name", value),
+)
+def test_what_coefficients_lack_is_within_the_bound(words: int, system, attitude: bool) -> None:
+    random, grid = Random(words), grid_of(words)
+    shares = []
+    for _ in range(6):
+        motion = some_motion(random, system, attitude, decades=random.choice([0, 3, 100]))
+        assert motion.in_words
+        carrier = Carrier(motion.scaled, grid, motion.forwards)
+        for centre in (rounded(motion, grid), extreme_centre(random, grid, len(motion.scaled.state))):
+            for halvings in range(8):
+                share = used(motion, carrier, centre, halvings)
+                if share is not None:
+                    shares.append(share)
+                    break
+    assert len(shares) == 12
+    assert 1e-5 < max(shares) <= 1
+
+
+def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:
+    random, refused = Random(3), 0
+    for bits in (49, 50, 51):
+        grid = Grid(3, bits)
+        for _ in range(6):
+            motion = some_motion(random)
+            carrier = Carrier(motion.scaled, grid, motion.forwards)
+            for centre in (rounded(motion, grid), extreme_centre(random, grid, 6)):
+                share = used(motion, carrier, centre, 3)
+                refused += share is None
+                assert share is None or share <= 1
+    assert refused
+
+
+@pytest.mark.parametrize("processor", LEVELS)
+def test_the_bits_are_those_of_every_processor(processor) -> None:
+    motion = some_motion(Random(5), attitude=True)
+    grid = grid_of(4)
+    one, other = (Carrier(motion.scaled, grid, True, processor=each) for each in (None, processor))
+    found, same = (carrier.series(rounded(motion, grid), 3) for carrier in (one, other))
+    assert found is not None
+    assert same is not None
+    assert found.values == same.values
+    assert found.rounding == same.rounding
+
+
+def test_a_carrier_travels_between_processes() -> None:
+    motion, grid = some_motion(Random(6)), grid_of(3)
+    carrier = Carrier(motion.scaled, grid, True)
+    again = pickle.loads(pickle.dumps(carrier))
+    centre = rounded(motion, grid)
+    assert again.series(centre, 4).values == carrier.series(centre, 4).values

@@ -1,0 +1,96 @@
+"""Motions in whole numbers: the field, proven accuracy, the same bits however a run is cut."""
+
+from fractions import Fraction
+from random import Random
+
+import pytest
+from words_helpers import problem
+
+from heavytop.exact.balls import midpoint
+from heavytop.exact.validated import Validated
+from heavytop.integrate.trajectory import Outcome
+from heavytop.integrate.words import propagate_words
+from heavytop.precision import exact, real
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.words.lanes import rates
+from heavytop.words.run import Status
+from heavytop.words.scaled import Scaled
+from heavytop.words.whole import Whole, field_of
+from helpers import fraction, positive, vector
+
+TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
+START = State(("1/8", "3/8", "7/8"), ("5/8", 0, "3/4"))
+MANY = real(1040)
+
+
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize("attitude", [False, True])
+@pytest.mark.parametrize("forwards", [True, False])
+def test_the_field_is_that_of_the_lanes(system, attitude: bool, forwards: bool) -> None:
+    random = Random(16)
+    for _ in range(20):
+        p = Parameters((positive(random), positive(random), positive(random)), vector(random), fraction(random))
+        y = (*vector(random), *vector(random), *(vector(random) if attitude else ()))
+        scaled = Scaled.of(system, p, y, bounded=True)
+        field, state = field_of(scaled, forwards), scaled.state
+        products = [state[j] * state[k] for j, k in field.pairs]
+        found = [
+            Fraction(sum(c * products[i] for c, i in row.products) + sum(c * state[j] for c, j in row.linear))
+            / row.denominator
+            for row in field.rows
+        ]
+        assert found == [(1 if forwards else -1) * rate for rate in rates(system, scaled.coefficients, state)]
+
+
+def test_more_bits_than_words_have_are_met_to_the_last() -> None:
+    times = [Fraction(1, 3), Fraction(5, 4)]
+    run = propagate_words(TOP, START, times, MANY)
+    assert run.outcome is Outcome.SUCCESS
+    assert run.flags["arithmetic"] == "whole numbers"
+    proven = Validated(run.problem.top, run.problem.start)
+    for time, state in zip(run.times, run.states, strict=True):
+        for ball, value in zip(proven.state(time, MANY.bits + 8), state, strict=True):
+            assert abs(midpoint(ball) - exact(value)) <= MANY.eps
+
+
+def test_a_run_is_taken_up_to_the_same_bits_and_samples_change_none() -> None:
+    whole = Whole(problem(1, attitude=True), 200, True)
+    assert whole.advance(Fraction(3), 100) is Status.FINE
+    before, place = whole.steps, whole.place()
+    whole.sample(whole.time - Fraction(1, 1000))
+    again = Whole(problem(1, attitude=True), 200, True)
+    again.restore(place, before - 1)
+    for run in (whole, again):
+        assert run.advance(Fraction(6), 100) is Status.FINE
+    assert (again.state, again.time, again.steps, again.place()) == (
+        whole.state,
+        whole.time,
+        whole.steps,
+        whole.place(),
+    )
+    assert whole.sample(whole.time) == whole.state
+
+
+def test_steps_can_be_limited() -> None:
+    run = propagate_words(TOP, START, [Fraction(50)], MANY, step_limit=1)
+    assert (run.outcome, run.steps) == (Outcome.STEP_LIMIT, 1)
+
+
+def test_what_an_unstable_axis_amplifies_is_there_though_no_words_would_hold_it() -> None:
+    """2^-1100 of another axis needs its own bits beside those of the format."""
+    start = State((Fraction(1, 2**1100), 1, 0), ("5/8", "-3/8", "11/16"))
+    free = HeavyTop((3, 2, 1), 0, (0, 0, 1))
+    run = propagate_words(free, start, [Fraction(1)], real(237))
+    assert int(run.flags["bits"]) > 237 + 1100
+    first = exact(run.states[0][0]) * 2**1100
+    # ω1' = ω2 ω3/3 and ω3' = ω1 ω2 with ω2 = 1: cosh(t/√3)
+    assert abs(float(first) - 1.1714) < 1e-3
+
+
+def test_backwards_is_the_way_back() -> None:
+    there = propagate_words(TOP, START, [Fraction(3, 4)], real(1100)).states[0]
+    arrived = State([exact(v) for v in there[:3]], [exact(v) for v in there[3:]])
+    back = propagate_words(TOP, arrived, [Fraction(-3, 4)], real(1100)).states[0]
+    for value, begun in zip(back, START.flat, strict=True):
+        assert abs(exact(value) - begun) < Fraction(1, 2**1090)
