@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 
 from heavytop import records
+from heavytop.errors import PeerFailed
 from heavytop.kinds import KINDS
 from heavytop.records import Against, Metric, Quantity, RowKey, Series, Subject
 from heavytop.report import compare as _compare
@@ -22,6 +23,7 @@ from heavytop.report.kind import kind_of
 from heavytop.suite import plan as _plan
 from heavytop.suite import workers as _workers
 from heavytop.suite.checkpoint import Saved
+from heavytop.suite.rows import failed as failed_row
 from heavytop.suite.task import Task
 
 compare = partial(_compare.compare, kinds=KINDS)
@@ -58,7 +60,10 @@ def rows(tasks: Any, workers: int, scheduler: str | None = None, *more: Any, **o
 
 
 def measure(task: Task, saved: Saved | None = None) -> records.Row:
-    return KINDS[task.key.kind].measure(task, saved or Saved())
+    try:
+        return KINDS[task.key.kind].measure(task, saved or Saved())
+    except PeerFailed as error:
+        return failed_row(task, error.cause)
 
 
 def contradictions(row: records.Row) -> Any:

@@ -21,7 +21,7 @@ from heavytop.records import Report
 from heavytop.report.junit import comparison_junit
 from heavytop.report.policy import Policy
 from heavytop.suite.cases import CASES
-from reports import all_good, compare, expand, html, load, measure
+from reports import all_good, compare, expand, html, load, measure, plan_of
 
 CASE = CASES["euler"]
 TIMES = [Fraction(1, 2), Fraction(2)]
@@ -343,3 +343,18 @@ def test_the_states_that_pass_are_the_bits_that_were_returned(precision) -> None
     raw = peers.peer("heyoka")(CASE.top, CASE.start, TIMES, precision)
     assert kept.texts() == raw.texts()
     assert (kept.times, kept.steps, kept.flags, kept.outcome) == (raw.times, raw.steps, raw.flags, raw.outcome)
+
+
+def test_every_kind_that_propagates_has_a_failed_row_for_an_integrator_that_fails(package: Path) -> None:
+    run = {"precision": "double", "horizon": "2", "samples": 4}
+    mine = {"cases": ["euler"], "integrator": "mine:zero"}
+    tables = [
+        mine | {"kind": "drift", "runs": [run]},
+        mine | {"kind": "growth", "runs": [run | {"starts": 8}]},
+        mine | {"kind": "homoclinic", "cases": ["delone"], "precisions": ["double"], "directions": ["forward"]},
+    ]
+    found = [measure(task) for task in expand(plan_of({"name": "mine", "measure": tables}))]
+    assert [(row.outcome, row.metrics) for row in found] == [("failed", {})] * 3
+    for row in found:
+        assert row.against.startswith("nothing: mine:zero raised ZeroDivisionError: division by zero in ")
+        assert row.key.subject.name == "mine:zero"
