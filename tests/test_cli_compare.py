@@ -136,7 +136,7 @@ def test_a_report_of_very_many_rows_is_shown_by_its_worst(reports, monkeypatch, 
     file = store.write(report(*(row(case=f"top[{i}]") for i in range(30))), reports / "old")
     for most, count in ((30, 30), (29, 1)):
         monkeypatch.setattr("heavytop.report.overview.MOST_LISTED", most)
-        assert heavytop(monkeypatch, "show", "old") == 0
+        assert heavytop(monkeypatch, "show", "old", "--full") == 0
         text = capsys.readouterr().out
         assert "30 measurements" in text
         assert text.count("top[") == count
