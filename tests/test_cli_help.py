@@ -37,7 +37,7 @@ def test_nothing_is_cut_at_80_columns() -> None:
         assert COMMANDS[name].help.partition("\n\n")[0] in done.stdout
 
 
-LONG = {"run": "minutes", "selftest": "minutes"} | dict.fromkeys(("figures", "audit", "reference", "score"), "seconds")
+LONG = {"run": "minutes", "selftest": "minute"} | dict.fromkeys(("figures", "audit", "reference", "score"), "seconds")
 
 
 @pytest.mark.parametrize(("name", "words"), list(LONG.items()))

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 import heavytop as ht
 from heavytop.cli import app
+from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE
 from heavytop.report.score_page import score_page
 from heavytop.report.score_text import score_text
@@ -137,7 +138,7 @@ def test_the_data_of_a_case_can_be_pasted_everywhere(name: str, tmp_path: Path) 
     plan = tmp_path / "plan.toml"
     measure = f'[[measure]]\nkind = "local_error"\ncases = ["my-{name}"]\nprecisions = ["double"]\nhorizon = "1"\n'
     plan.write_text(f'name = "mine"\n{data["toml"]}\n{measure}')
-    (top,) = read(str(plan))[0].top
+    (top,) = read(str(plan), KINDS)[0].top
     assert (tuple(map(Fraction, top.inertia)), top.system) == (case.top.inertia, case.system.name)
     # Python
     names: dict = {}

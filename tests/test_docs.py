@@ -14,6 +14,7 @@ import typer
 import heavytop as ht
 from documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
 from heavytop.cli import app
+from heavytop.kinds import KINDS
 from heavytop.report import policy
 from heavytop.suite import plan
 
@@ -79,7 +80,7 @@ def read_toml(text: str, folder: Path) -> None:
     content, file = tomllib.loads(text), folder / "block.toml"
     file.write_text(text, "utf-8")
     if "measure" in content:
-        assert list(plan.expand(plan.load(str(file))[0]))
+        assert list(plan.expand(plan.load(str(file), KINDS)[0]))
     elif "project" in content:
         info = folder / "block-1.0.dist-info"
         info.mkdir()

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from io import StringIO
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
@@ -89,7 +90,14 @@ def test_durations_are_short(seconds: float, text: str) -> None:
 @dataclass
 class Part:
     label: str
-    cost: float
+    weight: float
+
+    @property
+    def key(self) -> SimpleNamespace:
+        return SimpleNamespace(kind="part")
+
+
+KINDS = {"part": SimpleNamespace(cost=lambda part: part.weight)}
 
 
 def test_a_bar_says_rows_per_cent_and_time_left() -> None:
@@ -106,7 +114,7 @@ def test_a_bar_says_rows_per_cent_and_time_left() -> None:
 
 
 def test_nothing_is_written_where_there_is_no_terminal(capfd: pytest.CaptureFixture[str]) -> None:
-    with Progress([Part("a", 1.0), Part("b", 2.0)], 2) as advance:
+    with Progress([Part("a", 1.0), Part("b", 2.0)], KINDS, 2) as advance:
         advance(Part("a", 1.0))
     with counted("figures", 2, "figures", 1.0) as step:
         step()

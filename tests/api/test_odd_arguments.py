@@ -125,6 +125,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "workers": 1,
             "scheduler": None,
             "seed": 0,
+            "integrator": None,
             "parquet": False,
         },
     ),

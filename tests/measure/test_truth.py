@@ -110,7 +110,8 @@ def test_the_words_of_both_runs_differ_though_their_formats_are_served_by_the_sa
     assert 0 < computed.radius(Fraction(2)) < Fraction(1, 2**140)
 
 
-def test_more_bits_than_words_have_are_out_of_reach(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_takes_longer_than_anyone_waits_is_out_of_reach(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(validated, "_seconds_a_step", lambda *_: 1e9)
+    monkeypatch.setattr(computed_reference, "EFFORT", 0.3)
     with pytest.raises(OutOfReach):
         truth(Problem.of(CHAOTIC, START, real(1000)), times(200, 2))

@@ -30,8 +30,8 @@ def run(
 ) -> int:
     """Run a plan of measurements and write its report.
 
-    It goes to DIR/report.json and DIR/report.html.  On two cores smoke takes about 20 seconds, default a minute, gate
-    two, peers five, growth ten, long an hour.
+    It goes to DIR/report.json and DIR/report.html.  On two cores smoke takes about 20 seconds, default and gate
+    two minutes, peers five, growth ten, long an hour.
     """
     from heavytop.api.run_folder import PAGE, prepare
     from heavytop.kinds import KINDS

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from heavytop.kinds.base import Kind
 from heavytop.records import Row
+from heavytop.report.brief import digits_lines
 from heavytop.report.plots import digits, growth
 from heavytop.report.text import DIGITS, largest_over, motions, title
 
@@ -19,6 +20,10 @@ class Score(Kind):
 
     name = "score"
     sections = (digits, growth)
+
+    def brief(self, rows: Sequence[Row]) -> list[str]:
+        """Digits right, a line a motion."""
+        return digits_lines(rows, "Digits right, to |t|")
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line a row."""

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from itertools import chain, islice
 from math import inf
-from textwrap import shorten, wrap
+from textwrap import wrap
 
 from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.records import UNMEASURED, Report, Row
@@ -23,6 +23,8 @@ MOST_ROWS = 1000
 """More rows than these are counted, not listed."""
 _CELL, _MOST_COLUMNS = 14, 4
 _MOST_FAILURES = 3
+_MOST_OF_ONE = 4
+"""Lines of a failure."""
 _FEWEST = 2
 
 
@@ -40,7 +42,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
             if failed(row, kinds):
                 bad += 1
                 if len(failures) < _MOST_FAILURES:
-                    failures.append(shorten(failure(row), WIDTH, placeholder=" ..."))
+                    failures.append(failure(row).strip())
             yield row
 
     if len(first) <= MOST_ROWS:
@@ -53,7 +55,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     head += f"{bad} did not reach their horizon:" if bad else "all finished."
     if bad > len(failures):
         failures[-1:] = [f"and {bad - len(failures) + 1} more"]
-    lines = [head, *(f"  {line}" for line in failures)]
+    lines = [head, *(line for each in failures for line in wrapped(f"  {each}", "    ")[:_MOST_OF_ONE])]
     return "\n".join(printable(line)[:WIDTH] for line in [*lines, *fitted(parts, LINES - len(lines))])
 
 
