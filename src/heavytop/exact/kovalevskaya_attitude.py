@@ -26,7 +26,8 @@ On asymptotic motions e² = k², v tends to 0 and v² = f², f = l (s − e) −
 
 and (log f)' is known however small f is (:meth:`AbelMotion.approach`), so that M stands in the place of v.
 
-Derived here: the vector by fitting polynomials to motions, all of the above then proven by exact arithmetic.
+Derived here: the vector by fitting polynomials to motions; v·γ, v² and Λ' are then proven as identities between
+polynomials on |γ| = 1 (tests/exact/test_attitude.py).
 """
 
 from __future__ import annotations
