@@ -85,7 +85,7 @@ class ScaledMotion:
         return self._carriers[precision]
 
     def _require_right(self, carrier: Carrier) -> None:
-        """The first step that machine code takes in this process is held against exact integers."""
+        """The first step that machine code takes in this process is compared with exact integers."""
         grid, size = carrier.grid, len(self.scaled.state)
         key = (grid, self.scaled.system.name, size)
         if key in _seen_right:

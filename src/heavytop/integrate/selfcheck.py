@@ -77,7 +77,7 @@ def derivatives(system: System, attitude: bool, count: int, p: Parameters = PARA
 
 
 def check(engine: Any, system: System, precision: Precision, constants: Parameters | None = None) -> None:
-    """One step of a compiled integrator, scalar or batch, held against what is known; its time and state are reset.
+    """One step of a compiled integrator, scalar or batch, compared with what is known; its time and state are reset.
 
     Taylor coefficients (the first 100) against the exact ones; the length of the step against Jorba and Zou's rule;
     the new state and the dense output against the polynomial summed here.  Raises Contradiction.

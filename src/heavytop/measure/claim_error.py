@@ -1,5 +1,5 @@
-"""The error of a claim in its parts, never mixed: the formula held against the truth, and the formula held against
-itself in floating point.  (The third, an integrator held against the exact claim, is measured by SolutionError.)
+"""The error of a claim in its parts, never mixed: the formula compared with the truth, and the formula compared with
+itself in floating point.  (The third, an integrator compared with the exact claim, is measured by SolutionError.)
 """
 
 from __future__ import annotations

@@ -91,11 +91,11 @@ def _errors(
     lost = b - a
     if abs(lost) <= allowed:
         return SAME
-    luck = f", noise moves it by {noise / BITS:.1f} bits" if noise > limits.loss else ""
+    beyond = f", noise moves it by {noise / BITS:.1f} bits" if noise > limits.loss else ""
     if lost > 0:
-        return Verdict.WORSE, f"{lost / BITS:.1f} bits lost{luck}"
+        return Verdict.WORSE, f"{lost / BITS:.1f} bits lost{beyond}"
     odd = "; suspicious: look for a reason" if -lost > suspicious else ""
-    return Verdict.BETTER, f"{-lost / BITS:.1f} bits gained{luck}{odd}"
+    return Verdict.BETTER, f"{-lost / BITS:.1f} bits gained{beyond}{odd}"
 
 
 def _unresolved(old: Metric, new: Metric, lost: float, allowed: float) -> Judged:
