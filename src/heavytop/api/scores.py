@@ -11,7 +11,8 @@ from heavytop.display import Table
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.digits import digits_kept, digits_text
-from heavytop.measure.drift import Drift
+from heavytop.measure.drift import DRIFT, Drift
+from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import Precision
 from heavytop.records import Metric, Row
 from heavytop.report.diagnosis_text import diagnosis_text
@@ -124,8 +125,8 @@ def score(
     row = found.row
     return Score(
         row.outcome,
-        _summaries(row.metrics, "drift_"),
-        {part: size for part, size in _summaries(row.metrics, "solution_error_").items() if part in _PARTS},
+        _summaries(row.metrics, DRIFT),
+        {part: size for part, size in _summaries(row.metrics, SOLUTION_ERROR).items() if part in _PARTS},
         digits_kept(row),
         row.against,
         row,
@@ -158,7 +159,7 @@ def drift(run: Trajectory) -> dict[str, Summary]:
     measure = Drift(run.problem, run.problem.integrals())
     for time, state in zip(run.times, run.states, strict=True):
         measure(time, state)
-    return _summaries(measure.metrics(), "drift_")
+    return _summaries(measure.metrics(), DRIFT)
 
 
 def _rows(states: Any) -> list[list[Any]]:
@@ -173,7 +174,11 @@ def _rows(states: Any) -> list[list[Any]]:
     return rows
 
 
-def _summaries(metrics: dict[str, Metric], prefix: str) -> dict[str, Summary]:
-    """The metrics ``PREFIXNAME_max``, ``_rms`` and ``_final`` by NAME."""
-    names = [key[len(prefix) : -4] for key in metrics if key.startswith(prefix) and key.endswith("_rms")]
-    return {name: Summary(*(metrics[f"{prefix}{name}_{statistic}"] for statistic in Summary._fields)) for name in names}
+def _summaries(metrics: dict[str, Metric], name: str) -> dict[str, Summary]:
+    """Largest, root mean square and last of each component of the quantity of that name."""
+    quantities = [metric.quantity for metric in metrics.values() if metric.quantity]
+    return {
+        quantity.component: Summary(*(metrics[quantity.over(each).text] for each in Summary._fields))
+        for quantity in quantities
+        if (quantity.name, quantity.statistic) == (name, "rms")
+    }
