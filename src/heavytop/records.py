@@ -58,7 +58,6 @@ class Metric(msgspec.Struct, gc=False):
     """One measured number.
 
     quantity: what it is; its text is the metric's key in the report.
-
     value: decimal text; or a word that is no number: "nan", "missing", "never", "unresolved" (smaller than ten radii
     of the reference, see ``bound``).
     log10: its decimal logarithm; null for 0 and for the words.
@@ -260,10 +259,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """The exact data of a motion, as text: integers, decimals or fractions.
-
-    omega, gamma: of its start; empty for an ensemble of starts.
-    """
+    """The exact data of a motion, as text; omega and gamma, of its start, are empty for an ensemble of starts."""
 
     inertia: tuple[str, ...]
     weight: str
