@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import typer
 
+import from_a_wheel
 import heavytop as ht
 from documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
 from heavytop.cli import app
@@ -64,10 +65,14 @@ TABLES = (ht.Trajectory, ht.Reference, ht.Score, ht.Report, ht.Comparison, ht.Au
 def to_run(page: Path) -> list[Block]:
     """The blocks of code without a reason not to run them.
 
-    Not here: the two commands of the README, which .ci/run runs, and cells, which run when the site is built.
+    Not here: of the README the two commands and the three ways in, which .ci/run runs (the latter from a wheel), and
+    cells, which run when the site is built.
     """
     found = [block for block in blocks(page) if block.language not in NOT_CODE | {CELL} and not block.not_run]
-    return [block for block in found if block.language or page.name != "README.md"]
+    if page != ROOT / "README.md":
+        return found
+    doors = tuple(f"heavytop {key}" for key in from_a_wheel.LIMITS)
+    return [block for block in found if block.language and not any(door in block.text for door in doors)]
 
 
 def without_options(cell: str) -> str:

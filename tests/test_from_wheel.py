@@ -74,7 +74,9 @@ def installed(folder: Path, wheel: Path) -> Path:
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     site = folder / "env" / "lib" / version / "site-packages"
     (site / "others.pth").write_text(packages())
-    done(folder, sys.executable, "-m", "pip", "--python", "env/bin/python", "install", "--quiet", "--no-deps", wheel)
+    # the packages that are lent to it may hold a heavytop, which is not the one to try
+    pip = (sys.executable, "-m", "pip", "--python", "env/bin/python", "install", "--quiet", "--no-deps")
+    done(folder, *pip, "--ignore-installed", wheel)
     return folder / "env" / "bin"
 
 
