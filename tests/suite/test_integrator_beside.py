@@ -83,6 +83,18 @@ def test_what_it_cannot_do_is_a_row_that_failed(tmp_path: Path) -> None:
     assert row.reference.reason.startswith("scipy:DOP853 has no quad in euler")
 
 
+@pytest.mark.parametrize("integrator", ["words", "splitting:8"])
+def test_an_option_of_heyoka_that_it_lacks_fails_its_own_row(tmp_path: Path, integrator: str) -> None:
+    (tmp_path / "growth.toml").write_text(
+        PLAN[: PLAN.index("[[measure]]")]
+        + PLAN[PLAN.rindex("[[measure]]") :].replace("starts = 8", "starts = 8, high_accuracy = true")
+    )
+    _, theirs = read(str(tmp_path / "growth.toml"), KINDS, integrator=integrator)[2]
+    row = measure(theirs)
+    assert (row.outcome, row.metrics) == ("failed", {})
+    assert f"{integrator} has no high_accuracy" in row.reference.reason
+
+
 def test_the_gate_measures_every_thing_that_a_gate_asks() -> None:
     kinds = {kind for kind, name, _ in labels("gate", "splitting:4") if name == "splitting:4"}
     assert kinds == {"drift", "homoclinic", "work_precision", "growth"}

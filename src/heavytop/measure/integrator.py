@@ -84,14 +84,17 @@ class Integrator:
         **options: Any,
     ) -> list[Trajectory]:
         """The motions of ``problems``, as :func:`heavytop.integrate.ensemble.propagate_ensemble`; one after the other
-        where the integrator takes no more.  Raises InputError for an option that it does not have.
+        where the integrator takes no more.  Raises PeerFailed for an option that it does not have: its row fails alone.
         """
         if self.takes_many:
-            many = registry.ensemble_propagator(self.name, options)
+            try:
+                many = registry.ensemble_propagator(self.name, options)
+            except InputError as error:
+                raise PeerFailed(error.cause.removesuffix(".")) from None
             runs: list[Trajectory] = many(problems, times, observer=observer, finished=finished, threads=threads)
             return runs
         if options:
-            raise InputError(f"The integrator {self.name} has no {', '.join(options)}.", "Leave it out.")
+            raise PeerFailed(f"The integrator {self.name} has no {', '.join(options)}")
         runs = []
         for index, problem in enumerate(problems):
             watch = None if observer is None else _watching(observer, index)
@@ -109,11 +112,11 @@ class Integrator:
 
 
 def _given(problem: Problem) -> tuple[HeavyTop, State]:
-    """A top and a start that round to ``problem``; raises InputError for a gyrostat that is off its exact data."""
+    """A top and a start that round to ``problem``; raises PeerFailed for a gyrostat that is off its exact data."""
     if problem.system is HEAVY_TOP:
         return problem.top, problem.start
     if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system) != problem:
-        raise InputError("A gyrostat off its exact data is integrated side by side only.", "Use heyoka or words.")
+        raise PeerFailed("A gyrostat off its exact data is integrated side by side only, by heyoka and words")
     return problem.given
 
 
