@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
-from math import ceil
 from typing import Any
 
 from flint import arb
@@ -21,12 +20,11 @@ from heavytop.exact.balls import ball, midpoint, radius, radius_text, working_pr
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.integrate.words import follow
-from heavytop.integrate.words_engines import DoubleDouble, choose
+from heavytop.integrate.words_engines import accuracy, choose
 from heavytop.integrate.words_ensemble import propagate_words_ensemble
 from heavytop.precision import Precision, exact, number, real, shown
 from heavytop.records import Against
 from heavytop.top.times import check_times
-from heavytop.words import fixed
 
 MORE_BITS = 30
 """The words of the second run have at least so many more bits than those of the first."""
@@ -141,7 +139,7 @@ def compute(
 class _Served:
     """A motion in a format, and the words that serve it.
 
-    bits: of the words.  accuracy: the bits of a number near 1 that a step gets right.
+    bits: of the words.  accuracy: as in :func:`heavytop.integrate.words_engines.accuracy`.
     """
 
     problem: Problem
@@ -152,11 +150,7 @@ class _Served:
     def of(cls, given: Given, bits: int) -> _Served:
         problem = given(real(bits))
         arithmetic, scaled = choose(problem, None)
-        found = int(arithmetic.flags["bits"])
-        if isinstance(arithmetic, DoubleDouble):
-            return cls(problem, found, ceil(1 / arithmetic.tolerance).bit_length() - 1)
-        # what the smallest component needs below the others is no more than floating-point numbers have anyway
-        return cls(problem, found, found - _SEARCH - fixed.spread(scaled) - fixed.excess(scaled))
+        return cls(problem, int(arithmetic.flags["bits"]), accuracy(arithmetic, scaled))
 
 
 def _finer(given: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
