@@ -99,7 +99,7 @@ def agreement(found: Sequence[ComputedReference]) -> Against:
 def of_rounded(problems: Sequence[Problem], times: Sequence[Fraction], least: int = 0) -> list[ComputedReference]:
     """The motions of problems of one format, from the very numbers that they are, in 30 bits more and 60 more.
 
-    least: bits of the first run at least.  They end where half of them have no digit left in the format.
+    least: bits of the first run at least.  All end where one has no digit left in the format, as laws of growth do.
     Raises OutOfReach as :func:`compute` does, and InputError for more bits than there are.
     """
     bits = problems[0].precision.bits
@@ -166,12 +166,12 @@ def _finer(given: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
 
 
 def _last_digit(found: Sequence[ComputedReference], fewer: Sequence[int]) -> Fraction | None:
-    """The first time at which half of the motions have no digit left in a format of so many bits ``fewer`` than words.
+    """The first time at which some motion has no digit left in a format of so many bits ``fewer`` than the words have.
 
     Its error is that of the shorter words, times 2 to as many bits: both are amplified alike.
     """
     lost = [each.beyond(Fraction(1, _DIGIT) / 2 ** max(0, bits)) for each, bits in zip(found, fewer, strict=True)]
-    return next((time for time in found[0].balls if 2 * sum(time in each for each in lost) >= len(lost)), None)
+    return next((time for time in found[0].balls if any(time in each for each in lost)), None)
 
 
 def _runs(served: Sequence[_Served], times: Sequence[Fraction]) -> list[Trajectory]:
