@@ -18,9 +18,9 @@ from heavytop.kinds.claim_tasks import INTEGRATION_ERROR
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.integrator import HEYOKA, require
 from heavytop.measure.known import Known, certified
-from heavytop.measure.reruns import Remembered, Reruns, escape_band
+from heavytop.measure.reruns import Reruns, escape_band
 from heavytop.measure.scalar import GUARD_BITS
-from heavytop.measure.scorer import Scorer
+from heavytop.measure.scorer import Remembered, Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import DOUBLE, exact, parse
 from heavytop.records import Direction, Metric, Quantity, Row, RowKey, by_name

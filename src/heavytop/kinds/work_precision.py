@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache, lru_cache
+from functools import lru_cache
 from statistics import median
 from time import perf_counter, sleep
 from typing import Any
@@ -16,14 +16,13 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from heavytop.errors import InputError
-from heavytop.exact.solution import ExactSolution
 from heavytop.integrate import peers
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.known import Known, known_motion
 from heavytop.measure.scalar import metric, of_fraction
-from heavytop.measure.scorer import Scorer
+from heavytop.measure.scorer import Remembered, Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import DOUBLE, exact, number, parse, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
@@ -240,7 +239,10 @@ def _timed(integrate: Any) -> tuple[dict[str, float], Trajectory]:
 
 def _scored(task: Task, problem: Problem, run: Trajectory) -> Scorer:
     keep = [exact(number(time, problem.precision)) for time in task.keep]
-    scorer = Scorer(problem, _known(problem, exact(number(task.times[-1], problem.precision))), keep)
+    known, remembered = _known(problem, exact(number(task.times[-1], problem.precision)))
+    scorer = Scorer(problem, known, keep)
+    if scorer.error is not None:
+        scorer.error.known = remembered
     scorer.take(run.times, run.states)
     return scorer
 
@@ -272,18 +274,8 @@ def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:
     return of_fraction(max(abs(sign * exact(value) - start) for sign, value, start in pairs))
 
 
-class _Remembered:
-    """A known motion whose states are worked out once for all integrators that are compared with it."""
-
-    def __init__(self, solution: ExactSolution) -> None:
-        self.solution = solution
-        self.state = cache(solution.state)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.solution, name)
-
-
 @lru_cache(maxsize=8)
-def _known(problem: Problem, horizon: Fraction) -> Known | str:
+def _known(problem: Problem, horizon: Fraction) -> tuple[Known | str, Remembered | None]:
+    """The known motion; its states are worked out once for all integrators that are compared with it."""
     found = known_motion(problem, horizon)
-    return found if isinstance(found, str) else replace(found, solution=_Remembered(found.solution))
+    return found, None if isinstance(found, str) else Remembered(found.solution.state)

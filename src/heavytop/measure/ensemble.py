@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy
@@ -15,7 +15,7 @@ from flint import arb
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.digits import RELATIVE
 from heavytop.measure.ensemble_reference import Reference
-from heavytop.measure.growth import Ensemble, band, law, root_mean_square
+from heavytop.measure.growth import Array, Ensemble, band, law, root_mean_square
 from heavytop.measure.integrator import Integrator
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
 from heavytop.measure.scorer import Scorer, TimeText
@@ -23,11 +23,6 @@ from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import decimal_text
 from heavytop.records import Law, Metric, Quantity, Series
 from heavytop.top.heavy_top import State
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[Any]
 
 _DIGITS = 6
 _ACCUMULATES = {"along": 2, "across": 1, "omega": 2, "gamma": 2}

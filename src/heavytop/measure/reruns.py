@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache
 
 from flint import arb
 from msgspec.structs import replace as replace_struct
@@ -21,7 +20,7 @@ from heavytop.measure.integrator import Integrator
 from heavytop.measure.known import closed_form
 from heavytop.measure.rounding_noise import RERUNS, bands, duration_band, factor
 from heavytop.measure.scalar import to_ball
-from heavytop.measure.scorer import Scorer
+from heavytop.measure.scorer import Remembered, Scorer
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, available, exact, number, real, round_to
 from heavytop.records import Metric
 from heavytop.top.equations import GYROSTAT
@@ -36,13 +35,6 @@ _BITS = 32
 _FLOOR = math.log10(float(DOUBLE.eps)) - 1
 
 Metrics = dict[str, Metric]
-
-
-class Remembered:
-    """A known motion that works out each state once: state(time, bits) as in heavytop.exact.solution."""
-
-    def __init__(self, state: Callable[[Fraction, int], list[arb]]) -> None:
-        self.state = cache(state)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
+from functools import cache
 from typing import Any, Protocol
 
 from flint import arb
@@ -23,6 +24,13 @@ class TrueMotion(Protocol):
 
     def state(self, time: Fraction, bits: int) -> Sequence[arb]:
         """Six balls at ``time``."""
+
+
+class Remembered:
+    """A known motion that works out each state once: ``state(time, bits)`` as in :mod:`heavytop.exact.solution`."""
+
+    def __init__(self, state: Callable[[Fraction, int], Sequence[arb]]) -> None:
+        self.state = cache(state)
 
 
 class Scorer:

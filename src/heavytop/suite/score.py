@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
 from typing import Any
 
 import msgspec
@@ -16,7 +15,7 @@ from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.diagnosis import Diagnosis, diagnose
 from heavytop.measure.digits import RELATIVE, digits_kept, digits_of
 from heavytop.measure.known import known_motion
-from heavytop.measure.scorer import Scorer
+from heavytop.measure.scorer import Remembered, Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
 from heavytop.precision import DOUBLE_DOUBLE, exact, round_to
 from heavytop.records import Metric, Row, RowKey, Subject
@@ -120,7 +119,7 @@ def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Score
     keep = [times[i - 1] for i in log_spaced(len(times))]
     scorer = Scorer(problem, known_motion(problem, times[-1]), keep)
     if scorer.error is not None:
-        scorer.error.known = _Remembering(scorer.error.known)
+        scorer.error.known = Remembered(scorer.error.known.state)
     for time, state in zip(times, states, strict=False):
         scorer(time, state)
         progress()
@@ -149,13 +148,6 @@ def _finite(given: Given) -> list[tuple[Fraction, ...]]:
     """The states before the first that is not finite."""
     count = next((i for i, state in enumerate(given.states) if state is None), len(given.states))
     return [state for state in given.states[:count] if state is not None]
-
-
-class _Remembering:
-    """A known motion that works out each state once."""
-
-    def __init__(self, known: Any) -> None:
-        self.state = cache(known.state)
 
 
 def _size(row: Row) -> float | None:
