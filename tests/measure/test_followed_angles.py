@@ -51,4 +51,6 @@ def test_turns_through_a_swing_beside_the_pole_are_told_apart(integrator: str) -
 def test_at_a_pole_there_is_nothing_to_follow() -> None:
     top, start = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 9), (0, 0, 1))
     motion = compute(top, start, [Fraction(50)], DOUBLE, HEAVY_TOP, attitude=True)
-    assert motion.complete and motion.angles is not None and motion.angles[0][1] == "0"
+    assert motion.complete
+    assert motion.angles is not None
+    assert motion.angles[0][1] == "0"
