@@ -79,6 +79,17 @@ def test_where_it_is_not_done_the_attitude_is_the_enclosures():
     assert "validated" in attitude_of(PLAIN, 3400)[0]
 
 
+def upwards(a, h, side):
+    """d/dy of (u, α, β) at s + iy: du/ds = −αβ, α² = ∓(au − X), β² = ∓(au + X)."""
+
+    def field(_y, z):
+        u, alpha, beta = z
+        slope = 1.5 * u * u - h
+        return [-1j * alpha * beta, side * 1j * (a - slope) * beta / 2, side * 1j * (a + slope) * alpha / 2]
+
+    return field
+
+
 @pytest.mark.parametrize("seed", [2])
 def test_the_strips_are_analytic_as_far_as_they_say(seed):
     """The motion goes on upwards in s from real places, as far as |Im s| may be, within the bounds."""
@@ -94,18 +105,8 @@ def test_the_strips_are_analytic_as_far_as_they_say(seed):
             for angle in (0.3, 1.5, 2.9):
                 u, alpha, beta = (float(x) for x in form.halves(k, middle * 0 + angle, 0))
 
-                def field(_y, z):
-                    u, alpha, beta = z
-                    slope = 1.5 * u * u - h
-                    # du/ds = −d sin θ √g = −αβ for u1, α² = au − X
-                    return (
-                        [1j * -alpha * beta, -1j * (a - slope) * beta / 2, -1j * (a + slope) * alpha / 2]
-                        if k == 0
-                        else [1j * -alpha * beta, 1j * (a - slope) * beta / 2, 1j * (a + slope) * alpha / 2]
-                    )
-
                 with mpmath.workdps(15):
-                    flow = mpmath.odefun(field, 0, [u, alpha, beta])
+                    flow = mpmath.odefun(upwards(a, h, 2 * k - 1), 0, [u, alpha, beta])
                     place, first, second = flow(height)
                     assert abs(place - u) <= 0.45 * abs(u - other)
                     assert abs(first) <= one.largest[0]
