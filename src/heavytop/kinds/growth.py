@@ -25,6 +25,7 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import decimal_text, exact, number, parse, physical, usable_tolerance
 from heavytop.records import Law, Metric, Quantity, Row, RowKey, by_name
+from heavytop.report.answers import laws_headline
 from heavytop.report.brief import named, wrapped
 from heavytop.report.names import computed_by
 from heavytop.report.plots import digits
@@ -173,6 +174,10 @@ class Growth(Kind):
         seconds = {"reference": ready - began, "run": perf_counter() - ready, "compile": motions[0].compile}
         rounding = max(input_rounding(case.top, start, p) for start, p in zip(starts, true, strict=True))
         return _row(task, starts, motions, scorers, compared, seconds, rounding)
+
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """The laws, and whether the planted faults are told from them."""
+        return laws_headline(rows)
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line for each law."""

@@ -27,13 +27,14 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import exact, number, parse, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.answers import fastest
 from heavytop.report.brief import wrapped
 from heavytop.report.consistency import CLOSE, bound, ended, size_of, sizes
 from heavytop.report.method_growth import method_growth
 from heavytop.report.printable import printable
 from heavytop.report.text import table, title
 from heavytop.report.work_plots import work_precision
-from heavytop.report.work_precision import CONSTANTS, LANES, OURS, beside_ours, leads, panels
+from heavytop.report.work_precision import CONSTANTS, ERRORS, LANES, OURS, beside_ours, leads, panels
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import computed_row, time_text
@@ -49,11 +50,8 @@ _REST = 0.002
 """Seconds of sleep before a run: it then starts on a fresh slice of the processor's time."""
 _TOO_LONG = 3.0
 """A run of so many seconds is timed once."""
-ERROR_MAX, ERROR_FINAL, RETURN = (
-    Quantity("error", statistic="max"),
-    Quantity("error", statistic="final"),
-    Quantity("return_error"),
-)
+ERROR_MAX, ERROR_FINAL = ERRORS
+RETURN = Quantity("return_error")
 _OF_OTHERS = 0.6
 """Decades of rounding noise of integrators of others, whose step control turns a rounding into another step: rerun with
 other roundings, CVODE and splitting methods move by up to a decade."""
@@ -181,6 +179,10 @@ class WorkPrecision(Kind):
         ends = [size for series in both if (size := size_of(series.values[-1])) is not None]
         if len(ends) == len(both) and abs(max(ends) - last.log10) > CLOSE:
             yield "error_final: not the last value of its series"
+
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """Who is fastest at 1e-10 and by how much; of an integrator at one setting, what heyoka needs for its error."""
+        return fastest(rows)
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A table a case, then how heyoka compares."""

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from heavytop.precision import parse
-from heavytop.records import UNMEASURED, Row
+from heavytop.records import UNMEASURED, Quantity, Row
 
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 """heyoka; with the numbers of the top compiled into its code; eight motions at once.  All others are peers."""
+ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
+"""The largest over the samples, and that at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,27 +108,29 @@ class Lead:
         if self.ours is None:
             return f"{goal}: not reached"
         if self.ratio is None or self.theirs is None:
-            parts = [f"{goal} takes {_time(self.ours)}; no peer gets there"]
+            parts = [f"{goal} takes {seconds_text(self.ours)}; no peer gets there"]
         else:
-            pair = f"{_time(self.ours)} against {_time(self.theirs)}"
+            pair = f"{seconds_text(self.ours)} against {seconds_text(self.theirs)}"
             parts = [f"{goal} is {_speed(self.ratio)} than the best peer that gets there, {self.peer} ({pair})"]
         if self.general is not None:
             parts.append(f"{self.general[0]}, one code for every top, {self._general_said(self.general[1])}")
         if self.lanes is not None:
-            parts.append(f"a motion in lanes takes {_time(self.lanes)}")
+            parts.append(f"a motion in lanes takes {seconds_text(self.lanes)}")
         if self.compile:
-            parts.append("to compile, at most: " + ", ".join(f"{name} {_time(s)}" for name, s in self.compile.items()))
+            parts.append(
+                "to compile, at most: " + ", ".join(f"{name} {seconds_text(s)}" for name, s in self.compile.items())
+            )
         return "; ".join(parts)
 
     def _general_said(self, seconds: float | None) -> str:
         if seconds is None:
             return "does not get there"
         ratio = self._ratio(seconds)
-        return f"takes {_time(seconds)}" if ratio is None else f"is {_speed(ratio)} ({_time(seconds)})"
+        return f"takes {seconds_text(seconds)}" if ratio is None else f"is {_speed(ratio)} ({seconds_text(seconds)})"
 
 
-def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Line]]:
-    """The lines of each case.  metric: error_max (over the whole horizon) or error_final."""
+def panels(rows: Sequence[Row]) -> dict[str, list[Line]]:
+    """The lines of each case, by the largest error over the samples."""
     found: dict[str, dict[tuple[str, str], Line]] = {}
     for row in rows:
         if row.outcome in UNMEASURED:
@@ -134,7 +138,7 @@ def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Lin
         name, setting = row.key.subject.name, row.key.subject.setting
         line = found.setdefault(row.case, {}).setdefault((name, row.precision), Line(name, row.precision))
         seconds = row.seconds.get("least", math.nan)
-        error = row.metrics.get(metric)
+        error = row.metrics.get(ERRORS[0].text)
         if row.outcome != "success":
             line.failures.append(seconds)
         elif error is not None and error.log10 is not None and seconds > 0:
@@ -153,8 +157,8 @@ def beside_ours(rows: Sequence[Row]) -> list[str]:
                 continue
             (point,) = line.points
             seconds, _ = _quickest([each for each in ours if each.precision == line.precision], point.log10)
-            needs = "does not get there" if seconds is None else f"takes {_time(seconds)} for that"
-            text = f"{case}: {line.label} is off by {10**point.log10:.1e} at most after {_time(point.seconds)}"
+            needs = "does not get there" if seconds is None else f"takes {seconds_text(seconds)} for that"
+            text = f"{case}: {line.label} is off by {10**point.log10:.1e} at most after {seconds_text(point.seconds)}"
             said.append(f"{text}; {OURS} {needs}")
     return said
 
@@ -205,5 +209,6 @@ def _speed(ratio: float) -> str:
     return f"{ratio:.1f} times faster" if ratio >= 1 else f"{1 / ratio:.1f} times slower"
 
 
-def _time(seconds: float) -> str:
+def seconds_text(seconds: float) -> str:
+    """1.5 s, or 15 ms."""
     return f"{seconds:.3g} s" if seconds >= 1 else f"{1000 * seconds:.3g} ms"
