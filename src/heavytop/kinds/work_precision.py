@@ -24,7 +24,7 @@ from heavytop.measure.known import Known, known_motion
 from heavytop.measure.scalar import metric, of_fraction
 from heavytop.measure.scorer import Remembered, Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
-from heavytop.precision import exact, number, parse, usable_tolerance
+from heavytop.precision import DOUBLE, exact, number, parse, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.brief import wrapped
 from heavytop.report.consistency import CLOSE, bound, ended, size_of, sizes
@@ -53,6 +53,8 @@ ERROR_MAX, ERROR_FINAL, RETURN = (
     Quantity("error", statistic="final"),
     Quantity("return_error"),
 )
+_RUNGS = {"tolerance": ["1e-6", "1e-9", "1e-12", FINEST], "step": ["1/10", "1/30", "1/100", "1/300"], "": [FINEST]}
+"""Of an integrator that is measured beside heyoka in double, by what it is set by."""
 _OF_OTHERS = 0.6
 """Decades of rounding noise of integrators of others, whose step control turns a rounding into another step: rerun with
 other roundings, CVODE and splitting methods move by up to a decade."""
@@ -106,9 +108,15 @@ class WorkPrecisionTable(Table, tag=NAME):
         ]
 
     def beside(self, integrator: str) -> Table | None:
-        """Its finest rung in each format that heyoka has a ladder in."""
-        formats = dict.fromkeys(each.precision for each in self.ladders if each.integrator == OURS)
-        ladders = [Ladder(integrator, precision, [FINEST]) for precision in formats]
+        """Four rungs in double, and the finest in other formats, where heyoka has a ladder."""
+        formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
+        knob = peers.knob_apart(integrator) if DOUBLE.name in formats else ""
+        ladders = [
+            Ladder(integrator, name, **{"steps" if knob == "step" else "tolerances": _RUNGS[knob]})
+            if name == DOUBLE.name
+            else Ladder(integrator, name, [FINEST])
+            for name in formats
+        ]
         return msgspec.structs.replace(self, ladders=ladders) if ladders else None
 
 

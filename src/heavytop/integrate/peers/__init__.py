@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from fractions import Fraction
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
@@ -24,6 +26,7 @@ from typing import Any, NamedTuple
 from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate.peers.contract import Contained, contained, quiet, said
 from heavytop.integrate.trajectory import Trajectory
+from heavytop.processes import ChildContext
 
 GROUP = "heavytop.peers"
 HERE = "heavytop.integrate.peers"
@@ -119,6 +122,28 @@ def ready(name: str, setting: tuple[str, Fraction] | None = None) -> Contained:
     if not takes:
         raise PeerFailed(f"{name} has no {setting[0]}")
     return Contained(name, partial(chosen, **dict([setting])), own)
+
+
+def knob(name: str) -> str:
+    """What a peer is set by: "step", "tolerance", or "" for neither, as for one that cannot be used."""
+    for each in ("step", "tolerance"):
+        try:
+            ready(name, (each, Fraction(1, 100)))
+        except (InputError, PeerFailed):
+            continue
+        return each
+    return ""
+
+
+def knob_apart(name: str) -> str:
+    """:func:`knob`; one of another package is looked at in a process of its own, which it may end."""
+    if name in BUILT_IN:
+        return knob(name)
+    with ProcessPoolExecutor(1, mp_context=ChildContext()) as pool:
+        try:
+            return pool.submit(knob, name).result()
+        except BrokenProcessPool:
+            return ""
 
 
 def run(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
