@@ -1,8 +1,9 @@
-"""How many files of the program take part in one flow: a row of drift from TOML to the page, a propagation, a comparison.
+"""How many files take part in one flow: a row of drift from TOML to the page, a propagation, a comparison.
 
-``python benchmarks/hops.py`` prints, for each flow, the files of ``heavytop`` that execute a call in it, in the order of
-their first call; and how many of them are not the mathematics (`top/`, `words/`, `exact/`).  What runs while a module is imported counts for nothing: all modules are imported before.  Each flow
-is a process of its own, so that nothing is cached, and runs in one process and its threads.
+``python benchmarks/hops.py`` prints, for each flow, the files of ``heavytop`` that execute a call in it, in the order
+of their first call, and how many of them are not the mathematics (`top/`, `words/`, `exact/`).  What runs while a
+module is imported counts for nothing: all modules are imported before.  Each flow is a process of its own, so that
+nothing is cached.
 """
 
 from __future__ import annotations
