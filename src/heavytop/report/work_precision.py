@@ -97,6 +97,8 @@ class Lead:
         """The ratios in a line; "" where there is none."""
         if self.ratio is None:
             return ""
+        if self.ratio < 1:
+            return f"At 1e{self.log10:g} {self.peer} is {1 / self.ratio:.1f} × as fast as {self.name}"
         other = self.general and self._ratio(self.general[1])
         more = f" ({self.general[0]} {other:.1f} ×)" if self.general and other else ""
         return f"At 1e{self.log10:g} {self.name} is {self.ratio:.1f} × as fast as {self.peer}{more}"
@@ -106,9 +108,14 @@ class Lead:
         """The lead in a sentence."""
         goal = f"{self.case}: {self.name} at error 1e{self.log10:g}"
         if self.ours is None:
-            return f"{goal}: not reached"
+            theirs = "" if self.theirs is None else seconds_text(self.theirs)
+            fastest = f"; the fastest that gets there is {self.peer} ({theirs})" if theirs else ""
+            return f"{goal}: not reached{fastest}"
         if self.ratio is None or self.theirs is None:
             parts = [f"{goal} takes {seconds_text(self.ours)}; no peer gets there"]
+        elif self.ratio < 1:
+            parts = [f"{self.case}: the fastest at error 1e{self.log10:g} is {self.peer} ({seconds_text(self.theirs)})"]
+            parts.append(f"{self.name} is {_speed(self.ratio)} ({seconds_text(self.ours)})")
         else:
             pair = f"{seconds_text(self.ours)} against {seconds_text(self.theirs)}"
             parts = [f"{goal} is {_speed(self.ratio)} than the best peer that gets there, {self.peer} ({pair})"]
@@ -170,7 +177,7 @@ def leads(rows: Sequence[Row]) -> list[Lead]:
     return [
         lead
         for case, lines in panels(rows).items()
-        for log10, formats in ((-10.0, ("double",)), (-30.0, ("quad", "real")))
+        for log10, formats in ((-10.0, ("double",)), (-30.0, ("double-double", "quad", "real")))
         if (lead := _lead(case, log10, [line for line in lines if parse(line.precision).family in formats]))
     ]
 
