@@ -5,7 +5,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Metric, Report, Series
 from heavytop.report.svg import document
-from heavytop.report.work_precision import Line, Point, leads, panels
+from heavytop.report.work_precision import Line, Point, beside_ours, leads, panels
 from heavytop.report.work_precision_figure import draw_work_precision, growth_figure, work_precision_figure
 from reports import Row, summary
 
@@ -203,3 +203,31 @@ def test_a_hostile_name_is_text() -> None:
     drawn = document(work_precision_figure(rows))
     assert "<script" not in drawn
     assert "<b>" not in drawn
+
+
+def test_whoever_is_faster_stands_first() -> None:
+    wide = [
+        row("heyoka tolerance=eps", -33, 4.0, precision="quad"),
+        row("words tolerance=eps", -34, 0.5, precision="quad"),
+    ]
+    (lead,) = leads(wide)
+    assert lead.short == "At 1e-30 words quad is 8.0 × as fast as heyoka quad"
+    (alone,) = leads([OURS[0], row("words tolerance=eps", -15, 0.5)])
+    assert alone.text == "top/T=9: heyoka double at error 1e-10: not reached; words takes 500 ms"
+
+
+def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:
+    mine = [row("mine:rk4 step=1/10", -4, 0.0123), row("mine:rk4 step=1/30", -9.7, 123.4)]
+    mine += [row("mine:rk4 step=1/30", -13, 2.0, case="b/T=1"), row("heyoka tolerance=eps", -12, 0.5, case="b/T=1")]
+    said = [
+        "mine:rk4: largest error in its time (heyoka's time for that error)",
+        "                    top/T=9                        b/T=1",
+        "  step 1/10         1.0e-04 in 12 ms (1 s)         -",
+        "  step 1/30         2.0e-10 in 123 s (1.8 s)       1.0e-13 in 2 s (not reached)",
+    ]
+    assert beside_ours(OURS + LANES + mine) == said
+    # beside integrators of this program too: theirs are the plan's own ladders
+    assert beside_ours(ALL + mine) == said
+    assert beside_ours(ALL) == []
+    assert beside_ours(mine[:2]) == []
+    assert all(len(line) <= 80 for line in said)

@@ -205,9 +205,9 @@ class WorkPrecision(Kind):
         return parts + [Text(printable(f"  {lead.text}"), style="bold") for lead in leads(rows)]
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
-        """How heyoka compares, a sentence a case."""
+        """An integrator beside heyoka, rung by rung; else how heyoka compares, a sentence a case."""
         if beside := beside_ours(rows):
-            return [line for sentence in beside for line in wrapped(f"{sentence}.")]
+            return beside
         return [line for lead in leads(rows) if lead.short for line in wrapped(f"{lead.case}: {lead.short}.")]
 
 
