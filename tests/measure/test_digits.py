@@ -12,7 +12,7 @@ import pytest
 
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
-from heavytop.measure.known import known_motion
+from heavytop.measure.truth import known_motion
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import SCHEMA, Metric, Report
 from heavytop.report import plots

@@ -20,10 +20,10 @@ from heavytop.integrate import peers
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind
 from heavytop.measure.drift import DRIFT
-from heavytop.measure.known import Known, known_motion
 from heavytop.measure.scalar import metric, of_fraction
-from heavytop.measure.scorer import Remembered, Scorer
+from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
+from heavytop.measure.truth import Truth, truth
 from heavytop.precision import DOUBLE, exact, number, parse, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.brief import wrapped
@@ -239,10 +239,8 @@ def _timed(integrate: Any) -> tuple[dict[str, float], Trajectory]:
 
 def _scored(task: Task, problem: Problem, run: Trajectory) -> Scorer:
     keep = [exact(number(time, problem.precision)) for time in task.keep]
-    known, remembered = _known(problem, exact(number(task.times[-1], problem.precision)))
-    scorer = Scorer(problem, known, keep)
-    if scorer.error is not None:
-        scorer.error.known = remembered
+    times = tuple(exact(number(time, problem.precision)) for time in task.times)
+    scorer = Scorer(problem, _truth(problem, times), keep)
     scorer.take(run.times, run.states)
     return scorer
 
@@ -275,7 +273,7 @@ def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:
 
 
 @lru_cache(maxsize=8)
-def _known(problem: Problem, horizon: Fraction) -> tuple[Known | str, Remembered | None]:
-    """The known motion; its states are worked out once for all integrators that are compared with it."""
-    found = known_motion(problem, horizon)
-    return found, None if isinstance(found, str) else Remembered(found.solution.state)
+def _truth(problem: Problem, times: tuple[Fraction, ...]) -> Truth | str:
+    """Shared by all integrators that are compared with it, with every state that was worked out."""
+    found = truth(problem, times)
+    return found if isinstance(found, str) else found.remembered()
