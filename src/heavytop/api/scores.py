@@ -17,8 +17,8 @@ from heavytop.precision import Precision
 from heavytop.records import Metric, Row
 from heavytop.report.diagnosis_text import diagnosis_text
 from heavytop.report.text import short
+from heavytop.suite.given import of_arrays
 from heavytop.suite.score import Peer, assess
-from heavytop.suite.trajectory_file import of_arrays
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
 
