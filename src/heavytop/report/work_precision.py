@@ -108,10 +108,15 @@ class Lead:
         """The lead in a sentence."""
         goal = f"{self.case}: {self.name} at error 1e{self.log10:g}"
         if self.ours is None:
-            takes = "" if self.theirs is None else f"; {self.peer} takes {_time(self.theirs)}"
-            return f"{goal}: not reached{takes}"
+            fastest = (
+                "" if self.theirs is None else f"; the fastest that gets there is {self.peer} ({_time(self.theirs)})"
+            )
+            return f"{goal}: not reached{fastest}"
         if self.ratio is None or self.theirs is None:
             parts = [f"{goal} takes {_time(self.ours)}; no peer gets there"]
+        elif self.ratio < 1:
+            parts = [f"{self.case}: the fastest at error 1e{self.log10:g} is {self.peer} ({_time(self.theirs)})"]
+            parts.append(f"{self.name} is {_speed(self.ratio)} ({_time(self.ours)})")
         else:
             pair = f"{_time(self.ours)} against {_time(self.theirs)}"
             parts = [f"{goal} is {_speed(self.ratio)} than the best peer that gets there, {self.peer} ({pair})"]
@@ -195,7 +200,7 @@ def leads(rows: Sequence[Row]) -> list[Lead]:
     return [
         lead
         for case, lines in panels(rows).items()
-        for log10, formats in ((-10.0, ("double",)), (-30.0, ("quad", "real")))
+        for log10, formats in ((-10.0, ("double",)), (-30.0, ("double-double", "quad", "real")))
         if (lead := _lead(case, log10, [line for line in lines if parse(line.precision).family in formats]))
     ]
 
