@@ -13,7 +13,7 @@ from heavytop.report.answers import fastest
 from heavytop.report.pictures import draw_report
 from heavytop.report.svg import quiet_style
 from heavytop.report.work_plots import work_precision
-from heavytop.report.work_precision import Line, Point, leads, panels
+from heavytop.report.work_precision import Line, Point, beside_ours, leads, panels
 from reports import Row, summary
 
 KIND = ("svg", "pdf")
@@ -214,8 +214,6 @@ def test_who_is_fastest_at_1e_10_opens_the_page() -> None:
         "fast:x is the fastest at error 1e-10 on all 1 motions: 4.0 times as fast as heyoka double.",
     )
     assert fastest(OURS[:1] + CYRK) is None
-    (_, said) = fastest([*OURS, row("mine:x tolerance=eps", -8, 3.0)])
-    assert said == "top/T=9: mine:x is off by 1.0e-08 at most after 3 s; heyoka takes 1 s for that."
 
 
 def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:
@@ -246,3 +244,34 @@ def test_a_hostile_name_is_text() -> None:
     rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{$')]
     assert "<script" not in drawn(rows).svg
     assert "<b>" not in drawn(rows).svg
+
+
+def test_whoever_is_faster_stands_first() -> None:
+    wide = [
+        row("heyoka tolerance=eps", -33, 4.0, precision="quad"),
+        row("words tolerance=eps", -34, 0.5, precision="quad"),
+    ]
+    (lead,) = leads(wide)
+    assert lead.short == "At 1e-30 words quad is 8.0 × as fast as heyoka quad"
+    (alone,) = leads([OURS[0], row("words tolerance=eps", -15, 0.5)])
+    assert (
+        alone.text
+        == "top/T=9: heyoka double at error 1e-10: not reached; the fastest that gets there is words (500 ms)"
+    )
+
+
+def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:
+    mine = [row("mine:rk4 step=1/10", -4, 0.0123), row("mine:rk4 step=1/30", -9.7, 123.4)]
+    mine += [row("mine:rk4 step=1/30", -13, 2.0, case="b/T=1"), row("heyoka tolerance=eps", -12, 0.5, case="b/T=1")]
+    said = [
+        "mine:rk4: largest error in its time (heyoka's time for that error)",
+        "                    top/T=9                        b/T=1",
+        "  step 1/10         1.0e-04 in 12 ms (1 s)         -",
+        "  step 1/30         2.0e-10 in 123 s (1.8 s)       1.0e-13 in 2 s (not reached)",
+    ]
+    assert beside_ours(OURS + LANES + mine) == said
+    # beside integrators of this program too: theirs are the plan's own ladders
+    assert beside_ours(ALL + mine) == said
+    assert beside_ours(ALL) == []
+    assert beside_ours(mine[:2]) == []
+    assert all(len(line) <= 80 for line in said)

@@ -188,7 +188,7 @@ class WorkPrecision(Kind):
             yield "error_final: not the last value of its series"
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """Who is fastest at 1e-10 and by how much; of an integrator at one setting, what heyoka needs for its error."""
+        """Who is fastest at 1e-10 and by how much."""
         return fastest(rows)
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
@@ -207,9 +207,9 @@ class WorkPrecision(Kind):
         return parts + [Text(printable(f"  {lead.text}"), style="bold") for lead in leads(rows)]
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
-        """How heyoka compares, a sentence a case."""
+        """An integrator beside heyoka, rung by rung; else how heyoka compares, a sentence a case."""
         if beside := beside_ours(rows):
-            return [line for sentence in beside for line in wrapped(f"{sentence}.")]
+            return beside
         return [line for lead in leads(rows) if lead.short for line in wrapped(f"{lead.case}: {lead.short}.")]
 
 

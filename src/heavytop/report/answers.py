@@ -13,7 +13,7 @@ from heavytop.precision import exact
 from heavytop.records import Law, Quantity, Row
 from heavytop.report.section import clip
 from heavytop.report.text import short
-from heavytop.report.work_precision import beside_ours, leads
+from heavytop.report.work_precision import leads
 
 _ALONG = Quantity(SOLUTION_ERROR, "along")
 
@@ -48,14 +48,10 @@ def _place(row: Row) -> tuple[str, int, str]:
 
 
 def fastest(rows: Sequence[Row]) -> tuple[str, str] | None:
-    """Who is fastest at 1e-10 and by how much; of integrators at one setting alone, what heyoka takes for their error.
-
-    Over the motions on which heyoka and a peer reach it.
-    """
+    """Who is fastest at 1e-10 and by how much, over the motions on which heyoka and a peer reach it."""
     found = [(lead, ratio) for lead in leads(rows) if lead.log10 == -10 and (ratio := lead.ratio) is not None]
     if not found:
-        beside = beside_ours(rows)
-        return ("", f"{clip(beside[0], 300)}.") if beside else None
+        return None
     won = [(lead, ratio) for lead, ratio in found if ratio >= 1]
     if len(won) * 2 >= len(found):
         names = Counter(lead.name for lead, _ in won)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+from heavytop.integrate.peers import BUILT_IN
 from heavytop.precision import parse
 from heavytop.records import UNMEASURED, Quantity, Row
 
+_MOST_CASES, _CELL = 2, 31
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 """heyoka; with the numbers of the top compiled into its code; eight motions at once.  All others are peers."""
 ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
@@ -94,7 +96,7 @@ class Lead:
 
     @property
     def short(self) -> str:
-        """The ratios in a line; "" where there is none."""
+        """The ratios in a line, who is faster first; "" where there is none."""
         if self.ratio is None:
             return ""
         if self.ratio < 1:
@@ -155,19 +157,43 @@ def panels(rows: Sequence[Row]) -> dict[str, list[Line]]:
 
 
 def beside_ours(rows: Sequence[Row]) -> list[str]:
-    """Of each integrator that is measured at one setting alone: its error, its seconds, and heyoka's for that error."""
+    """The integrator that is measured beside heyoka alone, or comes from another package: a table of lines of 80
+    columns, a line a rung, of its error, its seconds and what heyoka takes for that error; two cases at most.
+    """
+    found = {case: lines for case, lines in panels(rows).items() if any(line.integrator == OURS for line in lines)}
+    names = {line.integrator for lines in found.values() for line in lines} - {OURS, CONSTANTS, LANES}
     said = []
-    for case, lines in panels(rows).items():
-        ours = [line for line in lines if line.integrator == OURS]
-        for line in lines:
-            if line.integrator in (OURS, CONSTANTS, LANES) or len(line.points) != 1 or not ours:
-                continue
-            (point,) = line.points
-            seconds, _ = _quickest([each for each in ours if each.precision == line.precision], point.log10)
-            needs = "does not get there" if seconds is None else f"takes {seconds_text(seconds)} for that"
-            text = f"{case}: {line.label} is off by {10**point.log10:.1e} at most after {seconds_text(point.seconds)}"
-            said.append(f"{text}; {OURS} {needs}")
+    for name in sorted(names if len(names) == 1 else names - BUILT_IN.keys()):
+        cases: dict[str, dict[str, str]] = {}
+        for case, lines in list(found.items())[:_MOST_CASES]:
+            for line in lines:
+                if line.integrator == name:
+                    ours = [each for each in lines if each.integrator == OURS and each.precision == line.precision]
+                    cells = {_rung(line, point): _cell(point, ours) for point in line.points}
+                    cases[case] = cases.get(case, {}) | cells
+        rungs = dict.fromkeys(rung for cells in cases.values() for rung in cells)
+        if rungs:
+            said += [f"{name}: largest error in its time (heyoka's time for that error)"]
+            said += [
+                _line("", cases),
+                *(_line(rung, [cells.get(rung, "-") for cells in cases.values()]) for rung in rungs),
+            ]
     return said
+
+
+def _rung(line: Line, point: Point) -> str:
+    setting = point.setting.replace("=", " ").replace("tolerance eps", "finest")
+    return setting if line.precision == "double" else f"{line.precision} {setting}"
+
+
+def _cell(point: Point, ours: Sequence[Line]) -> str:
+    seconds, _ = _quickest(ours, point.log10)
+    theirs = "not reached" if seconds is None else seconds_text(seconds, 2)
+    return f"{10**point.log10:.1e} in {seconds_text(point.seconds, 2)} ({theirs})"
+
+
+def _line(first: str, cells: Iterable[str]) -> str:
+    return f"  {first:18}" + "".join(f"{cell[: _CELL - 2]:{_CELL}}" for cell in cells).rstrip()
 
 
 def leads(rows: Sequence[Row]) -> list[Lead]:
@@ -216,6 +242,7 @@ def _speed(ratio: float) -> str:
     return f"{ratio:.1f} times faster" if ratio >= 1 else f"{1 / ratio:.1f} times slower"
 
 
-def seconds_text(seconds: float) -> str:
+def seconds_text(seconds: float, digits: int = 3) -> str:
     """1.5 s, or 15 ms."""
-    return f"{seconds:.3g} s" if seconds >= 1 else f"{1000 * seconds:.3g} ms"
+    value, unit = (seconds, "s") if seconds >= 1 else (1000 * seconds, "ms")
+    return f"{value:.0f} {unit}" if value >= 100 else f"{value:.{digits}g} {unit}"
