@@ -32,19 +32,16 @@ PARTS = {
         "integrate.taylor:propagate",
     ),
     "truth": (
-        "measure.known:certified",
-        "measure.known:known_motion",
-        "kinds.drift:known_motion",
-        "kinds.work_precision:known_motion",
+        "measure.truth:certified",
+        "measure.truth:Truth.evaluated",
         "kinds.homoclinic:certified",
         "kinds.claim_model:true_motion",
         "kinds.drift:truth",
         "kinds.work_precision:truth",
         "kinds.growth:reference",
-        "measure.solution_error:SolutionError.true_state",
     ),
     "scoring": ("measure.scorer:Scorer.__call__",),
-    "noise": ("measure.reruns:Reruns._of", "measure.reruns:_truth"),
+    "noise": ("measure.reruns:Reruns._of", "measure.reruns:uncertified"),
 }
 WHOLE = ("noise",)
 """Parts of which everything inside counts as that part."""

@@ -18,8 +18,8 @@ from heavytop.records import SCHEMA, Metric, Report
 from heavytop.report import plots
 from heavytop.report.overview import worst
 from heavytop.suite.cases import CASES
+from heavytop.suite.given import Given
 from heavytop.suite.score import score
-from heavytop.suite.trajectory_file import Given
 from report_helpers import error, row
 from reports import html, replace, summary
 

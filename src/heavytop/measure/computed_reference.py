@@ -37,8 +37,8 @@ _SEARCH = 8
 _WORD_BITS = 1032
 _DIGIT = 10
 """An error leaves a digit where it is below the size of the state over this."""
-_STAGES = (64, 16, 4, 1)
-"""The first 64th of the samples, then four times as many: most chaotic motions have lost their digits by then."""
+_STAGES = 6
+"""A truth that may end is computed to the horizon over 4^6 first, and then to four times as far, until it has ended."""
 
 Given = Callable[[Precision], Problem]
 """A motion to be computed, in any format."""
@@ -124,8 +124,7 @@ def compute(
     finer = _finer(given, bits, first)
     second = [_Served.of(each, finer) for each in given]
     words = [(one.bits, two.bits) for one, two in zip(first, second, strict=True)]
-    for part in _STAGES if format_bits is not None else _STAGES[-1:]:
-        early = times[: -(-len(times) // part)]
+    for early in _stages(times, _STAGES if format_bits is not None else 0):
         runs = _runs(first, early), _runs(second, early)
         balls = [dict(zip(early, _around(*pair, bits), strict=True)) for pair in zip(*runs, strict=True)]
         found = [ComputedReference(*each) for each in zip(words, balls, strict=True)]
@@ -163,6 +162,13 @@ def _finer(given: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
         while _Served.of(each, finer).bits < one.bits + MORE_BITS:
             finer += _SEARCH
     return finer
+
+
+def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
+    """Those of the times within the horizon over 4^n, each stage longer than the one before."""
+    ends = [abs(times[-1]) / 4**n for n in range(stages, -1, -1)]
+    counts = dict.fromkeys(sum(abs(time) <= end for time in times) for end in ends)
+    return [times[:count] for count in counts if count]
 
 
 def _last_digit(found: Sequence[ComputedReference], fewer: Sequence[int]) -> Fraction | None:

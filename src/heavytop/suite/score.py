@@ -20,10 +20,10 @@ from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE_DOUBLE, exact, round_to
 from heavytop.records import Against, Metric, Row, RowKey, Subject
 from heavytop.suite.cases import Case
+from heavytop.suite.given import Given
 from heavytop.suite.rows import computed_row, time_text
 from heavytop.suite.sampling import log_spaced
 from heavytop.suite.task import Task, seconds_a_step
-from heavytop.suite.trajectory_file import Given
 
 __all__ = ["Assessment", "Peer", "assess", "complete", "digits_kept", "score"]
 
