@@ -41,9 +41,8 @@ def looks(lines: Sequence[Line]) -> dict[str, dict[str, Any]]:
     return {key.label: {"color": COLOURS[key.colour], "marker": key.marker, "linewidth": 1.4} for key in keys}
 
 
-def work_precision_axes(axes: Any, lines: Sequence[Line], styles: dict[str, dict[str, Any]] | None = None) -> None:
+def work_precision_axes(axes: Any, lines: Sequence[Line], styles: dict[str, dict[str, Any]]) -> None:
     """Draw seconds against error on ``axes``; a run that gave up is a cross on the right edge, at the time it took."""
-    styles = looks(lines) if styles is None else styles
     for line in lines:
         style = styles[line.label]
         points = sorted(line.points, key=lambda point: point.log10)
@@ -62,9 +61,9 @@ def work_precision_axes(axes: Any, lines: Sequence[Line], styles: dict[str, dict
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def work_precision_figure(rows: Sequence[Row], metric: str = "error_max") -> Any:
+def work_precision_figure(rows: Sequence[Row]) -> Any:
     """A matplotlib figure: one panel a case, with the lead of heyoka in its title; None without such rows."""
-    cases = panels(rows, metric)
+    cases = panels(rows)
     if not cases:
         return None
     lead = {each.case: each for each in leads(rows)}
