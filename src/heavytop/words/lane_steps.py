@@ -19,7 +19,7 @@ from heavytop.top.equations import System
 from heavytop.words.double_double import LARGEST_STEP, STEP_BITS
 from heavytop.words.lanes import ZERO, turned
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
-from heavytop.words.pairs import add, log2, multiply, power_of_two, times
+from heavytop.words.pairs import add, divided, log2, multiply, power_of_two, times
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER, Pair, function
 
 FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
@@ -141,6 +141,7 @@ class _Round:
             words = code.loop(0, b.add(n, code.integer(1)), partial(self._pair_products, n, group), [code.zero] * 6)
             sums += [(words[2 * i], words[2 * i + 1]) for i in range(3)]
         y, following, quotient = self._row(n), self._row(b.add(n, code.integer(1))), self._quotient(n)
+        after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
         for i in range(6):
             total = code.quick_two_sum(*sums[i])
             if i < 3:
@@ -148,7 +149,7 @@ class _Round:
             for k, component, source in self.terms:
                 if component == i:
                     total = add(code, total, multiply(code, self._coefficient(k), self._pair(y, source)))
-            high, low = code.quick_two_sum(*multiply(code, total, quotient))
+            high, low = code.quick_two_sum(*divided(code, total, after, quotient))
             code.store(high, following, 16 * i)
             code.store(low, following, 16 * i + 8)
 

@@ -39,6 +39,17 @@ def times(code: Code, a: Pair, factor: Any) -> Pair:
     return product, code.fma(a[1], factor, error)
 
 
+def divided(code: Code, a: Pair, divisor: Any, inverse: Pair) -> Pair:
+    """a over a whole number whose inverse is given in two words.
+
+    A product with the inverse would be wrong in the same way at every step, which adds up where roundings average out;
+    the quotient of the exact remainder is not.
+    """
+    high = code.multiply(a[0], inverse[0])
+    rest = code.add(code.fma(code.negative(high), divisor, a[0]), a[1])
+    return high, code.fma(rest, inverse[0], code.multiply(rest, inverse[1]))
+
+
 def split(value: Fraction) -> tuple[float, float]:
     """The two doubles nearest to ``value``; exact for numbers of 106 bits."""
     high = float(value)
