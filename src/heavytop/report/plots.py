@@ -258,7 +258,7 @@ def _band(metrics: dict[str, Metric], quantity: Quantity) -> float | None:
 
 def _law(axes: Any, key: Key, law: Law, x: Sequence[float], y: Sequence[float]) -> None:
     """The law through the mean of the samples it was fitted to, with the fan of its interval."""
-    if law.exponent is None:
+    if law.exponent is None or law.growth == "unresolved":
         return
     ends = [logarithm(end) for end in (law.first, law.last)]
     low, high = (given if given is not None else other for given, other in zip(ends, (x[0], x[-1]), strict=True))
