@@ -19,9 +19,9 @@ from heavytop.precision import DOUBLE
 from heavytop.report.score_page import score_page
 from heavytop.report.score_text import score_text
 from heavytop.suite.cases import CASES
+from heavytop.suite.given import Given, of_arrays
 from heavytop.suite.plan import read
 from heavytop.suite.score import assess
-from heavytop.suite.trajectory_file import Given, of_arrays
 
 CASE = CASES["lagrange"]
 TIMES = [Fraction(k) for k in range(1, 9)]

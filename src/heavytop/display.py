@@ -10,6 +10,21 @@ _MOST = 12
 _ENDS = 5
 
 
+class Tabular:
+    """What shows itself as a table: ``repr`` as text, in a notebook as HTML."""
+
+    __slots__ = ()
+
+    def _table(self) -> Table:
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return self._table().text()
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """A title, a table below it and notes below that; long tables show their first and last rows.

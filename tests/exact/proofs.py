@@ -8,7 +8,9 @@ from fractions import Fraction
 import mpmath
 from flint import arb
 
+from heavytop.exact.attitude import attitude_of
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.validated import Validated
 from heavytop.top.equations import Parameters
 
 DIGITS_60 = 200
@@ -57,6 +59,17 @@ def assert_attitude(solution, time, step=Fraction(1, 10**12)):
         for a, b, w in zip(later, earlier, wanted, strict=True):
             # the error of the central difference is step²/6 times a third derivative
             assert abs((a - b) / (2 * ball(step)) - w).abs_upper() < size.abs_upper() ** 2 * arb("1e-20")
+
+
+def assert_meets(solution, times, bits=170):
+    """The attitude is that of the enclosure, both from the exact start."""
+    enclosure = Validated(solution.top, solution.start)
+    _, attitude = attitude_of(solution, bits)
+    for time in times:
+        pairs = list(zip(attitude(time, bits), enclosure.attitude(time, bits), strict=True))
+        with working_precision(2 * bits):
+            assert all(a.overlaps(b) for a, b in pairs)
+            assert max(abs(a - b).upper() for a, b in pairs) < arb("1e-40")
 
 
 def integrated(solution, time, digits=55):

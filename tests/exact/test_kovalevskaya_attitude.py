@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
-from proofs import assert_attitude, positive, rational, triple
+from proofs import assert_attitude, assert_meets, positive, rational, triple
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.attitude import attitude_of
@@ -15,7 +15,6 @@ from heavytop.exact.catalogue import find
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.kovalevskaya_attitude import along_gamma, level_vector
 from heavytop.exact.kovalevskaya_level import Level, start_of
-from heavytop.exact.validated import Validated
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
 F = Fraction
@@ -33,17 +32,6 @@ STARTS = {
 
 def motion_from(omega, gamma, moment=(F(1), F(0)), i3=F(1)):
     return Kovalevskaya(HeavyTop((2 * i3, 2 * i3, i3), 1, (*moment, 0)), State(omega, gamma))
-
-
-def assert_meets(motion, times, bits=170):
-    """The attitude is that of the enclosure, both from the exact start."""
-    enclosure = Validated(motion.top, motion.start)
-    _, attitude = attitude_of(motion)
-    for time in times:
-        pairs = list(zip(attitude(time, bits), enclosure.attitude(time, bits), strict=True))
-        with working_precision(2 * bits):
-            assert all(a.overlaps(b) for a, b in pairs)
-            assert max(abs(a - b).upper() for a, b in pairs) < arb("1e-40")
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -99,7 +87,7 @@ def test_every_naming_of_the_axes_has_the_attitude_of_its_enclosure(axes):
     top = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
     start = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
     found = find(renamed_top(top, axes), renamed_state(start, axes))
-    assert "validated" not in attitude_of(found)[0]
+    assert "validated" not in attitude_of(found, 170)[0]
     assert_meets(found, (F(3, 2),))
 
 
@@ -116,7 +104,7 @@ def test_with_a_variable_at_rest_the_attitude_is_the_enclosures():
     motion = motion_from((0, F(-4, 3), 0), UP)
     with pytest.raises(OutOfReach, match="at rest"):
         motion.attitude(F(1), 100)
-    assert "validated" in attitude_of(motion)[0]
+    assert "validated" in attitude_of(motion, 170)[0]
     assert_meets(motion, (F(2),))
 
 

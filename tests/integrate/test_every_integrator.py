@@ -68,6 +68,8 @@ def start_is_its_own_sample(name: str) -> None:
         ends_well(run, times)
         assert [exact(x) for x in run.states[0]] == list(Problem.of(GENERIC.top, GENERIC.start, DOUBLE).start.flat)
     assert call(name, GENERIC.top, GENERIC.start, [F(0)]).steps == 0
+    if name not in FORWARDS_ONLY:
+        ends_well(call(name, GENERIC.top, GENERIC.start, [F(0), F(-1)]), [F(0), F(-1)])
 
 
 def samples_are_those_of_one_motion(name: str) -> None:
@@ -127,6 +129,25 @@ def what_is_not_finite_is_no_success(name: str) -> None:
     assert len(run.states) == len(run.times) == 0
 
 
+def a_run_that_stops_early_says_so(name: str) -> None:
+    """A step limit is an outcome of those that have one; the others refuse it, as every option that they lack."""
+    if name == "planted fault":
+        return
+    with pytest.raises(InputError, match=f"{name} has no nonsense"):
+        registry.propagator(name, {"nonsense": 1})
+    if name not in registry.INTEGRATORS:
+        with pytest.raises(InputError, match=f"{name} has no step_limit"):
+            registry.propagator(name, {"step_limit": 3})
+        return
+    limited = registry.propagator(name, {"step_limit": 3})
+    run = limited(GENERIC.top, GENERIC.start, [F(1, 128), F(1000)], DOUBLE)
+    assert run.outcome is Outcome.STEP_LIMIT
+    assert run.times == (F(1, 128),)
+    assert run.steps == 3
+    assert F(1, 128) < run.time_reached < 1000
+    assert np.isfinite(np.asarray(run.states, float)).all()
+
+
 def bad_times_are_refused(name: str) -> None:
     for times in ([], [F(1), F(1)], [F(2), F(1)], [F(-1), F(1)]):
         with pytest.raises(InputError):
@@ -148,6 +169,7 @@ CONTRACT: tuple[Callable[[str], None], ...] = (
     rest_stays_rest,
     the_gyrostat_is_another_system,
     what_is_not_finite_is_no_success,
+    a_run_that_stops_early_says_so,
     bad_times_are_refused,
     threads_do_not_mix,
 )

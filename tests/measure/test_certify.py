@@ -17,9 +17,9 @@ from heavytop.exact.euler import Euler
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.validated import Validated
 from heavytop.measure.certify import _digits, agreed_digits, certify
-from heavytop.measure.known import certified
 from heavytop.measure.reference import reference
 from heavytop.measure.scalar import GUARD_BITS
+from heavytop.measure.truth import certified
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 

@@ -9,9 +9,10 @@ from heavytop.claims.ershkov import PartialCase
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.integrate.trajectory import Problem
 from heavytop.kinds.claim_model import true_motion
 from heavytop.measure.claim_error import claim_attitude, exact_claim, model_error
-from heavytop.measure.computed_reference import ComputedReference
+from heavytop.measure.computed_reference import ComputedReference, compute
 from heavytop.measure.parting import CLAIM_XI
 from helpers import VECTORS
 
@@ -46,9 +47,14 @@ def test_the_error_in_gamma_starts_like_half_k_t() -> None:
         assert float(error.omega) < 10 * float(case.solves.rate) ** 2 / 10**6
 
 
+def computed(motion, times: list[Fraction], **more) -> ComputedReference:
+    (found,) = compute([lambda precision: Problem.of(motion.top, motion.start, precision, **more)], times, 256)
+    return found
+
+
 def test_the_truth_for_six_is_the_motion_of_the_vectors() -> None:
     given = next(v for v in VECTORS if v["name"].startswith("paper data"))
-    known = ComputedReference(SIX.solves.top, SIX.solves.start, [Fraction(1)])
+    known = computed(SIX.solves, [Fraction(1)])
     for value, text in zip(known.state(Fraction(1)), given["state"], strict=True):
         assert abs(midpoint(value) - Fraction(text)) < Fraction(1, 10**58)
     assert "computed, not proven" in known.against.text
@@ -57,20 +63,20 @@ def test_the_truth_for_six_is_the_motion_of_the_vectors() -> None:
 def test_the_computed_truth_and_the_closed_form_agree_where_there_are_both() -> None:
     times = [Fraction(1, 2), Fraction(3)]
     delone = DeloneHomoclinic(TWO.alpha, TWO.i1)
-    computed = ComputedReference(delone.top, delone.start, times, xi=CLAIM_XI)
+    reference = computed(delone, times, xi=CLAIM_XI)
     truth, against = true_motion(TWO, times)
     assert against.how == "proven"
     for time in times:
         state, xi = truth(time)
         with working_precision(200):
-            for a, b in zip((*state, *xi), computed.state(time), strict=True):
+            for a, b in zip((*state, *xi), reference.state(time), strict=True):
                 assert abs(a - b) < ball(Fraction(1, 10**40))
 
 
 def test_a_computed_reference_that_does_not_arrive_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heavytop.measure.computed_reference._MOST_STEPS", 2)
     with pytest.raises(OutOfReach, match="stopped at the step limit"):
-        ComputedReference(SIX.solves.top, SIX.solves.start, [Fraction(10)])
+        computed(SIX.solves, [Fraction(10)])
 
 
 def test_claim_and_truth_start_from_the_same_attitude() -> None:

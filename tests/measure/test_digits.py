@@ -12,14 +12,14 @@ import pytest
 
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
-from heavytop.measure.known import known_motion
+from heavytop.measure.truth import known_motion
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import SCHEMA, Metric, Report
 from heavytop.report import plots
 from heavytop.report.overview import worst
 from heavytop.suite.cases import CASES
+from heavytop.suite.given import Given
 from heavytop.suite.score import score
-from heavytop.suite.trajectory_file import Given
 from report_helpers import error, row
 from reports import html, replace, summary
 

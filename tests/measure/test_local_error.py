@@ -1,5 +1,6 @@
 """Errors of single steps: a healthy step is right to an ulp, and a method's order shows beyond its step."""
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import accumulate, pairwise
 
@@ -7,25 +8,34 @@ import numpy
 import pytest
 
 from heavytop.integrate.broken import FAULTS
-from heavytop.integrate.taylor import first_steps
+from heavytop.integrate.taylor import first_steps, propagate
 from heavytop.integrate.trajectory import Outcome
+from heavytop.measure.integrator import Integrator
 from heavytop.measure.local_error import LocalError
+from heavytop.measure.single_calls import single_calls
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact
 from heavytop.suite.cases import CASES
 from heavytop.top.heavy_top import HeavyTop, State
 
 
 def examined(run, steps):
+    """The metrics of (time, step) pairs."""
     error = LocalError(run.problem)
-    for time, step in zip(run.times, steps, strict=True):
+    for time, step in steps:
         error(time, step)
     return error.metrics()
+
+
+def stepped(*given, by=first_steps, **options):
+    """A run and its (time, step) pairs."""
+    run, steps = by(*given, **options)
+    return run, list(zip(run.times, steps, strict=True))
 
 
 @pytest.mark.parametrize(("name", "precision"), [("kovalevskaya", DOUBLE), ("gyrostat", EXTENDED), ("euler", QUAD)])
 def test_a_step_is_right_to_an_ulp_and_of_the_order_that_heyoka_says(name, precision) -> None:
     case = CASES[name]
-    run, steps = first_steps(case.top, case.start, 2, precision, system=case.system)
+    run, steps = stepped(case.top, case.start, 2, precision, system=case.system)
     found = examined(run, steps)
     assert run.outcome is Outcome.SUCCESS
     assert 0 < float(found["local_error_ulp_rms"].value) <= float(found["local_error_ulp_max"].value) < 2
@@ -35,7 +45,7 @@ def test_a_step_is_right_to_an_ulp_and_of_the_order_that_heyoka_says(name, preci
 @pytest.mark.parametrize(("digits", "order"), [(6, 8), (12, 15)])
 def test_the_order_is_that_of_the_tolerance(digits, order) -> None:
     case = CASES["lagrange"]
-    run, steps = first_steps(case.top, case.start, 2, DOUBLE, tolerance=Fraction(1, 10**digits))
+    run, steps = stepped(case.top, case.start, 2, DOUBLE, tolerance=Fraction(1, 10**digits))
     assert run.order == order
     assert examined(run, steps)["observed_order"].value == str(order)
 
@@ -47,7 +57,7 @@ def test_a_step_that_is_off_by_ten_ulps_is_seen_as_that() -> None:
     off = step.end.copy()
     off[4] += 10 * numpy.finfo(float).eps * abs(step.start).max()
     good, bad = (
-        float(examined(run, [type(step)(step.start, step.length, step.coefficients, end)])["local_error_ulp_max"].value)
+        float(examined(run, [(run.times[0], replace(step, end=end))])["local_error_ulp_max"].value)
         for end in (step.end, off)
     )
     assert 10 - good <= bad <= 10 + good
@@ -56,7 +66,7 @@ def test_a_step_that_is_off_by_ten_ulps_is_seen_as_that() -> None:
 def test_one_order_less_shows_in_the_order_alone() -> None:
     case = CASES["generic"]
     asked = (first_steps, FAULTS["order"].first_steps)
-    healthy, broken = (examined(*steps(case.top, case.start, 4, DOUBLE)) for steps in asked)
+    healthy, broken = (examined(*stepped(case.top, case.start, 4, DOUBLE, by=steps)) for steps in asked)
     assert (healthy["observed_order"].value, broken["observed_order"].value) == ("20", "19")
 
 
@@ -75,3 +85,35 @@ def test_an_equilibrium_has_no_steps() -> None:
     run, steps = first_steps(top, State((0, 0, 0), (0, 0, 1)), 5, DOUBLE)
     assert (run.outcome, steps) == (Outcome.SUCCESS, [])
     assert LocalError(run.problem).metrics()["observed_order"].value == "missing"
+
+
+@pytest.mark.parametrize(("name", "order"), [("splitting:2", 2), ("splitting:8", 8)])
+def test_a_method_with_fixed_steps_shows_its_order_in_longer_ones(name, order) -> None:
+    case = CASES["generic"]
+    run, calls = single_calls(Integrator(name), case.top, case.start, Fraction(4), DOUBLE, case.system)
+    found = examined(run, calls)
+    assert found["observed_order"].value == str(order)
+    assert all(call.length == Fraction(1 / 100) for _, call in calls)
+    assert [time - call.length for time, call in calls] == [Fraction(i, 4) for i in range(16)]
+
+
+def test_an_error_of_a_call_is_that_of_one_step_from_where_it_starts() -> None:
+    case = CASES["euler"]
+    run, calls = single_calls(Integrator("splitting:2"), case.top, case.start, Fraction(1), DOUBLE, case.system)
+    size, worst = Fraction(0), Fraction(0)
+    for _, call in calls:
+        begin = State(*(tuple(map(exact, call.start[i : i + 3])) for i in (0, 3)))
+        (there,) = propagate(run.problem.top, begin, [call.length], QUAD).states
+        size = max(map(abs, (exact(value) for value in call.start)))
+        gap = max(abs(exact(a) - exact(b)) for a, b in zip(call.end, there, strict=True))
+        worst = max(worst, gap / size / DOUBLE.eps)
+    assert float(examined(run, calls)["local_error_ulp_max"].value) == pytest.approx(float(worst), rel=1e-7)
+
+
+def test_an_integrator_with_a_tolerance_is_called_over_its_mean_step_and_shows_no_order() -> None:
+    case = CASES["lagrange"]
+    run, calls = single_calls(Integrator("words"), case.top, case.start, Fraction(4), EXTENDED, case.system)
+    found = examined(run, calls)
+    assert float(calls[0][1].length) == pytest.approx(4 / run.steps)
+    assert found.keys() == {"local_error_ulp_max", "local_error_ulp_rms"}
+    assert 0 < float(found["local_error_ulp_max"].value) < 2

@@ -13,13 +13,12 @@ import heavytop.exact
 from heavytop.claims.ershkov import PartialCase
 from heavytop.exact.axes import ALL, renamed_state, renamed_top
 from heavytop.exact.catalogue import find
-from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds.claim_model import true_motion
-from heavytop.measure.computed_reference import ComputedReference
-from heavytop.measure.ensemble_reference import Wider, reference
-from heavytop.measure.known import Known, known_motion
-from heavytop.precision import DOUBLE, EXTENDED
+from heavytop.measure.computed_reference import of_rounded
+from heavytop.measure.ensemble_reference import reference
+from heavytop.measure.truth import Known, known_motion
+from heavytop.precision import DOUBLE
 from heavytop.records import Against
 from heavytop.report.against import weaker
 from heavytop.suite.cases import CASES
@@ -97,8 +96,7 @@ def test_a_known_motion_that_is_known_to_less_is_weaker(known, part: str, change
 
 
 def test_runs_that_agree_say_their_radius() -> None:
-    case = CASES["generic"]
-    coarse, fine = (ComputedReference(case.top, case.start, [ONE / 8], bits).against for bits in (100, 160))
+    coarse, fine = (of_rounded([problem("generic")], [ONE / 8], bits)[0].against for bits in (100, 160))
     assert (coarse.how, coarse.certificates) == ("computed", ())
     assert 0 < Fraction(fine.radius) < Fraction(1, 10**44) < Fraction(1, 10**32) < Fraction(coarse.radius)
     assert "radius" in weaker(fine, coarse)
@@ -115,38 +113,36 @@ def test_the_truth_of_a_claim_is_proven_whichever_it_is() -> None:
     assert weaker(closed, enclosed) == weaker(enclosed, closed) == ""
 
 
-def ensemble(problems: list[Problem], times: list[Fraction], name: str | None) -> Against:
-    wider = Wider({}, lambda: None)
-    return reference(problems, problems, times, name, propagate_ensemble, wider).against
-
-
 def test_references_of_ensembles_say_what_they_are_known_to() -> None:
-    times = [ONE, Fraction(12)]
-    closed = ensemble([problem("lagrange")] * 2, times, None)
+    times = (ONE, Fraction(12))
+    closed = reference((problem("lagrange"),) * 2, times).against
     first, every = closed.certificates
     assert (closed.how, first.starts, every.starts, every.of_starts) == ("proven", None, 2, 2)
     assert min(first.digits, every.digits) >= 19
     assert "2 of 2 starts certified" in closed.text
-    four = [problem("generic")] * 4
-    computed = ensemble(four, times, "extended")
-    assert (computed.how, computed.radius, computed.certificates) == ("computed", "", ())
-    assert (computed.checked.starts, Fraction(computed.checked.until)) == (4, 12)
-    assert Fraction(1, 10**5) < Fraction(computed.checked.part) < Fraction(1, 10)
-    assert "starts" in weaker(computed, ensemble(four[:1], times, "extended"))
-    assert "earlier" in weaker(computed, ensemble(four, times[:1], "extended"))
-    worse = msgspec.structs.replace(computed, checked=msgspec.structs.replace(computed.checked, part="1"))
-    assert "error of the computed reference" in weaker(computed, worse)
-    # what was not fit to score with is no reference, whatever is said of it
-    unfit, none = ensemble([problem("generic", EXTENDED)], times, "extended"), ensemble(four, times, None)
-    assert "of the error measured" in unfit.text
-    assert unfit.how == none.how == "none"
-    assert weaker(unfit, none) == weaker(none, unfit) == ""
+    four = (problem("generic"),) * 4
+    found = reference(four, times)
+    computed = found.against
+    assert (computed.how, computed.certificates, found.samples) == ("computed", (), 2)
+    assert "words of 106 and 138 bits agree within" in computed.text
+    assert 0 < max(map(max, found.blur)) < 1e-20
+    assert weaker(closed, computed) == "compared with a proven reference and with a computed reference"
+    worse = msgspec.structs.replace(computed, radius="1e-10")
+    assert "radius" in weaker(computed, worse)
+
+
+def test_a_truth_that_ends_earlier_is_weaker() -> None:
+    whole, late, early = (Against("computed", "words", "1e-9", until=until) for until in ("", "400", "-150"))
+    for old, new in ((whole, late), (whole, early), (late, early)):
+        assert weaker(old, new) == "the truth ends earlier"
+        assert weaker(new, old) == ""
+    assert weaker(late, msgspec.structs.replace(late, until="300")) == ""
 
 
 PLAN = {
     "name": "tiny",
     "measure": [
-        {"kind": "drift", "cases": ["generic"], "runs": [{"precision": "double", "horizon": "101", "samples": 2}]},
+        {"kind": "drift", "cases": ["generic"], "runs": [{"precision": "double", "horizon": "1e4", "samples": 2}]},
         {"kind": "local_error", "cases": ["euler"], "precisions": ["double"], "horizon": "1"},
         {"kind": "claim_evaluation", "cases": ["ershkov-partial-2"], "precisions": ["double"], "rate_times": ["1"]},
     ],

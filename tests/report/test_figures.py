@@ -11,7 +11,7 @@ import numpy
 import pytest
 
 from heavytop.claims.ershkov import PartialCase
-from heavytop.measure.curves import PAPER_FIGURES, drawings, gyrostat_curves, true_curves
+from heavytop.measure.curves import PAPER_FIGURES, drawings, exact_curves, true_curves
 from heavytop.report.figures import draw_figures
 
 
@@ -40,7 +40,7 @@ def test_the_drawn_truth_and_claim_are_as_far_apart_as_they_are(ratio, time, dis
     # distances computed to 50 digits by an independent integration
     times = [-Fraction(time), Fraction(0), Fraction(time)]
     truth, _ = true_curves(case(ratio), times)
-    ours = gyrostat_curves(case(ratio).solves, times)
+    ours = exact_curves(case(ratio).solves, times)
     found = numpy.abs(truth.states[-1, :3] - ours.states[-1, :3]).max()
     assert abs(found - distance) < 1e-6
 

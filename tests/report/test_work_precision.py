@@ -109,8 +109,11 @@ def test_an_error_that_nobody_reaches_makes_no_lead() -> None:
     [
         (OURS + SPLITTING, "takes 2 s; no peer gets there"),
         (OURS + FAILED, "no peer gets there"),
-        (OURS[:1] + CYRK, "not reached"),
-        ([*OURS, row("fast:x tolerance=1", -11, 0.5)], "4.0 times slower than the best peer that gets there, fast:x"),
+        (OURS[:1] + CYRK, "not reached; the fastest that gets there is cyrk:DOP853 (9 s)"),
+        (
+            [*OURS, row("fast:x tolerance=1", -11, 0.5)],
+            "the fastest at error 1e-10 is fast:x (500 ms); heyoka double is 4.0 times slower (2 s)",
+        ),
     ],
 )
 def test_a_lead_that_is_none_is_not_claimed(rows: list, words: str) -> None:
@@ -128,6 +131,14 @@ def test_formats_beyond_extended_are_compared_where_double_ends() -> None:
     ]
     assert both[1].ratio == pytest.approx(50)
     assert leads(OURS + wide) == both[1:]
+
+
+def test_whoever_is_fastest_is_named() -> None:
+    words = [row(f"words tolerance=1e{n}", n, 0.25, precision="double-double") for n in (-25, -31)]
+    heyoka = row("heyoka tolerance=eps", -33, 4.0, precision="quad")
+    (lead,) = leads([heyoka, *words])
+    assert lead.text.startswith("top/T=9: the fastest at error 1e-30 is words double-double (250 ms); ")
+    assert lead.short == "At 1e-30 words double-double is 16.0 × as fast as heyoka quad"
 
 
 def test_cases_formats_and_failures_are_kept_apart() -> None:

@@ -57,7 +57,8 @@ def test_whatever_heyoka_measures_is_measured_beside_it(plan: str) -> None:
     assert after[len(before) :] == [
         ("drift", "words", ""),
         ("homoclinic", "words", ""),
-        ("work_precision", "words", "tolerance=eps"),
+        ("local_error", "words", ""),
+        *(("work_precision", "words", f"tolerance={each}") for each in ("1e-6", "1e-9", "1e-12", "eps")),
         ("growth", "words", ""),
     ]
 
@@ -66,7 +67,7 @@ def test_whatever_heyoka_measures_is_measured_beside_it(plan: str) -> None:
 def test_its_rows_are_scored_like_those_of_heyoka(plan: str, integrator: str) -> None:
     tasks = read(plan, KINDS, integrator=integrator)[2]
     rows = [measure(task) for task in tasks if task.key.subject.name == integrator]
-    assert [row.outcome for row in rows] == ["success"] * 4
+    assert [row.outcome for row in rows] == ["success"] * 8
     assert all(row.finite and row.reference.how == "proven" for row in rows)
     assert all(row.integrator.startswith(integrator) for row in rows)
     kept = float(rows[0].metrics["solution_error_relative_max"])
@@ -97,7 +98,7 @@ def test_an_option_of_heyoka_that_it_lacks_fails_its_own_row(tmp_path: Path, int
 
 def test_the_gate_measures_every_thing_that_a_gate_asks() -> None:
     kinds = {kind for kind, name, _ in labels("gate", "splitting:4") if name == "splitting:4"}
-    assert kinds == {"drift", "homoclinic", "work_precision", "growth"}
+    assert kinds == {"drift", "homoclinic", "local_error", "work_precision", "growth"}
 
 
 def test_who_stands_beside_heyoka_is_another_that_is_known(plan: str, tmp_path: Path) -> None:

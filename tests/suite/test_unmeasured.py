@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from heavytop.errors import Contradiction, InputError, OutOfReach
-from heavytop.measure import known
+from heavytop.measure import truth
 from heavytop.report.policy import Policy
 from heavytop.suite.rows import unmeasured
 from reports import all_good, compare, expand, load, replace, rows, store
@@ -78,7 +78,8 @@ def test_a_contradiction_is_the_outcome_of_its_row_alone(tmp_path: Path, monkeyp
     def contradict(*_, **__):
         raise Contradiction("Two sources exclude each other.")
 
-    monkeypatch.setattr(known, "certify", contradict)
+    truth.known_motion.cache_clear()
+    monkeypatch.setattr(truth, "certify", contradict)
     ((_, row),) = rows(tasks_of(tmp_path, PLAN), 1, None)
     assert (row.outcome, row.against) == ("contradiction", "nothing: Two sources exclude each other.")
     key = row.key

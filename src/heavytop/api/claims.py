@@ -9,13 +9,13 @@ from heavytop.api import arguments
 from heavytop.claims.audit import PAPER, only_branch
 from heavytop.claims.audit import audit as audit_named
 from heavytop.claims.judge import AuditReport
-from heavytop.display import Table
+from heavytop.display import Table, Tabular
 from heavytop.top.equations import HEAVY_TOP, System
 
 _WORDS = {True: "holds", False: "refuted", None: "undecided"}
 
 
-class Audit(AuditReport):
+class Audit(Tabular, AuditReport):
     """The audit of a claim: ``verdict`` (holds, refuted or undecided), ``rows``, ``to_json()`` and ``exit_code``."""
 
     __slots__ = ()
@@ -31,12 +31,6 @@ class Audit(AuditReport):
         ]
         title = f"{self.claim} as a motion of {self.system}: {self.verdict}"
         return Table(title, ("equation", "component", "branch", "domain", "verdict"), lines)
-
-    def __repr__(self) -> str:
-        return self._table().text()
-
-    def _repr_html_(self) -> str:
-        return self._table().html()
 
 
 def audit(claim: str | os.PathLike[str], system: System | str = HEAVY_TOP, *, branch: str | None = None) -> Audit:

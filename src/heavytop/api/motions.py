@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import Any, TypeAlias, cast
 
@@ -65,14 +65,8 @@ def propagate(
     """
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)
-    options = _options(
-        xi=arguments.attitude(xi, state, form),
-        tolerance=arguments.tolerance(tolerance, form),
-        high_accuracy=arguments.flag(high_accuracy, "high_accuracy"),
-        compact_mode=arguments.flag(compact_mode, "compact_mode"),
-        step_limit=arguments.count(step_limit, "step_limit"),
-        observer=arguments.callback(observer, "observer"),
-    )
+    options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
+    options |= {} if xi is None else {"xi": arguments.attitude(xi, state, form)}
     run = registry.propagator(integrator, options)
     about, instants = arguments.system(system), arguments.times(times)
     return cast(Trajectory, run(body, state, instants, form, system=about))
@@ -112,27 +106,9 @@ def ensemble(
     form, about = arguments.precision(precision), arguments.system(system)
     bodies = arguments.listed(tops, HeavyTop, "tops")
     states = arguments.listed(starts, State, "starts")
-    size = max(len(bodies), len(states))
-    if not bodies or not states or {len(bodies), len(states)} - {1, size}:
-        raise InputError(
-            f"There are {len(bodies)} tops and {len(states)} starts.",
-            "Give as many of each, or one for all the others.",
-        )
-    problems = []
-    for index in range(size):
-        try:
-            body, state = arguments.motion(bodies[index % len(bodies)], states[index % len(states)], form)
-            problems.append(Problem.of(body, state, form, about))
-        except InputError as error:
-            raise InputError(f"Motion {index}: {error.cause}", error.remedy) from None
-    options = _options(
-        threads=arguments.count(threads, "threads"),
-        tolerance=arguments.tolerance(tolerance, form),
-        high_accuracy=arguments.flag(high_accuracy, "high_accuracy"),
-        compact_mode=arguments.flag(compact_mode, "compact_mode"),
-        step_limit=arguments.count(step_limit, "step_limit"),
-        observer=arguments.callback(observer, "observer"),
-    )
+    problems = _problems(bodies, states, form, about)
+    options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
+    options |= {} if threads is None else {"threads": arguments.count(threads, "threads")}
     run = registry.ensemble_propagator(integrator, options)
     return cast("list[Trajectory]", run(problems, arguments.times(times)))
 
@@ -171,6 +147,36 @@ def reference(
     )
 
 
-def _options(**given: object) -> dict[str, Any]:
-    """The options that were asked for: an integrator need not know the others."""
-    return {name: value for name, value in given.items() if value is not None}
+def _problems(tops: Sequence[HeavyTop], starts: Sequence[State], form: Precision, system: System) -> list[Problem]:
+    """The problems of an ensemble; a single top or start serves all of the others."""
+    size = max(len(tops), len(starts))
+    if not tops or not starts or {len(tops), len(starts)} - {1, size}:
+        remedy = "Give as many of each, or one for all the others."
+        raise InputError(f"There are {len(tops)} tops and {len(starts)} starts.", remedy)
+    problems = []
+    for index in range(size):
+        try:
+            top, start = arguments.motion(tops[index % len(tops)], starts[index % len(starts)], form)
+            problems.append(Problem.of(top, start, form, system))
+        except InputError as error:
+            raise InputError(f"Motion {index}: {error.cause}", error.remedy) from None
+    return problems
+
+
+def _options(
+    form: Precision,
+    tolerance: Number | None,
+    high_accuracy: bool | None,
+    compact_mode: bool | None,
+    step_limit: int | None,
+    observer: Callable[..., object] | None,
+) -> dict[str, Any]:
+    """The options that were asked for, checked: an integrator need not know the others."""
+    checked = {
+        "tolerance": arguments.tolerance(tolerance, form),
+        "high_accuracy": arguments.flag(high_accuracy, "high_accuracy"),
+        "compact_mode": arguments.flag(compact_mode, "compact_mode"),
+        "step_limit": arguments.count(step_limit, "step_limit"),
+        "observer": arguments.callback(observer, "observer"),
+    }
+    return {name: value for name, value in checked.items() if value is not None}

@@ -11,7 +11,7 @@ from heavytop import records
 from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.api.run_folder import prepare
-from heavytop.display import Table
+from heavytop.display import Table, Tabular
 from heavytop.errors import InputError, quoted
 from heavytop.kinds import KINDS
 from heavytop.measure.digits import digits_kept
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 PathLike = str | os.PathLike[str]
 
 
-class Report(records.Report):
+class Report(Tabular, records.Report):
     """A run of a plan: ``schema``, ``plan``, ``environment`` and ``rows``, in the plan's order."""
 
     @property
@@ -64,14 +64,8 @@ class Report(records.Report):
             body.append(list(map(printable, cells)))
         return Table(printable(title), ("row", "outcome", "digits kept", "largest drift"), body)
 
-    def __repr__(self) -> str:
-        return self._table().text()
 
-    def _repr_html_(self) -> str:
-        return self._table().html()
-
-
-class Comparison(comparing.Comparison):
+class Comparison(Tabular, comparing.Comparison):
     """Two reports compared: ``verdict`` (same, better, worse, incomparable), ``changed``, ``tally``, ``to_json()``."""
 
     __slots__ = ()
@@ -83,12 +77,6 @@ class Comparison(comparing.Comparison):
         ]
         notes = [printable(f"{name}: {old} -> {new}") for name, old, new in self.environment]
         return Table(headline(self), ("row", "metric", "verdict", "baseline", "candidate", "why"), body, notes)
-
-    def __repr__(self) -> str:
-        return self._table().text()
-
-    def _repr_html_(self) -> str:
-        return self._table().html()
 
 
 def run(

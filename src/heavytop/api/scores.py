@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Numbers
-from heavytop.display import Table
+from heavytop.display import Table, Tabular
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.digits import digits_kept, digits_text
@@ -17,8 +17,8 @@ from heavytop.precision import Precision
 from heavytop.records import Metric, Row
 from heavytop.report.diagnosis_text import diagnosis_text
 from heavytop.report.text import short
+from heavytop.suite.given import of_arrays
 from heavytop.suite.score import Peer, assess
-from heavytop.suite.trajectory_file import of_arrays
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
 
@@ -38,8 +38,8 @@ class Summary(NamedTuple):
     final: Metric
 
 
-@dataclass(frozen=True, slots=True)
-class Score:
+@dataclass(frozen=True, slots=True, repr=False)
+class Score(Tabular):
     """What a motion is worth.
 
     outcome: ``success``, or ``non_finite`` where a state is NaN or infinite: those before it are scored.
@@ -79,12 +79,6 @@ class Score:
         lines = [[label, *(short(metric.value) for metric in size)] for label, size in sizes.items()]
         title = f"{row.case} in {row.precision}: {self.outcome}, {kept}"
         return Table(title, ("", "largest", "rms", "final"), lines, [f"compared with {self.against}", *self.diagnosis])
-
-    def __repr__(self) -> str:
-        return self._table().text()
-
-    def _repr_html_(self) -> str:
-        return self._table().html()
 
 
 def score(

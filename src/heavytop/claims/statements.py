@@ -108,18 +108,20 @@ def motion_statements(motion: Motion, p: Parameters, system: System) -> Iterator
 
 def _integral_statements(motion: Motion, p: Parameters, system: System) -> Iterator[Statement]:
     third = (
-        (energy, "Omega.M/2 + P*r.gamma = C1")
+        (energy, "Omega.M/2 + P*r.gamma", "C1")
         if system is HEAVY_TOP
-        else (gyrostat_energy, "Omega.M/2 + lambda*M2 = C1")
+        else (gyrostat_energy, "Omega.M/2 + lambda*M2", "C1")
     )
-    for component, (integral, text) in enumerate(((gamma_squared, "|gamma|^2 = 1"), (area, "M.gamma = C0"), third), 1):
+    known = (gamma_squared, "|gamma|^2", "1"), (area, "M.gamma", "C0"), third
+    for component, (integral, left, right) in enumerate(known, 1):
+        text = f"{left} = {right}"
         value = integral(p, motion.state)
         if motion.constants is not None:
             yield _statement("1.3", component, motion, value - motion.constants[component - 1], text)
         elif component == 1:
             yield _statement("1.3", component, motion, value - 1, text)
         else:
-            yield _statement("1.3", component, motion, motion.rate(value), text.partition(" =")[0] + " is constant")
+            yield _statement("1.3", component, motion, motion.rate(value), f"{left} is constant")
 
 
 def _statement(equation: str, component: int, motion: Motion, residual: sympy.Expr, text: str) -> Statement:

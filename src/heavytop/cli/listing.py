@@ -44,7 +44,7 @@ def _everything() -> dict[str, Any]:
     from heavytop.suite.plan import BUILT_IN
 
     notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
-    own = {"heyoka": "every format but double-double", "words": "every format, up to about 1000 bits"}
+    own = {"heyoka": "every format but double-double", "words": "every format"}
     assert own.keys() == registry.INTEGRATORS.keys()
     others = {name: "installed" if reason is None else reason for name, reason in peers.available().items()}
     return {

@@ -11,21 +11,19 @@ farther.  :meth:`AlgebraicMotion.departure` encloses how far the two motions are
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import arb, arb_series
+from flint import arb
 
 from heavytop.errors import InputError
-from heavytop.exact.azimuth import Azimuth, Bearing
+from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
 from heavytop.exact.balls import ball, midpoint, to_bits, working_precision
-from heavytop.exact.closed_form import whole_series
 from heavytop.exact.flint_context import current_precision, whole_evaluation
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import Curve, OneGapMotion, gaps, value
-from heavytop.exact.reduced import Undecided
 from heavytop.exact.scales import exponent
 from heavytop.exact.validated import Validated
 from heavytop.precision import decimal_text, round_to, shown
@@ -35,7 +33,7 @@ _ROUNDED_BITS = 256
 
 
 @dataclass(frozen=True, slots=True)
-class AlgebraicMotion:
+class AlgebraicMotion(WithBearing):
     """A motion on a curve with P r = (N, 0, 0), N > 0 and |γ| = 1.
 
     place: x at t = 0.  signs: of Ω2 and Ω3 there (of √Q and √R, where x is not Ω1); +1 or −1.
@@ -83,44 +81,18 @@ class AlgebraicMotion:
 
         return to_bits(evaluate, bits)
 
-    def state(self, time: Fraction, bits: int) -> list[arb]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
-        return to_bits(lambda _working: self._evaluated(time), bits, time)
-
-    def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
-        """See :class:`heavytop.exact.solution.ExactSolution`."""
-        found: list[arb_series] = []
-
-        def evaluate(_working: int) -> list[arb]:
-            found[:] = [whole_series(part, length) for part in self._evaluated(time)]
-            return [part[0] for part in found]
-
-        to_bits(evaluate, bits, time, length)
-        return found
-
-    def _evaluated(self, time: Fraction) -> list[Any]:
-        try:
-            motion = _motion(self, current_precision()).at(ball(time))
-        except Undecided:
-            return [arb("nan")] * 6
-        size = ball(self.curve.gamma_square()).sqrt()
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.Evaluated`."""
+        motion, size = _motion(self, current_precision()).at(ball(time)), ball(self.curve.gamma_square()).sqrt()
         return [*motion[:3], *(component / size for component in motion[3:])]
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """A unit vector fixed in space and ⟂ γ, in body components: at t = 0 along the level part of M.
+    def bearing(self, time: Fraction) -> Bearing:
+        """See :class:`heavytop.exact.azimuth.WithBearing`."""
+        return _motion(self, current_precision()).bearing(_azimuth(self, current_precision()), ball(time))
 
-        Of Chaplygin's motion at rest, along the level part of what M/x tends to.
-        """
-
-        def evaluate(_working: int) -> list[arb]:
-            try:
-                azimuth, began = _azimuth(self, current_precision())
-                here = _motion(self, current_precision()).bearing(azimuth, ball(time))
-            except Undecided:
-                return [arb("nan")] * 3
-            return here.carried(began, began.along)
-
-        return to_bits(evaluate, bits, time)
+    def initial(self, began: Bearing) -> Sequence[arb]:
+        """Along the level part of M; of Chaplygin's motion at rest, of what M/x tends to."""
+        return began.along
 
     def rounded(self, bits: int = _ROUNDED_BITS) -> tuple[HeavyTop, State]:
         """A top of weight 1 and a start, exact, within 2^(3 − bits) of this one's, relative to sizes above 1; |γ| = 1.
@@ -142,10 +114,8 @@ class AlgebraicMotion:
 
 
 @kept
-def _azimuth(motion: AlgebraicMotion, bits: int) -> tuple[Azimuth, Bearing]:
-    made = _motion(motion, bits)
-    azimuth = made.azimuth()
-    return azimuth, made.bearing(azimuth, arb(0))
+def _azimuth(motion: AlgebraicMotion, bits: int) -> Azimuth:
+    return _motion(motion, bits).azimuth()
 
 
 @kept

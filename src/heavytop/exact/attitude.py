@@ -41,18 +41,19 @@ def turned_to_start(solution: ExactSolution, own: Attitude, time: Fraction, bits
     return to_bits(evaluate, bits)
 
 
-def has_attitude(solution: ExactSolution) -> bool:
-    """Whether its closed form has an attitude."""
-    return hasattr(solution, "attitude") and getattr(solution, "has_attitude", True)
+def has_attitude(solution: ExactSolution, bits: int) -> bool:
+    """Whether its closed form has an attitude to so many bits."""
+    return hasattr(solution, "attitude") and getattr(solution, "has_attitude", lambda _bits: True)(bits)
 
 
-def attitude_of(solution: ExactSolution) -> tuple[str, Attitude]:
+def attitude_of(solution: ExactSolution, bits: int) -> tuple[str, Attitude]:
     """How the attitude of ``solution`` is known, and ξ at (time, bits), from ``initial_xi`` of its γ.
 
-    By the closed form where it has an attitude, else by the validated enclosure of the same motion up to its reach.
+    By the closed form where it has an attitude to so many bits, else by the validated enclosure of the same motion up
+    to its reach.
     ξ raises OutOfReach where the bits cannot be proven, InputError for an enclosure of |γ| ≠ 1.
     """
-    if not has_attitude(solution):
+    if not has_attitude(solution, bits):
         enclosure = Validated(solution.top, solution.start, solution.system)
         return enclosure.method, enclosure.attitude
     own: Attitude = getattr(solution, "attitude")  # noqa: B009 - not every solution has it

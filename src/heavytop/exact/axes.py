@@ -78,10 +78,9 @@ class Renamed:
         there = inverse(self.axes)
         return f"{self.solution.method}, axes {there[0] + 1}{there[1] + 1}{there[2] + 1}"
 
-    @property
-    def has_attitude(self) -> bool:
-        """Whether the solution has one."""
-        return has_attitude(self.solution)
+    def has_attitude(self, bits: int) -> bool:
+        """Whether the solution has one to so many bits."""
+        return has_attitude(self.solution, bits)
 
     @property
     def system(self) -> System:

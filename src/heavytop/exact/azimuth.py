@@ -3,18 +3,27 @@
 Let h be the level part of a vector that the motion knows, and Λ its azimuth in space about γ.  Where Λ' = f(v) with a
 rational f of the variable v, Λ is an Abel integral over its phase: a polynomial over √g times the denominator of f,
 which counts as roots of multiplicity two (:mod:`heavytop.exact.gaps`).  It grows by a fixed angle with every turn.
-A vector ξ ⟂ γ fixed in space then stands at the angle δ − Λ from h, δ its angle at t = 0.
+A vector ξ ⟂ γ fixed in space then stands at the angle δ − Λ from h, δ its angle at t = 0 (:class:`WithBearing`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 from flint import arb
 
+from heavytop.errors import OutOfReach
+from heavytop.exact.balls import Undecided, to_bits, working_precision
+from heavytop.exact.closed_form import Evaluated
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.gaps import Gap
+from heavytop.exact.motion import kept
 from heavytop.top.heavy_top import cross, dot
+
+_GUARD = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,3 +63,53 @@ class Bearing:
         turned_sine, turned_cosine = (self.azimuth - began.azimuth).sin_cos()
         first, second = cosine * turned_cosine + sine * turned_sine, sine * turned_cosine - cosine * turned_sine
         return [first * a + second * b for a, b in zip(self.along, self.across, strict=True)]
+
+
+class WithBearing(Evaluated):
+    """A motion that knows the bearing of one vector, and so the attitude.
+
+    Mixed into the dataclass of each case, which brings ``made``.
+    """
+
+    __slots__ = ()
+
+    @abstractmethod
+    def bearing(self, time: Fraction) -> Bearing:
+        """At FLINT's working precision.
+
+        Raises Undecided where that does not suffice, OutOfReach where the azimuth is not known.
+        """
+
+    @abstractmethod
+    def initial(self, began: Bearing) -> Sequence[arb]:
+        """ξ at t = 0."""
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 :meth:`initial`.
+
+        Raises OutOfReach where it is not known.
+        """
+
+        def evaluate(working: int) -> list[arb]:
+            began = _began(self, working)
+            return self.bearing(time).carried(began, self.initial(began))
+
+        return to_bits(evaluate, bits, self.own_time(time))
+
+
+@kept
+def _began(case: WithBearing, _bits: int) -> Bearing:
+    return case.bearing(Fraction(0))
+
+
+@whole_evaluation
+def within_reach(make: Callable[[], object], bits: int) -> bool:
+    """Whether ``make`` does not raise OutOfReach where so many bits are wanted."""
+    with working_precision(bits + _GUARD):
+        try:
+            make()
+        except Undecided:
+            return True
+        except OutOfReach:
+            return False
+    return True

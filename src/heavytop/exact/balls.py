@@ -42,6 +42,10 @@ _SERIES_DIVISION = ("leading term in denominator is not nonzero", "quotient woul
 """What python-flint says of a division by a power series whose first coefficient may be 0, instead of nan."""
 
 
+class Undecided(ArithmeticError):
+    """The working precision does not decide a discrete question."""
+
+
 def ball(value: Fraction | int) -> arb:
     """``value`` as a ball at the working precision; of radius 0 where it is a binary number that fits."""
     return arb(fmpq(value.numerator, value.denominator))
@@ -136,7 +140,8 @@ def to_bits(
 ) -> list[arb]:
     """``evaluate(working bits)`` repeated at growing working precision until every ball has ``bits`` bits.
 
-    Bits count relative to a value above 1 and absolutely below it.  time: what it is evaluated at; it costs its own
+    Bits count relative to a value above 1 and absolutely below it; none are right where it raises Undecided.
+    time: what it is evaluated at; it costs its own
     bits, and the precision then comes in steps, so that lattices are made once.  length: of power series meanwhile.
     Raises OutOfReach where even a precision of 16 times the asked bits plus 4096, or of 32768, does not give them.
     """
@@ -148,6 +153,8 @@ def to_bits(
         with working_precision(inside, length):
             try:
                 values = evaluate(inside)
+            except Undecided:
+                values = [arb("nan")]
             except ValueError as error:
                 if str(error) not in _SERIES_DIVISION:
                     raise

@@ -71,26 +71,17 @@ def tanh_sech(argument: Any) -> tuple[Any, Any]:
     return side * (1 - decay * decay) / total, 2 * decay / total
 
 
-class ClosedForm(ABC):
-    """A motion given by one formula, :meth:`evaluate`, over power series.
-
-    Mixed into the dataclass of each case, which brings ``top``, ``start`` and ``method``.
-    """
+class Evaluated(ABC):
+    """A motion given by one formula, :meth:`evaluate`, over power series."""
 
     __slots__ = ()
-    system: System = HEAVY_TOP
-
-    if TYPE_CHECKING:  # a property here would become the default of the dataclass fields
-
-        @property
-        def top(self) -> HeavyTop: ...
-
-        @property
-        def start(self) -> State: ...
 
     @abstractmethod
     def evaluate(self, time: Fraction) -> list[Any]:
-        """The six components at ``time`` + ε, at FLINT's working precision and length of series."""
+        """The six components at ``time`` + ε, at FLINT's working precision and length of series.
+
+        Raises Undecided where that precision does not suffice.
+        """
 
     def own_time(self, time: Fraction) -> Fraction:
         """``time`` in the unit whose size costs working bits: that of a form which works in units of its own."""
@@ -110,6 +101,21 @@ class ClosedForm(ABC):
 
         to_bits(evaluate, bits, self.own_time(time), length)
         return found
+
+
+class ClosedForm(Evaluated):
+    """Mixed into the dataclass of each case, which brings ``top``, ``start`` and ``method``."""
+
+    __slots__ = ()
+    system: System = HEAVY_TOP
+
+    if TYPE_CHECKING:  # a property here would become the default of the dataclass fields
+
+        @property
+        def top(self) -> HeavyTop: ...
+
+        @property
+        def start(self) -> State: ...
 
 
 class WithAttitude(ClosedForm):

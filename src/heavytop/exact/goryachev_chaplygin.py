@@ -1,28 +1,14 @@
 """Goryachev-Chaplygin: I1 = I2 = 4 I3, c = 0, M·γ = 0, by inversion of Abel's integrals.
 
-The centre of mass may lie anywhere in the plane of the equal moments, and |γ| be anything but 0.  With I = (4, 4, 1),
-n = (c, 0, 0) (:mod:`heavytop.exact.reduced`), s = p² + q² and a = c|γ|
+The centre of mass may lie anywhere in the plane of the equal moments, and |γ| be anything but 0.  The separated
+variables (:mod:`heavytop.exact.goryachev_chaplygin_abel`) move along a straight line in Abel's integrals, at a cost
+that does not depend on the time; the attitude is beside them (:mod:`heavytop.exact.goryachev_chaplygin_attitude`).
 
-    h = 2s + r²/2 + cγ1,   G = r s − c p γ3,   u1,2 = ½ (r ± √(r² + 16 s)),   u1 ≥ 0 ≥ u2,   X(u) = ½ (u³ − 2h u − 4G)
-    x_k = X(u_k) = c (2pγ3 − γ1 u_k),   y_k = u_k' (u_k − u_other) = c (2qγ3 − γ2 u_k),   x_k² + y_k² = a² u_k²
-    f(u) = a² u² − X² = (au − X)(au + X),   y_k² = f(u_k),   Σ du/y = 0,   Σ u du/y = dt
-
-f has rational coefficients.  u_k = m + d cos θ_k, f = (u − lo)(hi − u) g (:mod:`heavytop.exact.gaps`),
-
-    θ1' = −√g1/(u1 − u2),   θ2' = −√g2/(u1 − u2),   G_0 constant,   G_1 → G_1 − t   (ε1 = 1, ε2 = −1)
-
-With α_k = √|au_k − X(u_k)|, β_k = √|au_k + X(u_k)|, analytic in θ_k, y1 = α1 β1, y2 = −α2 β2, and one sign σ for the
-whole motion
-
-    r = u1 + u2        p = σ (α1β2 + α2β1)/(4a)           q = −σ (β1β2 − α1α2)/(4a)
-    γ1 = −(X(u1) − X(u2))/(c (u1 − u2))     γ2 = −(α1β1 + α2β2)/(c (u1 − u2))     γ3 = −σ (α1β2 − α2β1)/(c (u1 − u2))
-
-so that turning points are points like any other.  σ is found by exclusion at the start.
 Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other.
 Where one variable tends to it the motion is asymptotic (:mod:`heavytop.exact.asymptotic`), and one may rest on it
 (:mod:`heavytop.exact.resting`).  Motions where both tend to it (G = 0) or both rest are refused; so are motions so near
 to them that the Fourier series do not resolve them, with the distance.
-Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); signs and recovery derived here from the integrals.
+Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904).
 """
 
 from __future__ import annotations
@@ -32,31 +18,29 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import acb, arb, arb_series
+from flint import arb
 
 from heavytop.errors import LevelNotDone, NotInClass
-from heavytop.exact.abel import Variable
+from heavytop.exact.azimuth import Bearing, WithBearing, within_reach
 from heavytop.exact.balls import ball
-from heavytop.exact.closed_form import ClosedForm, constant, series_length
+from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
-from heavytop.exact.gaps import MOST_TERMS, Roots, distance_of_others
-from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, roots, separated_start, size_of
-from heavytop.exact.motion import kept
-from heavytop.exact.reduced import Undecided
-from heavytop.exact.resting import Rest
-from heavytop.exact.separated import REMEDY, Line, decide, require_plane_centre, variable_between
+from heavytop.exact.gaps import distance_of_others
+from heavytop.exact.goryachev_chaplygin_abel import Motion
+from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude, Torus
+from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, roots, separated_start
+from heavytop.exact.motion import initial_xi, kept
+from heavytop.exact.separated import REMEDY, decide, require_plane_centre
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
 
 _DISTANCE = 1e-5
 """cosh β − 1 (:mod:`heavytop.exact.gaps`) where the Fourier series take nearly 2^17 terms for 50 digits."""
-_MINUS, _PLUS = 0, 1
-"""The factors au − X and au + X of f."""
 
 
 @dataclass(frozen=True, slots=True)
-class GoryachevChaplygin(ClosedForm):
+class GoryachevChaplygin(WithBearing, ClosedForm):
     """A motion of the Goryachev-Chaplygin top with the small moment on axis 3.
 
     Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0 and γ ≠ 0, and on the levels not done.
@@ -80,128 +64,29 @@ class GoryachevChaplygin(ClosedForm):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        try:
-            return _motion(self, current_precision()).at(time, current_length())
-        except Undecided:
-            return [arb("nan")] * 6
+        return _motion(self, current_precision()).at(time, current_length())
+
+    def has_attitude(self, bits: int) -> bool:
+        """Whether :meth:`attitude` holds: not for asymptotic motions, nor for very many digits."""
+        return within_reach(lambda: Torus.of(_motion(self, current_precision())), bits)
+
+    def bearing(self, time: Fraction) -> Bearing:
+        """See :class:`heavytop.exact.azimuth.WithBearing`."""
+        return _attitude(self, current_precision()).bearing(time)
+
+    def initial(self, began: Bearing) -> list[arb]:
+        """:func:`initial_xi` of γ."""
+        return initial_xi(self.start.gamma)
+
+
+@kept
+def _attitude(case: GoryachevChaplygin, bits: int) -> GoryachevChaplyginAttitude:
+    return GoryachevChaplyginAttitude.of(_motion(case, bits))
 
 
 @kept
 def _motion(case: GoryachevChaplygin, _bits: int) -> Motion:
     return Motion.of(Level.of(case.top, case.start))
-
-
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """The motion of a level at one working precision.
-
-    moment, size: c and a.  ends: numbers of the roots at both ends of each gap.  sign: σ.
-    """
-
-    level: Level
-    moment: arb
-    size: arb
-    curve: tuple[Root, ...]
-    ends: tuple[tuple[int, int], ...]
-    line: Line
-    sign: int
-
-    @classmethod
-    def of(cls, level: Level) -> Motion:
-        """At the working precision.
-
-        Raises Undecided where it does not suffice, OutOfReach where the Fourier series need too many terms.
-        """
-        curve, places = roots(level), separated_start(level)
-        ends = gap_ends(level, curve, places)
-        gaps = tuple(_variable(curve, pair) for pair in ends)
-        c, a = ball(level.moment_square).sqrt(), size_of(level)
-        turned = level.turned()
-        speeds = [c * (2 * turned[1] * turned[5] - turned[4] * u) for u in places]
-        # du/dθ is −y1/√g1 and y2/√g2
-        slopes = -speeds[0] * gaps[0].density(places[0]), speeds[1] * gaps[1].density(places[1])
-        phases = [gap.phase(u, slope) for gap, u, slope in zip(gaps, places, slopes, strict=True)]
-        line = Line.of(gaps, (1, -1), (0, -1), phases)
-        with series_length(1):
-            possible = []
-            for sign in (1, -1):
-                motion = cls(level, c, a, tuple(curve), tuple(ends), line, sign)
-                found = motion._state([arb_series([phase], prec=1) for phase in phases], [0, 0])
-                if all(one[0].overlaps(other) for one, other in zip(found, turned, strict=True)):
-                    possible.append(motion)
-        if len(possible) != 1:
-            raise Undecided
-        return possible[0]
-
-    def at(self, time: Fraction, length: int) -> list[Any]:
-        """The six components at ``time``, numbers, or series in t of that length.
-
-        Raises Undecided where the working precision does not prove the phases.
-        """
-        phases, turns = self.line.phases(ball(time * self.level.rate))
-        with series_length(length):
-            moving = self.line.series(phases, self._rates)
-            return self.level.restored(self._state(moving, turns), length)
-
-    def _rates(self, u1: Any, u2: Any) -> list[Any]:
-        """θ1' and θ2'."""
-        return [
-            u * 0 if isinstance(gap, Rest) else -1 / ((u1 - u2) * gap.density(u))
-            for gap, u in zip(self.line.variables, (u1, u2), strict=True)
-        ]
-
-    def _state(self, phases: Sequence[Any], turns: Sequence[int]) -> list[Any]:
-        """The six components in the turned frame."""
-        (u1, a1, b1), (u2, a2, b2) = (self._halves(k, phases[k], turns[k]) for k in (0, 1))
-        h, apart = ball(self.level.energy), 1 / (self.moment * (u1 - u2))
-        quarter = self.sign / (4 * self.size)
-        # (X(u1) − X(u2))/(u1 − u2)
-        slope = (u1 * u1 + u1 * u2 + u2 * u2 - 2 * h) / 2
-        return [
-            quarter * (a1 * b2 + a2 * b1),
-            quarter * (a1 * a2 - b1 * b2),
-            u1 + u2,
-            -slope / self.moment,
-            -(a1 * b1 + a2 * b2) * apart,
-            -self.sign * (a1 * b2 - a2 * b1) * apart,
-        ]
-
-    def _halves(self, variable: int, phase: Any, turns: int) -> tuple[Any, Any, Any]:
-        """(u, α, β)."""
-        gap, (low, high) = self.line.variables[variable], self.ends[variable]
-        u, side = gap.position(phase), -1 if turns % 2 else 1
-        at_end = dict(zip((low, high), gap.ends(phase), strict=True))
-        found = []
-        for factor in (_MINUS, _PLUS):
-            value, rest = phase * 0 + 1, phase * 0 + arb(1) / 2
-            for number, root in enumerate(self.curve):
-                if root.counts[factor] and number in at_end:
-                    # no power: FLINT takes logarithms for that, of 0 at a turning point
-                    value *= side * at_end[number] * (at_end[number] if root.counts[factor] > 1 else 1)
-                elif root.counts[factor]:
-                    rest *= _distance(u, root.value, root.counts[factor], gap.middle)
-            found.append(value * rest.sqrt())
-        # y_k = ±α_k β_k has the sign of −du/dθ
-        return u, -found[0] if constant(gap.bend(phase)) < 0 else found[0], found[1]
-
-
-def _distance(u: Any, root: acb, many: int, middle: arb) -> Any:
-    """|u − root|^many for a real root, its square for a pair once; 1 for the other of the pair."""
-    if root.imag.is_zero():
-        return (u - root.real if root.real < middle else root.real - u) ** many
-    if root.imag < 0:
-        return 1
-    return ((u - root.real) ** 2 + root.imag**2) ** many
-
-
-def _variable(curve: Sequence[Root], ends: tuple[int, int]) -> Variable:
-    """The gap between two simple roots, or the way from a simple one to a double one and back."""
-    low, high = (curve[number].value.real for number in ends)
-    if ends[0] == ends[1]:
-        return Rest(low)
-    rest = Roots.of(arb(1) / 4, [(root.value, root.multiplicity) for i, root in enumerate(curve) if i not in ends])
-    double = curve[ends[0]].multiplicity > 1, curve[ends[1]].multiplicity > 1
-    return variable_between(low, high, double, rest, MOST_TERMS)
 
 
 def _passes(curve: Sequence[Root], ends: tuple[int, int], place: Fraction) -> bool:

@@ -1,6 +1,6 @@
 """The exact level of a Goryachev-Chaplygin start, the roots of its curve, and u1, u2 there.
 
-Notation as in :mod:`heavytop.exact.goryachev_chaplygin`.
+Notation as in :mod:`heavytop.exact.goryachev_chaplygin_abel`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import Any
 
 from flint import acb, arb, fmpq_poly
 
-from heavytop.exact.balls import ball, midpoint
-from heavytop.exact.reduced import Reduced, Undecided, polynomial
+from heavytop.exact.balls import Undecided, ball, midpoint
+from heavytop.exact.reduced import Reduced, polynomial
 from heavytop.top.equations import Parameters
 from heavytop.top.integrals import goryachev_chaplygin
 

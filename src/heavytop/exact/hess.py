@@ -32,8 +32,8 @@ from flint import acb, arb, arb_mat, arb_series
 
 from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.abel import Inversion
-from heavytop.exact.azimuth import Azimuth, Bearing
-from heavytop.exact.balls import ball, to_bits, working_precision
+from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
+from heavytop.exact.balls import Undecided, ball, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.gaps import Gap, Roots
@@ -41,7 +41,6 @@ from heavytop.exact.hess_level import Level, require_hess
 from heavytop.exact.hess_transfer import System2, Transfer
 from heavytop.exact.motion import initial_xi, kept
 from heavytop.exact.one_gap import in_units
-from heavytop.exact.reduced import Undecided
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
@@ -51,7 +50,7 @@ _REMEDY = "The validated enclosure holds for every motion."
 
 
 @dataclass(frozen=True, slots=True)
-class Hess(ClosedForm):
+class Hess(WithBearing, ClosedForm):
     """A motion of Hess' top with M·γ ≠ 0 and the centre of mass in the plane of axes 1 and 3.
 
     Raises NotInClass unless P b = 0, P r ≠ 0, I1 (I2 − I3) a² = I3 (I1 − I2) c², M·P r = 0 and M·γ ≠ 0, all exactly,
@@ -80,32 +79,22 @@ class Hess(ClosedForm):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        try:
-            motion = _motion(self, current_precision())
-            return in_units(motion.at(ball(motion.level.rate * time)), motion.level.rate, motion.level.size)
-        except Undecided:
-            return [arb("nan")] * 6
+        motion = _motion(self, current_precision())
+        return in_units(motion.at(ball(motion.level.rate * time)), motion.level.rate, motion.level.size)
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 :func:`initial_xi` of γ."""
+    def bearing(self, time: Fraction) -> Bearing:
+        """See :class:`heavytop.exact.azimuth.WithBearing`."""
+        motion = _motion(self, current_precision())
+        return motion.bearing(_azimuth(self, current_precision()), ball(motion.level.rate * time))
 
-        def evaluate(_working: int) -> list[arb]:
-            try:
-                azimuth, began = _azimuth(self, current_precision())
-                motion = _motion(self, current_precision())
-                here = motion.bearing(azimuth, ball(motion.level.rate * time))
-            except Undecided:
-                return [arb("nan")] * 3
-            return here.carried(began, initial_xi(self.start.gamma))
-
-        return to_bits(evaluate, bits, self.own_time(time))
+    def initial(self, began: Bearing) -> list[arb]:
+        """:func:`initial_xi` of γ."""
+        return initial_xi(self.start.gamma)
 
 
 @kept
-def _azimuth(case: Hess, bits: int) -> tuple[Azimuth, Bearing]:
-    motion = _motion(case, bits)
-    azimuth = motion.azimuth()
-    return azimuth, motion.bearing(azimuth, arb(0))
+def _azimuth(case: Hess, bits: int) -> Azimuth:
+    return _motion(case, bits).azimuth()
 
 
 @kept

@@ -12,9 +12,9 @@ from typing import Any
 from flint import acb, arb, fmpq_poly
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import ball, midpoint
+from heavytop.exact.balls import Undecided, ball, midpoint
 from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
-from heavytop.exact.reduced import Undecided, polynomial
+from heavytop.exact.reduced import polynomial
 from heavytop.exact.scales import exponent, unit_of_time
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP

@@ -28,9 +28,8 @@ from typing import Any
 
 from flint import acb, arb, arb_mat, arb_poly, arb_series
 
-from heavytop.exact.balls import working_precision
+from heavytop.exact.balls import Undecided, working_precision
 from heavytop.exact.flint_context import current_precision, series_length
-from heavytop.exact.reduced import Undecided
 
 _SHARE, _WIDEST, _RATIO = 0.75, 1.5, 8
 """The radius of a disc over its distance from a cut; its largest; how many times a segment's half length it is."""

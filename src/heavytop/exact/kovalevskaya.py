@@ -30,8 +30,8 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
-from heavytop.exact.azimuth import Bearing
-from heavytop.exact.balls import to_bits, working_precision
+from heavytop.exact.azimuth import Bearing, WithBearing, within_reach
+from heavytop.exact.balls import to_bits
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.kovalevskaya_abel import AbelMotion
@@ -40,7 +40,6 @@ from heavytop.exact.kovalevskaya_gaps import Interval, intervals, ordered, pole
 from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
 from heavytop.exact.motion import initial_xi, kept
-from heavytop.exact.reduced import Undecided
 from heavytop.exact.separated import REMEDY, decide, require_plane_centre
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
@@ -51,11 +50,10 @@ SEPARATION = 2.0**-27
 """Where two roots are nearer than this, over the largest, the periods are not integrated."""
 _DISTANCE = 3e-4
 """cosh β − 1 of :func:`pole` where the Fourier series take :data:`MOST_TERMS` terms for 50 digits."""
-_ATTITUDE_BITS = 256
 
 
 @dataclass(frozen=True, slots=True)
-class Kovalevskaya(ClosedForm):
+class Kovalevskaya(WithBearing, ClosedForm):
     """A motion of Kovalevskaya's top with the small moment on axis 3.
 
     Raises NotInClass unless I1 = I2 = 2 I3, P c = 0, P r ≠ 0 and γ ≠ 0, and on and near the levels that are not done.
@@ -77,30 +75,19 @@ class Kovalevskaya(ClosedForm):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        try:
-            return _motion(self, current_precision()).at(time, current_length())
-        except Undecided:
-            return [arb("nan")] * 6
+        return _motion(self, current_precision()).at(time, current_length())
 
-    @property
-    def has_attitude(self) -> bool:
+    def has_attitude(self, bits: int) -> bool:
         """Whether :meth:`attitude` holds: not where a variable rests, nor very near M·γ = 0 and degenerate levels."""
-        return _has_attitude(self)
+        return within_reach(lambda: _attitude(self, current_precision()), bits)
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 :func:`initial_xi` of γ.
+    def bearing(self, time: Fraction) -> Bearing:
+        """See :class:`heavytop.exact.azimuth.WithBearing`."""
+        return _attitude(self, current_precision()).bearing(time)
 
-        Raises OutOfReach where a variable rests, and where the Fourier series need too many terms.
-        """
-
-        def evaluate(working: int) -> list[arb]:
-            try:
-                azimuth, began = _attitude(self, working)
-                return azimuth.bearing(time).carried(began, initial_xi(self.start.gamma))
-            except Undecided:
-                return [arb("nan")] * 3
-
-        return to_bits(evaluate, bits, time)
+    def initial(self, began: Bearing) -> list[arb]:
+        """:func:`initial_xi` of γ."""
+        return initial_xi(self.start.gamma)
 
     def exponent(self, bits: int) -> arb:
         """The rate λ of an asymptotic motion, > 0: its distance from the motion that it tends to goes like e^(−λ|t|).
@@ -109,10 +96,7 @@ class Kovalevskaya(ClosedForm):
         """
 
         def evaluate(working: int) -> list[arb]:
-            try:
-                motion = _motion(self, working)
-            except Undecided:
-                return [arb("nan")]
+            motion = _motion(self, working)
             found = motion.exponents() if isinstance(motion, AbelMotion) else []
             if not found:
                 raise NotInClass("The motion is not asymptotic.", "Only asymptotic ones have an exponent.")
@@ -129,10 +113,7 @@ class Kovalevskaya(ClosedForm):
         def evaluate(working: int) -> list[arb]:
             if isinstance(_motion(self, working), ThetaMotion) or not _has_thetas(Level.of(self.top, self.start)):
                 raise OutOfReach("There is one closed form of this motion only.", "Certify it by the enclosure.")
-            try:
-                return _thetas(self, working).at(time, 1)
-            except Undecided:
-                return [arb("nan")] * 6
+            return _thetas(self, working).at(time, 1)
 
         return to_bits(evaluate, bits, time, 1)
 
@@ -148,25 +129,12 @@ def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion | ThetaMotion:
     return ThetaMotion.of(level)
 
 
-@whole_evaluation
-def _has_attitude(case: Kovalevskaya) -> bool:
-    with working_precision(_ATTITUDE_BITS):
-        try:
-            _attitude(case, _ATTITUDE_BITS)
-        except Undecided:
-            return True
-        except OutOfReach:
-            return False
-    return True
-
-
 @kept
-def _attitude(case: Kovalevskaya, bits: int) -> tuple[KovalevskayaAttitude, Bearing]:
+def _attitude(case: Kovalevskaya, bits: int) -> KovalevskayaAttitude:
     motion = _motion(case, bits)
     if isinstance(motion, ThetaMotion):
         motion = AbelMotion.of(motion.level, 8 * MOST_TERMS)
-    azimuth = KovalevskayaAttitude.of(motion, 8 * MOST_TERMS)
-    return azimuth, azimuth.bearing(Fraction(0))
+    return KovalevskayaAttitude.of(motion, 8 * MOST_TERMS)
 
 
 @kept

@@ -38,13 +38,12 @@ from flint import acb, acb_series, arb, arb_series
 
 from heavytop.exact.abel import Variable
 from heavytop.exact.asymptotic import Approach
-from heavytop.exact.balls import ball
+from heavytop.exact.balls import Undecided, ball
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.flint_context import coefficient
 from heavytop.exact.gaps import Roots
 from heavytop.exact.kovalevskaya_gaps import Interval, intervals, pole
 from heavytop.exact.kovalevskaya_level import ORDERS, Level, Root, Start, linear, real_part, roots, start_of
-from heavytop.exact.reduced import Undecided
 from heavytop.exact.resting import Rest
 from heavytop.exact.separated import Line, variable_between
 

@@ -11,10 +11,9 @@ from itertools import pairwise
 
 from flint import acb, arb
 
-from heavytop.exact.balls import midpoint
+from heavytop.exact.balls import Undecided, midpoint
 from heavytop.exact.gaps import distance_of_others
 from heavytop.exact.kovalevskaya_level import Level, Root, Start
-from heavytop.exact.reduced import Undecided
 
 _SHARES = (0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98)
 _BEYOND = (0.05, 0.3, 1.0, 3.0, 10.0)

@@ -23,10 +23,10 @@ from typing import Any
 
 from flint import acb, acb_mat, arb, arb_series, fmpq_poly
 
-from heavytop.exact.balls import ball
+from heavytop.exact.balls import Undecided, ball
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.flint_context import coefficient, current_length
-from heavytop.exact.reduced import Reduced, Undecided, polynomial
+from heavytop.exact.reduced import Reduced, polynomial
 from heavytop.top.equations import Parameters, heavy_top
 from heavytop.top.integrals import kovalevskaya
 

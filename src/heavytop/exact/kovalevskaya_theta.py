@@ -30,7 +30,7 @@ from typing import Any
 
 from flint import acb, acb_mat, acb_series, arb, arb_mat
 
-from heavytop.exact.balls import ball, midpoint, whole
+from heavytop.exact.balls import Undecided, ball, midpoint, whole
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.flint_context import coefficient, current_length
 from heavytop.exact.kovalevskaya_level import (
@@ -43,7 +43,6 @@ from heavytop.exact.kovalevskaya_level import (
     square_root,
     start_of,
 )
-from heavytop.exact.reduced import Undecided
 
 Characteristic = tuple[tuple[int, int], tuple[int, int]]
 Pair = tuple[acb, acb]

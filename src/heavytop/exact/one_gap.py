@@ -29,10 +29,9 @@ from flint import acb, arb, arb_series, fmpq, fmpq_poly
 from heavytop.errors import NotInClass
 from heavytop.exact.abel import Inversion
 from heavytop.exact.azimuth import Azimuth, Bearing
-from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.balls import Undecided, ball, midpoint, working_precision
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
-from heavytop.exact.reduced import Undecided
 
 _X = fmpq_poly([0, 1])
 _HALF = fmpq(1, 2)

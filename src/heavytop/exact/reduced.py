@@ -17,10 +17,6 @@ from heavytop.exact.balls import ball
 from heavytop.top.heavy_top import HeavyTop, State
 
 
-class Undecided(ArithmeticError):
-    """The working precision does not decide a discrete question."""
-
-
 @dataclass(frozen=True, slots=True)
 class Reduced:
     """The exact data of a start in the units of ``rate`` and ``size``; moment: n' on axes 1 and 2."""

@@ -16,10 +16,9 @@ from flint import arb, arb_series
 from heavytop.errors import LevelNotDone, NotInClass
 from heavytop.exact.abel import Inversion, Variable
 from heavytop.exact.asymptotic import Approach
-from heavytop.exact.balls import working_precision
+from heavytop.exact.balls import Undecided, working_precision
 from heavytop.exact.flint_context import current_length
 from heavytop.exact.gaps import Gap, Roots
-from heavytop.exact.reduced import Undecided
 from heavytop.exact.resting import Beside, Rest
 from heavytop.precision import shown
 from heavytop.top.heavy_top import HeavyTop, State

@@ -21,13 +21,13 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import InputError, LevelNotDone, NotInClass, OutOfReach
-from heavytop.exact.azimuth import Azimuth, Bearing
-from heavytop.exact.balls import ball, to_bits, working_precision
+from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
+from heavytop.exact.balls import Undecided, ball, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_precision, whole_evaluation
 from heavytop.exact.motion import initial_xi, kept
 from heavytop.exact.one_gap import Curve, OneGapMotion, in_units, value
-from heavytop.exact.reduced import Undecided, polynomial
+from heavytop.exact.reduced import polynomial
 from heavytop.exact.scales import unit_of_time
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
@@ -41,7 +41,7 @@ _REMEDY = "`steklov_motion` builds a top with such a motion."
 
 
 @dataclass(frozen=True, slots=True)
-class Steklov(ClosedForm):
+class Steklov(WithBearing, ClosedForm):
     """A Steklov motion of a top with its centre of mass on axis 1.
 
     Raises NotInClass unless P b = P c = 0, P r ≠ 0, γ ≠ 0, no two moments are equal, A ≠ 2B, A ≠ 2C, and the start
@@ -73,32 +73,21 @@ class Steklov(ClosedForm):
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         rate, torque = _units(self.top, self.start)
-        try:
-            motion = _motion(self, current_precision())
-            return in_units(motion.at(ball(rate * time)), rate, 1 / torque)
-        except Undecided:
-            return [arb("nan")] * 6
+        return in_units(_motion(self, current_precision()).at(ball(rate * time)), rate, 1 / torque)
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 :func:`initial_xi` of γ."""
+    def bearing(self, time: Fraction) -> Bearing:
+        """See :class:`heavytop.exact.azimuth.WithBearing`."""
         rate, _ = _units(self.top, self.start)
+        return _motion(self, current_precision()).bearing(_azimuth(self, current_precision()), ball(rate * time))
 
-        def evaluate(_working: int) -> list[arb]:
-            try:
-                azimuth, began = _azimuth(self, current_precision())
-                here = _motion(self, current_precision()).bearing(azimuth, ball(rate * time))
-            except Undecided:
-                return [arb("nan")] * 3
-            return here.carried(began, initial_xi(self.start.gamma))
-
-        return to_bits(evaluate, bits, time)
+    def initial(self, began: Bearing) -> list[arb]:
+        """:func:`initial_xi` of γ."""
+        return initial_xi(self.start.gamma)
 
 
 @kept
-def _azimuth(case: Steklov, bits: int) -> tuple[Azimuth, Bearing]:
-    motion = _motion(case, bits)
-    azimuth = motion.azimuth()
-    return azimuth, motion.bearing(azimuth, arb(0))
+def _azimuth(case: Steklov, bits: int) -> Azimuth:
+    return _motion(case, bits).azimuth()
 
 
 @kept

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from importlib import import_module
+from importlib.metadata import EntryPoint
 from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, quoted
@@ -57,8 +57,7 @@ def _find(name: str) -> Integrator:
 
 
 def _load(place: str) -> Callable[..., Any]:
-    module, _, function = place.partition(":")
-    found: Callable[..., Any] = getattr(import_module(module), function)
+    found: Callable[..., Any] = EntryPoint("", place, "").load()
     return found
 
 

@@ -11,7 +11,7 @@ from heavytop.integrate.engines import Compiled, compiled, load
 from heavytop.integrate.stepper import Stepper, far
 from heavytop.integrate.trajectory import Outcome, Place, Problem, TaylorStep, Trajectory
 from heavytop.precision import Precision, exact, number
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import check_times
 
@@ -31,7 +31,10 @@ def propagate(
     stepping: type[Stepper] = Stepper,
     place: Place | None = None,
     mark: Callable[[Place], None] | None = None,
-    **options: Any,
+    tolerance: Fraction | None = None,
+    high_accuracy: bool = False,
+    compact_mode: bool | None = None,
+    constants: Parameters | None = None,
 ) -> Trajectory:
     """The motion from ``start`` at t = 0, at ``times``, computed by heyoka in ``precision``.
 
@@ -42,7 +45,7 @@ def propagate(
     stepping: how steps are taken; another than heyoka's own is for trying the detectors.
     place: where an earlier run of the same problem stopped; goes on behind its samples, to the same bits.
     mark: called after each sample with the place from which this run could go on.
-    options: tolerance, high_accuracy, compact_mode as in :func:`heavytop.integrate.engines.compiled`.
+    tolerance, high_accuracy, compact_mode, constants: as in :func:`heavytop.integrate.engines.compiled`.
 
     Raises InputError for times out of order, a format that the platform lacks, data outside its exponent range, a
     start that the system does not admit, and a place reached with other flags.  A failed run is an outcome, not an
@@ -50,7 +53,15 @@ def propagate(
     """
     problem = Problem.of(top, start, precision, system, xi)
     targets = [number(time, precision) for time in check_times(times)]
-    tool = compiled(system, precision, attitude=xi is not None, **options)
+    tool = compiled(
+        system,
+        precision,
+        attitude=xi is not None,
+        tolerance=tolerance,
+        high_accuracy=high_accuracy,
+        compact_mode=compact_mode,
+        constants=constants,
+    )
     with tool.lent() as engine:
         return follow(tool, engine, problem, targets, step_limit, observer, stepping=stepping, place=place, mark=mark)
 
@@ -123,7 +134,7 @@ def first_steps(
 ) -> tuple[Trajectory, list[TaylorStep]]:
     """The steps that begin before the time ``until`` > 0, at their ends and as polynomials; none at an equilibrium.
 
-    stepping, options: as in :func:`propagate`.  Raises what that raises.
+    stepping: as in :func:`propagate`; options: as in :func:`heavytop.integrate.engines.compiled`.
     """
     problem = Problem.of(top, start, precision, system)
     tool = compiled(system, precision, **options)

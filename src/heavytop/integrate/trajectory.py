@@ -7,7 +7,7 @@ from enum import Enum
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from heavytop.display import Table
+from heavytop.display import Table, Tabular
 from heavytop.errors import InputError
 from heavytop.precision import Precision, decimal_text, exact, native, native_text, number, rounded
 from heavytop.top.equations import HEAVY_TOP, NAMES, Parameters, System
@@ -154,8 +154,8 @@ class Place:
         return cls(samples, state, time, steps, seconds, flags, tuple(content.get("words", ())))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Trajectory(Tabular):
     """A computed motion at the times that were reached.
 
     times: exact values of the rounded times, shape (n,).
@@ -212,12 +212,6 @@ class Trajectory:
         if self.outcome is not Outcome.SUCCESS:
             notes.append(f"reached t = {decimal_text(self.time_reached, 6)} only")
         return Table(title, ("t", *names), rows, notes)
-
-    def __repr__(self) -> str:
-        return self._table().text()
-
-    def _repr_html_(self) -> str:
-        return self._table().html()
 
 
 def _shown(value: Any, digits: int) -> str:

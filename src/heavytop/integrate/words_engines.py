@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
 from threading import Lock
 
 from heavytop.errors import InputError
@@ -174,6 +175,16 @@ def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Sc
     if grid is None:
         return WholeNumbers(wanted, -(-bits // _STEP_OF_BITS) * _STEP_OF_BITS), scaled
     return Words(wanted, grid), scaled
+
+
+def accuracy(arithmetic: Arithmetic, scaled: Scaled) -> int:
+    """The bits of a number near 1 that a step gets right.
+
+    What a grid has for the smallest component of the start is not counted: numbers that float have it anyway.
+    """
+    if isinstance(arithmetic, DoubleDouble):
+        return ceil(1 / arithmetic.tolerance).bit_length() - 1
+    return int(arithmetic.flags["bits"]) - _GUARD_BITS - fixed.spread(scaled) - fixed.excess(scaled)
 
 
 _made: dict[tuple[type, Grid | None, str, bool], float] = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from fractions import Fraction
+from functools import partial
 
 from flint import arb
 from rich.console import RenderableType
@@ -14,14 +15,15 @@ from heavytop.claims.ershkov import Branch, PartialCase
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import FUNCTIONS, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.integrate.trajectory import Problem
 from heavytop.kinds.base import Kind
 from heavytop.kinds.claim_section import claim_error
 from heavytop.kinds.claim_tasks import CLAIM, MODEL_ERROR, claim_of, claimed
 from heavytop.measure import claim_error as errors_of
-from heavytop.measure.computed_reference import ComputedReference
-from heavytop.measure.known import certified
+from heavytop.measure.computed_reference import compute
 from heavytop.measure.parting import CLAIM_XI, parting, true_solution
 from heavytop.measure.scalar import largest, metric, text
+from heavytop.measure.truth import certified
 from heavytop.precision import exact
 from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
 from heavytop.report.brief import wrapped
@@ -161,7 +163,8 @@ def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_o
     except OutOfReach:
         if isinstance(known, DeloneHomoclinic):
             raise
-        computed = ComputedReference(known.top, known.start, times, xi=CLAIM_XI)
+        given = partial(Problem.of, known.top, known.start, xi=CLAIM_XI)
+        (computed,) = compute([given], times, bits)
         return lambda time: (computed.state(time)[:6], computed.state(time)[6:]), computed.against
     if proven is None:
         raise OutOfReach(f"{known.method} is not certified to {bits} bits.", "Ask for earlier times.")

@@ -12,9 +12,9 @@ from rich.text import Text
 from heavytop.integrate.trajectory import Place, Problem
 from heavytop.kinds.base import Kind
 from heavytop.measure.integrator import HEYOKA, require
-from heavytop.measure.known import known_motion
 from heavytop.measure.reruns import Reruns
 from heavytop.measure.scorer import Scorer
+from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact, number, parse
 from heavytop.records import Row, RowKey
 from heavytop.report.brief import digits_lines
@@ -85,8 +85,7 @@ class Drift(Kind):
         problem = Problem.of(case.top, case.start, precision, case.system)
         # samples are taken at the rounded times, so the series must be asked for by these
         keep = [exact(number(time, precision)) for time in task.keep]
-        known = known_motion(problem, exact(number(task.times[-1], precision)))
-        scorer = Scorer(problem, known, keep)
+        scorer = Scorer(problem, truth(problem, [exact(number(time, precision)) for time in task.times]), keep)
         before = saved.load()
         if before is not None:
             scorer.restore(before["measures"])

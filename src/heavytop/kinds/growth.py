@@ -14,11 +14,11 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from heavytop.errors import InputError
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.kinds.base import Kind
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.ensemble import Ended, complete, growing
-from heavytop.measure.ensemble_reference import Reference, Texts, Wider, reference
+from heavytop.measure.ensemble_reference import Reference, reference
 from heavytop.measure.integrator import HEYOKA, require
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import Scorer
@@ -58,8 +58,8 @@ class Run(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     samples: a decade, over ``decades`` decades before the horizon.  starts: random ones, the same for the same seed.
     tolerance, high_accuracy: of the integrator.  bias: a relative error of I1 in the field that is integrated and not
-    in the reference: a planted fault.  reference: the wider format whose runs stand for the truth where no closed form
-    is known; None for none.
+    in the reference: a planted fault.  reference: a format whose bits the runs have at least that stand for the truth
+    where no closed form is known; None for 30 bits more than those of ``precision``, which they have in any case.
     """
 
     precision: str
@@ -122,7 +122,6 @@ def _task(case: Case, run: Run, integrator: str) -> Task:
 class _Done(msgspec.Struct):
     """What of a row is done, by the index of the start: its text is the place of a row in progress."""
 
-    reference: dict[int, Texts]
     motions: dict[int, Ended]
 
 
@@ -153,21 +152,16 @@ class Growth(Kind):
         given = [_biased(problem, run.bias) for problem in true]
         times = [exact(number(time, precision)) for time in task.times]
         before = saved.load()
-        done = _Done({}, {}) if before is None else msgspec.convert(before, _Done, strict=False)
-        wider = Wider(done.reference, lambda: save())
+        done = _Done({}) if before is None else msgspec.convert(before, _Done, strict=False)
 
         def save() -> None:
             if saved.due():
-                saved.save(msgspec.to_builtins(_Done(wider.done, done.motions), str_keys=True))
-
-        def measured(problems: Sequence[Problem], instants: Sequence[Fraction]) -> list[Trajectory]:
-            return task.integrator.propagate_many(problems, instants, **run.options)
+                saved.save(msgspec.to_builtins(done, str_keys=True))
 
         began = perf_counter()
-        compared = reference(true, given, times, run.reference, measured, wider)
+        compared = reference(tuple(true), tuple(times), parse(run.reference).bits if run.reference else 0)
         ready = perf_counter()
-        known = ["none fit to score with" if motion is None else motion for motion in compared.motions]
-        scorers = [Scorer(problem, motion, times) for problem, motion in zip(true, known, strict=True)]
+        scorers = [Scorer(problem, motion, times) for problem, motion in zip(true, compared.motions, strict=True)]
         complete(done.motions, given, times, scorers, save, task.integrator, run.options)
         motions = [done.motions[index] for index in range(len(starts))]
         seconds = {"reference": ready - began, "run": perf_counter() - ready, "compile": motions[0].compile}

@@ -17,11 +17,11 @@ from heavytop.kinds.claim_section import claim_error
 from heavytop.kinds.claim_tasks import INTEGRATION_ERROR
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.integrator import HEYOKA, require
-from heavytop.measure.known import Known, certified
-from heavytop.measure.reruns import Remembered, Reruns, escape_band
+from heavytop.measure.reruns import Reruns, escape_band
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
+from heavytop.measure.truth import Truth, certified
 from heavytop.precision import DOUBLE, exact, parse
 from heavytop.records import Direction, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.brief import named, wrapped
@@ -114,9 +114,10 @@ class Homoclinic(Kind):
         known = certified(closed, early, precision.bits + GUARD_BITS)
         if known is None:
             raise OutOfReach(f"{closed.method} is not certified for {precision.name}.", "Use a format with fewer bits.")
-        scorer = _scorer(case, problem, known, task.keep)
+        truth = known.truth.remembered()
+        scorer = _scorer(case, problem, truth, task.keep)
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer)
-        metrics = _with_bands(task, run, _metrics(scorer), Remembered(closed.state))
+        metrics = _with_bands(task, run, _metrics(scorer), truth)
         error = scorer.error
         assert error is not None
         series = error.series(time_text) | scorer.drift.series(time_text)
@@ -162,10 +163,10 @@ def _end(case: Case, bits: int) -> float:
     return (1.1 * bits * math.log(2) + 4) / case.rate
 
 
-def _scorer(case: Case, problem: Problem, known: Known | Remembered, keep: Sequence[Fraction] = ()) -> Scorer:
+def _scorer(case: Case, problem: Problem, truth: Truth, keep: Sequence[Fraction] = ()) -> Scorer:
     name = INTEGRATION_ERROR if case.claim else SOLUTION_ERROR
     until = WINDOW / case.rate
-    return Scorer(problem, known, keep, threshold=ESCAPED * case.alpha, until=until, name=name)
+    return Scorer(problem, truth, keep, threshold=ESCAPED * case.alpha, until=until, name=name)
 
 
 def _metrics(scorer: Scorer) -> dict[str, Metric]:
@@ -174,7 +175,7 @@ def _metrics(scorer: Scorer) -> dict[str, Metric]:
     return by_name({ESCAPE: escape}) | scorer.error.metrics() | scorer.drift.metrics()
 
 
-def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric], known: Remembered) -> dict[str, Metric]:
+def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric], truth: Truth) -> dict[str, Metric]:
     """``metrics`` of a row with their bands, that of the escape time from the times of the reruns."""
     case = task.case
     assert case is not None
@@ -182,7 +183,7 @@ def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric], known: 
     if run.outcome is not Outcome.SUCCESS or not reruns.possible:
         return metrics
     times = [time for time in task.times[3::4] if float(abs(time)) <= _end(case, DOUBLE.bits)]
-    banded, found = reruns.escape_bands(run, times, metrics, lambda given: _scorer(case, given, known))
+    banded, found = reruns.escape_bands(run, times, metrics, lambda given: _scorer(case, given, truth))
     escapes = [abs(each) for each in found if each is not None]
     own = banded[ESCAPE.text]
     if own.log10 is not None and len(escapes) == len(found):

@@ -1,19 +1,24 @@
-"""Error of the single steps that begin before the horizon, and the order of the method as it shows beyond them."""
+"""Error of single steps before the horizon, and the order of the method as it shows in longer ones."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
 
+import msgspec
 from rich.console import RenderableType
 from rich.text import Text
 
 from heavytop.errors import OutOfReach
-from heavytop.integrate.trajectory import Outcome
+from heavytop.integrate.trajectory import Outcome, TaylorStep
 from heavytop.kinds.base import Kind
 from heavytop.measure import local_error
 from heavytop.measure.integrator import HEYOKA, require
+from heavytop.measure.single_calls import single_calls
 from heavytop.precision import parse
 from heavytop.records import Against, Row, RowKey
+from heavytop.report.brief import wrapped
+from heavytop.report.names import computed_by
 from heavytop.report.text import short, table, title
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
@@ -25,8 +30,11 @@ NAME = "local_error"
 _AGAINST = Against("proven", "known: validated enclosure of each step from where it starts")
 
 
+_LARGEST = local_error.LOCAL_ERROR.over("max").text
+
+
 class LocalErrorTable(Table, tag=NAME):
-    """integrator: one that hands over its single steps, as heyoka does."""
+    """integrator: any that `heavytop list` shows; its steps, or calls over its mean step where it keeps them."""
 
     cases: list[str]
     precisions: list[str]
@@ -35,7 +43,7 @@ class LocalErrorTable(Table, tag=NAME):
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
-        require(self.integrator, with_steps=True)
+        require(self.integrator)
         times = tuple(positive([self.horizon], "horizon"))
         horizon, subject = time_text(times[-1]), computed(self.integrator)
         return [
@@ -49,10 +57,6 @@ class LocalErrorTable(Table, tag=NAME):
             for case in map(find, self.cases)
             for precision in self.precisions
         ]
-
-    def beside(self, integrator: str) -> Table | None:
-        """Nothing: other integrators do not hand over their single steps."""
-        return None
 
 
 class LocalError(Kind):
@@ -69,31 +73,37 @@ class LocalError(Kind):
     def measure(self, task: Task, saved: Saved) -> Row:
         """Raises OutOfReach where a step is not enclosed, and at an equilibrium, where there are no steps."""
         case, precision = task.given, task.precision
-        run, steps = task.integrator.first_steps(case.top, case.start, task.times[-1], precision, case.system)
-        if run.outcome is Outcome.SUCCESS and not steps:
-            raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
+        given = case.top, case.start, task.times[-1], precision, case.system
+        steps: Iterable[tuple[Fraction, TaylorStep | local_error.Call]]
+        if task.integrator.hands_over_steps:
+            run, taken = task.integrator.first_steps(*given)
+            steps = zip(run.times, taken, strict=True)
+        else:
+            run, steps = single_calls(task.integrator, *given)
         error = local_error.LocalError(run.problem)
-        for time, step in zip(run.times, steps, strict=True):
+        for time, step in steps:
             error(time, step)
-        return computed_row(task, run, error.metrics(), {}, _AGAINST)
+        if run.outcome is Outcome.SUCCESS and not error.running.count:
+            raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
+        row = computed_row(task, run, error.metrics(), {}, _AGAINST)
+        return msgspec.structs.replace(row, samples=error.running.count)
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
-        """The largest error of a step, a line a motion and format."""
-        largest = local_error.LOCAL_ERROR.over("max").text
-        return [
-            f"{row.case} in {row.precision}: a step is off by {short(row.metrics[largest].value)} eps at most"
-            for row in rows
-            if largest in row.metrics
-        ]
+        """The largest error of a step and the order, a sentence a motion and format; of integrators of others alone
+        where there are any.
+        """
+        theirs = [row for row in rows if row.key.subject.name != HEYOKA]
+        found = [row for row in theirs or rows if _LARGEST in row.metrics]
+        return [line for row in found for line in wrapped(_said(row))]
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line a row."""
         quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)
         lines = [
             [
-                row.case,
+                f"{row.case}{computed_by(row)}",
                 row.precision,
-                str(row.steps),
+                str(row.samples if row.key.subject.name != HEYOKA else row.steps),
                 *(short(row.metrics[q.text].value) if q.text in row.metrics else "-" for q in quantities),
                 "-" if row.order is None else str(row.order),
                 row.outcome,
@@ -105,5 +115,15 @@ class LocalError(Kind):
             Text(
                 "  Error in eps of the format times the largest component of the state; the order as the steps show it."
             ),
-            table(["case", "format", "steps", "largest", "rms", "order seen", "order asked", "outcome"], lines),
+            table(["case", "format", "steps", "largest", "rms", "order seen", "declared", "outcome"], lines),
         ]
+
+
+def _said(row: Row) -> str:
+    """The largest error of a step, and the order beside the one that the integrator declares."""
+    text = f"{row.case}{computed_by(row)} in {row.precision}: a step is off by {short(row.metrics[_LARGEST].value)} eps"
+    order = row.metrics.get(local_error.ORDER.text)
+    if order is None:
+        return f"{text} at most."
+    declared = "as it says" if order.value == str(row.order) else f"not the {row.order} that it says"
+    return f"{text} at most; its order is {order.value}, {declared}."

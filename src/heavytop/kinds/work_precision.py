@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache, lru_cache
+from functools import lru_cache
 from statistics import median
 from time import perf_counter, sleep
 from typing import Any
@@ -16,16 +16,15 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from heavytop.errors import InputError
-from heavytop.exact.solution import ExactSolution
 from heavytop.integrate import peers
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind
 from heavytop.measure.drift import DRIFT
-from heavytop.measure.known import Known, known_motion
 from heavytop.measure.scalar import metric, of_fraction
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
-from heavytop.precision import exact, number, parse, usable_tolerance
+from heavytop.measure.truth import Truth, truth
+from heavytop.precision import DOUBLE, exact, number, parse, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.brief import wrapped
 from heavytop.report.consistency import CLOSE, bound, ended, size_of, sizes
@@ -54,6 +53,8 @@ ERROR_MAX, ERROR_FINAL, RETURN = (
     Quantity("error", statistic="final"),
     Quantity("return_error"),
 )
+_RUNGS = {"tolerance": ["1e-6", "1e-9", "1e-12", FINEST], "step": ["1/10", "1/30", "1/100", "1/300"], "": [FINEST]}
+"""Of an integrator that is measured beside heyoka in double, by what it is set by."""
 _OF_OTHERS = 0.6
 """Decades of rounding noise of integrators of others, whose step control turns a rounding into another step: rerun with
 other roundings, CVODE and splitting methods move by up to a decade."""
@@ -107,9 +108,15 @@ class WorkPrecisionTable(Table, tag=NAME):
         ]
 
     def beside(self, integrator: str) -> Table | None:
-        """Its finest rung in each format that heyoka has a ladder in."""
-        formats = dict.fromkeys(each.precision for each in self.ladders if each.integrator == OURS)
-        ladders = [Ladder(integrator, precision, [FINEST]) for precision in formats]
+        """Four rungs in double, and the finest in other formats, where heyoka has a ladder."""
+        formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
+        knob = peers.knob_apart(integrator) if DOUBLE.name in formats else ""
+        ladders = [
+            Ladder(integrator, name, **{"steps" if knob == "step" else "tolerances": _RUNGS[knob]})
+            if name == DOUBLE.name
+            else Ladder(integrator, name, [FINEST])
+            for name in formats
+        ]
         return msgspec.structs.replace(self, ladders=ladders) if ladders else None
 
 
@@ -232,7 +239,8 @@ def _timed(integrate: Any) -> tuple[dict[str, float], Trajectory]:
 
 def _scored(task: Task, problem: Problem, run: Trajectory) -> Scorer:
     keep = [exact(number(time, problem.precision)) for time in task.keep]
-    scorer = Scorer(problem, _known(problem, exact(number(task.times[-1], problem.precision))), keep)
+    times = tuple(exact(number(time, problem.precision)) for time in task.times)
+    scorer = Scorer(problem, _truth(problem, times), keep)
     scorer.take(run.times, run.states)
     return scorer
 
@@ -264,18 +272,8 @@ def _returned(problem: Problem, run: Trajectory, integrate: Any) -> Metric:
     return of_fraction(max(abs(sign * exact(value) - start) for sign, value, start in pairs))
 
 
-class _Remembered:
-    """A known motion whose states are worked out once for all integrators that are compared with it."""
-
-    def __init__(self, solution: ExactSolution) -> None:
-        self.solution = solution
-        self.state = cache(solution.state)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.solution, name)
-
-
 @lru_cache(maxsize=8)
-def _known(problem: Problem, horizon: Fraction) -> Known | str:
-    found = known_motion(problem, horizon)
-    return found if isinstance(found, str) else replace(found, solution=_Remembered(found.solution))
+def _truth(problem: Problem, times: tuple[Fraction, ...]) -> Truth | str:
+    """Shared by all integrators that are compared with it, with every state that was worked out."""
+    found = truth(problem, times)
+    return found if isinstance(found, str) else found.remembered()

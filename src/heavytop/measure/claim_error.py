@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from types import SimpleNamespace
 from typing import Any
 
 import numpy
@@ -22,15 +21,6 @@ from heavytop.precision import Precision, exact, number
 from heavytop.top.angles import attitude_from_angles, euler_angles, rotation_angle
 
 MODEL_BITS = 160
-NATIVE_FUNCTIONS = SimpleNamespace(
-    sqrt=numpy.sqrt,
-    exp=numpy.exp,
-    log=numpy.log,
-    arctan=numpy.arctan,
-    arccos=numpy.arccos,
-    tanh=numpy.tanh,
-    cosh=numpy.cosh,
-)
 
 Truth = Callable[[Fraction], tuple[list[arb], list[arb]]]
 """time -> (six balls of the state, three of the attitude vector ξ)."""
@@ -134,9 +124,9 @@ def evaluation_error(case: PartialCase, time: Fraction, precision: Precision, fo
     alpha = number(case.alpha, precision)
     with numpy.errstate(all="ignore"):
         if form == "printed":
-            computed = partial_case(given[0], given[1], given[2], given[3], NATIVE_FUNCTIONS, "printed")
+            computed = partial_case(given[0], given[1], given[2], given[3], numpy, "printed")
         else:
-            computed = stable_case(alpha, given[0], given[1], given[3], NATIVE_FUNCTIONS)
+            computed = stable_case(alpha, given[0], given[1], given[3], numpy)
     bits = precision.bits + 64
 
     def evaluate(_working: int) -> list[arb]:

@@ -8,9 +8,9 @@ the words differ by, on a chaotic motion too: what one loses the other loses.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import ceil
+from functools import partial
 from typing import Any
 
 from flint import arb
@@ -20,20 +20,28 @@ from heavytop.exact.balls import ball, midpoint, radius, radius_text, working_pr
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.integrate.words import follow
-from heavytop.integrate.words_engines import Arithmetic, DoubleDouble, choose
-from heavytop.precision import Precision, exact, number, real
+from heavytop.integrate.words_engines import accuracy, choose
+from heavytop.integrate.words_ensemble import propagate_words_ensemble
+from heavytop.precision import Precision, exact, number, real, shown
 from heavytop.records import Against
-from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import check_times
 
 MORE_BITS = 30
 """The words of the second run have at least so many more bits than those of the first."""
 EFFORT = 60.0
 """Seconds of the model of the cost that each run may take; absurd starts and times would take for ever."""
+EFFORT_OF_MANY = 600.0
+"""The same for all the runs of an ensemble together."""
 _MOST_STEPS = 10**8
 _SEARCH = 8
 _WORD_BITS = 1032
+_DIGIT = 10
+"""An error leaves a digit where it is below the size of the state over this."""
+_STAGES = 6
+"""A truth that may end is computed to the horizon over 4^6 first, and then to four times as far, until it has ended."""
+
+Given = Callable[[Precision], Problem]
+"""A motion to be computed, in any format."""
 
 
 def seconds_a_step(bits: int) -> float:
@@ -41,45 +49,22 @@ def seconds_a_step(bits: int) -> float:
     return 3e-6 + 4e-12 * bits**3 if bits <= _WORD_BITS else 6e-8 * bits**2
 
 
+@dataclass(frozen=True, slots=True)
 class ComputedReference:
-    """States, and on request attitude vectors, at given times, from runs in about ``bits`` bits and in 30 more.
+    """States, with an attitude vector where the motion has one, at the times of two runs.
 
-    times: as for :func:`heavytop.integrate.words.propagate_words`.
-    words: the bits of the words of both runs.  accuracy: the bits to which a step of the first is right.
-    Raises OutOfReach if either run does not reach the last time within :data:`EFFORT`.
+    words: the bits of the words of both.  ends: the first time at which the format that is measured has no digit left;
+    None where it keeps one to the last.
     """
 
-    def __init__(
-        self,
-        top: HeavyTop,
-        start: State,
-        times: Sequence[Fraction],
-        bits: int = 256,
-        system: System = HEAVY_TOP,
-        xi: tuple[Fraction, ...] | None = None,
-    ) -> None:
-        self._compute(lambda precision: Problem.of(top, start, precision, system, xi), times, bits)
+    words: tuple[int, int]
+    balls: dict[Fraction, list[arb]]
+    ends: Fraction | None = None
 
-    @classmethod
-    def of(cls, problem: Problem, times: Sequence[Fraction], bits: int) -> ComputedReference:
-        """The motion of a rounded problem, from the very numbers that it is; ``bits``: at least those of its format."""
-        found = cls.__new__(cls)
-        found._compute(lambda precision: replace(problem, precision=precision), times, bits)
-        return found
-
-    def _compute(self, problem: Callable[[Precision], Problem], times: Sequence[Fraction], bits: int) -> None:
-        first = _arithmetic(problem, bits)
-        finer, second = _second(problem, bits, first)
-        self.bits, self.accuracy, self.words = bits, _accuracy(first), (_bits(first), _bits(second))
-        coarse, fine = (_run(problem(real(b)), times, w) for b, w in zip((bits, finer), self.words, strict=True))
-        states = zip(times, coarse.states, fine.states, strict=True)
-        self.balls: dict[Fraction, list[arb]] = {time: _around(a, b, bits) for time, a, b in states}
-        self.against = self.against_at(times)
-
-    def against_at(self, times: Sequence[Fraction]) -> Against:
-        """What it is, and how far the runs agree at these times."""
-        agreed = radius_text(max(map(self.radius, times))) if times else ""
-        return Against("computed", f"words of {self.words[0]} and {self.words[1]} bits", agreed)
+    @property
+    def against(self) -> Against:
+        """What it is, how far the runs agree as long as the format has digits, and how long that is."""
+        return agreement([self])
 
     def state(self, time: Fraction, bits: int = 0) -> list[arb]:
         """Six balls, or nine with the attitude vector, at one of the times; ``bits`` are what they are."""
@@ -87,59 +72,146 @@ class ComputedReference:
 
     def radius(self, time: Fraction) -> Fraction:
         """The largest radius at one of the times, relative to a value above 1."""
-        return _radius(self.balls[time])
+        return max(radius(value) / max(Fraction(1), abs(midpoint(value))) for value in self.balls[time])
+
+    def blur(self, time: Fraction) -> float:
+        """How far the state at one of the times may be off, absolute."""
+        return float(sum(map(radius, self.balls[time])))
+
+    def beyond(self, part: Fraction) -> set[Fraction]:
+        """The times at which Ω or γ is uncertain by more than this part of the largest that it becomes."""
+        found: set[Fraction] = set()
+        for group in (slice(0, 3), slice(3, 6)):
+            largest = max(abs(midpoint(value)) for state in self.balls.values() for value in state[group])
+            found |= {t for t, state in self.balls.items() if radius(state[group][0]) > part * largest}
+        return found
 
 
-def _second(problem: Callable[[Precision], Problem], bits: int, first: Arithmetic) -> tuple[int, Arithmetic]:
-    """The bits of a second format, and its words: they have 30 bits more at least.
+def agreement(found: Sequence[ComputedReference]) -> Against:
+    """What the references of one ensemble are, all over the same times."""
+    (coarse, fine), ends = found[0].words, found[0].ends
+    radii = [each.radius(t) for each in found for t in each.balls if ends is None or abs(t) < abs(ends)]
+    agreed = radius_text(max(radii)) if radii else ""
+    until = "" if ends is None else shown(ends)
+    return Against("computed", f"words of {coarse} and {fine} bits", agreed, until=until)
+
+
+def of_rounded(problems: Sequence[Problem], times: Sequence[Fraction], least: int = 0) -> list[ComputedReference]:
+    """The motions of problems of one format, from the very numbers that they are, in 30 bits more and 60 more.
+
+    least: bits of the first run at least.  All end where one has no digit left in the format, as laws of growth do.
+    Raises OutOfReach as :func:`compute` does, and InputError for more bits than there are.
+    """
+    bits = problems[0].precision.bits
+    given = [partial(_in_format, problem) for problem in problems]
+    return compute(given, times, max(least, bits + MORE_BITS), bits)
+
+
+def _in_format(problem: Problem, precision: Precision) -> Problem:
+    return replace(problem, precision=precision)
+
+
+def compute(
+    given: Sequence[Given], times: Sequence[Fraction], bits: int, format_bits: int | None = None
+) -> list[ComputedReference]:
+    """The motions at ``times``, from runs in about ``bits`` bits and in at least :data:`MORE_BITS` more.
+
+    times: as for :func:`heavytop.integrate.words.propagate_words`.
+    format_bits: those of the format that is measured, in which the motions may lose all digits; None for no format.
+    Raises OutOfReach if a run does not reach the last time within the effort.
+    """
+    first = [_Served.of(each, bits) for each in given]
+    finer = _finer(given, bits, first)
+    second = [_Served.of(each, finer) for each in given]
+    words = [(one.bits, two.bits) for one, two in zip(first, second, strict=True)]
+    for early in _stages(times, _STAGES if format_bits is not None else 0):
+        runs = _runs(first, early), _runs(second, early)
+        balls = [dict(zip(early, _around(*pair, bits), strict=True)) for pair in zip(*runs, strict=True)]
+        found = [ComputedReference(*each) for each in zip(words, balls, strict=True)]
+        ends = None if format_bits is None else _last_digit(found, [each.accuracy - format_bits for each in first])
+        if ends is not None:
+            break
+    return [replace(each, ends=ends) for each in found]
+
+
+@dataclass(frozen=True, slots=True)
+class _Served:
+    """A motion in a format, and the words that serve it.
+
+    bits: of the words.  accuracy: as in :func:`heavytop.integrate.words_engines.accuracy`.
+    """
+
+    problem: Problem
+    bits: int
+    accuracy: int
+
+    @classmethod
+    def of(cls, given: Given, bits: int) -> _Served:
+        problem = given(real(bits))
+        arithmetic, scaled = choose(problem, None)
+        return cls(problem, int(arithmetic.flags["bits"]), accuracy(arithmetic, scaled))
+
+
+def _finer(given: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
+    """The bits of a second format, whose words have 30 bits more at least.
 
     Two formats may be served by the same words, and then differ by nothing.
     """
     finer = bits + MORE_BITS
-    while _bits(found := _arithmetic(problem, finer)) < _bits(first) + MORE_BITS:
-        finer += _SEARCH
-    return finer, found
+    for each, one in zip(given, first, strict=True):
+        while _Served.of(each, finer).bits < one.bits + MORE_BITS:
+            finer += _SEARCH
+    return finer
 
 
-def _arithmetic(problem: Callable[[Precision], Problem], bits: int) -> Arithmetic:
-    return choose(problem(real(bits)), None)[0]
+def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
+    """Those of the times within the horizon over 4^n, each stage longer than the one before."""
+    ends = [abs(times[-1]) / 4**n for n in range(stages, -1, -1)]
+    counts = dict.fromkeys(sum(abs(time) <= end for time in times) for end in ends)
+    return [times[:count] for count in counts if count]
 
 
-def _bits(arithmetic: Arithmetic) -> int:
-    return int(arithmetic.flags["bits"])
+def _last_digit(found: Sequence[ComputedReference], fewer: Sequence[int]) -> Fraction | None:
+    """The first time at which some motion has no digit left in a format of so many bits ``fewer`` than the words have.
+
+    Its error is that of the shorter words, times 2 to as many bits: both are amplified alike.
+    """
+    lost = [each.beyond(Fraction(1, _DIGIT) / 2 ** max(0, bits)) for each, bits in zip(found, fewer, strict=True)]
+    return next((time for time in found[0].balls if any(time in each for each in lost)), None)
 
 
-def _accuracy(arithmetic: Arithmetic) -> int:
-    """What the local error of double-double aims at; else all bits but a few."""
-    if isinstance(arithmetic, DoubleDouble):
-        return ceil(1 / arithmetic.tolerance).bit_length() - 1
-    return _bits(arithmetic) - _SEARCH
-
-
-def _run(problem: Problem, times: Sequence[Fraction], words: int) -> Trajectory:
-    targets = [number(time, problem.precision) for time in check_times(times)]
-    run = follow(problem, targets, step_limit=min(_MOST_STEPS, int(EFFORT / seconds_a_step(words))))
-    if run.outcome is not Outcome.SUCCESS:
-        raise OutOfReach(
-            f"A reference run in words of {words} bits {run.outcome.message}.",
-            "Ask for an earlier time.",
-        )
-    return run
+def _runs(served: Sequence[_Served], times: Sequence[Fraction]) -> list[Trajectory]:
+    """In words; one by itself is not put into lanes."""
+    problems = [each.problem for each in served]
+    targets = [number(time, problems[0].precision) for time in check_times(times)]
+    words = max(each.bits for each in served)
+    effort = EFFORT if len(problems) == 1 else EFFORT_OF_MANY / len(problems)
+    limit = min(_MOST_STEPS, int(effort / seconds_a_step(words)))
+    if len(problems) == 1:
+        runs = [follow(problems[0], targets, step_limit=limit)]
+    else:
+        runs = propagate_words_ensemble(problems, targets, step_limit=limit)
+    for run in runs:
+        if run.outcome is not Outcome.SUCCESS:
+            raise OutOfReach(
+                f"A reference run in words of {words} bits {run.outcome.message}.", "Ask for an earlier time."
+            )
+    return runs
 
 
 @whole_evaluation
-def _around(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[arb]:
+def _around(coarse: Trajectory, fine: Trajectory, bits: int) -> list[list[arb]]:
     """The finer values; the radius of Ω, γ and ξ is the largest difference in it, and a rounding of the coarser."""
-    one, two = ([exact(value) for value in run] for run in (coarse, fine))
-    found: list[arb] = []
     with working_precision(bits + 128):
-        for k in range(0, len(one), 3):
-            group = two[k : k + 3]
-            apart = max(abs(b - a) for a, b in zip(one[k : k + 3], group, strict=True))
-            apart += max(Fraction(1), *map(abs, group)) * Fraction(2) ** -bits
-            found += [ball(value) + arb(0, ball(apart).abs_upper()) for value in group]
+        return [_group_balls(one, two, bits) for one, two in zip(coarse.states, fine.states, strict=True)]
+
+
+def _group_balls(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[arb]:
+    one, two = ([exact(value) for value in state] for state in (coarse, fine))
+    found: list[arb] = []
+    for k in range(0, len(one), 3):
+        group = two[k : k + 3]
+        apart = max(abs(b - a) for a, b in zip(one[k : k + 3], group, strict=True))
+        apart += max(map(abs, group)) * Fraction(2) ** -bits
+        found += [ball(value) + arb(0, ball(apart).abs_upper()) for value in group]
     return found
-
-
-def _radius(values: Sequence[arb]) -> Fraction:
-    return max(radius(value) / max(Fraction(1), abs(midpoint(value))) for value in values)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from types import SimpleNamespace
 from typing import Any
 
 import numpy
@@ -20,9 +19,6 @@ from heavytop.top.angles import euler_angles, perpendicular, unwrap
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.integrals import gyrostat_energy
 
-NUMERIC = SimpleNamespace(
-    sqrt=numpy.sqrt, exp=numpy.exp, log=numpy.log, arctan=numpy.arctan, arccos=numpy.arccos, atan2=numpy.arctan2
-)
 _BITS = 64
 RATIOS = (2, 6)
 
@@ -49,13 +45,13 @@ class PaperFigure:
 
     def values(self, t: Any) -> Any:
         """The angle at the times ``t``, with u of (4.2) for ψ and u = √Ω2 for φ and θ, as printed."""
-        u = ershkov.u(self.a, 1.0, t, NUMERIC)
+        u = ershkov.u(self.a, 1.0, t, numpy)
         with numpy.errstate(divide="ignore"):
             if self.angle == "phi":
-                return ershkov.phi_of_6_1(1.0, numpy.sqrt(u * u), NUMERIC)
+                return ershkov.phi_of_6_1(1.0, numpy.sqrt(u * u), numpy)
             if self.angle == "theta":
-                return ershkov.theta_of_6_1(1.0, numpy.sqrt(u * u), NUMERIC)
-        return ershkov.psi(float(self.ratio or self.implied_ratio), 1.0, 1.0, u, t, NUMERIC)
+                return ershkov.theta_of_6_1(1.0, numpy.sqrt(u * u), numpy)
+        return ershkov.psi(float(self.ratio or self.implied_ratio), 1.0, 1.0, u, t, numpy)
 
 
 PAPER_FIGURES = (
@@ -144,14 +140,14 @@ def _compared(ratio: int) -> Compared:
     truth, method = true_curves(case, times)
     branches: tuple[Branch, ...] = ("printed", "smooth")
     parted = {branch: parting(case, times[-1], branch) for branch in branches}
-    return Compared(ratio, truth, method, gyrostat_curves(case.solves, times), claim_curves(case, times), parted)
+    return Compared(ratio, truth, method, exact_curves(case.solves, times), claim_curves(case, times), parted)
 
 
 def _portrait() -> Portrait:
     case = PartialCase(Fraction(1), Fraction(1), Fraction(1, 2))
     times = [Fraction(index, 10) for index in range(-140, 141)]
     moments = numpy.array([float(moment) for moment in case.solves.top.inertia])
-    gyrostat, heavy_top = gyrostat_curves(case.solves, times), true_curves(case, times)[0]
+    gyrostat, heavy_top = exact_curves(case.solves, times), true_curves(case, times)[0]
     orbits = [curves.states[:, :3] * moments for curves in (gyrostat, heavy_top)]
     return Portrait(orbits[0], orbits[1], _levels(case), float(case.alpha * case.i1))
 
@@ -178,17 +174,12 @@ def _levels(case: PartialCase) -> list[Any]:
     return [point(*numpy.asarray(line).T) for line in found]
 
 
-def gyrostat_curves(motion: ErshkovPartial, times: list[Fraction]) -> Curves:
-    """The exact motion of the gyrostat, smooth branch: Ω as the paper has it, θ taking the sign of −t."""
-    return _exact(motion, times)
-
-
 def claim_curves(case: PartialCase, times: list[Fraction]) -> Curves:
     """The claim as printed: u = √Ω2, positive roots and arctan."""
     t = numpy.array([float(time) for time in times])
     i1, i3, c1 = float(case.i1), float(case.i3), float(case.c1)
     with numpy.errstate(divide="ignore"):
-        v = ershkov.partial_case(i1, i3, c1, t, NUMERIC, "printed")
+        v = ershkov.partial_case(i1, i3, c1, t, numpy, "printed")
     # at t = 0 (4.5) divides by 0 and arctan takes it to π/2; the radicand of θ can fall below 0 by rounding
     return Curves(t, numpy.stack([*v.omega, *v.gamma], axis=1), numpy.stack([v.phi, v.theta, v.psi], axis=1))
 
@@ -196,7 +187,7 @@ def claim_curves(case: PartialCase, times: list[Fraction]) -> Curves:
 def true_curves(case: PartialCase, times: list[Fraction]) -> tuple[Curves, str]:
     """The heavy top from the claim's own data at t = 0, and the method: closed form for I1 = 2 I3, else enclosed."""
     if case.i1 == 2 * case.i3:
-        return _exact(DeloneHomoclinic(case.alpha, case.i1), times), "closed form"
+        return exact_curves(DeloneHomoclinic(case.alpha, case.i1), times), "closed form"
     gyrostat = case.solves
     # the γ of the true motion leaves the pole towards φ = π: with this ξ, ψ is 0 there
     first, second, third = (-part for part in perpendicular(gyrostat.start.gamma))
@@ -204,7 +195,7 @@ def true_curves(case: PartialCase, times: list[Fraction]) -> tuple[Curves, str]:
     ordered = sorted({*times, Fraction(0)})
     balls = [[*known.state(time, _BITS), *known.attitude(time, _BITS)] for time in ordered]
     states = numpy.array([[float(value.mid()) for value in row] for row in balls])
-    angles = numpy.array([euler_angles(row[3:6], row[6:9], NUMERIC) for row in states])
+    angles = numpy.array([euler_angles(row[3:6], row[6:9], numpy) for row in states])
     t = numpy.array([float(time) for time in ordered])
     return Curves(t, states[:, :6], _continuous(angles, states)), "proven enclosure"
 
@@ -224,7 +215,8 @@ def _continuous(angles: Any, states: Any) -> Any:
     return numpy.stack([columns[1], columns[0], columns[2]], axis=1)
 
 
-def _exact(motion: ErshkovPartial | DeloneHomoclinic, times: list[Fraction]) -> Curves:
+def exact_curves(motion: ErshkovPartial | DeloneHomoclinic, times: list[Fraction]) -> Curves:
+    """A motion in closed form; that of the gyrostat on its smooth branch: θ takes the sign of −t."""
     t = numpy.array([float(time) for time in times])
     states = numpy.array([[float(value.mid()) for value in motion.state(time, _BITS)] for time in times])
     angles = numpy.array([[float(value.mid()) for value in motion.angles(time, _BITS)] for time in times])

@@ -9,20 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy
 
 from heavytop.measure import mistaken_data, mistaken_states, mistaken_times
-from heavytop.measure.suspects import ALIKE, DROP, FITTED_DROP, FLOOR, Suspect, Units, suspect
+from heavytop.measure.suspects import ALIKE, DROP, FITTED_DROP, FLOOR, Array, Suspect, Units, suspect
 from heavytop.measure.written import explains, rounding
 from heavytop.precision import Precision, decimal_text
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import holding
-
-if TYPE_CHECKING:
-    from heavytop.measure.suspects import Array
 
 _WORTH_ASKING = 1e-10
 """Relative errors below it are no mistake of this kind."""

@@ -10,7 +10,7 @@ from flint import arb
 
 from heavytop.measure.scalar import largest
 from heavytop.precision import exact, log10
-from heavytop.records import Metric, Quantity
+from heavytop.records import Against, Metric, Quantity
 
 RELATIVE = Quantity("solution_error", "relative", "max")
 """The metric behind the digits kept: the largest |error|/max(1, |true value|) of a component of Ω or γ over the
@@ -28,6 +28,7 @@ class Measured(Protocol):
 
     bits: int
     metrics: dict[str, Metric]
+    reference: Against
 
 
 def digits_kept(row: Measured) -> float | None:
@@ -35,11 +36,14 @@ def digits_kept(row: Measured) -> float | None:
 
     Rounded to two places, and at most the digits that the format has.  Where the reference does not resolve the error,
     the digits that are proven.  Of an ensemble: from the root mean square over its starts of each start's largest.
+    0 where the format has no digit left before the end.
     None without a reference, without a sample, and for a value that is not finite.
     """
     metric = row.metrics.get(RELATIVE.text)
     if metric is None or (metric.log10 is None and metric.bound is None and metric.value != "0"):
         return None
+    if row.reference.until:
+        return 0.0
     size = metric.log10 if metric.bound is None else log10(exact(metric.bound))
     most = row.bits * math.log10(2)
     return round(most if size is None else min(most, -size), 2)

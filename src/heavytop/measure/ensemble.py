@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy
@@ -15,7 +15,7 @@ from flint import arb
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.digits import RELATIVE
 from heavytop.measure.ensemble_reference import Reference
-from heavytop.measure.growth import Ensemble, band, law, root_mean_square
+from heavytop.measure.growth import Array, Ensemble, band, law, root_mean_square
 from heavytop.measure.integrator import Integrator
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
 from heavytop.measure.scorer import Scorer, TimeText
@@ -23,11 +23,6 @@ from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import decimal_text
 from heavytop.records import Law, Metric, Quantity, Series
 from heavytop.top.heavy_top import State
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[Any]
 
 _DIGITS = 6
 _ACCUMULATES = {"along": 2, "across": 1, "omega": 2, "gamma": 2}
@@ -37,7 +32,8 @@ _ACCUMULATES = {"along": 2, "across": 1, "omega": 2, "gamma": 2}
 class Ended(msgspec.Struct, frozen=True):
     """What stays of one start when its motion has ended.
 
-    values: by the key of each quantity, at the samples that it reached, None where that is no number.  The rest as in
+    values: by the key of each quantity, at the samples that it reached, as far as there is a truth; None where that is
+    no number.  The rest as in
     :class:`heavytop.integrate.trajectory.Trajectory`.
     """
 
@@ -54,7 +50,7 @@ class Ended(msgspec.Struct, frozen=True):
     def of(cls, run: Trajectory, scorer: Scorer) -> Ended:
         """What stays of a run that went to ``scorer``."""
         running = scorer.running()
-        values = {q.text: [_finite(each.kept[time]) for time in run.times] for q, each in running.items()}
+        values = {q.text: [_finite(kept) for kept in each.kept.values()] for q, each in running.items()}
         lost = run.outcome is Outcome.SUCCESS and any(None in kept for kept in values.values())
         return cls(
             run.integrator,
@@ -135,13 +131,13 @@ def growing(
     step = float(times[-1]) / steps if steps else 0.0
     found = Growing({}, {}, {})
     quantities = _drifts(scorers, len(times), motions)
-    known = any(scorer.error for scorer in scorers)
+    known = any(scorer.error for scorer in scorers) and reference.samples
     if known:
-        quantities |= _errors(starts, len(times), motions, reference)
+        quantities |= _errors(starts, motions, reference)
     for quantity, measured in quantities.items():
-        _add(found, quantity, measured, times, step, time_text)
+        _add(found, quantity, measured, times[: measured.values.shape[1]], step, time_text)
     if known:
-        values = _values(RELATIVE.over(""), len(times), motions)
+        values = _values(RELATIVE.over(""), reference.samples, motions)
         # over the starts that reached the end, of the largest of their values
         found.metrics[RELATIVE] = _metric(values[numpy.isfinite(values).all(axis=1)].max(axis=1), True)
     return found
@@ -155,18 +151,15 @@ def _drifts(scorers: Sequence[Scorer], samples: int, motions: Sequence[Ended]) -
     return found
 
 
-def _errors(
-    starts: Sequence[State], samples: int, motions: Sequence[Ended], reference: Reference
-) -> dict[Quantity, _Measured]:
+def _errors(starts: Sequence[State], motions: Sequence[Ended], reference: Reference) -> dict[Quantity, _Measured]:
     omega = numpy.linalg.norm([[float(w) for w in start.omega] for start in starts], axis=1)
     one = numpy.ones(len(starts))
     whole = numpy.hypot(omega, one)
     sizes = {"along": whole, "across": whole, "omega": omega, "gamma": one}
-    found = {}
+    blur, found = numpy.array(reference.blur), {}
     for part, accumulates in _ACCUMULATES.items():
         quantity = Quantity(SOLUTION_ERROR, part)
-        values = _values(quantity, samples, motions)
-        found[quantity] = _Measured(values, sizes[part], accumulates, reference.radius + reference.part * values)
+        found[quantity] = _Measured(_values(quantity, reference.samples, motions), sizes[part], accumulates, blur)
     return found
 
 

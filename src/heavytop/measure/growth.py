@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
+
+import numpy
+from numpy.typing import NDArray
 
 from heavytop.records import Growth, Law
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[Any]
+Array = NDArray[Any]
 
 Interval = tuple[float, float]
 CLASSES: dict[Growth, float] = dict(zip(get_args(Growth)[:5], (0.0, 0.5, 1.0, 1.5, 2.0), strict=True))
@@ -61,14 +61,10 @@ class Ensemble:
     @property
     def healthy(self) -> Array:
         """Which starts are finite at every time, shape (starts,)."""
-        import numpy
-
         return numpy.asarray(numpy.isfinite(self.errors).all(axis=1))
 
     def rms(self) -> Array:
         """Root mean square over the healthy starts, shape (samples,); NaN where it is not resolved or no start is."""
-        import numpy
-
         kept = self.errors[self.healthy]
         if not len(kept):
             return numpy.full(len(self.times), numpy.nan)
@@ -79,8 +75,6 @@ class Ensemble:
 
 def root_mean_square(values: Array) -> Array:
     """Of finite values over axis 0, which is not empty, without underflow of the squares."""
-    import numpy
-
     largest: Array = numpy.abs(values).max(axis=0)
     scaled = numpy.divide(values, largest, out=numpy.zeros_like(values, dtype=float), where=largest > 0)
     root: Array = largest * numpy.sqrt((scaled**2).mean(axis=0))
@@ -90,8 +84,6 @@ def root_mean_square(values: Array) -> Array:
 @cache
 def resampled(starts: int) -> Array:
     """Weights of the bootstrap, shape (resamples, starts); each row sums to 1.  The same for the same ``starts``."""
-    import numpy
-
     draws = numpy.random.default_rng(_SEED).multinomial(starts, numpy.full(starts, 1 / starts), _RESAMPLES)
     weights: Array = draws / starts
     return weights
@@ -102,8 +94,6 @@ def band(values: Array) -> float | None:
 
     None with fewer than eight values, where one is not finite, and where most are 0.
     """
-    import numpy
-
     if len(values) < FEWEST_STARTS or not numpy.isfinite(values).all() or numpy.count_nonzero(values) < len(values) / 2:
         return None
     squares = (values / values.max()) ** 2
@@ -117,8 +107,6 @@ def _interval(estimates: Array, starts: int) -> Interval:
     By √(n/(n − 1)), for resamples scatter about the sample and not the truth, and by the ratio of the 97.5 % points of
     Student's t and the normal distribution, 1 + (z² + 1)/(4 (n − 1)) with z = 1.96.
     """
-    import numpy
-
     low, middle, high = numpy.percentile(estimates, [2.5, 50, 97.5])
     wider = (starts / (starts - 1)) ** 0.5 * (1 + 1.21 / (starts - 1))
     return float(middle + (low - middle) * wider), float(middle + (high - middle) * wider)
@@ -149,8 +137,6 @@ def law(ensemble: Ensemble) -> Law:
     √(r_low² + f²), must be above the upper end r_high of the healthy one: f = √(r_high² − r_low²), with
     f = size ε n for an integral and size ε n²/2 for the phase.
     """
-    import numpy
-
     starts = int(ensemble.healthy.sum())
     unresolved = Law("unresolved", starts)
     if starts < FEWEST_STARTS:
@@ -184,8 +170,6 @@ def law(ensemble: Ensemble) -> Law:
 
 def _detects(ensemble: Ensemble, last: float, logs: Interval) -> str:
     """As :func:`law` says, from the interval of log RMS at the ``last`` time."""
-    import numpy
-
     low, high = numpy.exp(logs)
     n, order = last / ensemble.step, ensemble.accumulates
     return f"{(high**2 - low**2) ** 0.5 * order / n**order / ensemble.size:.3g}"
@@ -193,8 +177,6 @@ def _detects(ensemble: Ensemble, last: float, logs: Interval) -> str:
 
 def _usable(ensemble: Ensemble, errors: Array) -> Array:
     """Indices of the samples from the first step on, with a resolved RMS, before saturation."""
-    import numpy
-
     saturated = numpy.flatnonzero(errors.max(axis=0) >= LOST * ensemble.size)
     end = int(saturated[0]) if len(saturated) else len(ensemble.times)
     known = (ensemble.rms() > 0) & (ensemble.times >= ensemble.step)
@@ -203,8 +185,6 @@ def _usable(ensemble: Ensemble, errors: Array) -> Array:
 
 def _fit(x: Array, y: Array, weights: Array | None = None) -> tuple[Any, Any]:
     """Slopes and sums of squared residuals of least-squares lines through (x, y), y of shape (..., samples)."""
-    import numpy
-
     w = numpy.ones_like(x) if weights is None else weights
     centred = x - numpy.average(x, weights=w)
     rest = y - numpy.average(y, axis=-1, weights=w)[..., numpy.newaxis]
@@ -217,8 +197,6 @@ _Found = tuple[Growth, float, float, Interval, Interval | None]
 
 
 def _power(times: Array, rms: Array, shares: Array) -> _Found | None:
-    import numpy
-
     # times are rounded to a few digits
     late = times >= times[-1] / 10**FEWEST_DECADES * 0.999
     x, y, shares = numpy.log(times[late]), numpy.log(rms[late]), shares[:, late]
@@ -264,8 +242,6 @@ def _levelled(shares: Array, weights: Array) -> Array:
 
     weights: of the starts, shape (resamples, starts); the shares that the own means refer to are the resample's.
     """
-    import numpy
-
     mean = weights @ shares
     # a start's own mean is taken relative to all: again with the scaled ones, until large ones do not lead
     for _ in range(_ROUNDS):
@@ -276,8 +252,6 @@ def _levelled(shares: Array, weights: Array) -> Array:
 
 
 def _exponential(times: Array, rms: Array, shares: Array) -> _Found | None:
-    import numpy
-
     if rms[-1] < rms[0] * 10**FEWEST_DECADES:
         return None
     weights, starts = numpy.gradient(times), len(shares)
@@ -298,8 +272,6 @@ def finite_time_rates(times: Array, errors: Array) -> Array:
 
     Samples where the error is exactly 0 count for nothing; a start with fewer than two others has the rate 0.
     """
-    import numpy
-
     weights = numpy.where(errors > 0, numpy.gradient(times), 0.0)
     logs = numpy.log(numpy.where(errors > 0, errors, 1.0))
     total = numpy.maximum(weights.sum(axis=1, keepdims=True), numpy.finfo(float).tiny)
@@ -317,8 +289,6 @@ def median_interval(values: Array) -> Interval:
     number of those below is binomial, and the interval is exact for any number of starts, where a percentile bootstrap
     of the median is too narrow (W. J. Conover, Practical Nonparametric Statistics, 1999, §3.2).
     """
-    import numpy
-
     ordered, count = numpy.sort(values), len(values)
     outside, last = 0, 0
     for place in range(count // 2):
@@ -331,8 +301,6 @@ def median_interval(values: Array) -> Interval:
 
 def _lost(ensemble: Ensemble, growth: Growth, times: Array, rms: Array) -> str | None:
     """When the RMS is a tenth of the size: the first sample where it is, else by the class, if that says when."""
-    import numpy
-
     beyond = numpy.flatnonzero(ensemble.rms() >= LOST * ensemble.size)
     if len(beyond):
         return f"{ensemble.times[beyond[0]]:.3g}"

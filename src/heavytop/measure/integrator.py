@@ -21,27 +21,32 @@ from heavytop.top.heavy_top import HeavyTop, State
 HEYOKA = "heyoka"
 
 
-def require(name: str, with_steps: bool = False) -> None:
-    """Raises InputError for an integrator that is unknown, or built in and not installed; ``with_steps``: also for one
-    that does not hand over its single steps.
-    """
+def require(name: str) -> None:
+    """Raises InputError for an integrator that is unknown, or built in and not installed."""
     if name not in registry.INTEGRATORS:
         peers.require(name)
-    if with_steps and name != HEYOKA:
-        raise InputError(f"The integrator {name} does not hand over its single steps.", f"Use {HEYOKA}.")
 
 
 @dataclass(frozen=True, slots=True)
 class Integrator:
-    """The integrator of that name, or a planted fault of :mod:`heavytop.integrate.broken` in the place of heyoka."""
+    """The integrator of that name, or a planted fault of :mod:`heavytop.integrate.broken` in the place of heyoka.
+
+    setting: ("tolerance", 1e-9) or ("step", 1/50) of an integrator of others; None for what it does by itself.
+    """
 
     name: str = HEYOKA
     fault: str = ""
+    setting: tuple[str, Fraction] | None = None
 
     @property
     def takes_many(self) -> bool:
         """Whether many motions go side by side, which makes each cheap."""
         return not self.fault and self.name in registry.INTEGRATORS
+
+    @property
+    def hands_over_steps(self) -> bool:
+        """Whether its single steps can be looked at, as heyoka's."""
+        return self.name == HEYOKA
 
     def propagate(
         self,
@@ -66,7 +71,7 @@ class Integrator:
             run: Trajectory = call(top, start, times, precision, system=system, observer=observer, **going_on)
             return run
         try:
-            run = peers.ready(self.name)(top, start, times, precision, system=system)
+            run = peers.ready(self.name, self.setting)(top, start, times, precision, system=system)
         except InputError as error:  # what a peer of this program cannot be asked for is one row's failure too
             raise PeerFailed(error.cause.removesuffix(".")) from None
         if observer is not None:
@@ -106,7 +111,7 @@ class Integrator:
     def first_steps(
         self, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
     ) -> tuple[Trajectory, list[TaylorStep]]:
-        """As :func:`heavytop.integrate.taylor.first_steps`."""
+        """As :func:`heavytop.integrate.taylor.first_steps`, where it :attr:`hands_over_steps`."""
         steps = FAULTS[self.fault].first_steps if self.fault else taylor.first_steps
         return steps(top, start, until, precision, system=system)
 

@@ -11,18 +11,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import permutations, product
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy
 
 from heavytop.errors import InputError
-from heavytop.measure.suspects import ALIKE, Suspect, motion
+from heavytop.measure.suspects import ALIKE, Array, Suspect, motion
 from heavytop.precision import decimal_text
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-
-if TYPE_CHECKING:
-    from heavytop.measure.suspects import Array
 
 _SINGULAR = 1e-4
 """The integrals name one top if the smallest singular value is smaller than this part of the next."""

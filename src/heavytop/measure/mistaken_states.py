@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import permutations, product
-from typing import TYPE_CHECKING
 
 import numpy
 
-from heavytop.measure.suspects import ALIKE, FLOOR, Suspect
-
-if TYPE_CHECKING:
-    from heavytop.measure.suspects import Array
+from heavytop.measure.suspects import ALIKE, FLOOR, Array, Suspect
 
 _DEGREES = 180 / numpy.pi
 _TURNS = 1 / (2 * numpy.pi)

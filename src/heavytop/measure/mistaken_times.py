@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy
 
-from heavytop.measure.suspects import ALIKE, FARTHEST, FLOOR, Suspect
-
-if TYPE_CHECKING:
-    from heavytop.measure.suspects import Array
+from heavytop.measure.suspects import ALIKE, FARTHEST, FLOOR, Array, Suspect
 
 _GRID = 1500
 _WITHIN = 0.3

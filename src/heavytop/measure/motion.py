@@ -17,16 +17,15 @@ from heavytop.exact.scales import least_rate
 from heavytop.integrate import registry
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
+from heavytop.measure.followed_angles import FollowedAngles
 from heavytop.measure.scalar import GUARD_BITS, text, to_ball
 from heavytop.precision import Precision, decimal_text, exact, exact_text, number
 from heavytop.records import Metric
-from heavytop.top.angles import euler_angles, perpendicular, unwrap
+from heavytop.top.angles import euler_angles, perpendicular
 from heavytop.top.equations import System
-from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import Integral, holding
 
-_DENSE = 32
-_MOST_DENSE = 200_000
 _MOST_TURNS = 10**13
 
 
@@ -77,23 +76,19 @@ class Motion:
 
 
 class _Watcher:
-    """Keeps the states at the times asked for, their drift, and the angles followed from sample to sample."""
+    """Keeps the states at the times asked for, their drift, and the angles at every sample."""
 
     def __init__(self, problem: Problem, integrals: Sequence[Integral], wanted: frozenset[Fraction]) -> None:
         self.drift = Drift(problem, integrals)
         self.wanted = wanted
-        self.kept: list[tuple[Fraction, Any, list[float]]] = []
-        self.followed: list[float] = []
-        self.attitude = problem.xi is not None
+        self.kept: list[tuple[Fraction, Any]] = []
+        self.angles = FollowedAngles(problem) if problem.xi is not None else None
 
     def __call__(self, time: Fraction, state: Any) -> None:
-        if self.attitude:
-            values = [float(value) for value in state]
-            now = euler_angles(values[3:6], values[6:9], math)
-            pairs = zip(self.followed or now, now, strict=True)
-            self.followed = [unwrap(pair, math.tau)[1] for pair in pairs]
+        if self.angles is not None:
+            self.angles.see(time, state)
         if time in self.wanted:
-            self.kept.append((time, state, self.followed))
+            self.kept.append((time, state))
             self.drift(time, state)
 
 
@@ -120,16 +115,18 @@ def compute(
     _require_reach(problem, times[-1])
     wanted = frozenset(exact(number(time, precision)) for time in times)
     watcher = _Watcher(problem, holding(top, start, system), wanted)
-    samples = _dense(problem, times) if attitude else times
-    asked = {"xi": xi, "step_limit": step_limit, "observer": watcher}
-    options = {name: value for name, value in asked.items() if value is not None}
-    run = registry.propagator(integrator, options)(top, start, samples, precision, system=system)
-    run = replace(
-        run, times=tuple(time for time, *_ in watcher.kept), states=tuple(state for _, state, _ in watcher.kept)
-    )
+    samples = times if watcher.angles is None else watcher.angles.samples(times)
+    options = {name: value for name, value in (("xi", xi), ("step_limit", step_limit)) if value is not None}
+    propagate = registry.propagator(integrator, {**options, "observer": watcher})
+    run = propagate(top, start, samples, precision, system=system)
+    run = replace(run, times=tuple(time for time, _ in watcher.kept), states=tuple(state for _, state in watcher.kept))
     texts = run.texts()
-    angles = [_angles(state, followed, precision) for _, state, followed in watcher.kept] if attitude else None
-    attitudes = [line[6:] for line in texts] if attitude else None
+    attitudes = angles = None
+    if watcher.angles is not None:
+        again = registry.propagator(integrator, {**options, "observer": watcher.angles.see})
+        followed = watcher.angles.complete(lambda more: again(top, start, more, precision, system=system))
+        attitudes = [line[6:] for line in texts]
+        angles = [_angles(state, followed[time], precision) for time, state in watcher.kept]
     return Motion(top, start, run, [line[:6] for line in texts], watcher.drift.metrics(), attitudes, angles)
 
 
@@ -143,24 +140,6 @@ def _require_reach(problem: Problem, end: Fraction) -> None:
             f"Integrators take several steps for each: up to {_MOST_TURNS:.0e} are tried; `heavytop reference` needs "
             "none where there is a closed form.",
         )
-
-
-def _dense(problem: Problem, times: Sequence[Fraction]) -> list[Fraction]:
-    """The times with others between them, so close that the body turns by less than 1/32 radian from one to the next.
-
-    From energy (heavy top) or |M| (gyrostat): |Ω|² <= (Ω·M + 4 |P r|)/min I at all times, and |ω| <= |Ω| + |λ|.
-    Where that would be more than 200,000 samples they stay as they are, and angles jump by whole turns.
-    """
-    top, omega = problem.top, problem.start.omega
-    energy = float(dot(omega, top.angular_momentum(omega))) + 4 * math.sqrt(float(dot(top.moment, top.moment)))
-    least, most = float(min(top.inertia)), float(max(top.inertia))
-    rate = math.sqrt(energy * most) / least + abs(float(problem.parameters.rotor))
-    count = math.ceil(_DENSE * rate * abs(float(times[-1])))
-    if count > _MOST_DENSE or count == 0:
-        return list(times)
-    step = times[-1] / count
-    between = {step * i for i in range(1, count)}
-    return sorted(between | set(times), key=abs)
 
 
 @whole_evaluation

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from heavytop.display import Table
+from heavytop.display import Table, Tabular
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.exact.attitude import attitude_of
 from heavytop.exact.balls import radius_text, value_text
@@ -40,7 +40,7 @@ class Ball(msgspec.Struct, frozen=True):
     radius: str
 
 
-class Reference(msgspec.Struct, frozen=True, omit_defaults=True):
+class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True):
     """Proven states; its JSON is that of ``heavytop reference``.
 
     times: exact, as decimals or fractions.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
@@ -81,12 +81,6 @@ class Reference(msgspec.Struct, frozen=True, omit_defaults=True):
         title = f"{self.system}, known to {self.digits} digits: {self.method}"
         return Table(title, ("t", *NAMES), rows, [f"largest radius {radius_text(worst)}"])
 
-    def __repr__(self) -> str:
-        return self._table().text()
-
-    def _repr_html_(self) -> str:
-        return self._table().html()
-
 
 def _rounded_up(text: str) -> float:
     value = float(text)
@@ -113,7 +107,7 @@ def reference(
     instants = [exact(time) for time in times]
     require_handy(top, start, instants)
     solution = finder(top, start, system)
-    method, xi = attitude_of(solution) if attitude else (None, None)
+    method, xi = attitude_of(solution, bits_of(digits)) if attitude else (None, None)
     return Reference(
         method=solution.method,
         digits=digits,

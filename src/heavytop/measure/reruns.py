@@ -9,20 +9,15 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache
 
-from flint import arb
 from msgspec.structs import replace as replace_struct
 
-from heavytop.exact.balls import working_precision
-from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.integrator import Integrator
-from heavytop.measure.known import closed_form
 from heavytop.measure.rounding_noise import RERUNS, bands, duration_band, factor
-from heavytop.measure.scalar import to_ball
 from heavytop.measure.scorer import Scorer
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, available, exact, number, real, round_to
+from heavytop.measure.truth import Truth, uncertified
+from heavytop.precision import DOUBLE, exact, number, round_to
 from heavytop.records import Metric
 from heavytop.top.equations import GYROSTAT
 
@@ -36,13 +31,6 @@ _BITS = 32
 _FLOOR = math.log10(float(DOUBLE.eps)) - 1
 
 Metrics = dict[str, Metric]
-
-
-class Remembered:
-    """A known motion that works out each state once: state(time, bits) as in heavytop.exact.solution."""
-
-    def __init__(self, state: Callable[[Fraction, int], list[arb]]) -> None:
-        self.state = cache(state)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +57,7 @@ class Reruns:
         end = horizon if run.steps <= most else horizon * most / run.steps
         times = [exact(number(end * i / _SAMPLES, DOUBLE)) for i in range(1, _SAMPLES + 1)]
         problem = _short(self.problem)
-        truth: Remembered | str = _truth(problem, times) if known else "not asked for"
+        truth: Truth | str = uncertified(problem, times) if known else "not asked for"
         reruns = self._of(problem, times, lambda given: Scorer(given, truth))
         return _banded(run, metrics, [scorer.metrics() for scorer in reruns])
 
@@ -108,21 +96,6 @@ def _short(problem: Problem) -> Problem:
     p = problem.parameters
     inertia, moment = (tuple(round_to(value, _BITS) for value in part) for part in (p.inertia, p.moment))
     return replace(problem, parameters=p._replace(inertia=inertia, moment=moment))
-
-
-def _truth(problem: Problem, times: Sequence[Fraction]) -> Remembered:
-    """The closed form, or a run in a wider format: truth enough for a band."""
-    if (known := closed_form(problem)) is not None:
-        return Remembered(known.state)
-    wider = next(p for p in (EXTENDED, QUAD, real(QUAD.bits)) if not available()[p.family])
-    (run,) = propagate_ensemble([replace(problem, precision=wider)], times)
-    states = dict(zip(run.times, run.states, strict=True))
-
-    def state(time: Fraction, bits: int) -> list[arb]:
-        with working_precision(bits):
-            return [to_ball(value) for value in states[time]]
-
-    return Remembered(state)
 
 
 def _banded(run: Trajectory, metrics: Metrics, reruns: list[Metrics]) -> Metrics:

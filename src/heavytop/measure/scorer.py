@@ -5,30 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
-from typing import Any, Protocol
-
-from flint import arb
+from typing import Any
 
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.drift import Drift, Running
-from heavytop.measure.known import Known
 from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
+from heavytop.measure.truth import Truth
 from heavytop.records import Against, Metric, Quantity, Series
 
 TimeText = Callable[[Fraction], str]
 
 
-class TrueMotion(Protocol):
-    """What a motion is compared with: a closed form, an enclosure, a run in a wider format."""
-
-    def state(self, time: Fraction, bits: int) -> Sequence[arb]:
-        """Six balls at ``time``."""
-
-
 class Scorer:
     """Takes in the states of one motion, one after the other, and holds what they are worth.
 
-    problem: what the integrator was given.  known: the known motion, or why there is none.
+    problem: what the integrator was given.  truth: the true motion, or why there is none.
     keep: the times whose values go into the series.
     threshold, until, name: as in :class:`heavytop.measure.solution_error.SolutionError`.
     Drift is in the units of each integral, errors of Ω are in 1/time unit, of γ in none.
@@ -37,7 +28,7 @@ class Scorer:
     def __init__(
         self,
         problem: Problem,
-        known: Known | TrueMotion | str,
+        truth: Truth | str,
         keep: Sequence[Fraction] = (),
         *,
         threshold: Fraction | None = None,
@@ -45,10 +36,9 @@ class Scorer:
         name: str = SOLUTION_ERROR,
     ) -> None:
         self.drift = Drift(problem, problem.integrals(), keep)
-        self.known = known
+        self.truth = truth
         self.error: SolutionError | None = None
-        if not isinstance(known, str):
-            truth = known.solution if isinstance(known, Known) else known
+        if not isinstance(truth, str):
             self.error = SolutionError(problem, truth, keep, threshold, until, name)
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
@@ -65,9 +55,9 @@ class Scorer:
     @property
     def against(self) -> Against:
         """What the motion was compared with."""
-        if isinstance(self.known, Known):
-            return self.known.against
-        return Against("none", reason=f"no reference: {self.known}")
+        if isinstance(self.truth, str):
+            return Against("none", reason=f"no reference: {self.truth}")
+        return self.truth.against
 
     def running(self) -> dict[Quantity, Running]:
         """The running values of every drift and error by what they are of."""

@@ -15,6 +15,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.measure.digits import relative_error
 from heavytop.measure.drift import Running, Sums, parameter_balls
 from heavytop.measure.scalar import GUARD_BITS, largest, resolved, to_ball
+from heavytop.measure.truth import Truth
 from heavytop.records import Metric, Quantity, Series, by_name
 
 SOLUTION_ERROR = "solution_error"
@@ -26,8 +27,8 @@ class SolutionError:
     """Error of Ω and of γ (largest component), of the state along the flow (phase) and across it (Euclidean), and
     relative: the largest |error|/max(1, |true value|) of a component, which says how many digits are kept.
 
-    known: what has the true ``state(time, bits)``; its start and top are those of ``problem``, rounded, so no input
-    rounding is charged.
+    truth: the true motion from the start and top of ``problem``, rounded, so no input rounding is charged; what it does
+    not cover is not compared.
     threshold: the error of Ω, in units of Ω, whose first crossing is the escape time.
     until: the |t| up to which errors count; later ones go into the series alone.
     name: of the quantity, whose components are omega, gamma, along and across.
@@ -36,13 +37,13 @@ class SolutionError:
     def __init__(
         self,
         problem: Problem,
-        known: Any,
+        truth: Truth,
         keep: Sequence[Fraction] = (),
         threshold: Fraction | None = None,
         until: float = math.inf,
         name: str = SOLUTION_ERROR,
     ) -> None:
-        self.known = known
+        self.truth = truth
         self.bits = problem.precision.bits + GUARD_BITS
         self.keep = frozenset(keep)
         self.threshold = threshold
@@ -55,7 +56,9 @@ class SolutionError:
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
         """Take in one native state."""
-        sums, left = self._following(state, self.known.state(time, self.bits))
+        if not self.truth.covers(time):
+            return
+        sums, left = self._following(state, self.truth.state(time, self.bits))
         keep = time in self.keep
         counts = float(abs(time)) <= self.until
         for running, part in zip(self.running.values(), sums, strict=True):

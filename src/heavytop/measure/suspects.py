@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy
+from numpy.typing import NDArray
 
 from heavytop.errors import HeavyTopError
 from heavytop.integrate.taylor import propagate
@@ -20,10 +20,7 @@ from heavytop.precision import DOUBLE, log10
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[numpy.float64]
+Array = NDArray[numpy.float64]
 
 MOST_SAMPLES = 24
 _TURNS = 60.0

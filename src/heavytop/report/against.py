@@ -33,7 +33,9 @@ def weaker(old: Against, new: Against) -> str:
         return f"compared with {old.method!r} and {new.method!r}"
     if _is_proven(old) and not _is_proven(new):
         return "the reference is no longer proven"
-    if _grew(old.radius, new.radius, _RADIUS_DECADES):
+    if _earlier(old.until, new.until):
+        return "the truth ends earlier"
+    if _grew(old.radius, new.radius, _RADIUS_DECADES if old.how == "proven" else _PART_DECADES):
         return "the radius of the reference is larger, or not said"
     if _grew(_part(old), _part(new), _PART_DECADES):
         return "the error of the computed reference is larger, or not said"
@@ -93,6 +95,11 @@ def _log(text: str) -> float:
 
 def _grew(old: str, new: str, decades: float) -> bool:
     return bool(old) and (not new or not _log(new) <= _log(old) + decades)
+
+
+def _earlier(old: str, new: str) -> bool:
+    """Whether a truth that had an end, or none, ends at less than half of the time now."""
+    return bool(new) and not (old and _log(new) >= _log(old) + math.log10(_TIME_KEPT))
 
 
 def _kept(old: tuple[Any, ...], new: tuple[Any, ...], enough: Callable[[Any, Any], bool]) -> bool:

@@ -95,8 +95,9 @@ def digits_lines(rows: Sequence[Row], title: str) -> list[str]:
         name, column = names(row), row.precision
         if len(formats) == 1:
             name, column = row.key.case, row.key.subject.name
-        until = logarithm(row.horizon.removeprefix("-"))
-        cell = f"{digits_text(kept)} to {'0' if until is None else _until(until)}"
+        lost = row.reference.until
+        until = logarithm((lost or row.horizon).removeprefix("-"))
+        cell = f"{digits_text(kept)} {'from' if lost else 'to'} {'0' if until is None else _until(until)}"
         cells = table.setdefault(name, {})
         # of two horizons the longer
         cells[column] = max(cells.get(column, (-inf, "")), (-inf if until is None else until, cell))

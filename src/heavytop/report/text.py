@@ -130,6 +130,8 @@ def motions(rows: Sequence[Row]) -> Table:
         error, across = ("no reference" if each is None else with_noise(each, 2) for each in errors)
         kept = digits_kept(row)
         digits = "-" if kept is None else digits_text(kept)
+        if row.reference.until:
+            digits += f" from {row.reference.until}"
         lines.append(
             [
                 row.case + computed_by(row),

@@ -66,10 +66,14 @@ def _said(text: str, source: str) -> str:
 
 
 def _key(keys: dict[str, Key], source: str, line: Line) -> Key:
-    name, place = clip(line.label + (f", {source}" if source else ""), 50), len(keys)
-    colour, turn = place % len(COLOURS), place // len(COLOURS)
-    marker = MARKERS[(place + turn) % len(MARKERS)]
-    return keys.setdefault(name, Key(name, colour, marker, old=source == "baseline"))
+    name = clip(line.label + (f", {source}" if source else ""), 50)
+    return keys.setdefault(name, numbered(name, len(keys), source == "baseline"))
+
+
+def numbered(label: str, place: int, old: bool = False) -> Key:
+    """The key of the curve in that place: places that share a colour differ in the marker."""
+    turn, colour = divmod(place, len(COLOURS))
+    return Key(label, colour, MARKERS[(place + turn) % len(MARKERS)], old=old)
 
 
 def _picture(

@@ -95,6 +95,8 @@ class Lead:
         """The ratios in a line; "" where there is none."""
         if self.ratio is None:
             return ""
+        if self.ratio < 1:
+            return f"At 1e{self.log10:g} {self.peer} is {1 / self.ratio:.1f} × as fast as {self.name}"
         other = self.general and self._ratio(self.general[1])
         more = f" ({self.general[0]} {other:.1f} ×)" if self.general and other else ""
         return f"At 1e{self.log10:g} {self.name} is {self.ratio:.1f} × as fast as {self.peer}{more}"
@@ -104,9 +106,15 @@ class Lead:
         """The lead in a sentence."""
         goal = f"{self.case}: {self.name} at error 1e{self.log10:g}"
         if self.ours is None:
-            return f"{goal}: not reached"
+            fastest = (
+                "" if self.theirs is None else f"; the fastest that gets there is {self.peer} ({_time(self.theirs)})"
+            )
+            return f"{goal}: not reached{fastest}"
         if self.ratio is None or self.theirs is None:
             parts = [f"{goal} takes {_time(self.ours)}; no peer gets there"]
+        elif self.ratio < 1:
+            parts = [f"{self.case}: the fastest at error 1e{self.log10:g} is {self.peer} ({_time(self.theirs)})"]
+            parts.append(f"{self.name} is {_speed(self.ratio)} ({_time(self.ours)})")
         else:
             pair = f"{_time(self.ours)} against {_time(self.theirs)}"
             parts = [f"{goal} is {_speed(self.ratio)} than the best peer that gets there, {self.peer} ({pair})"]
@@ -166,7 +174,7 @@ def leads(rows: Sequence[Row]) -> list[Lead]:
     return [
         lead
         for case, lines in panels(rows).items()
-        for log10, formats in ((-10.0, ("double",)), (-30.0, ("quad", "real")))
+        for log10, formats in ((-10.0, ("double",)), (-30.0, ("double-double", "quad", "real")))
         if (lead := _lead(case, log10, [line for line in lines if parse(line.precision).family in formats]))
     ]
 

@@ -7,25 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.records import Row
+from heavytop.records import Row, RowKey
 from heavytop.report.method_growth import QUANTITIES, alike, growth_axes, keyed
 from heavytop.report.section import TIME, clip
 from heavytop.report.svg import COLOURS, document, plain, quiet_style
+from heavytop.report.work_plots import numbered
 from heavytop.report.work_precision import Line, leads, panels
 
-# Okabe and Ito's colours, one a family; markers and dashes tell its members apart
-_COLOURS = {
-    "heyoka": "#0072B2",
-    "cyrk": "#D55E00",
-    "diffrax": "#E69F00",
-    "scipy": "#009E73",
-    "sundials": "#CC79A7",
-    "splitting": "#000000",
-    "mpmath": "#8A6D00",
-}
-_OTHER = "#777777"
-_MARKERS = "osD^v<>pP*Xh"
-_DASHES = ("-", "--", ":", "-.")
 _CROSS: dict[str, Any] = {"linestyle": "", "marker": "x", "markersize": 9, "markeredgewidth": 2}
 
 
@@ -48,22 +36,9 @@ def draw_work_precision(rows: Sequence[Row], directory: Path) -> list[Path]:
 
 
 def looks(lines: Sequence[Line]) -> dict[str, dict[str, Any]]:
-    """Colour, marker and dashes for each label, the same in every panel."""
-    members: dict[str, list[str]] = {}
-    for line in lines:
-        labels = members.setdefault(line.integrator.partition(":")[0], [])
-        if line.label not in labels:
-            labels.append(line.label)
-    return {
-        label: {
-            "color": _COLOURS.get(family, _OTHER),
-            "marker": _MARKERS[index % len(_MARKERS)],
-            "linestyle": _DASHES[index % len(_DASHES)],
-            "linewidth": 2.2 if label == "heyoka double" else 1.2,
-        }
-        for family, labels in members.items()
-        for index, label in enumerate(labels)
-    }
+    """Colour and marker for each label, the same in every panel and on the page."""
+    keys = [numbered(label, place) for place, label in enumerate(dict.fromkeys(line.label for line in lines))]
+    return {key.label: {"color": COLOURS[key.colour], "marker": key.marker, "linewidth": 1.4} for key in keys}
 
 
 def work_precision_axes(axes: Any, lines: Sequence[Line], styles: dict[str, dict[str, Any]] | None = None) -> None:
@@ -93,6 +68,7 @@ def work_precision_figure(rows: Sequence[Row], metric: str = "error_max") -> Any
     if not cases:
         return None
     lead = {each.case: each for each in leads(rows)}
+    keys = {row.case: row.key for row in rows}
     styles = looks([line for lines in cases.values() for line in lines])
     height = -(-len(cases) // 2)
     figure = _figure(11, 4.4 * height + 1.2)
@@ -101,7 +77,7 @@ def work_precision_figure(rows: Sequence[Row], metric: str = "error_max") -> Any
     for axes, (case, lines) in zip(grid, cases.items(), strict=False):
         work_precision_axes(axes, lines, styles)
         found = lead.get(case)
-        title = plain(case.replace("/T=", ", up to t = "))
+        title = plain(_up_to(keys[case]))
         if found is not None and found.short:
             title += f"\n{plain(found.short)}"
         axes.set_title(title, fontsize=10)
@@ -110,7 +86,7 @@ def work_precision_figure(rows: Sequence[Row], metric: str = "error_max") -> Any
     for axes in grid[len(cases) :]:
         axes.set_visible(False)
     if any(line.failures for lines in cases.values() for line in lines):
-        labels["× gave up before the end"] = grid[0].plot([], [], color=_OTHER, **_CROSS)[0]
+        labels["× gave up before the end"] = grid[0].plot([], [], color=COLOURS[-1], **_CROSS)[0]
     figure.legend(labels.values(), labels.keys(), loc="outside lower center", ncols=5, fontsize=8, frameon=False)
     return figure
 
@@ -128,8 +104,12 @@ def growth_figure(rows: Sequence[Row]) -> Any:
                 axes.plot([], [], marker=key.marker, color=COLOURS[key.colour], label=label)
             axes.set(title=title, xlabel=TIME, ylabel=unit)
             axes.legend(fontsize=8, frameon=False)
-        figure.suptitle(clip(chosen[0][1].case.replace("/T=", ", up to t = ")), fontsize=10)
+        figure.suptitle(clip(_up_to(chosen[0][1].key)), fontsize=10)
     return figure
+
+
+def _up_to(key: RowKey) -> str:
+    return f"{key.case}, up to t = {key.horizon}"
 
 
 def _figure(width: float, height: float) -> Any:

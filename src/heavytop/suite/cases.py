@@ -88,11 +88,9 @@ def _asymptotic() -> Case:
     )
 
 
-def _near(name: str, known: AlgebraicMotion) -> Case:
+def _near(name: str, who: str, known: AlgebraicMotion) -> Case:
     """Rational data within 2^-253 of a motion whose start is algebraic; their truth is the enclosure."""
-    top, start = known.rounded()
-    about = f"rational data beside {known.method.removeprefix('algebraic: ').partition(',')[0]}"
-    return Case(name, about, HEAVY_TOP, top, start)
+    return Case(name, f"rational data beside {who}'s motion", HEAVY_TOP, *known.rounded())
 
 
 CASES: dict[str, Case] = {
@@ -165,9 +163,9 @@ CASES: dict[str, Case] = {
             HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)),
             State((0, 4, 2), (-1, 0, 0)),
         ),
-        _near("goryachev", goryachev_motion(Fraction(39, 64), Fraction(-1), Fraction(1, 4))),
-        _near("kowalewski", kowalewski_motion(Fraction(5, 8), Fraction(1))),
-        _near("chaplygin", chaplygin_motion(Fraction(49, 32), Fraction(1), Fraction(1, 2))),
+        _near("goryachev", "Goryachev", goryachev_motion(Fraction(39, 64), Fraction(-1), Fraction(1, 4))),
+        _near("kowalewski", "N. Kowalewski", kowalewski_motion(Fraction(5, 8), Fraction(1))),
+        _near("chaplygin", "Chaplygin", chaplygin_motion(Fraction(49, 32), Fraction(1), Fraction(1, 2))),
         Case(
             "gyrostat",
             "asymmetric gyrostat of (2.1)-(2.4), gamma = M/|M|",

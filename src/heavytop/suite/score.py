@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
 from typing import Any
 
 import msgspec
@@ -15,16 +14,16 @@ from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.diagnosis import Diagnosis, diagnose
 from heavytop.measure.digits import RELATIVE, digits_kept, digits_of
-from heavytop.measure.known import known_motion
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
+from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE_DOUBLE, exact, round_to
-from heavytop.records import Metric, Row, RowKey, Subject
+from heavytop.records import Against, Metric, Row, RowKey, Subject
 from heavytop.suite.cases import Case
+from heavytop.suite.given import Given
 from heavytop.suite.rows import computed_row, time_text
 from heavytop.suite.sampling import log_spaced
 from heavytop.suite.task import Task, seconds_a_step
-from heavytop.suite.trajectory_file import Given
 
 __all__ = ["Assessment", "Peer", "assess", "complete", "digits_kept", "score"]
 
@@ -118,9 +117,8 @@ def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Score
     count = len(states)
     times = [round_to(time, precision.bits) for time in given.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
-    scorer = Scorer(problem, known_motion(problem, times[-1]), keep)
-    if scorer.error is not None:
-        scorer.error.known = _Remembering(scorer.error.known)
+    true = truth(problem, times)
+    scorer = Scorer(problem, true if isinstance(true, str) else true.remembered(), keep)
     for time, state in zip(times, states, strict=False):
         scorer(time, state)
         progress()
@@ -151,13 +149,6 @@ def _finite(given: Given) -> list[tuple[Fraction, ...]]:
     return [state for state in given.states[:count] if state is not None]
 
 
-class _Remembering:
-    """A known motion that works out each state once."""
-
-    def __init__(self, known: Any) -> None:
-        self.state = cache(known.state)
-
-
 def _size(row: Row) -> float | None:
     metric = row.metrics.get(RELATIVE.text)
     if metric is None or not (_is_number(metric) or metric.bound is not None):
@@ -171,6 +162,7 @@ class _Measured:
 
     bits: int
     metrics: dict[str, Metric]
+    reference: Against
 
 
 def _peer(given: Given, scorer: Scorer, count: int, progress: Progress) -> Peer | None:
@@ -178,7 +170,7 @@ def _peer(given: Given, scorer: Scorer, count: int, progress: Progress) -> Peer 
     precision = given.precision
     if scorer.error is None or not count or precision == DOUBLE_DOUBLE:
         return None
-    error = SolutionError(Problem.of(given.top, given.start, precision, given.system), scorer.error.known)
+    error = SolutionError(Problem.of(given.top, given.start, precision, given.system), scorer.error.truth)
     limit = max(1, int(_EFFORT / seconds_a_step(precision.bits)))
     times = given.times[:count]
 
@@ -192,7 +184,7 @@ def _peer(given: Given, scorer: Scorer, count: int, progress: Progress) -> Peer 
         )
     except HeavyTopError:  # a format that this platform lacks, or numbers outside its range
         return None
-    digits = digits_kept(_Measured(precision.bits, error.metrics()))
+    digits = digits_kept(_Measured(precision.bits, error.metrics(), scorer.against))
     if run.outcome is not Outcome.SUCCESS or digits is None:
         return None
     return Peer(PEER, precision.name, digits, run.steps)

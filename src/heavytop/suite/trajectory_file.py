@@ -5,37 +5,21 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-from dataclasses import dataclass
-from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import numpy
-
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import (
-    DOUBLE,
-    EXTENDED,
-    QUAD,
-    Precision,
-    decimal_text,
-    exact,
-    exact_text,
-    number,
-    parse,
-    real,
-    round_to,
-    shown,
-)
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, exact_text, parse, real, shown
 from heavytop.suite import written_numbers
 from heavytop.suite.cases import Case
 from heavytop.suite.files import read_whole, without_repeats
+from heavytop.suite.given import LONGEST_NAME, MOST, Given, named, require_states, rounded_state, too_many
 from heavytop.suite.trajectory_case import require_case
 from heavytop.suite.trajectory_table import REMEDY, VECTORS, Table, unknown
-from heavytop.top.equations import VARIABLES, System, system
-from heavytop.top.heavy_top import HeavyTop, State, dot, require_physical
+from heavytop.top.equations import system
+from heavytop.top.heavy_top import HeavyTop, State, require_physical
 from heavytop.top.times import check_times
 
 _FLAGS = ("language", "tolerance", "step")
@@ -43,55 +27,10 @@ _KEYS = {*VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", 
 _KEYS |= {"outcome", "steps"}
 _NOT_READ = {"time_reached", "order", "flags", "seconds", "metrics", "attitude", "angles"}
 """What else `heavytop propagate --json` writes."""
-_ODD_GAMMA = Fraction(1, 10)
-"""A state whose |γ|² is off 1 by more is no rounding, and seldom a method."""
-_NAME = 200
-_MOST = 100_000
-_FITS_ANYWHERE = 1 << 1023
-"""Every format holds numbers below that."""
-_SMALLEST, _LARGEST = Fraction(1, 1 << 1000), 1 << 1000
-"""Between them a double has all its bits."""
 _SLACK = 8
 """γ may be off the unit sphere by so many bits of rounding."""
 _ROW_SLACK = Fraction(1, 100)
 """γ of a row t = 0 may be off by so much: it is written with the digits of the other rows."""
-
-
-@dataclass(frozen=True, slots=True)
-class Given:
-    """A trajectory as it was given.
-
-    times: exact, as written.  states: six exact numbers each, rounded to the format; None for a state that is not
-    finite.  name, integrator: as the row will call them.  flags: what else the file says.  sha256: of the file.
-    format_guessed: whether the format was read off the digits written.  notes: what reading the file took for granted.
-    """
-
-    name: str
-    integrator: str
-    top: HeavyTop
-    start: State
-    system: System
-    precision: Precision
-    times: list[Fraction]
-    states: list[tuple[Fraction, ...] | None]
-    outcome: Outcome
-    steps: int
-    flags: dict[str, str]
-    sha256: str
-    format_guessed: bool = False
-    notes: tuple[str, ...] = ()
-
-    def warnings(self) -> list[str]:
-        """What no rigid body can have, and a γ so far off the unit sphere that the columns may be in another order."""
-        found = [*self.notes, *self.top.warnings()]
-        for time, state in zip(self.times, self.states, strict=True):
-            if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
-                found.append(
-                    f"|gamma|^2 is off 1 by {decimal_text(off, 3)} at t = {shown(time)}: "
-                    f"are the states in the order {' '.join(VARIABLES)}?"
-                )
-                break
-        return found
 
 
 def read(path: Path, case: Case | None = None) -> Given:
@@ -102,7 +41,7 @@ def read(path: Path, case: Case | None = None) -> Given:
     number that is none, times out of order, states of another shape or count, data that no heavy top has, and data
     that are not those of the case.
     """
-    shown_path = str(path)[:_NAME]
+    shown_path = str(path)[:LONGEST_NAME]
     piped = str(path) == "-"
     if not piped and path.exists() and not path.is_dir() and path.suffix.lower() not in _SUFFIXES:
         raise InputError(f"{shown_path} is neither .json nor .csv.", REMEDY)
@@ -146,18 +85,16 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
     """The comments and columns of a text table, as the JSON document would hold them, and what was noticed."""
     if "\0" in text:
         raise InputError("This is no text: it holds a byte 0.", REMEDY)
-    if text.count("\n") > 2 * _MOST:
-        raise _too_many(text.count("\n"))
+    if text.count("\n") > 2 * MOST:
+        raise too_many(text.count("\n"))
     table = Table(text, sorted(_KEYS - {"times", "states"}))
-    return table.keys | {
-        "times": [row[0] for row in table.rows],
-        "states": [row[1:] for row in table.rows],
-    }, table.notes
+    columns = {"times": [row[0] for row in table.rows], "states": [row[1:] for row in table.rows]}
+    return table.keys | columns, table.notes
 
 
 def _given(document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str]) -> Given:
-    if isinstance(document.get("times"), list) and len(document["times"]) > _MOST:
-        raise _too_many(len(document["times"]))
+    if isinstance(document.get("times"), list) and len(document["times"]) > MOST:
+        raise too_many(len(document["times"]))
     which = system(_text(document, "system", "heavy_top" if case is None else case.system.name))
     top, at_start = _top(document, case), _row_of_start(document)
     start = _start(document, case, at_start)
@@ -168,21 +105,21 @@ def _given(document: dict[str, Any], stem: str, sha256: str, case: Case | None, 
         require_case(case, top, start, which, at_start)
     require_physical(top, start)
     rows = _list(document, "states")
-    _require_states(times, rows)
+    require_states(times, rows)
     texts = [_list({"state": row}, "state", 6) for row in rows]
     precision = _precision(document, texts)
     from_row = at_start is not None and start == at_start
     slack = _ROW_SLACK if from_row and "gamma" not in document else 2**_SLACK * precision.eps
     start.require_unit_gamma(slack, "Give it in full.")
     which.parameters(top, start)
-    states = [_state([written_numbers.number(v, "a component of a state") for v in row], precision) for row in texts]
+    states = [rounded_state([written_numbers.component(v) for v in row], precision) for row in texts]
     word = _text(document, "outcome", "success")
     if word not in [outcome.value for outcome in Outcome]:
         raise InputError(f"Unknown outcome {word[:60]!r}.", f"Use {', '.join(outcome.value for outcome in Outcome)}.")
     steps = _integer(document.get("steps", "0"), "steps")
     return Given(
-        _name(_text(document, "name", stem if case is None else case.name), "name"),
-        _name(_text(document, "integrator", "given"), "integrator"),
+        named(_text(document, "name", stem if case is None else case.name), "name"),
+        named(_text(document, "integrator", "given"), "integrator"),
         top,
         start,
         which,
@@ -191,7 +128,7 @@ def _given(document: dict[str, Any], stem: str, sha256: str, case: Case | None, 
         states,
         Outcome.NON_FINITE if None in states else Outcome(word),
         steps,
-        {key: _name(_text(document, key), key) for key in _FLAGS if key in document},
+        {key: named(_text(document, key), key) for key in _FLAGS if key in document},
         sha256,
         "precision" not in document and "bits" not in document,
         tuple(notes),
@@ -232,68 +169,9 @@ def _row_of_start(document: dict[str, Any]) -> State | None:
         return None
     if len(rows[0]) != 6 or written_numbers.number(times[0], "a time") != 0:
         return None
-    values = [written_numbers.number(value, "a component of a state") for value in rows[0]]
+    values = [written_numbers.component(value) for value in rows[0]]
     found = [value for value in values if value is not None]
     return State(found[:3], found[3:]) if len(found) == 6 else None
-
-
-def of_arrays(
-    top: HeavyTop,
-    start: State,
-    which: System,
-    times: list[Fraction],
-    rows: list[list[Any]],
-    precision: Precision | None,
-    name: str,
-    integrator: str,
-) -> Given:
-    """A trajectory from memory: exact times, and states of six numbers each in any format or as text.
-
-    precision: None for the narrowest format that holds every number as it is given.
-    Raises InputError for what is no number, and as :func:`read` for times, counts and names.
-    """
-    _require_states(times, rows)
-    form = precision or written_numbers.of_bits(max(_bits_of(value) for row in rows for value in row))
-    states = [_state([_component(value) for value in row], form) for row in rows]
-    outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
-    named = _name(name, "name"), _name(integrator, "integrator")
-    return Given(*named, top, start, which, form, times, states, outcome, 0, {}, "")
-
-
-def _require_states(times: list[Fraction], rows: list[Any]) -> None:
-    """Raises InputError unless there are as many states as times, and not too many."""
-    if len(rows) != len(times):
-        raise InputError(f"There are {len(times)} times and {len(rows)} states.", "Give one state for each time.")
-    if len(times) > _MOST:
-        raise _too_many(len(times))
-
-
-def _too_many(count: int) -> InputError:
-    every = -(-count // _MOST)
-    return InputError(
-        f"{count} states are too many to score.", f"Give at most {_MOST} of them, such as one row in {every}."
-    )
-
-
-def _component(value: Any) -> Fraction | None:
-    """An exact number out of a number of any format or text; None for NaN and infinities."""
-    if isinstance(value, str):
-        return written_numbers.number(value, "a component of a state")
-    try:
-        return exact(value)
-    except InputError:
-        if isinstance(value, float | Decimal | numpy.floating) or type(value).__name__ in ("real", "real128", "mpf"):
-            return None
-        raise
-
-
-def _bits_of(value: Any) -> int:
-    """Bits of the format of a number in memory; of exact numbers, those that they are written with."""
-    kind = type(value).__name__
-    if kind in ("real128", "longdouble", "real"):
-        return {"real128": QUAD.bits, "longdouble": EXTENDED.bits}.get(kind) or int(value.prec)
-    exactly = isinstance(value, str | int | Fraction | Decimal) and not isinstance(value, bool)
-    return written_numbers.bits_of(str(value)) if exactly else DOUBLE.bits
 
 
 def _list(document: dict[str, Any], key: str, count: int | None = None) -> list[Any]:
@@ -315,43 +193,11 @@ def _text(document: dict[str, Any], key: str, default: str | None = None) -> str
     return value
 
 
-def _name(text: str, what: str) -> str:
-    if not 0 < len(text) <= _NAME or not text.isprintable():
-        raise InputError(
-            f"The {what} of {len(text)} characters begins {text[:40]!r}.", f"Use 1 to {_NAME} printable characters."
-        )
-    return text
-
-
 def _integer(value: Any, what: str) -> int:
     number = written_numbers.finite(value, what)
     if number < 0 or number.denominator != 1 or number >= 1 << 63:
         raise InputError(f"{what} = {shown(number)} is not a count.", "Give an integer from 0 to 2^63 - 1.")
     return int(number)
-
-
-def _state(values: list[Fraction | None], precision: Precision) -> tuple[Fraction, ...] | None:
-    """The numbers rounded to the format; None where one is not finite there, as 1e400 in double."""
-    found = tuple(_rounded(value, precision) for value in values if value is not None)
-    finite = len(found) == len(values) and all(_fits(value, precision) for value in found)
-    return found if finite else None
-
-
-def _rounded(value: Fraction, precision: Precision) -> Fraction:
-    """As :func:`heavytop.precision.round_to`; the processor's own rounding where it does the same."""
-    if precision is DOUBLE and _SMALLEST <= abs(value) < _LARGEST:
-        return Fraction(float(value))
-    return round_to(value, precision.bits)
-
-
-def _fits(value: Fraction, precision: Precision) -> bool:
-    if abs(value) < _FITS_ANYWHERE:
-        return True
-    try:
-        number(value, precision)
-    except InputError:
-        return False
-    return True
 
 
 def _precision(document: dict[str, Any], rows: list[list[Any]]) -> Precision:

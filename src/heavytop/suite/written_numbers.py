@@ -68,7 +68,7 @@ def format_of(texts: Iterable[str]) -> Precision:
     double nearest to it has just these digits.
     """
     every = list(texts)
-    bits = max((_bits(text) for text in every), default=0)
+    bits = max((bits_of(text) for text in every), default=0)
     some = every[:: max(1, len(every) // _ASKED)]
     for form in (DOUBLE, EXTENDED, QUAD):
         if bits <= form.bits or all(_is_printed_from(text, form) for text in some):
@@ -81,14 +81,15 @@ def of_bits(bits: int) -> Precision:
     return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits <= form.bits), None) or real(bits)
 
 
+def component(value: Any) -> Fraction | None:
+    """As :func:`number`, of a state."""
+    return number(value, "a component of a state")
+
+
 def bits_of(text: str) -> int:
     """Bits that a number was written from: its own if it is hexadecimal, else as many as its decimal digits name."""
-    return _bits(text)
-
-
-def _bits(text: str) -> int:
     if _HEX.fullmatch(text.strip()):
-        value = number(text, "a component of a state") or Fraction(0)
+        value = component(text) or Fraction(0)
         return (value.numerator // (value.numerator & -value.numerator)).bit_length() if value else 0
     digits = digits_written(text)
     return next((form.bits for form in (DOUBLE, EXTENDED, QUAD) if digits <= form.digits), 0) or int(
@@ -103,7 +104,7 @@ def digits_written(text: str) -> int:
 
 def _is_printed_from(text: str, form: Precision) -> bool:
     """Whether the number, rounded to the format and written with as many digits, is the same text."""
-    value = number(text, "a component of a state")
+    value = component(text)
     if not value:
         return True
     if _HEX.fullmatch(text.strip()) or "/" in text:

@@ -15,14 +15,18 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from fractions import Fraction
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from importlib.util import find_spec
+from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate.peers.contract import Contained, contained, quiet, said
 from heavytop.integrate.trajectory import Trajectory
+from heavytop.processes import ChildContext
 
 GROUP = "heavytop.peers"
 HERE = "heavytop.integrate.peers"
@@ -30,28 +34,36 @@ _REMEDY = "Install the peers with: pip install 'heavytop[peers]'"
 
 Peer = Callable[..., Trajectory]
 
+
+class BuiltIn(NamedTuple):
+    """Where one of this program's is, as ``module:name``, and the package that it needs, if it is an extra."""
+
+    place: str
+    package: str = ""
+
+
 BUILT_IN = {
-    "heyoka": f"{HERE}.heyoka_taylor:heyoka",
-    "heyoka:constants": f"{HERE}.heyoka_taylor:constants",
-    "heyoka:lanes": f"{HERE}.heyoka_taylor:lanes",
-    "words": "heavytop.integrate.words:propagate_words",
-    "scipy:DOP853": f"{HERE}.scipy_ivp:dop853",
-    "scipy:LSODA": f"{HERE}.scipy_ivp:lsoda",
-    "scipy:Radau": f"{HERE}.scipy_ivp:radau",
-    "cyrk:DOP853": f"{HERE}.cyrk:dop853",
-    "cyrk:Vern8": f"{HERE}.cyrk:vern8",
-    "sundials:CVODE": f"{HERE}.sundials:cvode",
-    "diffrax:Dopri8": f"{HERE}.diffrax_dopri8:dopri8",
-    "mpmath:odefun": f"{HERE}.mpmath_taylor:odefun",
-    "splitting:2": f"{HERE}.splitting:order2",
-    "splitting:4": f"{HERE}.splitting:order4",
-    "splitting:8": f"{HERE}.splitting:order8",
+    "heyoka": BuiltIn("heavytop.integrate.taylor:propagate"),
+    "heyoka:constants": BuiltIn(f"{HERE}.heyoka_taylor:constants"),
+    "heyoka:lanes": BuiltIn(f"{HERE}.heyoka_taylor:lanes"),
+    "words": BuiltIn("heavytop.integrate.words:propagate_words"),
+    "scipy:DOP853": BuiltIn(f"{HERE}.scipy_ivp:dop853", "scipy"),
+    "scipy:LSODA": BuiltIn(f"{HERE}.scipy_ivp:lsoda", "scipy"),
+    "scipy:Radau": BuiltIn(f"{HERE}.scipy_ivp:radau", "scipy"),
+    "cyrk:DOP853": BuiltIn(f"{HERE}.cyrk:dop853", "CyRK"),
+    "cyrk:Vern8": BuiltIn(f"{HERE}.cyrk:vern8", "CyRK"),
+    "sundials:CVODE": BuiltIn(f"{HERE}.sundials:cvode", "sksundae"),
+    "diffrax:Dopri8": BuiltIn(f"{HERE}.diffrax_dopri8:dopri8", "diffrax"),
+    "mpmath:odefun": BuiltIn(f"{HERE}.mpmath_taylor:odefun"),
+    "splitting:2": BuiltIn(f"{HERE}.splitting:order2"),
+    "splitting:4": BuiltIn(f"{HERE}.splitting:order4"),
+    "splitting:8": BuiltIn(f"{HERE}.splitting:order8"),
 }
 
 
 def known() -> dict[str, EntryPoint]:
     """Every peer by name, not yet imported: the built-in ones, then those of other packages, which replace none."""
-    found = {name: EntryPoint(name, place, GROUP) for name, place in BUILT_IN.items()}
+    found = {name: EntryPoint(name, built_in.place, GROUP) for name, built_in in BUILT_IN.items()}
     for entry in entry_points(group=GROUP):
         found.setdefault(entry.name, entry)
     return found
@@ -112,20 +124,47 @@ def ready(name: str, setting: tuple[str, Fraction] | None = None) -> Contained:
     return Contained(name, partial(chosen, **dict([setting])), own)
 
 
+def knob(name: str) -> str:
+    """What a peer is set by: "step", "tolerance", or "" for neither, as for one that cannot be used."""
+    for each in ("step", "tolerance"):
+        try:
+            ready(name, (each, Fraction(1, 100)))
+        except (InputError, PeerFailed):
+            continue
+        return each
+    return ""
+
+
+def knob_apart(name: str) -> str:
+    """:func:`knob`; one of another package is looked at in a process of its own, which it may end."""
+    if name in BUILT_IN:
+        return knob(name)
+    with ProcessPoolExecutor(1, mp_context=ChildContext()) as pool:
+        try:
+            return pool.submit(knob, name).result()
+        except BrokenProcessPool:
+            return ""
+
+
 def run(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
     """``ready(name, setting)(*problem, **options)``."""
     return ready(name, setting)(*problem, **options)
 
 
 def available() -> dict[str, str | None]:
-    """For each peer: None if it can be used here, else the reason why not."""
+    """For each peer: None if it is installed, else the reason why it cannot be used.
+
+    One of this program's is not imported: its package is looked for.  One of another package is.
+    """
     found: dict[str, str | None] = {}
     for name in known():
-        try:
-            peer(name)
-            found[name] = None
-        except InputError as error:
-            found[name] = error.cause
+        built_in = BUILT_IN.get(name)
+        found[name] = None
+        if built_in is None or (built_in.package and find_spec(built_in.package) is None):
+            try:
+                peer(name)
+            except InputError as error:
+                found[name] = error.cause
     return found
 
 

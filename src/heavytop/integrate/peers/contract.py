@@ -20,6 +20,8 @@ from numbers import Real
 from threading import RLock
 from typing import Any
 
+import numpy
+
 from heavytop.errors import HeavyTopError, PeerFailed
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, exact, number
@@ -38,8 +40,6 @@ def quiet() -> Iterator[None]:
 
     That is NumPy's error state, the working directory, and who hears of Ctrl-C and SIGTERM.
     """
-    import numpy
-
     with (
         _ALONE,
         _process_as_it_was(),
@@ -197,8 +197,6 @@ class Contained:
 
     def _state(self, state: Any, precision: Precision) -> Any:
         """Six numbers of the format, as it holds them."""
-        import numpy
-
         self._require(not isinstance(state, str | bytes | dict | set), f"a {type(state).__name__} as a state")
         dtype = getattr(state, "dtype", None)
         self._require(dtype is None or dtype != numpy.dtype(object), "an array of objects as a state")

@@ -10,6 +10,8 @@ from threading import RLock
 from time import perf_counter
 from typing import Any, TypeVar
 
+import numpy
+
 from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, exact, number
@@ -103,8 +105,6 @@ def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") ->
 
 
 def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Given:
-    import numpy
-
     if problem.precision != DOUBLE:
         raise InputError(f"{name} has no {problem.precision.name}.", "Use double.")
     if not 0 < setting <= 1:
@@ -117,8 +117,6 @@ def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], se
 
 def _from_start(name: str, given: Given, solve: Solve) -> Solved:
     """What ``solve`` gives for the times after 0, which most libraries refuse, behind the start itself."""
-    import numpy
-
     at_start = int(given.times[0] == 0)
     # the times are judged by as they were, whatever is done to those that are given
     later = replace(given, times=given.times[at_start:].copy())
@@ -141,8 +139,6 @@ def _judged(
     flags: dict[str, str],
 ) -> Trajectory:
     """What was solved, up to the first state that is not finite."""
-    import numpy
-
     states = _states(name, solved.states, len(times))
     finite = numpy.isfinite(states).all(axis=1)
     count = len(states) if finite.all() else int(finite.argmin())
@@ -165,8 +161,6 @@ def _judged(
 
 def _states(name: str, given: Any, count: int) -> Any:
     """The states as an array of doubles, shape (m, 6) with m <= count; raises PeerFailed for anything else."""
-    import numpy
-
     states = numpy.asarray(given)
     if not states.size:
         return numpy.zeros((0, 6))
@@ -230,8 +224,6 @@ def fill(system: System) -> Callable[..., None]:
 @compiled_once
 def rates(system: System) -> Callable[..., Any]:
     """(t, y, numbers) -> the field at y as a new array; machine code where numba is installed."""
-    import numpy
-
     write = compiler()(fill(system))
 
     def rates(time: float, y: Any, numbers: Any) -> Any:

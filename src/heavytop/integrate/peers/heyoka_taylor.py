@@ -1,4 +1,4 @@
-"""heyoka's Taylor method in the peers' call: for any top, for one top, eight motions at once."""
+"""Other forms of heyoka's Taylor method in the peers' call: compiled for one top, and eight motions at once."""
 
 from __future__ import annotations
 
@@ -14,19 +14,6 @@ from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
-
-
-def heyoka(
-    top: HeavyTop,
-    start: State,
-    times: Sequence[Fraction],
-    precision: Precision = DOUBLE,
-    *,
-    system: System = HEAVY_TOP,
-    tolerance: Fraction | None = None,
-) -> Trajectory:
-    """heyoka in any format; tolerance None is the eps of the format."""
-    return propagate(top, start, times, precision, system=system, tolerance=tolerance)
 
 
 def constants(

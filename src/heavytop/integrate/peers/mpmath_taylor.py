@@ -7,6 +7,8 @@ from fractions import Fraction
 from time import perf_counter
 from typing import Any
 
+import numpy
+
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import Precision, exact, number
@@ -30,7 +32,6 @@ def odefun(
     Forwards only: raises InputError for a negative time.
     """
     import mpmath
-    import numpy
 
     grid = [exact(number(time, precision)) for time in check_times(times)]
     if grid[-1] < 0:

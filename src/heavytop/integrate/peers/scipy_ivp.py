@@ -5,15 +5,10 @@ A relative tolerance below 100 eps is raised to that, as SciPy would do with a w
 
 from __future__ import annotations
 
-import warnings
-from threading import Lock
-
 from heavytop.integrate.peers.double import Given, Solve, Solved, double_peer, rates, timed
 from heavytop.integrate.trajectory import Outcome
 
 _FINEST = 100 * 2.0**-52
-_filters = Lock()
-"""The filters of warnings are one list for the whole process: two runs that change it would put it back wrongly."""
 
 
 def _solver(method: str) -> Solve:
@@ -22,23 +17,21 @@ def _solver(method: str) -> Solve:
 
         field, seconds = timed(rates, given.system)
         dense = len(given.times) > 1
-        with _filters, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what they say is in the outcome
-            try:
-                run = solve_ivp(
-                    field,
-                    (0.0, given.times[-1]),
-                    given.start,
-                    method=method,
-                    args=(given.numbers,),
-                    rtol=max(given.setting, _FINEST),
-                    atol=given.setting,
-                    dense_output=dense,
-                )
-            except ValueError as error:
-                if "infs or NaNs" not in str(error):
-                    raise
-                return Solved([], 0.0, 0, None, seconds, Outcome.NON_FINITE)  # Radau, whose matrices must be finite
+        try:
+            run = solve_ivp(
+                field,
+                (0.0, given.times[-1]),
+                given.start,
+                method=method,
+                args=(given.numbers,),
+                rtol=max(given.setting, _FINEST),
+                atol=given.setting,
+                dense_output=dense,
+            )
+        except ValueError as error:
+            if "infs or NaNs" not in str(error):
+                raise
+            return Solved([], 0.0, 0, None, seconds, Outcome.NON_FINITE)  # Radau, whose matrices must be finite
         covered = given.times[abs(given.times) <= abs(run.t[-1])]
         states = run.sol(covered).T if dense else run.y.T[-1:] if run.success else []
         return Solved(states, run.t[-1], len(run.t) - 1, run.nfev, seconds)

@@ -12,6 +12,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy
+
 from heavytop.integrate.peers.double import Given, Solve, Solved, compiled_once, compiler, double_peer, timed
 from heavytop.top.equations import Parameters, System
 
@@ -36,8 +38,6 @@ STAGES = {
 @compiled_once
 def _stepper(system: System) -> Callable[..., None]:
     """(M and γ in one array, numbers, h, count, stages): ``count`` steps of size h."""
-    import numpy
-
     jit = compiler()
     field, velocity = jit(system.field), jit(system.angular_velocity)
     cos, sin = math.cos, math.sin
@@ -76,8 +76,6 @@ def _stepper(system: System) -> Callable[..., None]:
 
 def _solver(order: int) -> Solve:
     def solve(given: Given) -> Solved:
-        import numpy
-
         advance, seconds = timed(_stepper, given.system)
         stages = numpy.array(STAGES[order])
         inertia = given.numbers[:3]

@@ -1,11 +1,10 @@
-"""SUNDIALS' CVODE through scikit-sundae: Adams-Moulton of variable order up to 12, for problems that are not stiff."""
+"""SUNDIALS' CVODE through scikit-sundae: Adams-Moulton of variable order up to 12, for problems that are not stiff.
+
+CVODE prints why it gives up; :func:`heavytop.integrate.peers.contract.quiet` drops it, and the outcome says so.
+"""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from threading import Lock, get_ident
 from typing import Any
 
 import numpy
@@ -24,37 +23,6 @@ def _machine_code(system: System) -> Any:
     return write
 
 
-class _Muted:
-    """Standard output without what one thread writes; anything else of it is as it was."""
-
-    def __init__(self, stream: Any, thread: int) -> None:
-        self.stream = stream
-        self.thread = thread
-
-    def write(self, text: str) -> int:
-        return len(text) if get_ident() == self.thread else self.stream.write(text)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.stream, name)
-
-
-_muting = Lock()
-"""Standard output is one for the whole process: two runs that replace it would put it back wrongly."""
-
-
-@contextmanager
-def _muted() -> Iterator[None]:
-    """Nothing that this thread prints is seen."""
-    with _muting:
-        before = sys.stdout
-        sys.stdout = muted = _Muted(before, get_ident())
-        try:
-            yield
-        finally:
-            if sys.stdout is muted:
-                sys.stdout = before
-
-
 def _solve(given: Given) -> Solved:
     write, seconds = timed(_machine_code, given.system)
 
@@ -62,8 +30,7 @@ def _solve(given: Given) -> Solved:
         write(result, time, y, given.numbers)
 
     solver = CVODE(rates, method="Adams", rtol=given.setting, atol=given.setting, max_num_steps=_MOST_STEPS)
-    with _muted():  # CVODE prints why it gives up: the outcome says so
-        run = solver.solve(numpy.concatenate([[0.0], given.times]), given.start)
+    run = solver.solve(numpy.concatenate([[0.0], given.times]), given.start)
     if len(given.times) == 1:
         # two times are a span: CVODE gives every step in between
         return Solved(run.y[-1:] if run.success else [], run.t[-1], len(run.t) - 1, run.nfev, seconds)

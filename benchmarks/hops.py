@@ -1,0 +1,98 @@
+"""How many files take part in one flow: a row of drift from TOML to the page, a propagation, a comparison.
+
+``python benchmarks/hops.py`` prints, for each flow, the files of ``heavytop`` that execute a call in it, in the order
+of their first call, and how many of them are not the mathematics (`top/`, `words/`, `exact/`).  What runs while a
+module is imported counts for nothing: all modules are imported before.  Each flow is a process of its own, so that
+nothing is cached.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import heavytop as ht
+
+PACKAGE = Path(ht.__file__).parent
+MATHEMATICS = ("top/", "words/", "exact/")
+PLAN = """name = "one"
+[[measure]]
+kind = "drift"
+cases = ["euler"]
+runs = [{ precision = "double", horizon = "10", samples = 10 }]
+"""
+TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
+START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
+
+
+def drift(folder: Path) -> Callable[[], object]:
+    """From the TOML to report.json and the page."""
+    (folder / "plan.toml").write_text(PLAN)
+    return lambda: ht.run(folder / "plan.toml", folder / "out", workers=1)
+
+
+def propagate(folder: Path) -> Callable[[], object]:
+    """One motion in double."""
+    return lambda: ht.propagate(TOP, START, [1, 2], ht.DOUBLE)
+
+
+def compare(folder: Path) -> Callable[[], object]:
+    """Two reports from disk."""
+    drift(folder)()
+    return lambda: ht.compare(folder / "out", folder / "out")
+
+
+FLOWS = {flow.__name__: flow for flow in (drift, propagate, compare)}
+
+
+def files(flow: Callable[[], object]) -> list[str]:
+    """Of the package, those that execute a call in it, in the order of their first call."""
+    found: dict[str, None] = {}
+
+    def watch(frame: FrameType, event: str, _: Any) -> None:
+        code = frame.f_code
+        # the bodies of modules and classes are not optimized code
+        if (
+            event == "call"
+            and code.co_flags & inspect.CO_OPTIMIZED
+            and code.co_filename.startswith(str(PACKAGE))
+            and code.co_filename.endswith(".py")
+        ):
+            found[str(Path(code.co_filename).relative_to(PACKAGE))] = None
+
+    threading.setprofile(watch)
+    sys.setprofile(watch)
+    try:
+        flow()
+    finally:
+        sys.setprofile(None)
+        threading.setprofile(None)  # type: ignore[arg-type]
+    return list(found)
+
+
+def main() -> None:
+    """All flows, or the one that is named."""
+    if len(sys.argv) == 1:
+        for name in FLOWS:
+            subprocess.run([sys.executable, __file__, name], check=True)
+        return
+    for module in pkgutil.walk_packages([str(PACKAGE)], "heavytop."):
+        if "peers." not in module.name and "__main__" not in module.name:
+            importlib.import_module(module.name)
+    with tempfile.TemporaryDirectory() as folder:
+        found = files(FLOWS[sys.argv[1]](Path(folder)))
+    passed_on = [file for file in found if not file.startswith(MATHEMATICS)]
+    print(f"{sys.argv[1]}: {len(found)} files, {len(passed_on)} without the mathematics\n  " + ", ".join(found))
+
+
+if __name__ == "__main__":
+    main()

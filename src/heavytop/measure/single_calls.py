@@ -1,0 +1,65 @@
+"""Single steps of an integrator that keeps them to itself: calls over its own step size, from where its run stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+from heavytop.integrate import peers, registry
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.measure.integrator import Integrator
+from heavytop.measure.local_error import Call
+from heavytop.precision import Precision, exact, number
+from heavytop.top.equations import System
+from heavytop.top.heavy_top import HeavyTop, State
+
+_CALLS = 16
+_LONGER = (2, 4, 8, 16, 32, 64)
+"""Lengths, in steps, of the single steps in which the order of a method with fixed steps shows."""
+
+
+def single_calls(
+    integrator: Integrator, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
+) -> tuple[Trajectory, list[tuple[Fraction, Call]]]:
+    """A run to ``until`` > 0, and 16 calls, each with the time at which it ends; none where a run failed.
+
+    A call starts at one of 16 states of the run, evenly spread from the start on, and goes over the mean step of the
+    run, which a method with fixed steps takes as its step.  Raises PeerFailed for whatever an integrator of others
+    does wrong, and for a gyrostat unless it takes many motions.
+    """
+    whole = integrator.propagate(top, start, [until], precision, system)
+    times = [exact(number(until * i / _CALLS, precision)) for i in range(1, _CALLS)]
+    sampled = integrator.propagate(top, start, times, precision, system)
+    begins = [whole.problem.native(whole.problem.start.flat), *sampled.states]
+    problems = [_from(whole.problem, state) for state in begins]
+    fixed = integrator.name not in registry.INTEGRATORS and peers.knob(integrator.name) == "step"
+    length = until / max(whole.steps, 1)
+
+    def over(n: int) -> list[Trajectory]:
+        tau = exact(number(n * length, precision))
+        asked = replace(integrator, setting=("step", tau)) if fixed else integrator
+        return asked.propagate_many(problems, [tau])
+
+    own = over(1)
+    failed = next((run for run in (whole, sampled, *own) if run.outcome is not Outcome.SUCCESS), None)
+    if failed is not None:
+        return failed, []
+    longer = {n: over(n) for n in (_LONGER if fixed else ()) if n * length <= 1}
+    calls = [
+        Call(begin, exact(number(length, precision)), own[i].states[0], _reached(longer, i))
+        for i, begin in enumerate(begins)
+    ]
+    return whole, [(time + call.length, call) for time, call in zip((Fraction(0), *times), calls, strict=True)]
+
+
+def _reached(runs: dict[int, list[Trajectory]], place: int) -> dict[int, Any]:
+    """Where the runs from one state end, without those that failed."""
+    return {n: many[place].states[0] for n, many in runs.items() if len(many[place].states)}
+
+
+def _from(problem: Problem, state: Sequence[Any]) -> Problem:
+    """The same problem from another state of its format."""
+    values = tuple(exact(value) for value in state)
+    return replace(problem, start=State(values[:3], values[3:]), given=None)
