@@ -123,7 +123,7 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     axes.set_xlim(left=0)
     axes.grid(False, axis="y")
     section.pictures.append(finish(axes, "Digits kept per format", spoken(heard, 24), "digits"))
-    section.notes.append("A cross at 0 is a run that failed or has no number.")
+    section.notes.append("A cross at 0 is a run that failed or whose digits are not available.")
     return section
 
 
