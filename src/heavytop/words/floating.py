@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from threading import Lock
 
 import numpy
 
-from heavytop.top.equations import System
 from heavytop.words import double_double as dd
-from heavytop.words.machine import Doubles, Machine, Processor, doubles, pointer
+from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
 from heavytop.words.pairs import split
 from heavytop.words.recurrence import LEAST_LOW_ORDER, Layout
 from heavytop.words.run import Run, Status
@@ -25,9 +23,6 @@ _DOUBLE_BITS = 53
 _ROUNDING_BITS = 4
 _LEAST_ROOM = -66.0
 LARGEST_TIME = Fraction(2) ** 1000
-
-_machines: dict[tuple[str, bool, Processor | None], tuple[Machine, Layout]] = {}
-_making = Lock()
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +54,8 @@ class Ladder:
         return cls(order, reach, max(_DOUBLE_BITS - depth / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM))
 
 
-def machine(system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, Layout]:
-    """The machine code for this system, compiled at its first use."""
-    key = (system.name, attitude, processor)
-    with _making:
-        if key not in _machines:
-            _machines[key] = dd.build(system, attitude, processor)
-        return _machines[key]
+machine = once(dd.build)
+"""The machine code, compiled at its first use."""
 
 
 class Floating(Run):
