@@ -79,7 +79,7 @@ def test_there_is_no_sentence_about_heyoka_where_it_did_not_run(name: str, monke
 
 def test_without_a_reference_and_without_a_sample_no_digits_are_said() -> None:
     case = CASES["generic"]
-    found = assess(given(case, [Fraction(150)]))
+    found = assess(given(case, [Fraction(3000)]))
     assert (found.digits_right, found.peer, found.direction) == (None, None, None)
     assert printed(found)[0].startswith("How many digits are right is not known")
     lost = assess(given(spoilt=lambda i, state: [float("nan")] * 6))
@@ -121,7 +121,7 @@ def test_the_page_draws_both_parts_and_is_the_same_every_time() -> None:
     assert page == score_page(found, {"commit": "x"})
     assert page.count("<svg") >= 1
     assert "along the flow (phase)" in page
-    no_reference = assess(given(CASES["generic"], [Fraction(150)]))
+    no_reference = assess(given(CASES["generic"], [Fraction(3000)]))
     assert "Digits lost over time" not in score_page(no_reference, {})
 
 
