@@ -46,7 +46,7 @@ def test_heyoka_against_the_best_peer(benchmark, case: str) -> None:
     def once(each: str) -> float:
         knob, _, text = settings[each]
         time.sleep(0.001)
-        run = peers.run(each, *problem, setting=None if text == "eps" else (knob, exact(text)))
+        run = peers.ready(each, None if text == "eps" else (knob, exact(text)))(*problem)
         return run.seconds["run"]
 
     def repeat() -> None:

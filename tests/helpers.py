@@ -6,7 +6,10 @@ import json
 from fractions import Fraction
 from pathlib import Path
 from random import Random
+from typing import Any
 
+from heavytop.integrate import peers
+from heavytop.integrate.trajectory import Trajectory
 from heavytop.top.heavy_top import HeavyTop, State
 
 VECTORS = json.loads((Path(__file__).parent / "data" / "vectors.json").read_text("utf-8"))
@@ -38,3 +41,8 @@ def top_of(given: dict) -> HeavyTop:
 
 def start_of(given: dict) -> State:
     return State(given["omega"], given["gamma"])
+
+
+def run_peer(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
+    """One run of a peer, as the rows of a report make it."""
+    return peers.ready(name, setting)(*problem, **options)

@@ -58,7 +58,7 @@ class Metric(msgspec.Struct, gc=False):
     """One measured number.
 
     quantity: what it is; its text is the metric's key in the report.
-    value: decimal text; or a word that is no number: "nan", "missing", "never", "unresolved" (smaller than ten radii
+    value: decimal text; or a word: "nan", "missing", "never", "unresolved" (smaller than ten radii
     of the reference, see ``bound``).
     log10: its decimal logarithm; null for 0 and for the words.
     band: half-width in decades of the 95 % interval in which rounding noise alone moves the value, where measured.

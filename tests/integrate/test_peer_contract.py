@@ -21,6 +21,7 @@ from heavytop.records import Report
 from heavytop.report.junit import comparison_junit
 from heavytop.report.policy import Policy
 from heavytop.suite.cases import CASES
+from helpers import run_peer
 from reports import all_good, compare, expand, html, load, measure, plan_of
 
 CASE = CASES["euler"]
@@ -253,7 +254,7 @@ def test_a_peer_that_is_only_rude_is_measured_like_a_polite_one(package: Path, n
     before = state()
     found = peers.ready(f"mine:{name}")(CASE.top, CASE.start, TIMES, DOUBLE)
     assert state() == before
-    ours = peers.run("heyoka", CASE.top, CASE.start, TIMES, DOUBLE)
+    ours = run_peer("heyoka", CASE.top, CASE.start, TIMES, DOUBLE)
     assert found.times == ours.times
     np.testing.assert_allclose(found.states, ours.states, rtol=0, atol=1e-11)
     assert capfd.readouterr() == ("", "")
@@ -341,7 +342,7 @@ def test_peers_in_many_threads_leave_standard_output_as_it_was(package: Path) ->
 
 @pytest.mark.parametrize("precision", [DOUBLE, QUAD], ids=lambda p: p.name)
 def test_the_states_that_pass_are_the_bits_that_were_returned(precision) -> None:
-    kept = peers.run("heyoka", CASE.top, CASE.start, TIMES, precision)
+    kept = run_peer("heyoka", CASE.top, CASE.start, TIMES, precision)
     raw = peers.peer("heyoka")(CASE.top, CASE.start, TIMES, precision)
     assert kept.texts() == raw.texts()
     assert (kept.times, kept.steps, kept.flags, kept.outcome) == (raw.times, raw.steps, raw.flags, raw.outcome)

@@ -19,6 +19,7 @@ from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, QUAD, exact, real
 from heavytop.suite.cases import CASES
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from helpers import run_peer
 
 TIMES = [Fraction(1, 3), Fraction(2), Fraction(5)]
 FINE = Fraction(1, 10**12)
@@ -51,8 +52,8 @@ def test_every_peer_and_heyoka_agree_to_the_tolerance(name: str, case: str) -> N
     need(name)
     given = CASES[case]
     ours = propagate(given.top, given.start, TIMES, DOUBLE, system=given.system)
-    many = peers.run(name, given.top, given.start, TIMES, DOUBLE, system=given.system, setting=setting_of(name))
-    alone = peers.run(name, given.top, given.start, TIMES[-1:], DOUBLE, system=given.system, setting=setting_of(name))
+    many = run_peer(name, given.top, given.start, TIMES, DOUBLE, system=given.system, setting=setting_of(name))
+    alone = run_peer(name, given.top, given.start, TIMES[-1:], DOUBLE, system=given.system, setting=setting_of(name))
     assert many.outcome is alone.outcome is Outcome.SUCCESS
     assert many.integrator == name
     assert distance(many, ours) < (Fraction(1, 10**7) if name == "scipy:Radau" else Fraction(1, 10**9))
@@ -81,7 +82,7 @@ def test_half_the_step_of_a_splitting_has_its_order(order: int, step: int, name:
     ours = propagate(case.top, case.start, [Fraction(8)], DOUBLE, system=case.system)
     errors = [
         distance(
-            peers.run(
+            run_peer(
                 f"splitting:{order}",
                 case.top,
                 case.start,
@@ -103,7 +104,7 @@ def test_a_splitting_keeps_the_casimirs_and_bounds_the_energy() -> None:
     inertia, moment = (np.array([float(v) for v in part]) for part in problem.parameters[:2])
     worst = {}
     for step in (Fraction(1, 4), Fraction(1, 8)):
-        run = peers.run("splitting:4", case.top, case.start, times, setting=("step", step))
+        run = run_peer("splitting:4", case.top, case.start, times, setting=("step", step))
         y = np.array([[float(v) for v in problem.start.flat], *run.states])
         omega, gamma = y[:, :3], y[:, 3:]
         momentum = inertia * omega
@@ -133,12 +134,12 @@ def test_a_run_that_gives_up_says_where(capfd) -> None:
     case = CASES["lagrange"]
     times = [Fraction(5), Fraction(10), Fraction(20)]
     finer = ("tolerance", Fraction(1, 10**16))
-    run = peers.run("sundials:CVODE", case.top, case.start, times, setting=finer)
+    run = run_peer("sundials:CVODE", case.top, case.start, times, setting=finer)
     assert run.outcome is Outcome.STEP_TOO_SMALL
     assert run.times == (5,)
     assert len(run.states) == 1
     assert 5 < run.time_reached < 10
-    alone = peers.run("sundials:CVODE", case.top, case.start, times[-1:], setting=finer)
+    alone = run_peer("sundials:CVODE", case.top, case.start, times[-1:], setting=finer)
     assert alone.outcome is Outcome.STEP_TOO_SMALL
     assert len(alone.states) == 0
     assert 5 < alone.time_reached < 10
@@ -167,13 +168,13 @@ def test_what_a_peer_cannot_do_is_refused() -> None:
     case = CASES["euler"]
     both = case.top, case.start
     for call, message in (
-        (lambda: peers.run("scipy:DOP853", *both, TIMES, QUAD), "scipy:DOP853 has no quad"),
+        (lambda: run_peer("scipy:DOP853", *both, TIMES, QUAD), "scipy:DOP853 has no quad"),
         (lambda: odefun(*both, [Fraction(-1)], QUAD), "forwards only"),
-        (lambda: peers.run("rk4", *both, TIMES, DOUBLE), "Unknown integrator 'rk4'"),
-        (lambda: peers.run("heyoka", *both, TIMES, DOUBLE, setting=("step", FINE)), "heyoka has no step"),
-        (lambda: peers.run("splitting:2", *both, TIMES, DOUBLE, setting=("tolerance", FINE)), "has no tolerance"),
-        (lambda: peers.run("scipy:LSODA", *both, TIMES, DOUBLE, setting=("tolerance", Fraction(0))), "between 0 and 1"),
-        (lambda: peers.run("scipy:LSODA", *both, [2, 1], DOUBLE), "does not come after"),
+        (lambda: run_peer("rk4", *both, TIMES, DOUBLE), "Unknown integrator 'rk4'"),
+        (lambda: run_peer("heyoka", *both, TIMES, DOUBLE, setting=("step", FINE)), "heyoka has no step"),
+        (lambda: run_peer("splitting:2", *both, TIMES, DOUBLE, setting=("tolerance", FINE)), "has no tolerance"),
+        (lambda: run_peer("scipy:LSODA", *both, TIMES, DOUBLE, setting=("tolerance", Fraction(0))), "between 0 and 1"),
+        (lambda: run_peer("scipy:LSODA", *both, [2, 1], DOUBLE), "does not come after"),
     ):
         with pytest.raises(InputError, match=message):
             call()
@@ -204,9 +205,9 @@ def test_another_package_adds_peers_and_replaces_none() -> None:
     case = CASES["generic"]
     assert peers.available()["mine:midpoint"] is None
     coarse, fine = (
-        peers.run("mine:midpoint", case.top, case.start, TIMES, setting=("step", Fraction(1, n))) for n in (50, 100)
+        run_peer("mine:midpoint", case.top, case.start, TIMES, setting=("step", Fraction(1, n))) for n in (50, 100)
     )
-    ours = peers.run("heyoka", case.top, case.start, TIMES, DOUBLE)
+    ours = run_peer("heyoka", case.top, case.start, TIMES, DOUBLE)
     assert ours.integrator == "heyoka"
     assert 3.5 < distance(coarse, ours) / distance(fine, ours) < 4.5
 
@@ -244,7 +245,7 @@ from heavytop.integrate import peers
 from heavytop.suite.cases import CASES
 case = CASES["generic"]
 for name, knob, size in (("scipy:DOP853", "tolerance", 10**10), ("splitting:4", "step", 512)):
-    run = peers.run(name, case.top, case.start, [Fraction(2)], setting=(knob, Fraction(1, size)))
+    run = peers.ready(name, (knob, Fraction(1, size)))(case.top, case.start, [Fraction(2)])
     print(run.flags["field"], *run.states[-1])
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

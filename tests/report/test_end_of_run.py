@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from heavytop.kinds import KINDS
-from heavytop.records import SCHEMA, Report
+from heavytop.records import SCHEMA, Law, Report, Row, Series
 from heavytop.report import store
 from heavytop.report.brief import LINES, MOST_ROWS, WIDTH, brief, fitted
 from small_reports import error, row
@@ -65,3 +65,57 @@ def test_parts_that_are_too_long_are_cut_where_they_are_longest_and_say_so() -> 
     assert found[-4:] == ["c0", "c1", "c2", "c3"]
     assert found[7] == "  and 24 lines more"
     assert fitted(parts, 100) == [line for part in parts for line in part]
+
+
+def law_row(growth: str, integrator: str = "mine:rk4", **laws: str) -> Row:
+    found = {"solution_error_along": growth, **laws}
+    times = [f"{10**k}" for k in range(4)]
+    series = {"solution_error_along": Series(times, ["1e-9", "1e-8", "1e-7", "5e-6"])}
+    return row(
+        measure="growth",
+        integrator=integrator,
+        laws={name: Law(each, 12) for name, each in found.items()},
+        series=series,
+    )
+
+
+@pytest.mark.parametrize(
+    ("growth", "words"),
+    [
+        ("t^1.5", "grows like t^1.5: rounding noise alone, the least there is."),
+        ("t", "grows like t: a frequency that is off by a constant, by truncation or a wrong coefficient."),
+        ("bounded", "is bounded."),
+        ("unresolved", "follows no single law, over the last decade of t like t^1.7."),
+    ],
+)
+def test_the_law_of_an_integrator_of_others_is_said_with_what_it_means(growth: str, words: str) -> None:
+    lines = said(law_row("t^1.5", "heyoka"), law_row(growth))
+    sentence = " ".join(line.strip() for line in lines[4:])
+    assert sentence == f"euler: the error of mine:rk4 along the flow {words}"
+
+
+def test_laws_that_do_not_fit_a_column_are_counted() -> None:
+    drifts = {"drift_energy": "unresolved", "drift_area": "t^0.5", "drift_gamma_squared": "t"}
+    (line,) = (line for line in said(law_row("t", **drifts)) if "double" in line)
+    assert line.split() == ["double:", "euler", "3", "laws", "t", "-"]
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        ("4", "at most; its order is 4, as it says."),
+        ("0", "at most; its order is 0, not the 4 that it says."),
+        ("", "at most."),
+    ],
+)
+def test_a_step_of_an_integrator_of_others_is_said_with_its_order(order: str, words: str) -> None:
+    metrics = {"local_error_ulp_max": error("85947")} | ({"observed_order": error(order)} if order else {})
+    theirs = row(measure="local_error", integrator="mine:rk4", metrics=metrics, order=4)
+    sentence = " ".join(line.strip() for line in said(row(measure="local_error", metrics=metrics), theirs)[1:])
+    assert sentence == f"euler mine:rk4 in double: a step is off by 85947 eps {words}"
+
+
+def test_escapes_in_one_format_stand_by_integrator() -> None:
+    metrics = {"break_away_time": error("33.6")}
+    rows = [row(measure="homoclinic", integrator=name, metrics=metrics) for name in ("heyoka", "mine:rk4")]
+    assert said(*rows)[1:] == ["Escape from a homoclinic motion at |t|, heyoka, mine:rk4:", "  euler: 33.6, 33.6"]

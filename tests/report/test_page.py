@@ -6,14 +6,23 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import heavytop as ht
+from heavytop.precision import DOUBLE
+from heavytop.records import Report, Row
+from heavytop.report.history_page import history_page
 from heavytop.report.policy import Policy
+from heavytop.report.score_page import score_page
+from heavytop.suite.cases import CASES
+from heavytop.suite.score import Assessment, assess
+from heavytop.suite.trajectory_file import of_arrays
 from report_helpers import HOSTILE, error, full_report
-from reports import compare, html, store
+from reports import compare, history, html, replace, store
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
@@ -33,6 +42,10 @@ FLAGS = [
 TEXT, LARGE_TEXT, DRAWING = 4.5, 3.0, 3.0
 """Contrast that WCAG 2.2 AA asks for."""
 PAGES = ("report", "results", "comparison")
+BUILT_IN = ("growth", "long", "peers", "smoke", "gate")
+"""Plans whose pages are looked at beside that of the default plan."""
+ALL = (*PAGES, *BUILT_IN, "score", "history")
+RESULTS = Path(__file__).parents[2] / "results"
 VIEWS = [(width, scheme) for width in (1280, 390) for scheme in ("light", "dark")]
 
 
@@ -50,11 +63,14 @@ class Browser:
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
 
-    def open(self, page: Path, width: int, scheme: str, media: str = "screen") -> None:
+    def look(self, width: int, scheme: str, media: str = "screen") -> None:
         size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         features = [{"name": "prefers-color-scheme", "value": scheme}]
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media, "features": features})
+
+    def open(self, page: Path, width: int, scheme: str, media: str = "screen") -> None:
+        self.look(width, scheme, media)
         for log in ("browser", "performance"):
             self.driver.get_log(log)
         self.driver.get(page.as_uri())
@@ -84,35 +100,140 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     baseline, candidate = full_report(), full_report(HOSTILE)
     candidate.rows[5].metrics["solution_error_relative_max"] = error("1e-7")
     html.write_report(candidate, folder / "report.html")
-    html.write_report(store.read(Path(__file__).parents[2] / "results" / "default"), folder / "results.html")
+    read = {name: store.read(RESULTS / name) for name in ("default", "growth", "long", "peers")}
+    html.write_report(read["default"], folder / "results.html")
+    read["peers"] = few(read["peers"])
+    read |= {"smoke": smoke(read["default"]), "gate": gate(read["default"], read["growth"], read["peers"])}
+    for name in BUILT_IN:
+        html.write_report(read[name], folder / f"{name}.html")
+    (folder / "score.html").write_text(score_page(scored(), {"commit": "0" * 40}), "utf-8")
+    names = ["a", "b", "c"]
+    older = replace(candidate, rows=candidate.rows[:6])
+    tracks = history([baseline, candidate, older], Policy())
+    (folder / "history.html").write_text(history_page(names, [baseline, candidate, older], tracks), "utf-8")
     (folder / "comparison.html").write_text(
         html.comparison_page(baseline, candidate, compare(baseline, candidate, Policy())), "utf-8"
     )
-    return {name: folder / f"{name}.html" for name in PAGES}
+    return {name: folder / f"{name}.html" for name in ALL}
+
+
+def few(peers: Report) -> Report:
+    """Of plan peers one case of each picture, for 334 rows take the browser long."""
+    cases = ("lagrange/T=1000", "lagrange/T=10000", "lagrange/T=5")
+    return replace(peers, rows=[each for each in peers.rows if each.case in cases])
+
+
+def smoke(default: Report) -> Report:
+    """What plan smoke has of the kinds of plan default, in one format and one direction."""
+    rows = [each for each in default.rows if each.precision in ("double", "exact") and "backward" not in each.case]
+    return replace(default, plan={"name": "smoke"}, rows=rows)
+
+
+def gate(default: Report, growth: Report, peers: Report) -> Report:
+    """An integrator of a user beside heyoka, as plan gate has it: drift, one ladder, growth."""
+    drift = [each for each in default.rows if each.key.kind == "drift" and each.precision == "double"]
+    work = [each for each in peers.rows if each.case == "euler/T=1000" and each.key.subject.name == "heyoka"]
+    rows = [*drift, *work, growth.rows[0]]
+    theirs = [mine(each) for each in (drift[0], work[0], growth.rows[0])]
+    return replace(default, plan={"name": "gate"}, rows=[*rows, *theirs])
+
+
+def mine(row: Row) -> Row:
+    subject = replace(row.key.subject, name="mine:name", tolerance="eps")
+    return replace(row, key=replace(row.key, subject=subject), integrator="mine:name")
+
+
+def scored() -> Assessment:
+    """A motion that is off by 1e-8 across the flow."""
+    case = CASES["lagrange"]
+    times = [Fraction(time) for time in range(1, 9)]
+    run = ht.propagate(case.top, case.start, times, DOUBLE)
+    states = [[float(value) + 1e-8 * (place == 2) for place, value in enumerate(state)] for state in run.states]
+    return assess(of_arrays(case.top, case.start, case.system, times, states, DOUBLE, "mine", "rk4"))
 
 
 UNFOLD = "document.querySelectorAll('details').forEach(each => each.open = true);"
 OVERFLOW = """
 const root = document.documentElement;
 const wide = [...document.querySelectorAll('body *')].filter(each =>
-  !each.closest('.scroll') && !each.closest('svg') && !each.closest('.skip') &&
+  !each.closest('svg') && !each.closest('.skip') &&
   each.getBoundingClientRect().right > root.clientWidth + 0.5);
 return [root.scrollWidth, root.clientWidth, wide.map(each => each.outerHTML.slice(0, 80))];
 """
 
 
-@pytest.mark.parametrize("page", PAGES)
-@pytest.mark.parametrize(("width", "scheme"), VIEWS)
-def test_nothing_overflows_errs_or_is_loaded(
-    browser: Browser, pages: dict[str, Path], page: str, width: int, scheme: str
+CLIPPED = """
+const seen = [...document.querySelectorAll('main *')].filter(each => !each.closest('svg') && each.checkVisibility());
+const cut = seen.filter(each => each.scrollWidth > each.clientWidth + 1 && each.clientWidth > 0 &&
+  (/^(TABLE|T[DH]|FIGURE)$/.test(each.tagName) || getComputedStyle(each).overflowX !== 'visible'));
+const out = seen.filter(each => each.matches('td, th, table')).filter(each => {
+  const own = each.getBoundingClientRect(), room = each.closest('details, section').getBoundingClientRect();
+  return own.width > 0 && (own.right > room.right + 1 || own.left < room.left - 1) && !each.closest('thead');
+});
+return [...cut, ...out].map(each => each.outerHTML.slice(0, 120));
+"""
+OVERLAPPING = """
+const bad = [];
+for (const svg of document.querySelectorAll('main figure svg')) {
+  const box = svg.getBoundingClientRect();
+  const texts = [...svg.querySelectorAll('text')].map(each => [each.textContent, each.getBoundingClientRect()]);
+  texts.forEach(([name, a], index) => {
+    if (a.left < box.left - 1 || a.right > box.right + 1 || a.top < box.top - 1 || a.bottom > box.bottom + 1)
+      bad.push(['outside', svg.firstChild.textContent, name]);
+    for (const [other, b] of texts.slice(index + 1)) {
+      const across = Math.min(a.right, b.right) - Math.max(a.left, b.left);
+      const down = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+      // the box of a line is a quarter higher than its letters
+      if (across > 1 && down > 0.25 * Math.min(a.height, b.height))
+        bad.push(['overlap', svg.firstChild.textContent, name, other]);
+    }
+  });
+}
+return bad;
+"""
+
+
+@pytest.mark.parametrize("page", ALL)
+def test_nothing_overflows_is_clipped_overlaps_errs_or_is_loaded(
+    browser: Browser, pages: dict[str, Path], page: str
 ) -> None:
-    browser.open(pages[page], width, scheme)
-    for script in (OVERFLOW, UNFOLD + OVERFLOW):
-        needed, there, wide = browser.ask(script)
-        assert needed <= there, wide
+    browser.open(pages[page], *VIEWS[0])
+    for view in VIEWS:
+        browser.look(*view)
+        assert browser.ask(OVERLAPPING) == [], view
+        assert browser.ask(OVERFLOW)[2] == [], view
+    for width in (1280, 390):
+        browser.look(width, "light")
+        needed, there, wide = browser.ask(UNFOLD + OVERFLOW)
+        assert needed <= there, (width, wide)
         assert not wide
+        assert browser.ask(CLIPPED) == [], width
     assert browser.driver.get_log("browser") == []
     assert browser.requests() == []
+
+
+CUT = """
+const table = document.querySelector('main table'), figure = document.querySelector('main figure');
+document.querySelectorAll('details').forEach(each => each.open = true);
+"""
+
+
+@pytest.mark.parametrize(
+    ("fault", "finds"),
+    [
+        ("table.style.width = '1400px'; table.style.maxWidth = 'none';", "clipped"),
+        ("table.parentElement.style.overflowX = 'auto'; table.style.minWidth = '1400px';", "clipped"),
+        ("const [a, b] = figure.querySelectorAll('text'); b.setAttribute('x', a.getAttribute('x'));"
+         " b.setAttribute('y', a.getAttribute('y')); b.removeAttribute('transform'); a.removeAttribute('transform');",
+         "overlapping"),
+        ("figure.querySelector('text').setAttribute('x', -200);"
+         " figure.querySelector('text').removeAttribute('transform');", "overlapping"),
+    ],
+)  # fmt: skip
+def test_what_is_clipped_or_overlaps_is_found(browser: Browser, pages: dict[str, Path], fault: str, finds: str) -> None:
+    browser.open(pages["results"], 1280, "light")
+    script = {"clipped": CLIPPED, "overlapping": OVERLAPPING}[finds]
+    assert browser.ask(CUT + fault + script) != []
 
 
 PLOTS = """
@@ -125,7 +246,7 @@ return [...document.querySelectorAll('main figure svg')].map(svg => ({
 }));
 """
 UNITS = re.compile(
-    r"case|.+ \((bits|rad|1/time unit|units of ε|units of Ω and γ|units of the energy|s|correct decimal digits"
+    r"case|.+ \((bits|rad|1/time unit|units of ε|units of Ω and γ|units of the energy|s|decimal digits"
     r"|time units of the data)\)"
 )
 

@@ -1,13 +1,22 @@
 """What is read off work against precision, on rows whose answers are known."""
 
+import math
+from pathlib import Path
+from typing import Any
+
 import pytest
 
 from heavytop.errors import InputError
+from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Metric, Report, Series
-from heavytop.report.svg import document
-from heavytop.report.work_precision import Line, Point, leads, panels
-from heavytop.report.work_precision_figure import draw_work_precision, growth_figure, work_precision_figure
+from heavytop.report.answers import fastest
+from heavytop.report.pictures import draw_report
+from heavytop.report.svg import quiet_style
+from heavytop.report.work_plots import work_precision
+from heavytop.report.work_precision import Line, Point, beside_ours, leads, panels
 from reports import Row, summary
+
+KIND = ("svg", "pdf")
 
 
 def row(
@@ -153,8 +162,6 @@ def test_cases_formats_and_failures_are_kept_apart() -> None:
     }
     failed = found["top/T=9"][3]
     assert (failed.points, failed.failures) == ([], [0.1])
-    assert panels(ALL, "error_final")["top/T=9"][0].points[0].log10 == -9
-    assert not panels([row("heyoka tolerance=1e-3", -3, 9.0)], "return_error")["top/T=9"][0].points
 
 
 def test_the_summary_says_it() -> None:
@@ -170,47 +177,101 @@ def test_the_summary_says_it() -> None:
     assert line.split() == ["sundials:CVODE", "-", "-", "-", "-", "-", "1"]
 
 
+def drawn(rows: list[Row]) -> Any:
+    """Their picture of the page."""
+    with quiet_style():
+        (picture,) = work_precision([("", Report(SCHEMA, {}, {}, rows))]).pictures
+    return picture
+
+
 def test_the_picture_shows_every_line_and_each_failure_as_a_cross_on_the_edge() -> None:
-    figure = work_precision_figure(ALL)
-    axes = figure.axes[0]
-    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    assert axes.get_xlabel()
-    assert "seconds" in axes.get_ylabel()
-    drawn = {line.get_label(): line for line in axes.get_lines()}
-    assert list(drawn["heyoka double"].get_ydata()) == [4.0, 1.0]
-    assert list(drawn["sundials:CVODE"].get_xdata()) == []
-    (cross,) = [line for line in axes.get_lines() if line.get_marker() == "x" and len(line.get_xdata())]
-    assert (list(cross.get_xdata()), list(cross.get_ydata())) == ([1.0], [0.1])
-    looks = [(line.get_color(), line.get_marker(), line.get_linestyle()) for line in drawn.values()]
+    picture = drawn(ALL)
+    lines = {line.get_label(): line for line in picture.axes.get_lines() if line.get_marker() != "x"}
+    assert [round(y, 5) for y in lines["heyoka double"].get_ydata()] == [round(math.log10(4), 5), 0.0]
+    assert "sundials:CVODE" not in lines
+    (cross,) = [line for line in picture.axes.get_lines() if line.get_marker() == "x"]
+    assert (list(cross.get_xdata()), list(cross.get_ydata())) == ([1.0], [pytest.approx(-1)])
+    looks = [(line.get_color(), line.get_marker()) for line in lines.values()]
     assert len(set(looks)) == len(looks)
-    assert "4.5 × as fast as cyrk:DOP853" in axes.get_title()
-    assert document(figure) == document(work_precision_figure(ALL))
-    assert document(growth_figure(ALL)).count("<svg") == 1
+    assert picture.svg == drawn(ALL).svg
+    for name in ("heyoka double", "cyrk:DOP853", "sundials:CVODE"):
+        assert f">{name}</text>" in picture.svg
 
 
 def test_a_case_without_any_error_is_drawn_empty() -> None:
     for rows in ([row("heyoka tolerance=1", None, 1.0)], FAILED):
-        assert "<svg" in document(work_precision_figure(rows))
+        assert drawn(rows).svg
 
 
-def test_the_pictures_are_files(tmp_path) -> None:
+def test_who_is_fastest_at_1e_10_opens_the_page() -> None:
+    assert fastest(ALL) == (
+        "",
+        "heyoka double is the fastest at error 1e-10 on all 1 motions: 4.5 times as fast as cyrk:DOP853.",
+    )
+    slow = [*OURS, row("fast:x tolerance=1", -11, 0.5)]
+    assert fastest(slow) == (
+        "",
+        "fast:x is the fastest at error 1e-10 on all 1 motions: 4.0 times as fast as heyoka double.",
+    )
+    assert fastest(OURS[:1] + CYRK) is None
+
+
+def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:
     growth = [row(f"{name} tolerance=1e-5", -5, 1.0) for name in ("heyoka", "cyrk:DOP853")] + SPLITTING
-    files = draw_work_precision(growth, tmp_path / "new")
-    assert [file.name for file in files] == ["work-precision.svg", "work-precision.png", "growth.svg", "growth.png"]
-    assert all(file.stat().st_size > 5000 for file in files)
-    with pytest.raises(InputError, match="no row of work against precision"):
-        draw_work_precision([], tmp_path / "none")
+    report = Report(SCHEMA, {}, {}, growth)
+    files = draw_report(report, tmp_path / "new", KINDS)
+    names = [file.name for file in files]
+    assert names == [f"{stem}.{kind}" for stem in ("work-0", "method-growth-0", "method-growth-1") for kind in KIND]
+    for file in files:
+        text = file.read_bytes()
+        assert text.startswith(b"%PDF" if file.suffix == ".pdf" else b"<?xml")
+        assert len(text) > 4000
+    assert "Energy drift over time" in files[2].read_text("utf-8")
+    assert "cyrk:DOP853 tolerance=1e-5" in files[2].read_text("utf-8")
+    again = draw_report(report, tmp_path / "again", KINDS)
+    assert [file.read_bytes() for file in again] == [file.read_bytes() for file in files]
+    with pytest.raises(InputError, match="no row that is drawn"):
+        draw_report(Report(SCHEMA, {}, {}, []), tmp_path / "none", KINDS)
     assert not (tmp_path / "none").exists()
 
 
 def test_without_such_rows_there_is_no_picture() -> None:
-    assert work_precision_figure([]) is None
-    assert growth_figure([]) is None
+    assert work_precision([("", Report(SCHEMA, {}, {}, []))]) is None
     assert leads([]) == []
 
 
 def test_a_hostile_name_is_text() -> None:
     rows = [row("<script>alert(1)</script>:x$ tolerance=1", -3, 1.0, case='<b>"&$_{$')]
-    drawn = document(work_precision_figure(rows))
-    assert "<script" not in drawn
-    assert "<b>" not in drawn
+    assert "<script" not in drawn(rows).svg
+    assert "<b>" not in drawn(rows).svg
+
+
+def test_whoever_is_faster_stands_first() -> None:
+    wide = [
+        row("heyoka tolerance=eps", -33, 4.0, precision="quad"),
+        row("words tolerance=eps", -34, 0.5, precision="quad"),
+    ]
+    (lead,) = leads(wide)
+    assert lead.short == "At 1e-30 words quad is 8.0 × as fast as heyoka quad"
+    (alone,) = leads([OURS[0], row("words tolerance=eps", -15, 0.5)])
+    assert (
+        alone.text
+        == "top/T=9: heyoka double at error 1e-10: not reached; the fastest that gets there is words (500 ms)"
+    )
+
+
+def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:
+    mine = [row("mine:rk4 step=1/10", -4, 0.0123), row("mine:rk4 step=1/30", -9.7, 123.4)]
+    mine += [row("mine:rk4 step=1/30", -13, 2.0, case="b/T=1"), row("heyoka tolerance=eps", -12, 0.5, case="b/T=1")]
+    said = [
+        "mine:rk4: largest error in its time (heyoka's time for that error)",
+        "                    top/T=9                        b/T=1",
+        "  step 1/10         1.0e-04 in 12 ms (1 s)         -",
+        "  step 1/30         2.0e-10 in 123 s (1.8 s)       1.0e-13 in 2 s (not reached)",
+    ]
+    assert beside_ours(OURS + LANES + mine) == said
+    # beside integrators of this program too: theirs are the plan's own ladders
+    assert beside_ours(ALL + mine) == said
+    assert beside_ours(ALL) == []
+    assert beside_ours(mine[:2]) == []
+    assert all(len(line) <= 80 for line in said)

@@ -14,7 +14,6 @@ from heavytop.precision import DOUBLE, Precision, exact, parse, physical, requir
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.equations import system as system_named
 from heavytop.top.heavy_top import HeavyTop, State, dot, ordered, require_physical, vector
-from heavytop.top.times import check_times
 
 Number: TypeAlias = int | float | str | Fraction | Decimal | SupportsIndex
 """A number: an integer, a float of any format (the exact binary number it is), or exact text such as "-2/5"."""
@@ -70,11 +69,6 @@ def precision(value: Precision | str) -> Precision:
     if found != value:
         raise InputError(f"Unknown precision {quoted(value)}.", "Use DOUBLE, EXTENDED, QUAD or real(BITS).")
     return found
-
-
-def times(values: Numbers) -> list[Fraction]:
-    """Exact times of one sign, strictly monotone away from 0."""
-    return check_times(values)
 
 
 def any_times(values: Numbers) -> list[Fraction]:

@@ -16,6 +16,7 @@ from heavytop.measure.reference import reference as proven
 from heavytop.precision import DOUBLE, Precision, whole
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.times import check_times
 
 Observer: TypeAlias = Callable[[Fraction, Any], object]
 EnsembleObserver: TypeAlias = Callable[[int, Fraction, Any], object]
@@ -68,7 +69,7 @@ def propagate(
     options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
     options |= {} if xi is None else {"xi": arguments.attitude(xi, state, form)}
     run = registry.propagator(integrator, options)
-    about, instants = arguments.system(system), arguments.times(times)
+    about, instants = arguments.system(system), check_times(times)
     return cast(Trajectory, run(body, state, instants, form, system=about))
 
 
@@ -110,7 +111,7 @@ def ensemble(
     options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
     options |= {} if threads is None else {"threads": arguments.count(threads, "threads")}
     run = registry.ensemble_propagator(integrator, options)
-    return cast("list[Trajectory]", run(problems, arguments.times(times)))
+    return cast("list[Trajectory]", run(problems, check_times(times)))
 
 
 def reference(

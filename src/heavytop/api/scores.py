@@ -21,6 +21,7 @@ from heavytop.suite.given import of_arrays
 from heavytop.suite.score import Peer, assess
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
+from heavytop.top.times import check_times
 
 _PARTS = ("omega", "gamma", "along", "across")
 _LABELS = {"omega": "error of Ω", "gamma": "error of γ", "along": "along the flow", "across": "across the flow"}
@@ -112,7 +113,7 @@ def score(
     """
     form = None if precision is None else arguments.precision(precision)
     body, state = arguments.motion(top, start)
-    about, instants = arguments.system(system), arguments.times(times)
+    about, instants = arguments.system(system), check_times(times)
     rows = _rows(states)
     names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
     found = assess(of_arrays(body, state, about, instants, rows, form, *names))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
@@ -92,6 +93,15 @@ def require_new(folder: Path) -> None:
     """Raises InputError for a folder that holds anything already."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} already holds other content.", "Give a new folder with --out.")
+
+
+@contextmanager
+def writing() -> Iterator[None]:
+    """A file that cannot be written is an error with the remedy of a command that writes one file."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(error.cause, "Give a file in a writable folder.") from None
 
 
 def numbers(text: str) -> list[str]:

@@ -51,7 +51,7 @@ def audit(
 @command
 def figures(
     out: Annotated[Path, typer.Option(help="Folder for the pictures.")],
-    report: Annotated[Path | None, typer.Option(help="Draw work against precision of this report instead.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Draw every picture of its page instead, as SVG and PDF.")] = None,
 ) -> int:
     """Draw Figs 2-8 of the paper, and the true motion.
 
@@ -75,8 +75,7 @@ def _drawn(out: Path, report: Path | None) -> list[Path]:
         with counted("figures", FIGURES, "figures", _FIGURE_SECONDS) as advance:
             return draw_figures(drawings(), out, advance)
     from heavytop.kinds import KINDS
-    from heavytop.kinds.work_precision import NAME
     from heavytop.report import store
-    from heavytop.report.work_precision_figure import draw_work_precision
+    from heavytop.report.pictures import draw_report
 
-    return draw_work_precision([row for row in store.read(report, KINDS).rows if row.key.kind == NAME], out)
+    return draw_report(store.read(report, KINDS), out, KINDS)

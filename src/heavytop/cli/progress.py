@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event, Thread
 from time import perf_counter
-from typing import Any
+from typing import Any, Self
 
 _TRUST, _MEASURED = 0.05, 0.1
 """The expected speed counts at first as much as a twentieth of the work, and no more when a tenth of it is done."""
@@ -98,7 +98,7 @@ class Bar:
         named = None if label is None else label[:40]
         self.bar.update(self.id, completed=self.estimator.fraction, description=named, said=self.said())
 
-    def __enter__(self) -> Bar:
+    def __enter__(self) -> Self:
         self.bar.start()
         return self
 
@@ -106,7 +106,7 @@ class Bar:
         self.bar.stop()
 
 
-class Progress:
+class Progress(Bar):
     """The bar of a run, called with each finished task.
 
     kinds: of measurement, by name, which know what a task costs.  workers: how many tasks run at once.
@@ -114,23 +114,16 @@ class Progress:
 
     def __init__(self, tasks: Sequence[Any], kinds: Any, workers: int = 1) -> None:
         self.kinds = kinds
-        self.bar = Bar(Estimator(sum(map(self._cost, tasks)), 1 / max(workers, 1)), len(tasks))
-
-    def __enter__(self) -> Progress:
-        self.bar.__enter__()
-        return self
+        super().__init__(Estimator(sum(map(self._cost, tasks)), 1 / max(workers, 1)), len(tasks))
 
     def __call__(self, task: Any) -> None:
-        self.bar.finished += 1
-        self.bar.estimator.advance(self._cost(task))
-        self.bar.show(task.label)
+        self.finished += 1
+        self.estimator.advance(self._cost(task))
+        self.show(task.label)
 
     def _cost(self, task: Any) -> float:
         cost: float = self.kinds[task.key.kind].cost(task)
         return cost
-
-    def __exit__(self, *_: object) -> None:
-        self.bar.__exit__()
 
 
 @contextmanager

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, command, print_json, show_on_terminal
+from heavytop.cli.app import Json, command, print_json, show_on_terminal, writing
 from heavytop.errors import InputError
 
 
@@ -111,16 +110,8 @@ def _policy(file: Path | None, floor: str | None, loss: str | None) -> Any:
 def _write(files: list[tuple[Path, str]]) -> None:
     from heavytop.suite.files import replace_all
 
-    with _writing():
+    with writing():
         replace_all([(path, text.encode()) for path, text in files])
-
-
-@contextmanager
-def _writing() -> Iterator[None]:
-    try:
-        yield
-    except InputError as error:
-        raise InputError(error.cause, "Give a file in a writable folder.") from None
 
 
 @command
@@ -159,7 +150,7 @@ def show(
         return 0
     found = store.read(report, KINDS)
     with ExitStack() as stack:
-        stack.enter_context(_writing())
+        stack.enter_context(writing())
         if html is not None:
             from heavytop.report.html import report_page
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, command, print_json, require_new, show_on_terminal
+from heavytop.cli.app import Json, command, print_json, require_new, show_on_terminal, writing
 from heavytop.cli.progress import counted
 from heavytop.errors import InputError
 
@@ -77,7 +77,5 @@ def _write_page(found: Any, path: Path) -> None:
     from heavytop.report.score_page import score_page
     from heavytop.suite.files import replace
 
-    try:
+    with writing():
         replace(path, score_page(found, environment()).encode())
-    except InputError as error:
-        raise InputError(error.cause, "Give a file in a writable folder.") from None

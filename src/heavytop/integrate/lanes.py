@@ -29,7 +29,7 @@ _WINDOW = 64
 _ROOM = 1000
 _FAR = 2.0**1000
 # parameters and state of an idle lane: a bounded motion in either system
-_UNWATCHED = 1.0, numpy.linspace(0.1, 1.0, 9)
+_DUMMY = 1.0, numpy.linspace(0.1, 1.0, 9)
 _FAILED = heyoka.taylor_outcome.err_nf_state
 
 
@@ -144,9 +144,9 @@ class Lanes:
             self._take_samples()
 
     def _load(self, lane: int) -> None:
-        """Put the next problem into the lane; when there is none, a harmless motion that nobody watches."""
+        """Put the next problem into the lane; when there is none, a dummy motion."""
         taken = self.work.take()
-        parameters, state = arrays(taken[1]) if taken else _UNWATCHED
+        parameters, state = arrays(taken[1]) if taken else _DUMMY
         run = _Run(*taken, parameters, perf_counter()) if taken else None
         if run and self.work.times[0] == 0:
             self._keep(run, state)

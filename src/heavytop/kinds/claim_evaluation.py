@@ -59,7 +59,7 @@ class ClaimEvaluationTable(Table, tag=NAME):
 
 
 class ClaimEvaluation(Kind):
-    """The largest errors of a form in a format, and from when on it gives no number.
+    """The largest errors of a form in a format, and from when on its values are not finite.
 
     The times of a task are values of k t of one sign.  Errors of Ω in 1/time unit, of the angles in rad.
     """
@@ -121,7 +121,7 @@ class ClaimEvaluation(Kind):
                 yield f"{Quantity(EVALUATION_ERROR, component, _WORST).text}: not the largest of its series"
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """The largest errors of each form in each format, and when it gives no number."""
+        """The largest errors of each form in each format, and from when on its values are not finite."""
         lines = [
             (
                 row,

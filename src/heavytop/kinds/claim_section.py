@@ -46,10 +46,10 @@ def claim_error(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "The model’s error of the attitude is the angle between the two attitudes: both motions start at the pole "
             "γ = e3, where φ and ψ are undefined and their differences say nothing. Beside it the error of the formula "
             "for ψ, which turns the attitude by as much.",
-            "Crosses along the top mark times at which floating point gives no number; an error of exactly 0 has no "
-            "place on these axes.",
+            "Crosses along the top mark times at which floating point gives NaN or an infinity; an error of exactly 0 "
+            "has no place on these axes.",
         ],
-        columns=["case", "error", "quantity", "|t| = 1", "largest drawn", "no number from |t|"],
+        columns=["case", "error", "quantity", "|t| = 1", "largest drawn", "not finite from |t|"],
         across=2,
         place=20,
     )
@@ -125,7 +125,7 @@ def _claim_curve(
     if x:
         draw(axes, key, x, y)
     at_one = next((v for t, v in zip(x, y, strict=True) if abs(t) < 1e-6), None)
-    largest = scientific(max(y)) if y else "no number"
+    largest = scientific(max(y)) if y else "none finite"
     section.rows.append(
         [
             clip(case, 40),
@@ -136,5 +136,5 @@ def _claim_curve(
             scientific(lost[0]) if lost else "",
         ]
     )
-    tail = f", no number from |t| = {scientific(lost[0])}" if lost else ""
+    tail = f", not finite from |t| = {scientific(lost[0])}" if lost else ""
     return [f"{key.label}: largest sample {largest}{tail}."]

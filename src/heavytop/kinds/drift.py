@@ -17,6 +17,7 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact, number, parse
 from heavytop.records import Row, RowKey
+from heavytop.report.answers import digits_headline
 from heavytop.report.brief import digits_lines
 from heavytop.report.plots import digits, growth
 from heavytop.report.text import DIGITS, NOISE, largest_over, motions, title
@@ -103,6 +104,10 @@ class Drift(Kind):
         reruns = Reruns(plain, task.integrator, task.seed)
         metrics = reruns.drift_bands(run, task.times[-1], scorer.metrics(), scorer.truth)
         return computed_row(task, run, metrics, scorer.series(time_text), scorer.against)
+
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """Digits left at the longest horizon, or of an integrator of others beside heyoka's."""
+        return digits_headline(rows)
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line a row."""

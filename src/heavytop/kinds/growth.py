@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from textwrap import wrap
@@ -24,11 +24,13 @@ from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import decimal_text, exact, number, parse, physical, usable_tolerance
-from heavytop.records import Law, Metric, Quantity, Row, RowKey, by_name
+from heavytop.records import Law, Metric, Quantity, Row, RowKey, Series, by_name
+from heavytop.report.answers import laws_headline
 from heavytop.report.brief import named, wrapped
 from heavytop.report.names import computed_by
 from heavytop.report.plots import digits
 from heavytop.report.plots import growth as over_time
+from heavytop.report.section import points
 from heavytop.report.text import short, table, title
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
@@ -41,13 +43,14 @@ NAME = "growth"
 FAILED = Quantity("starts_failed")
 _MEANS = {
     "t^0.5": "less than rounding noise that adds up",
-    "t": "a wrong coefficient, or a method that keeps its first integrals within bounds",
+    "t": "a frequency that is off by a constant, by truncation or a wrong coefficient",
     "t^1.5": "rounding noise alone, the least there is",
-    "t^2": "every step errs in the same way, as by truncation; a smaller step or tolerance helps",
+    "t^2": "every step errs in the same way and a first integral drifts; a smaller step or tolerance helps",
     "exponential": "the motion amplifies every error",
 }
 """Laws of the error along the flow."""
 _SUMMED_UP = ("integrals", "along", "across")
+_WIDE = 16
 _MOST_BITS = 900
 """Errors of more bits underflow in the floats that laws of growth are fitted with."""
 _LIMITS = {"starts": range(1, 100_001), "samples": range(4, 1001), "decades": range(1, 13)}
@@ -168,6 +171,10 @@ class Growth(Kind):
         rounding = max(input_rounding(case.top, start, p) for start, p in zip(starts, true, strict=True))
         return _row(task, starts, motions, scorers, compared, seconds, rounding)
 
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """The laws, and whether the planted faults are told from them."""
+        return laws_headline(rows)
+
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line for each law."""
         lines = [
@@ -208,7 +215,7 @@ class Growth(Kind):
                 what = "integrals" if quantity.name == DRIFT else quantity.component
                 if what in _SUMMED_UP and (law.growth, law.exponent) != ("bounded", None):  # exactly 0
                     laws.setdefault(what, {})[law.growth] = None
-            growths = (" or ".join(laws.get(what, {"-": None})) for what in _SUMMED_UP)
+            growths = (_either(laws.get(what, {})) for what in _SUMMED_UP)
             found.setdefault((row.precision, row.key.subject.variant, *growths), []).append(names(row))
         if not found:
             return []
@@ -223,17 +230,36 @@ class Growth(Kind):
 
 def _meaning(row: Row) -> str:
     """What the law of an integrator of others says about it."""
-    law = row.laws.get(Quantity(SOLUTION_ERROR, "along").text)
+    name = Quantity(SOLUTION_ERROR, "along").text
+    law = row.laws.get(name)
     growth = "unresolved" if law is None else law.growth
-    grows = "follows no law that these starts tell" if growth == "unresolved" else f"grows like {growth}"
-    if growth in ("bounded", "exponential"):
-        grows = f"is {growth}" if growth == "bounded" else "grows exponentially"
+    grows = {
+        "unresolved": f"follows no single law{_lately(row.series.get(name))}",
+        "bounded": "is bounded",
+        "exponential": "grows exponentially",
+    }.get(growth, f"grows like {growth}")
     means = f": {_MEANS[growth]}" if growth in _MEANS else ""
     return f"{row.key.case}: the error of {row.key.subject.name} along the flow {grows}{means}."
 
 
+def _lately(series: Series | None) -> str:
+    """By which power an error grew over the last decade of t; "" where that is not known."""
+    known = {} if series is None else dict(zip(*points(series), strict=True))
+    if not known or max(known) - min(known) < 1:
+        return ""
+    end = max(known)
+    begin = min(known, key=lambda time: abs(end - 1 - time))
+    return f", over the last decade of t like t^{(known[end] - known[begin]) / (end - begin):.1f}"
+
+
+def _either(growths: Iterable[str]) -> str:
+    """The laws of several quantities: by name where they are one or two."""
+    found = list(growths)
+    return " or ".join(found) or "-" if len(" or ".join(found)) <= _WIDE else f"{len(found)} laws"
+
+
 def _columns(name: str, integrals: str, along: str, across: str) -> str:
-    return f"{name:37}{integrals:17}{along:13}{across}"
+    return f"{name:37}{integrals:{_WIDE + 1}}{along:13}{across}"
 
 
 def _biased(problem: Problem, bias: str | None) -> Problem:

@@ -145,17 +145,20 @@ class Homoclinic(Kind):
         ]
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
-        """The escape times of each case, a format after the other."""
+        """The escape times of each case, a format after the other, or an integrator where all are in one format."""
         found: dict[str, dict[str, str]] = {}
         names = named(rows)
+        rows = [row for row in rows if row.key.direction != "backward" and ESCAPE.text in row.metrics]
+        one_format = len({row.precision for row in rows}) == 1
         for row in rows:
-            if row.key.direction != "backward" and ESCAPE.text in row.metrics:
-                found.setdefault(names(row), {})[row.precision] = short(row.metrics[ESCAPE.text].value)
-        formats = list(dict.fromkeys(name for times in found.values() for name in times))
-        lines = [f"  {case}: {', '.join(times.get(name, '-') for name in formats)}" for case, times in found.items()]
+            time = short(row.metrics[ESCAPE.text].value)
+            case, column = (row.key.case, row.key.subject.name) if one_format else (names(row), row.precision)
+            found.setdefault(case, {})[column] = time
+        columns = list(dict.fromkeys(name for times in found.values() for name in times))
+        lines = [f"  {case}: {', '.join(times.get(name, '-') for name in columns)}" for case, times in found.items()]
         if not lines:
             return []
-        return [*wrapped(f"Escape from a homoclinic motion at |t|, {', '.join(formats)}:"), *lines]
+        return [*wrapped(f"Escape from a homoclinic motion at |t|, {', '.join(columns)}:"), *lines]
 
 
 def _end(case: Case, bits: int) -> float:

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from heavytop.kinds.base import Kind
 from heavytop.records import Row
+from heavytop.report.answers import digits_headline
 from heavytop.report.brief import digits_lines
 from heavytop.report.plots import digits, growth
 from heavytop.report.text import DIGITS, largest_over, motions, title
@@ -20,6 +21,10 @@ class Score(Kind):
 
     name = "score"
     sections = (digits, growth)
+
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """Digits right."""
+        return digits_headline(rows)
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
         """Digits right, a line a motion."""

@@ -26,13 +26,14 @@ from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import DOUBLE, exact, number, parse, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.answers import fastest
 from heavytop.report.brief import wrapped
 from heavytop.report.consistency import CLOSE, bound, ended, size_of, sizes
 from heavytop.report.method_growth import method_growth
 from heavytop.report.printable import printable
 from heavytop.report.text import table, title
 from heavytop.report.work_plots import work_precision
-from heavytop.report.work_precision import CONSTANTS, LANES, OURS, beside_ours, leads, panels
+from heavytop.report.work_precision import CONSTANTS, ERRORS, LANES, OURS, beside_ours, leads, panels
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import computed_row, time_text
@@ -48,11 +49,8 @@ _REST = 0.002
 """Seconds of sleep before a run: it then starts on a fresh slice of the processor's time."""
 _TOO_LONG = 3.0
 """A run of so many seconds is timed once."""
-ERROR_MAX, ERROR_FINAL, RETURN = (
-    Quantity("error", statistic="max"),
-    Quantity("error", statistic="final"),
-    Quantity("return_error"),
-)
+ERROR_MAX, ERROR_FINAL = ERRORS
+RETURN = Quantity("return_error")
 _RUNGS = {"tolerance": ["1e-6", "1e-9", "1e-12", FINEST], "step": ["1/10", "1/30", "1/100", "1/300"], "": [FINEST]}
 """Of an integrator that is measured beside heyoka in double, by what it is set by."""
 _OF_OTHERS = 0.6
@@ -189,6 +187,10 @@ class WorkPrecision(Kind):
         if len(ends) == len(both) and abs(max(ends) - last.log10) > CLOSE:
             yield "error_final: not the last value of its series"
 
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """Who is fastest at 1e-10 and by how much."""
+        return fastest(rows)
+
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A table a case, then how heyoka compares."""
         parts: list[RenderableType] = [title("Work against precision: seconds that an error takes, whole horizon")]
@@ -205,9 +207,9 @@ class WorkPrecision(Kind):
         return parts + [Text(printable(f"  {lead.text}"), style="bold") for lead in leads(rows)]
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
-        """How heyoka compares, a sentence a case."""
+        """An integrator beside heyoka, rung by rung; else how heyoka compares, a sentence a case."""
         if beside := beside_ours(rows):
-            return [line for sentence in beside for line in wrapped(f"{sentence}.")]
+            return beside
         return [line for lead in leads(rows) if lead.short for line in wrapped(f"{lead.case}: {lead.short}.")]
 
 

@@ -33,8 +33,7 @@ class Ended(msgspec.Struct, frozen=True):
     """What stays of one start when its motion has ended.
 
     values: by the key of each quantity, at the samples that it reached, as far as there is a truth; None where that is
-    no number.  The rest as in
-    :class:`heavytop.integrate.trajectory.Trajectory`.
+    not finite.  The rest as in :class:`heavytop.integrate.trajectory.Trajectory`.
     """
 
     integrator: str

@@ -19,11 +19,11 @@ from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
 from heavytop.measure.followed_angles import FollowedAngles
 from heavytop.measure.scalar import GUARD_BITS, text, to_ball
-from heavytop.precision import Precision, decimal_text, exact, exact_text, number
+from heavytop.precision import Precision, decimal_text, exact, number
 from heavytop.records import Metric
 from heavytop.top.angles import euler_angles, perpendicular
 from heavytop.top.equations import System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import HeavyTop, State, data_texts
 from heavytop.top.integrals import Integral, holding
 
 _MOST_TURNS = 10**13
@@ -59,11 +59,7 @@ class Motion:
             "states": self.states,
             "time_reached": decimal_text(run.time_reached, precision.digits),
             "order": run.order,
-            "inertia": [exact_text(value) for value in self.top.inertia],
-            "weight": exact_text(self.top.weight),
-            "centre": [exact_text(value) for value in self.top.centre],
-            "omega": [exact_text(value) for value in self.start.omega],
-            "gamma": [exact_text(value) for value in self.start.gamma],
+            **data_texts(self.top, self.start),
             "integrator": run.integrator,
             "flags": run.flags,
             "seconds": run.seconds,

@@ -49,7 +49,7 @@ def bands(runs: Sequence[Mapping[str, Metric]], floor: float, own: Mapping[str, 
 
     floor: log10 below which all errors are the same.  own: the run that the bands are for.  It counts where it came out
     no larger than the others: chance may have made it small, but must not excuse what went wrong.
-    Metrics that some run has no number for have no band.
+    Metrics that are not finite or missing in some run have no band.
     """
     found = {}
     for name in runs[0]:
@@ -72,7 +72,7 @@ def duration_band(times: Sequence[float], own: float, expected: float) -> float:
 
 
 def _size(run: Mapping[str, Metric], name: str) -> float:
-    """log10 of an error; -inf for 0, NaN where there is no number."""
+    """log10 of an error; -inf for 0, NaN for the words."""
     metric = run.get(name)
     if metric is None or (metric.log10 is None and metric.value != "0"):
         return math.nan

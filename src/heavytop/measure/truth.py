@@ -37,7 +37,7 @@ _ALWAYS_ENCLOSED = 100
 _DIGITS_A_BIT = Fraction(30103, 100000)
 _SPARE_DIGITS = 3
 _EFFORT = 1.0
-"""Seconds that a second source at the horizon itself may cost; beyond, it is held near 0 and near the horizon."""
+"""Seconds that a second source at the horizon itself may cost; beyond, it is compared near 0 and near the horizon."""
 
 Evaluate = Callable[[Fraction, int], list[arb]]
 

@@ -48,7 +48,7 @@ def _all(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Rounding
     for digits in range(1, most):
         unit = Fraction(1, 10**digits)
         if all(round_to(round(value / unit) * unit, precision.bits) == value for value in numbers):
-            yield Rounding("decimals", digits, 0.5 * 10.0**-digits / max(1.0, 1.0))
+            yield Rounding("decimals", digits, 0.5 * 10.0**-digits)
             break
     for digits in range(1, most):
         if all(round_to(Fraction(decimal_text(value, digits)), precision.bits) == value for value in numbers):

@@ -73,7 +73,7 @@ def _series(row: Row, kind: Kind) -> Iterator[str]:
             yield f"{name}: not one value for each time"
             continue
         if row.finite and any(value in _NO_NUMBER for value in series.values):
-            yield f"finite: said to be finite, but {name} holds what is no number"
+            yield f"finite: said to be finite, but {name} holds nan or missing"
         if series.quantity is not None and not kind.series_has_more(series.quantity):
             yield from _against_metrics(series.quantity, series, row)
 
@@ -126,7 +126,7 @@ def log_size(text: str) -> float:
 
 
 def bound(metric: Metric) -> float:
-    """log10 of the most that a metric can be; infinite where it is no number."""
+    """log10 of the most that a metric can be; infinite where it is not finite or missing."""
     if metric.log10 is not None:
         return metric.log10
     if metric.value == UNRESOLVED and metric.bound:

@@ -86,7 +86,7 @@ def _points(track: Track) -> dict[int, float]:
 
 def _picture(section: Section, track: Track, count: int, name: str) -> Picture:
     points = _points(track)
-    axes = new_axes("report", "value", height=2.2, left=0.2)
+    axes = new_axes("report", "value", height=2.2)
     draw(axes, section.key(_VALUE), [number + 1 for number in points], list(points.values()), every=None)
     for number, (verdict, _) in sorted(track.steps.items()):
         key = _STEPS.get(verdict)

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Container, Iterable, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from msgspec.structs import replace as replace_struct
 
-from heavytop.measure.digits import digits_kept
-from heavytop.records import UNMEASURED, Report, Row
-from heavytop.report.compare import Comparison
+from heavytop.measure.digits import RELATIVE, digits_kept
+from heavytop.records import UNMEASURED, Identity, Report, Row
+from heavytop.report.compare import Comparison, Finding
 from heavytop.report.kind import Kinds, MakeSection, kind_of
 from heavytop.report.names import row_name
-from heavytop.report.section import Section, Sources, clip
+from heavytop.report.section import Section, Sources, clip, logarithm
 from heavytop.report.svg import quiet_style
 from heavytop.report.text import failed, short
+from heavytop.report.work_precision import ERRORS
 from heavytop.suite.files import replace
 from heavytop.suite.plan import BUILT_IN
 
@@ -25,7 +27,6 @@ MOST_WORST = 50
 MOST_FAILURES = 50
 MOST_METRICS = 100
 MOST_FINDINGS = 500
-_NOTHING = "nothing", "No claim about the heavy top is audited in this plan."
 
 
 def write_report(report: Report, path: Path, kinds: Kinds) -> None:
@@ -38,14 +39,12 @@ def report_page(report: Report, kinds: Kinds) -> str:
     rows, left_out = detailed(report.rows)
     failures = [row for row in report.rows if failed(row, kinds)]
     of_kind = {name: [row for row in report.rows if row.key.kind == name] for name in kinds}
-    said = [kind.headline(of_kind[name]) for name, kind in kinds.items()]
-    word, sentence = next((each for each in said if each), _NOTHING)
+    said = [found for name, kind in kinds.items() if (found := kind.headline(of_kind[name]))]
     not_finite = [row for row in report.rows if row.outcome == "success" and not row.finite]
     return render(
         "report.html.j2",
         report=report,
-        word=word,
-        sentence=sentence,
+        headlines=said or [("", f"{len(report.rows)} measurements, {len(failures)} of which failed.")],
         cards=[card for name, kind in kinds.items() for card in kind.cards(of_kind[name])],
         failures=failures[:MOST_FAILURES],
         failed=len(failures),
@@ -53,7 +52,7 @@ def report_page(report: Report, kinds: Kinds) -> str:
         not_finite=not_finite,
         overflowed=all(kind_of(row, kinds).may_overflow for row in not_finite),
         sections=sections([("", report)], kinds),
-        measures=_by_measure(rows),
+        groups=_by_kind(rows),
         left_out=left_out,
         environment=report.environment,
         commands=commands(report),
@@ -69,6 +68,9 @@ def _gave_up(row: Row, kinds: Kinds) -> bool:
 def comparison_page(baseline: Report, candidate: Report, comparison: Comparison, kinds: Kinds) -> str:
     """The page of a comparison: verdict, changed rows, both reports on the same axes."""
     changed = comparison.changed
+    motions: dict[Identity, list[Finding]] = {}
+    for finding in changed[:MOST_FINDINGS]:
+        motions.setdefault(finding.row, []).append(finding)
     sources = [("baseline", baseline), ("candidate", candidate)]
     return render(
         "comparison.html.j2",
@@ -76,7 +78,7 @@ def comparison_page(baseline: Report, candidate: Report, comparison: Comparison,
         baseline=baseline,
         comparison=comparison,
         tally={verdict.value: count for verdict, count in comparison.tally.items()},
-        changed=changed[:MOST_FINDINGS],
+        changed=motions,
         left_out=max(0, len(changed) - MOST_FINDINGS),
         sections=sections(sources, kinds, dict.fromkeys(finding.row.case for finding in changed)),
         differences=[[clip(part, 200) for part in each] for each in comparison.environment],
@@ -112,7 +114,7 @@ def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
     return [*rows[:MOST_ROWS], *rest], max(0, len(rows) - MOST_ROWS - len(rest))
 
 
-def _by_measure(rows: Sequence[Row]) -> dict[str, list[Row]]:
+def _by_kind(rows: Sequence[Row]) -> dict[str, list[Row]]:
     found: dict[str, list[Row]] = {}
     for row in rows:
         found.setdefault(row.key.kind or "other", []).append(row)
@@ -122,6 +124,52 @@ def _by_measure(rows: Sequence[Row]) -> dict[str, list[Row]]:
 def _badness(row: Row) -> tuple[bool, bool, float]:
     kept = digits_kept(row)
     return row.outcome == "success", row.finite, float("inf") if kept is None else kept
+
+
+def main_metric(row: Row) -> str:
+    """What a line about a row says first: an error if it has one that is a number, else what its kind is about."""
+    errors = [name for name in (RELATIVE.text, ERRORS[0].text) if name in row.metrics]
+    errors += [name for name, metric in row.metrics.items() if metric.kind == "error" and metric.log10 is not None]
+    name = next(iter(errors or row.metrics), None)
+    if name is None:
+        return "no metric"
+    return f"{_MAIN.get(name, clip(name.replace('_', ' '), 60))} {short(row.metrics[name].value)}"
+
+
+_MAIN = {RELATIVE.text: "relative error", ERRORS[0].text: "error"}
+
+
+def metric_cells(row: Row) -> list[list[str]]:
+    """Name, value, and rounding noise in decades of the first metrics."""
+    return [
+        [
+            clip(name, 80),
+            clip(metric.value, 40) + (f" (below {short(metric.bound)})" if metric.bound else ""),
+            f"{metric.band:.2f}" if metric.band else "",
+        ]
+        for name, metric in islice(row.metrics.items(), MOST_METRICS)
+    ]
+
+
+def change(findings: Sequence[Finding]) -> str:
+    """What happened to one motion: digits lost or gained where an error moved, of the relative one if it did; else why.
+
+    The first finding is the worst.
+    """
+    worst = [finding for finding in findings if finding.verdict == findings[0].verdict]
+    moved = {finding.metric: lost for finding in worst if (lost := _digits_moved(finding)) is not None}
+    if not moved:
+        return worst[0].reason
+    lost = moved.get(RELATIVE.text, max(moved.values(), key=abs))
+    return f"{abs(lost):.1f} digits {'lost' if lost > 0 else 'gained'}"
+
+
+def _digits_moved(finding: Finding) -> float | None:
+    """Of an error that both reports have as a number; None for laws, timings and words."""
+    if finding.timing or ("error" not in finding.metric.split("_") and not finding.metric.startswith("drift")):
+        return None
+    old, new = logarithm(finding.baseline), logarithm(finding.candidate)
+    return None if old is None or new is None else new - old
 
 
 def commands(report: Report) -> list[str]:
@@ -151,6 +199,13 @@ def render(template: str, **context: Any) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"clip": clip, "short": short, "row_name": row_name}
+    environment.filters |= {
+        "clip": clip,
+        "short": short,
+        "row_name": row_name,
+        "main_metric": main_metric,
+        "metric_cells": metric_cells,
+        "change": change,
+    }
     environment.globals |= {"most_metrics": MOST_METRICS}
     return environment.get_template(template).render(**context)

@@ -66,7 +66,10 @@ class Kind(Protocol):
         return []
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """A word (refuted, holds, undecided) and the sentence that opens the page; None where it has nothing to say."""
+        """A word (refuted, holds, undecided; or "") and the answer of its rows in a sentence; None for no answer.
+
+        That of the first kind opens the page.
+        """
         return None
 
     def cards(self, rows: Sequence[Row]) -> list[Card]:

@@ -12,8 +12,8 @@ from typing import Any
 
 from heavytop.measure.growth import BENT, CLASSES, FEWEST_SAMPLES, NEAR
 from heavytop.records import Row, Series
-from heavytop.report.section import DASHED, TIME, Key, Section, Sources, clip, draw, points, scientific
-from heavytop.report.svg import COLOURS, MARKERS, decades, finish, new_axes, spoken
+from heavytop.report.section import DASHED, TIME, Key, Section, Sources, clip, draw, numbered, points, scientific
+from heavytop.report.svg import COLOURS, End, decades, finish, new_axes, spoken
 from heavytop.report.text import short
 
 METHODS = ("heyoka", "cyrk:DOP853", "splitting:4")
@@ -25,6 +25,7 @@ QUANTITIES = (
 _LOG10 = -5.0
 """The error that the rungs of the methods are to have."""
 _DECADES, _FEWEST_DECADES = 2.0, 1.5
+_FITTED = Key("fitted power of t", 5, "", "6 3")
 _ABOVE_ROUNDING = 10
 """Times the error that rounding may have made: below, the exponent of a single motion is chance."""
 
@@ -105,41 +106,31 @@ def alike(rows: Sequence[Row]) -> list[Row]:
     return [rows[min(chosen[name])[1]] for name in METHODS]
 
 
-def growth_axes(
-    axes: Any, rows: Sequence[tuple[Key, Row]], name: str, power: float
-) -> list[tuple[Key, Row, Trend | None, str]]:
-    """Draw the series ``name`` of each row over time on ``axes``, its trend dashed; both and the last value.
+def _curve(axes: Any, key: Key, row: Row, name: str, power: float) -> tuple[Trend | None, str, End | None]:
+    """Draw the series ``name`` of a row over time, its trend dashed: the trend, the last value, the place of the law.
 
     The axes carry decimal logarithms.  power: of the steps, by which rounding errors grow.
     """
-    decades(axes.xaxis)
-    decades(axes.yaxis)
-    drawn = []
-    for key, row in rows:
-        held = row.series.get(name, Series([], []))
-        x, y = points(held)
-        found = trend(held, 2.0 ** (1 - row.bits) * row.steps**power)
-        if x:
-            draw(axes, key, x, y, 4.2, every=None)
-        if found is not None:
-            ends = [found.height + found.exponent * t for t in found.span]
-            axes.plot(found.span, ends, color=COLOURS[key.colour], lw=1.2, ls=DASHED)
-        drawn.append((key, row, found, scientific(y[-1]) if y else ""))
-    return drawn
-
-
-def keyed(rows: Sequence[Row], source: str = "") -> list[tuple[Key, Row]]:
-    """Each row with its entry of the legend."""
-    more = f", {source}" if source else ""
-    return [
-        (Key(clip(row.integrator + more, 50), place, MARKERS[place], old=source == "baseline"), row)
-        for place, row in enumerate(rows)
-    ]
+    held, end = row.series.get(name, Series([], [])), None
+    x, y = points(held)
+    found = trend(held, 2.0 ** (1 - row.bits) * row.steps**power)
+    if x:
+        draw(axes, key, x, y, 4.2, every=None)
+    if found is not None:
+        heights = [found.height + found.exponent * t for t in found.span]
+        axes.plot(found.span, heights, color=COLOURS[key.colour], lw=1.2, ls=DASHED, label=_FITTED.label)
+        law = "no law" if found.law == "unresolved" else found.law
+        end = End(f"{law} ({found.exponent:z.2f})", COLOURS[key.colour], x[-1], heights[-1])
+    return found, scientific(y[-1]) if y else "", end
 
 
 def method_growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """The section of the page: energy drift and phase error of the three methods, with the power of t of each."""
-    chosen = [pair for source, report in sources for pair in keyed(alike(report.rows), source)]
+    chosen: list[tuple[Key, Row]] = []
+    for source, report in sources:
+        for place, row in enumerate(alike(report.rows)):
+            label = f"{row.integrator}, {source}" if source else row.integrator
+            chosen.append((numbered(label, place, source == "baseline"), row))
     if not chosen:
         return None
     section = Section(
@@ -148,18 +139,24 @@ def method_growth(sources: Sources, first: Iterable[str] = ()) -> Section | None
         [
             f"{clip(chosen[0][1].case)}: a splitting, which preserves structure, beside two methods that do not, each "
             "at the tolerance or step whose error is nearest to 1e-5.",
-            "Dashed: a power of t through the largest error so far, by least squares over the last two decades of t, "
-            "and in brackets that of each half. A law is named where the halves agree, and only where the error is ten "
-            "times what rounding may have made: below, the exponent of one motion is chance.",
+            "Dashed, with its exponent at its end: a power of t through the largest error so far, by least squares on "
+            "the last two decades of t; in the numbers that of each half too. A law is named where the halves agree, "
+            "and only where the error is ten times what rounding may have made: below, the exponent of one motion is "
+            "chance.",
         ],
         columns=["integrator", "error on the way", "quantity", "last |t|", "last value", "exponent", "law"],
         across=2,
         place=60,
     )
     for number, (name, title, unit, power) in enumerate(QUANTITIES):
-        axes = new_axes(TIME, unit)
+        axes = new_axes(TIME, unit, height=3.2, right=1.2)
+        decades(axes.xaxis)
+        decades(axes.yaxis)
         heard = []
-        for key, row, found, last in growth_axes(axes, chosen, name, power):
+        ends = []
+        for key, row in chosen:
+            found, last, end = _curve(axes, key, row, name, power)
+            ends += [end] if end else []
             section.key(key)
             heard.append(f"{key.label}: {found.text if found else 'too few samples for a law'}.")
             exponent = found.said if found else ""
@@ -167,8 +164,6 @@ def method_growth(sources: Sources, first: Iterable[str] = ()) -> Section | None
             section.rows.append([key.label, error, title, short(row.time_reached), last, exponent, law])
         said = [f"{row[0]}: {row[4]} at |t| = {row[3]}." for row in section.rows if row[2] == title]
         heading = f"{title[0].upper()}{title[1:]} over time"
-        section.pictures.append(
-            finish(axes, heading, spoken([*said, *heard]), f"method-growth-{number}", " ".join(heard))
-        )
-    section.key(Key("fitted power of t", 5, "", "6 3"))
+        section.pictures.append(finish(axes, heading, spoken([*said, *heard]), f"method-growth-{number}", ends=ends))
+    section.key(_FITTED)
     return section

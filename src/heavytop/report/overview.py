@@ -59,7 +59,7 @@ def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
         ]
         if group in fewest:
             lines.append(["digits kept, fewest", digits_text(fewest[group][0]), fewest[group][1], ""])
-        parts.append(table(["metric", "largest", "in", "no number"], lines))
+        parts.append(table(["metric", "largest", "in", "not available"], lines))
     return Group(*parts, Text(), Text(hint))
 
 

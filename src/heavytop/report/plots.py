@@ -1,4 +1,4 @@
-"""The sections of a page about computed motions: digits kept, and drift and state error over time."""
+"""The sections of a page about computed motions: digits lost by the horizon, and drift and state error over time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.solution_error import SOLUTION_ERROR
-from heavytop.records import Law, Metric, Quantity, Row, Series, Subject
+from heavytop.records import Law, Metric, Quantity, Row, Series
 from heavytop.report.section import (
     DASHED,
     MOST_PLOTS,
@@ -22,113 +22,126 @@ from heavytop.report.section import (
     draw,
     left_out,
     logarithm,
+    numbered,
     points,
     scientific,
 )
-from heavytop.report.svg import COLOURS, MARKERS, decades, finish, new_axes, spoken
+from heavytop.report.svg import COLOURS, MARKERS, End, decades, finish, new_axes, room, spoken
 from heavytop.report.text import short
 
 MOST_LANES = 40
+_GREY = 5
+_FITTED = Key("fitted law", _GREY, "", "6 3")
 
 
-def _formats(sources: Sources) -> dict[str, int]:
-    """Formats by their bits, each with its place: its colour and its marker."""
-    bits = {row.precision: row.bits for _, report in sources for row in report.rows if row.series and row.bits}
-    return {name: place for place, name in enumerate(sorted(bits, key=lambda name: (bits[name], name)))}
+def variant(row: Row) -> str:
+    """The integrator and what is asked of it; "" for heyoka as it is."""
+    subject = row.key.subject
+    name = "" if subject.name == HEYOKA else subject.name
+    return " ".join(part for part in (name, subject.variant) if part)
 
 
-def _format_key(name: str, place: int, source: str, line: bool = True) -> Key:
-    marker, colour = MARKERS[place % len(MARKERS)], place % len(COLOURS)
-    old = source == "baseline"
-    label = f"{clip(name, 20)}, {source}" if source else clip(name, 20)
-    return Key(label, colour, marker, "", old, line)
-
-
-class _Lane(NamedTuple):
-    """What is drawn together: one case of one subject, in its formats."""
-
-    case: str
-    subject: Subject
-    many: bool
-    kind: str
-    system: str
-
-    @classmethod
-    def of(cls, row: Row) -> _Lane:
-        return cls(row.case, row.key.subject, row.starts > 1, row.key.kind, row.system)
-
-    def name(self, most: int = 40) -> str:
-        subject = "" if self.subject.name == HEYOKA else self.subject.name
-        extra = " ".join(part for part in (subject, self.subject.variant) if part)
-        extra = extra or ("many starts" if self.many else "")
-        return clip(self.case, most) + (f" ({clip(extra, most)})" if extra else "")
+def digits_lost(row: Row) -> float | None:
+    """Of the digits that the format has; None for a run that failed, and where nothing says."""
+    kept = digits_kept(row) if row.outcome == "success" else None
+    return None if kept is None else row.bits * math.log10(2) - max(kept, 0.0)
 
 
 def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
-    """Digits that each format keeps over its run, beside the digits it started with."""
-    lanes: dict[_Lane, list[tuple[str, Row]]] = {}
+    """Digits lost against the horizon: a line a motion, a marker a format."""
+    lanes: dict[tuple[str, str], list[tuple[str, Row]]] = {}
     for source, report in sources:
         for row in report.rows:
             if RELATIVE.text in row.metrics:
-                lanes.setdefault(_Lane.of(row), []).append((source, row))
+                lanes.setdefault((row.case, variant(row)), []).append((source, row))
     if not lanes:
         return None
     section = Section(
         "digits",
-        "Digits kept per format",
+        "Digits lost over a run",
         [
-            "Digits kept: −log10 of the largest |error|/max(1, |true value|) of a component of Ω or γ over the "
-            "samples, against the known motion, or for many starts without one against runs in a wider format, which "
-            "prove nothing; of many starts the root mean square over them. A thin line leads from the digits of the "
-            "format to those it kept."
+            "Digits lost: those of the format less the digits kept, −log10 of the largest |error|/max(1, |true value|) "
+            "of a component of Ω or γ over the samples, against the known motion, or for many starts without one "
+            "against runs in a wider format, which prove nothing; of many starts the root mean square over them. A bar "
+            "is the interval in which rounding noise alone moves it."
         ],
-        columns=["case", "format", "T", "samples", "digits", "kept", "lost", "± digits"],
+        columns=["case", "format", "T", "samples", "of digits", "lost", "kept", "± digits"],
         place=10,
     )
-    formats = _formats(sources)
     wanted = set(first)
-    names = sorted(lanes, key=lambda lane: lane.case not in wanted)[:MOST_LANES]
+    names = sorted(lanes, key=lambda lane: lane[0] not in wanted)[:MOST_LANES]
     left_out(section, len(lanes) - len(names), "case")
-    count = max(len(members) for members in lanes.values())
-    lines = (count + 1) * len(names)
-    axes = new_axes("kept (correct decimal digits)", "case", max(2.4, 0.8 + 0.12 * lines), 0.4)
-    height = 0.8 / count
-    heard = []
-    for index, lane in enumerate(names):
-        for place, (source, row) in enumerate(sorted(lanes[lane], key=lambda each: each[1].bits)):
-            key = section.key(_format_key(row.precision, formats.get(row.precision, 0), source, line=False))
-            y = index + (place - (len(lanes[lane]) - 1) / 2) * height
-            full = row.bits * math.log10(2)
-            kept = digits_kept(row) if row.outcome == "success" else None
-            band = row.metrics[RELATIVE.text].band
-            if kept is None:
-                axes.plot([0], [y], "x", color=COLOURS[key.colour], mew=1.6, ms=6)
-                said = row.outcome if row.outcome != "success" else row.metrics[RELATIVE.text].value
-            else:
-                axes.plot([kept, full], [y, y], "-", color=COLOURS[key.colour], lw=0.9)
-                axes.plot([full], [y], "|", color=COLOURS[key.colour], ms=6)
-                if band:
-                    axes.plot([kept - band, kept + band], [y, y], "-", color=COLOURS[key.colour], lw=4, alpha=0.3)
-                draw(axes, key, [kept], [y], 5)
-                said = digits_text(kept)
-            heard.append(f"{lane.name()}, {key.label}: {said} of {full:.1f}.")
-            lost = "" if kept is None else f"{full - max(kept, 0.0):.1f}"
-            spread = "" if band is None else f"{band:.2f}"
-            samples = str(row.samples or "")
-            section.rows.append(
-                [lane.name(), key.label, short(row.horizon), samples, f"{full:.1f}", said, lost, spread]
-            )
-    axes.set_yticks(range(len(names)), [lane.name(15).replace(" (", "\n(", 1) for lane in names])
-    axes.set_ylim(len(names) - 0.4, -0.6)
-    axes.set_xlim(left=0)
-    axes.grid(False, axis="y")
-    section.pictures.append(finish(axes, "Digits kept per format", spoken(heard, 24), "digits"))
-    section.notes.append("A cross at 0 is a run that failed or has no number.")
+    labels = [clip(name[0], 30) + (f" ({clip(name[1], 30)})" if name[1] else "") for name in names]
+    height = 1 + 0.17 * max(14, len(names))
+    axes = new_axes("T (time units of the data)", "digits lost (decimal digits)", height, room(labels))
+    decades(axes.xaxis)
+    formats = _formats(sources)
+    heard: list[str] = []
+    ends = []
+    for index, (name, label) in enumerate(zip(names, labels, strict=True)):
+        end = _lane(section, axes, index % _GREY, label, lanes[name], formats, heard)
+        if end:
+            ends.append(end)
+    for key in sorted(section.legend.values(), key=lambda key: MARKERS.index(key.marker)):
+        section.legend[key.label] = section.legend.pop(key.label)
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    low, high = axes.dataLim.intervalx
+    axes.set_xlim(math.floor(low - 0.1), math.ceil(high + 0.1))
+    section.pictures.append(finish(axes, section.title, spoken(heard, 24), "digits", ends=ends))
+    if any(cell[5] == "" for cell in section.rows):
+        section.notes.append("A cross at the top is a run that failed, or one whose error is not available.")
     return section
 
 
+def _formats(sources: Sources) -> dict[str, int]:
+    """Formats by their bits, each with its place: its marker."""
+    bits = {row.precision: row.bits for _, report in sources for row in report.rows if row.bits}
+    return {name: place for place, name in enumerate(sorted(bits, key=lambda name: (bits[name], name)))}
+
+
+def _lane(
+    section: Section,
+    axes: Any,
+    colour: int,
+    label: str,
+    members: Sequence[tuple[str, Row]],
+    formats: dict[str, int],
+    heard: list[str],
+) -> End | None:
+    """Draw one motion in its formats, and list it; where its last point is."""
+    ink, found = COLOURS[colour], []
+    for source, row in sorted(members, key=lambda each: logarithm(each[1].horizon) or 0.0):
+        lost, until = digits_lost(row), logarithm(row.horizon)
+        marker = MARKERS[formats[row.precision] % len(MARKERS)] if row.precision in formats else "o"
+        old = source == "baseline"
+        key = section.key(Key(_with(clip(row.precision, 20), source), _GREY, marker, old=old, line=False))
+        band = row.metrics[RELATIVE.text].band or 0.0
+        if until is not None and lost is None:
+            axes.plot([until], [1], "x", transform=axes.get_xaxis_transform(), color=ink, mew=1.6, ms=6, clip_on=False)
+        elif until is not None and lost is not None:
+            face = "none" if old else ink
+            axes.plot([until], [lost], key.marker, ms=6, color=ink, mfc=face, mec=ink, label=key.label)
+            axes.plot([until] * 2, [lost - band, lost + band], "-", color=ink, lw=3, alpha=0.3)
+            found.append((source, until, lost))
+        full = row.bits * math.log10(2)
+        metric = row.metrics[RELATIVE.text].value
+        said = row.outcome if row.outcome != "success" else metric if lost is None else digits_text(full - lost)
+        shown = "" if lost is None else f"{lost:.1f}"
+        heard.append(f"{label}, {key.label}: {shown or said} of {full:.1f} lost at {short(row.horizon)}.")
+        cells = [label, key.label, short(row.horizon), str(row.samples or ""), f"{full:.1f}", shown, said]
+        section.rows.append([*cells, f"{band:.2f}" if band else ""])
+    for source in dict.fromkeys(source for source, _, _ in found):
+        own = [(x, y) for other, x, y in found if other == source]
+        axes.plot(*zip(*own, strict=True), "-", color=ink, lw=1.2, alpha=0.5 if source == "baseline" else 1)
+    return End(label, ink, *found[-1][1:]) if found else None
+
+
+def _with(name: str, source: str) -> str:
+    return f"{name}, {source}" if source else name
+
+
 class _Column(NamedTuple):
-    """One plot of a lane: a drift, or one component of the error."""
+    """One plot of a case: a drift, or one component of the error."""
 
     quantity: Quantity
     label: str
@@ -148,14 +161,26 @@ _COLUMNS = (
 )
 
 
+class _Chart(NamedTuple):
+    """Axes of one case and quantity, with what they show in words, and where each law stands."""
+
+    axes: Any
+    title: str
+    heard: list[str]
+    ends: list[End]
+
+
 def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
-    """Drift and state error over time, on logarithmic axes that all plots share.  ``first``: cases to draw first."""
-    lanes: dict[_Lane, list[tuple[str, Row]]] = {}
+    """Drift and state error over time, on logarithmic axes that the plots of a case share; cases ``first``."""
+    cases: dict[str, list[tuple[Key, Row]]] = {}
+    keys: dict[str, Key] = {}
     for source, report in sources:
         for row in report.rows:
             if row.bits and any(column.of(row) for column in _COLUMNS):
-                lanes.setdefault(_Lane.of(row), []).append((source, row))
-    if not lanes:
+                label = _with(", ".join(part for part in (clip(row.precision, 20), variant(row)) if part), source)
+                key = keys.setdefault(label, numbered(label, len(keys), source == "baseline"))
+                cases.setdefault(row.case, []).append((key, row))
+    if not cases:
         return None
     section = Section(
         "growth",
@@ -164,81 +189,71 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
             "Each error in units of ε = 2^(1 − bits) of its own format, so that all formats share one scale: 10⁶ means "
             "that six digits are lost. Of the first integrals the one that drifts farthest is drawn. A first integral "
             "that holds is no proof that the motion is right: the distance from the true motion stands beside it.",
-            "Dashed: the fitted law of growth over the span that was fitted, with the 95 % interval of its exponent; a "
-            "shade around a curve is the interval in which rounding noise alone moves it.",
+            "Dashed, and in words at its end: the fitted law of growth with its exponent, or the rate of an "
+            "exponential, over the span that was fitted, and the 95 % interval as a fan. A shade around a curve is the "
+            "interval in which rounding noise alone moves it.",
         ],
-        columns=["case", "format", "quantity", "last |t|", "last value", "law", "exponent", "digits gone at |t|"],
+        columns=["case", "run", "quantity", "last |t|", "last value", "law", "exponent", "digits gone at |t|"],
         place=30,
     )
     wanted = set(first)
-    names = sorted(lanes, key=lambda lane: (lane.case not in wanted, not any(row.laws for _, row in lanes[lane])))
-    names = names[:MOST_PLOTS]
-    left_out(section, len(lanes) - len(names), "case")
-    formats = _formats(sources)
-    drawn = [_growth_axes(section, lanes[lane], lane, column, formats) for lane in names for column in _COLUMNS]
-    plots = [plot for plot in drawn if plot]
-    x = [plot[0].get_xlim() for plot in plots]
-    y = [plot[0].get_ylim() for plot in plots]
-    if any(row.laws for lane in names for _, row in lanes[lane]):
-        section.key(Key("fitted law", 5, "", "6 3"))
-    for number, (axes, title, heard, laws) in enumerate(plots):
-        axes.set_xlim(min(low for low, _ in x), max(high for _, high in x))
-        axes.set_ylim(min(low for low, _ in y), max(high for _, high in y))
-        section.pictures.append(finish(axes, title, spoken([*heard, *laws]), f"growth-{number}", " ".join(laws)))
+    names = sorted(cases, key=lambda case: case not in wanted)
+    left_out(section, len(names) - MOST_PLOTS, "case")
+    for name in names[:MOST_PLOTS]:
+        drawn = [_chart(section, name, column, cases[name]) for column in _COLUMNS]
+        charts = [chart for chart in drawn if chart]
+        x, y = ([getattr(chart.axes, f"get_{axis}lim")() for chart in charts] for axis in "xy")
+        for axes, title, heard, ends in charts:
+            axes.set_xlim(min(low for low, _ in x), max(high for _, high in x))
+            axes.set_ylim(min(low for low, _ in y), max(high for _, high in y))
+            name = f"growth-{len(section.pictures)}"
+            section.pictures.append(finish(axes, title, spoken(heard, 24), name, ends=ends))
+    if _FITTED.label in section.legend:
+        section.legend[_FITTED.label] = section.legend.pop(_FITTED.label)
     return section
 
 
-def _growth_axes(
-    section: Section,
-    members: Sequence[tuple[str, Row]],
-    lane: _Lane,
-    column: _Column,
-    formats: dict[str, int],
-) -> tuple[Any, str, list[str], list[str]] | None:
-    axes, heard, laws, lacking = None, [], [], []
-    for source, row in members:
+def _chart(section: Section, case: str, column: _Column, members: Sequence[tuple[Key, Row]]) -> _Chart | None:
+    laws = [_law_short(law) for _, row in members for law in row.laws.values()]
+    axes = new_axes(TIME, column.unit, right=room(laws) if laws else 0.12)
+    decades(axes.xaxis)
+    decades(axes.yaxis)
+    chart = _Chart(axes, f"{clip(case, 40)}: {column.label}", [], [])
+    lacking = []
+    for key, row in members:
         largest = _largest(column.of(row))
         if largest is None:
-            lacking.append(row.precision)
-            continue
-        quantity, last = largest
-        epsilon = (1 - row.bits) * math.log10(2)
-        x, y = points(last, epsilon)
-        if not x:
-            heard.append(f"{row.precision}: nothing that the reference resolves, or exactly 0.")
-            continue
-        if axes is None:
-            axes = new_axes(TIME, column.unit)
-            decades(axes.xaxis)
-            decades(axes.yaxis)
-        key = section.key(_format_key(row.precision, formats.get(row.precision, 0), source))
-        draw(axes, key, x, y)
-        law, band = row.laws.get(quantity.text), _band(row.metrics, quantity)
-        if band:
-            axes.fill_between(
-                x, [v - band for v in y], [v + band for v in y], color=COLOURS[key.colour], alpha=0.18, lw=0
-            )
-        if law:
-            _law(axes, key, law, x, y)
-            laws.append(_law_said(key.label, law))
-        what = quantity.component.replace("_", " ")
-        heard.append(f"{key.label}: {scientific(y[-1])} ε ({what}) at |t| = {scientific(x[-1])}.")
-        section.rows.append(
-            [
-                lane.name(),
-                key.label,
-                f"{'drift of' if quantity.name == DRIFT else 'error'} {what}",
-                short(last.times[-1]),
-                short(last.values[-1]),
-                *_law_words(law),
-            ]
-        )
-    if axes is None:
+            lacking.append(key.label)
+        else:
+            _curve(section, chart, clip(case, 40), key, row, *largest)
+    if not axes.lines:
         return None
     if lacking and column is _COLUMNS[-1]:
-        these = ", ".join(dict.fromkeys(map(clip, lacking)))
-        section.notes.append(f"{lane.name()}: no known motion reaches as far as {these} ran, so no state error.")
-    return axes, f"{lane.name()}: {column.label}", heard, laws
+        section.notes.append(f"{clip(case, 40)}: no known motion reaches as far as {', '.join(lacking)} ran.")
+    return chart
+
+
+def _curve(section: Section, chart: _Chart, case: str, key: Key, row: Row, quantity: Quantity, held: Series) -> None:
+    """Draw one run with its noise and its law, and list it."""
+    x, y = points(held, (1 - row.bits) * math.log10(2))
+    if not x:
+        chart.heard.append(f"{key.label}: nothing that the reference resolves, or exactly 0.")
+        return
+    draw(chart.axes, section.key(key), x, y)
+    colour = COLOURS[key.colour]
+    law, band = row.laws.get(quantity.text), _band(row.metrics, quantity)
+    if band:
+        above, below = [v + band for v in y], [v - band for v in y]
+        chart.axes.fill_between(x, below, above, color=colour, alpha=0.18, lw=0)
+    if law:
+        if _law(chart.axes, colour, law, x, y):
+            section.key(_FITTED)
+        chart.heard.append(_law_said(key.label, law))
+        chart.ends.append(End(_law_short(law), colour, x[-1], y[-1]))
+    what = quantity.component.replace("_", " ")
+    chart.heard.append(f"{key.label}: {scientific(y[-1])} ε ({what}) at |t| = {scientific(x[-1])}.")
+    named = f"{'drift of' if quantity.name == DRIFT else 'error'} {what}"
+    section.rows.append([case, key.label, named, short(held.times[-1]), short(held.values[-1]), *_law_words(law)])
 
 
 def _largest(found: dict[Quantity, Series]) -> tuple[Quantity, Series] | None:
@@ -256,21 +271,21 @@ def _band(metrics: dict[str, Metric], quantity: Quantity) -> float | None:
     return next((metric.band for metric in found if metric and metric.band), None)
 
 
-def _law(axes: Any, key: Key, law: Law, x: Sequence[float], y: Sequence[float]) -> None:
-    """The law through the mean of the samples it was fitted to, with the fan of its interval."""
+def _law(axes: Any, colour: str, law: Law, x: Sequence[float], y: Sequence[float]) -> bool:
+    """Draw the law through the mean of its samples, and the fan of its interval; False where it has no slope."""
     if law.exponent is None:
-        return
+        return False
     ends = [logarithm(end) for end in (law.first, law.last)]
     low, high = (given if given is not None else other for given, other in zip(ends, (x[0], x[-1]), strict=True))
     fitted = [(a, b) for a, b in zip(x, y, strict=True) if low - 1e-9 <= a <= high + 1e-9]
     if len(fitted) < 2:
-        return
+        return False
     grid = [low + (high - low) * step / 24 for step in range(25)]
     lines = [through(law, slope, fitted, grid) for slope in (law.exponent, law.low, law.high) if slope is not None]
-    colour = COLOURS[key.colour]
-    axes.plot(grid, lines[0], color=colour, lw=1.2, ls=DASHED)
+    axes.plot(grid, lines[0], color=colour, lw=1.2, ls=DASHED, label=_FITTED.label)
     if len(lines) == 3:
         axes.fill_between(grid, *lines[1:], color=colour, alpha=0.18, lw=0)
+    return True
 
 
 def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid: Sequence[float]) -> list[float]:
@@ -283,6 +298,15 @@ def through(law: Law, slope: float, fitted: Sequence[tuple[float, float]], grid:
     return [height + slope * shape(x) for x in grid]
 
 
+def _law_short(law: Law) -> str:
+    """Few enough letters to stand beside a curve."""
+    if law.exponent is None or law.growth == "unresolved":
+        return "no law"
+    if law.growth == "bounded":
+        return law.growth
+    return f"e^({law.exponent:.2g} t)" if law.growth == "exponential" else f"{law.growth} ({law.exponent:z.2f})"
+
+
 def _law_said(label: str, law: Law) -> str:
     growth, exponent, _ = _law_words(law)
     if not exponent:
@@ -293,6 +317,6 @@ def _law_said(label: str, law: Law) -> str:
 def _law_words(law: Law | None) -> list[str]:
     if law is None:
         return ["", "", ""]
-    interval = "" if law.low is None or law.high is None else f" [{law.low:.2f}, {law.high:.2f}]"
-    exponent = "" if law.exponent is None else f"{law.exponent:.2f}{interval}"
+    interval = "" if law.low is None or law.high is None else f" [{law.low:z.2f}, {law.high:z.2f}]"
+    exponent = "" if law.exponent is None else f"{law.exponent:z.2f}{interval}"
     return [law.growth, exponent, short(law.lost_at) if law.lost_at else ""]

@@ -14,7 +14,7 @@ from typing import Any
 from heavytop.errors import InputError
 from heavytop.precision import exact, log10
 from heavytop.records import Report, Series
-from heavytop.report.svg import COLOURS, Picture
+from heavytop.report.svg import COLOURS, MARKERS, Picture
 
 MOST_PLOTS = 12
 TIME = "|t| (time units of the data)"
@@ -59,16 +59,26 @@ class Card:
     note: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Cells under their columns; the first of each row names it."""
+
+    caption: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
 @dataclass(slots=True)
 class Section:
     """A part of the page: words, pictures with one legend, the same in numbers, and what is not drawn.
 
-    place: the sections stand in the order of their places.
+    answers: what the pictures come to, above them.  place: the sections stand in the order of their places.
     """
 
     id: str
     title: str
     text: list[str]
+    answers: Table | None = None
     pictures: list[Picture] = field(default_factory=list)
     legend: dict[str, Key] = field(default_factory=dict)
     columns: list[str] = field(default_factory=list)
@@ -114,18 +124,22 @@ def points(series: Series, shift: float = 0.0, scale: float = 1.0) -> tuple[list
     return [x for x, _ in pairs], [y for _, y in pairs]
 
 
+def numbered(label: str, place: int, old: bool = False) -> Key:
+    """The entry of the curve that is the ``place``-th: no two of the first thirty look alike."""
+    turn = place // len(COLOURS)
+    return Key(clip(label, 50), place % len(COLOURS), MARKERS[(place + turn) % len(MARKERS)], old=old)
+
+
 def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6, every: float | None = 0.07) -> None:
     """One curve, or points, as its legend has it.
 
     every: markers evenly along a curve, however dense its samples are, this part of the diagonal apart; None for all.
     """
     colour = COLOURS[key.colour]
-    face = "none" if key.old else colour
-    if key.line:
-        axes.plot(x, y, "-", color=colour, lw=4.5 if key.old else 1.6, alpha=0.35 if key.old else None)
-    size += 2 * key.old
+    style: dict[str, Any] = {"lw": 4.5, "alpha": 0.5, "mfc": "none", "ms": size + 2} if key.old else {"ms": size}
     spread = every if key.line and len(x) > 1 else None
-    axes.plot(x, y, key.marker, color=colour, mfc=face, mec=colour, ms=size, markevery=spread)
+    shape = "-" if key.line else ""
+    axes.plot(x, y, shape, marker=key.marker, color=colour, mec=colour, markevery=spread, label=key.label, **style)
 
 
 def left_out(section: Section, count: int, what: str) -> None:

@@ -50,7 +50,7 @@ def judge(
         if metric.value in ("nan", "missing") or (
             metric.value == UNRESOLVED and old.kind == "error" and not metric.bound
         ):
-            return Verdict.INCOMPARABLE, f"{metric.value} is no number"
+            return Verdict.INCOMPARABLE, f"the value is {metric.value}"
     if old.kind == "error":
         return _errors(old, new, limits, limits.floor + eps, suspicious, least)
     if old.kind == "duration":
@@ -59,7 +59,7 @@ def judge(
 
 
 def size(metric: Metric) -> float:
-    """log10 of an error, or of its bound where it is unresolved; -inf for 0, and for what is no number."""
+    """log10 of an error, or of its bound where it is unresolved; -inf for 0 and for words such as nan."""
     if metric.log10 is not None:
         return metric.log10
     try:

@@ -6,32 +6,43 @@ import math
 from collections.abc import Iterable, Sequence
 
 from heavytop.records import Row
-from heavytop.report.section import MOST_PLOTS, Key, Section, Sources, clip, draw, left_out, scientific
-from heavytop.report.svg import COLOURS, MARKERS, Picture, decades, finish, new_axes, spoken
+from heavytop.report.section import Key, Section, Sources, Table, clip, draw, left_out, numbered, scientific
+from heavytop.report.svg import COLOURS, End, Picture, decades, finish, new_axes, room, spoken
 from heavytop.report.text import short
-from heavytop.report.work_precision import Line, leads, panels
+from heavytop.report.work_precision import ERRORS, Lead, Line, leads, panels, seconds_text
 
-_METRICS = (("error_max", "largest over the samples"), ("error_final", "at the end"))
+MOST_CASES = 12
+_LEADS = (
+    "case",
+    "error",
+    "heyoka",
+    "takes",
+    "best peer",
+    "takes",
+    "times as fast",
+    "general code takes",
+    "in lanes",
+)
 
 
 def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | None:
-    """Seconds of a run against its error, on the way and at the end; a run that gave up is a cross, and no point."""
+    """Seconds of a run against its error; a run that gave up is a cross, and no point."""
     rows = [(source, row) for source, report in sources for row in report.rows]
     if not rows:
         return None
+    found = [_lead_cells(lead, source) for source, report in sources for lead in leads(report.rows)]
     section = Section(
         "work-precision",
         "Work and precision",
         [
-            "Seconds of a run, the fastest of several, against its error, largest component, compared with the known "
-            "motion: the lower and the farther left, the better. A curve is one integrator over its tolerances or "
-            "steps; the time to compile is apart, in the numbers. A cross on the right edge is a run that gave up "
-            "before the end, at the time it took: it has no error. Charts and sentences have the fastest run, since "
-            "other work on the machine only ever adds; “run” in the rows at the end of the page is the median. "
-            "heyoka:constants has the numbers of the top compiled into its code; heyoka double and the peers are "
-            "given them when they run.",
-            *(_said(lead.text, source) for source, report in sources for lead in leads(report.rows)),
+            "Seconds of a run, the fastest of several, since other work on the machine only ever adds, against its "
+            "error, the largest of a component over the samples, compared with the known motion: the lower and the "
+            "farther left, the better. A curve is one integrator over its tolerances or steps; the time to compile is "
+            "apart, in the numbers. A cross on the right edge is a run that gave up before the end, at the time it "
+            "took: it has no error. heyoka:constants has the numbers of the top compiled into its code; heyoka with "
+            "general code, and the peers, are given them when they run.",
         ],
+        answers=Table("Seconds that heyoka and the best peer take for an error", _LEADS, found) if found else None,
         columns=[
             "case",
             "integrator",
@@ -48,43 +59,40 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
         place=50,
     )
     cases = list(dict.fromkeys(row.case for _, row in rows))
-    left_out(section, len(cases) - MOST_PLOTS // 2, "case")
+    left_out(section, len(cases) - MOST_CASES, "case")
     keys: dict[str, Key] = {}
-    short = {(source, lead.case): lead.short for source, report in sources for lead in leads(report.rows) if lead.short}
-    for number, case in enumerate(cases[: MOST_PLOTS // 2]):
-        for metric, when in _METRICS:
-            lines = [(source, line) for source, report in sources for line in panels(report.rows, metric).get(case, ())]
-            title = f"{clip(case, 40)}: time against error, {when}"
-            known = [_said(short[source, case], source) for source, _ in sources if (source, case) in short]
-            note = " ".join(known) if metric == "error_max" else ""
-            section.pictures.append(_picture(section, lines, keys, title, f"work-{number}-{metric}", note))
+    for number, case in enumerate(cases[:MOST_CASES]):
+        lines = [(source, line) for source, report in sources for line in panels(report.rows).get(case, ())]
+        section.pictures.append(_picture(lines, keys, f"{clip(case, 40)}: time against error", f"work-{number}"))
     return section
 
 
-def _said(text: str, source: str) -> str:
-    return clip(f"{source.capitalize()}: {text}" if source else text, 400) + "."
+def _lead_cells(lead: Lead, source: str) -> list[str]:
+    def said(seconds: float | None) -> str:
+        return "not reached" if seconds is None else seconds_text(seconds)
+
+    return [
+        clip(lead.case, 40) + (f", {source}" if source else ""),
+        f"1e{lead.log10:g}",
+        clip(lead.name, 40),
+        said(lead.ours),
+        clip(lead.peer, 40),
+        said(lead.theirs) if lead.peer else "",
+        "" if lead.ratio is None else f"{lead.ratio:.1f}",
+        "" if lead.general is None else said(lead.general[1]),
+        "" if lead.lanes is None else seconds_text(lead.lanes),
+    ]
 
 
-def _key(keys: dict[str, Key], source: str, line: Line) -> Key:
-    name = clip(line.label + (f", {source}" if source else ""), 50)
-    return keys.setdefault(name, numbered(name, len(keys), source == "baseline"))
-
-
-def numbered(label: str, place: int, old: bool = False) -> Key:
-    """The key of the curve in that place: places that share a colour differ in the marker."""
-    turn, colour = divmod(place, len(COLOURS))
-    return Key(label, colour, MARKERS[(place + turn) % len(MARKERS)], old=old)
-
-
-def _picture(
-    section: Section, lines: Sequence[tuple[str, Line]], keys: dict[str, Key], title: str, name: str, note: str
-) -> Picture:
-    axes = new_axes("error (units of Ω and γ)", "time of a run (s)")
+def _picture(lines: Sequence[tuple[str, Line]], keys: dict[str, Key], title: str, name: str) -> Picture:
+    names = [clip(line.label, 30) + (f", {source}" if source else "") for source, line in lines]
+    height = max(3.4, 1 + 0.17 * len(lines))
+    axes = new_axes("error (units of Ω and γ)", "time of a run (s)", height, room(names))
     decades(axes.xaxis)
     decades(axes.yaxis)
-    heard = []
-    for source, line in lines:
-        key = section.key(_key(keys, source, line))
+    heard, ends = [], []
+    for (source, line), label in zip(lines, names, strict=True):
+        key = keys.setdefault(label, numbered(label, len(keys), source == "baseline"))
         points = sorted((point.log10, math.log10(point.seconds)) for point in line.points)
         if points:
             draw(axes, key, [x for x, _ in points], [y for _, y in points], 4.2, every=None)
@@ -94,11 +102,14 @@ def _picture(
             edge = {"transform": axes.get_yaxis_transform(), "clip_on": False, "color": COLOURS[key.colour]}
             axes.plot([1.0] * len(failures), failures, "x", ms=6, mew=1.6, **edge)
             heard.append(f"{key.label}: gave up ({len(line.failures)}).")
-    return finish(axes, title, spoken(heard, 24), name, note)
+        if points or failures:
+            x, y = points[-1] if points else (axes.get_xlim()[1], failures[-1])
+            ends.append(End(label, COLOURS[key.colour], x, y))
+    return finish(axes, title, spoken(heard, 24), name, ends=ends)
 
 
 def _numbers(source: str, row: Row) -> list[str]:
-    errors = (row.metrics.get(metric) for metric, _ in _METRICS)
+    errors = (row.metrics.get(quantity.text) for quantity in ERRORS)
     return [
         clip(row.case) + (f", {source}" if source else ""),
         clip(row.integrator, 50),

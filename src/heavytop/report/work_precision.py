@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+from heavytop.integrate.peers import BUILT_IN
 from heavytop.precision import parse
-from heavytop.records import UNMEASURED, Row
+from heavytop.records import UNMEASURED, Quantity, Row
 
+_MOST_CASES, _CELL = 2, 31
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 """heyoka; with the numbers of the top compiled into its code; eight motions at once.  All others are peers."""
+ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
+"""The largest over the samples, and that at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +96,7 @@ class Lead:
 
     @property
     def short(self) -> str:
-        """The ratios in a line; "" where there is none."""
+        """The ratios in a line, who is faster first; "" where there is none."""
         if self.ratio is None:
             return ""
         if self.ratio < 1:
@@ -106,35 +110,36 @@ class Lead:
         """The lead in a sentence."""
         goal = f"{self.case}: {self.name} at error 1e{self.log10:g}"
         if self.ours is None:
-            fastest = (
-                "" if self.theirs is None else f"; the fastest that gets there is {self.peer} ({_time(self.theirs)})"
-            )
+            theirs = "" if self.theirs is None else seconds_text(self.theirs)
+            fastest = f"; the fastest that gets there is {self.peer} ({theirs})" if theirs else ""
             return f"{goal}: not reached{fastest}"
         if self.ratio is None or self.theirs is None:
-            parts = [f"{goal} takes {_time(self.ours)}; no peer gets there"]
+            parts = [f"{goal} takes {seconds_text(self.ours)}; no peer gets there"]
         elif self.ratio < 1:
-            parts = [f"{self.case}: the fastest at error 1e{self.log10:g} is {self.peer} ({_time(self.theirs)})"]
-            parts.append(f"{self.name} is {_speed(self.ratio)} ({_time(self.ours)})")
+            parts = [f"{self.case}: the fastest at error 1e{self.log10:g} is {self.peer} ({seconds_text(self.theirs)})"]
+            parts.append(f"{self.name} is {_speed(self.ratio)} ({seconds_text(self.ours)})")
         else:
-            pair = f"{_time(self.ours)} against {_time(self.theirs)}"
+            pair = f"{seconds_text(self.ours)} against {seconds_text(self.theirs)}"
             parts = [f"{goal} is {_speed(self.ratio)} than the best peer that gets there, {self.peer} ({pair})"]
         if self.general is not None:
             parts.append(f"{self.general[0]}, one code for every top, {self._general_said(self.general[1])}")
         if self.lanes is not None:
-            parts.append(f"a motion in lanes takes {_time(self.lanes)}")
+            parts.append(f"a motion in lanes takes {seconds_text(self.lanes)}")
         if self.compile:
-            parts.append("to compile, at most: " + ", ".join(f"{name} {_time(s)}" for name, s in self.compile.items()))
+            parts.append(
+                "to compile, at most: " + ", ".join(f"{name} {seconds_text(s)}" for name, s in self.compile.items())
+            )
         return "; ".join(parts)
 
     def _general_said(self, seconds: float | None) -> str:
         if seconds is None:
             return "does not get there"
         ratio = self._ratio(seconds)
-        return f"takes {_time(seconds)}" if ratio is None else f"is {_speed(ratio)} ({_time(seconds)})"
+        return f"takes {seconds_text(seconds)}" if ratio is None else f"is {_speed(ratio)} ({seconds_text(seconds)})"
 
 
-def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Line]]:
-    """The lines of each case.  metric: error_max (over the whole horizon) or error_final."""
+def panels(rows: Sequence[Row]) -> dict[str, list[Line]]:
+    """The lines of each case, by the largest error over the samples."""
     found: dict[str, dict[tuple[str, str], Line]] = {}
     for row in rows:
         if row.outcome in UNMEASURED:
@@ -142,7 +147,7 @@ def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Lin
         name, setting = row.key.subject.name, row.key.subject.setting
         line = found.setdefault(row.case, {}).setdefault((name, row.precision), Line(name, row.precision))
         seconds = row.seconds.get("least", math.nan)
-        error = row.metrics.get(metric)
+        error = row.metrics.get(ERRORS[0].text)
         if row.outcome != "success":
             line.failures.append(seconds)
         elif error is not None and error.log10 is not None and seconds > 0:
@@ -152,19 +157,43 @@ def panels(rows: Sequence[Row], metric: str = "error_max") -> dict[str, list[Lin
 
 
 def beside_ours(rows: Sequence[Row]) -> list[str]:
-    """Of each integrator that is measured at one setting alone: its error, its seconds, and heyoka's for that error."""
+    """The integrator that is measured beside heyoka alone, or comes from another package: a table of lines of 80
+    columns, a line a rung, of its error, its seconds and what heyoka takes for that error; two cases at most.
+    """
+    found = {case: lines for case, lines in panels(rows).items() if any(line.integrator == OURS for line in lines)}
+    names = {line.integrator for lines in found.values() for line in lines} - {OURS, CONSTANTS, LANES}
     said = []
-    for case, lines in panels(rows).items():
-        ours = [line for line in lines if line.integrator == OURS]
-        for line in lines:
-            if line.integrator in (OURS, CONSTANTS, LANES) or len(line.points) != 1 or not ours:
-                continue
-            (point,) = line.points
-            seconds, _ = _quickest([each for each in ours if each.precision == line.precision], point.log10)
-            needs = "does not get there" if seconds is None else f"takes {_time(seconds)} for that"
-            text = f"{case}: {line.label} is off by {10**point.log10:.1e} at most after {_time(point.seconds)}"
-            said.append(f"{text}; {OURS} {needs}")
+    for name in sorted(names if len(names) == 1 else names - BUILT_IN.keys()):
+        cases: dict[str, dict[str, str]] = {}
+        for case, lines in list(found.items())[:_MOST_CASES]:
+            for line in lines:
+                if line.integrator == name:
+                    ours = [each for each in lines if each.integrator == OURS and each.precision == line.precision]
+                    cells = {_rung(line, point): _cell(point, ours) for point in line.points}
+                    cases[case] = cases.get(case, {}) | cells
+        rungs = dict.fromkeys(rung for cells in cases.values() for rung in cells)
+        if rungs:
+            said += [f"{name}: largest error in its time (heyoka's time for that error)"]
+            said += [
+                _line("", cases),
+                *(_line(rung, [cells.get(rung, "-") for cells in cases.values()]) for rung in rungs),
+            ]
     return said
+
+
+def _rung(line: Line, point: Point) -> str:
+    setting = point.setting.replace("=", " ").replace("tolerance eps", "finest")
+    return setting if line.precision == "double" else f"{line.precision} {setting}"
+
+
+def _cell(point: Point, ours: Sequence[Line]) -> str:
+    seconds, _ = _quickest(ours, point.log10)
+    theirs = "not reached" if seconds is None else seconds_text(seconds, 2)
+    return f"{10**point.log10:.1e} in {seconds_text(point.seconds, 2)} ({theirs})"
+
+
+def _line(first: str, cells: Iterable[str]) -> str:
+    return f"  {first:18}" + "".join(f"{cell[: _CELL - 2]:{_CELL}}" for cell in cells).rstrip()
 
 
 def leads(rows: Sequence[Row]) -> list[Lead]:
@@ -213,5 +242,7 @@ def _speed(ratio: float) -> str:
     return f"{ratio:.1f} times faster" if ratio >= 1 else f"{1 / ratio:.1f} times slower"
 
 
-def _time(seconds: float) -> str:
-    return f"{seconds:.3g} s" if seconds >= 1 else f"{1000 * seconds:.3g} ms"
+def seconds_text(seconds: float, digits: int = 3) -> str:
+    """1.5 s, or 15 ms."""
+    value, unit = (seconds, "s") if seconds >= 1 else (1000 * seconds, "ms")
+    return f"{value:.0f} {unit}" if value >= 100 else f"{value:.{digits}g} {unit}"

@@ -3,37 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from fractions import Fraction
 from typing import Any
 
-from heavytop.precision import exact_text
 from heavytop.suite.cases import Case
+from heavytop.top.heavy_top import data_texts
 
 _TIMES = ("1", "5", "10")
 
 
 def case_data(case: Case) -> dict[str, Any]:
     """Exact data as text, by the keys of a trajectory file."""
-    return {
-        "name": case.name,
-        "system": case.system.name,
-        "inertia": _texts(case.top.inertia),
-        "weight": exact_text(case.top.weight),
-        "centre": _texts(case.top.centre),
-        "omega": _texts(case.start.omega),
-        "gamma": _texts(case.start.gamma),
-    }
+    return {"name": case.name, "system": case.system.name} | data_texts(case.top, case.start)
 
 
 def forms(case: Case) -> dict[str, str]:
     """The data of a case in each form: ``command`` (line), ``toml``, ``json`` and ``python``."""
     data = case_data(case)
     return {"command": _command(data), "toml": _toml(data), "json": _json(data), "python": _python(data)}
-
-
-def _texts(values: Sequence[Fraction]) -> list[str]:
-    return [exact_text(value) for value in values]
 
 
 def _command(data: dict[str, Any]) -> str:
@@ -58,10 +44,13 @@ def _json(data: dict[str, Any]) -> str:
 
 
 def _python(data: dict[str, Any]) -> str:
-    def numbers(key: str) -> str:
-        return "(" + ", ".join(value if value.lstrip("-").isdigit() else f'"{value}"' for value in data[key]) + ")"
+    def number(value: str) -> str:
+        return value if value.lstrip("-").isdigit() else f'"{value}"'
 
-    weight = data["weight"] if data["weight"].lstrip("-").isdigit() else f'"{data["weight"]}"'
+    def numbers(key: str) -> str:
+        return f"({', '.join(map(number, data[key]))})"
+
+    weight = number(data["weight"])
     system = "" if data["system"] == "heavy_top" else f', system="{data["system"]}"'
     return "\n".join(
         [

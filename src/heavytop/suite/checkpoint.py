@@ -104,7 +104,9 @@ class Checkpoint:
         end = 0
         with self.path.open("rb") as file:
             first = verified(file.readline().removesuffix(b"\n"))
-            self._require_same(first)
+            if first is None:
+                raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.")
+            require_same(msgspec.json.decode(first, type=dict[str, str]), self.identity, self.path)
             end = file.tell()
             for whole in file:
                 content = verified(whole[:-1]) if whole.endswith(b"\n") else None
@@ -117,11 +119,6 @@ class Checkpoint:
         # what a kill cut short goes, so that the next line starts on its own
         self._file.truncate(end)
         self._file.seek(end)
-
-    def _require_same(self, first: bytes | None) -> None:
-        if first is None:
-            raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.")
-        require_same(msgspec.json.decode(first, type=dict[str, str]), self.identity, self.path)
 
     def saved(self, index: int) -> Saved:
         """Where the row of that index keeps its place."""

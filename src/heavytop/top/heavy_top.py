@@ -10,7 +10,7 @@ from math import isqrt
 from typing import Any
 
 from heavytop.errors import HeavyTopError, InputError, quoted
-from heavytop.precision import decimal_text, exact, physical, shown
+from heavytop.precision import decimal_text, exact, exact_text, physical, shown
 
 Vector = tuple[Fraction, Fraction, Fraction]
 _NEAR_BITS = 10
@@ -184,6 +184,15 @@ class State:
         norm = 1 + u * u + v * v
         sign = 1 if g3 >= 0 else -1
         return State(self.omega, (2 * u / norm, 2 * v / norm, sign * (2 / norm - 1)))
+
+
+def data_texts(top: HeavyTop, start: State) -> dict[str, str | list[str]]:
+    """The data as exact text, by the keys of every file and document: inertia, weight, centre, omega, gamma."""
+    inertia, centre, omega, gamma = (
+        [exact_text(value) for value in part] for part in (top.inertia, top.centre, start.omega, start.gamma)
+    )
+    weight = exact_text(top.weight)
+    return {"inertia": inertia, "weight": weight, "centre": centre, "omega": omega, "gamma": gamma}
 
 
 def _text(value: Fraction | Vector) -> str:

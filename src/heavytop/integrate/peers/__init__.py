@@ -146,11 +146,6 @@ def knob_apart(name: str) -> str:
             return ""
 
 
-def run(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
-    """``ready(name, setting)(*problem, **options)``."""
-    return ready(name, setting)(*problem, **options)
-
-
 def available() -> dict[str, str | None]:
     """For each peer: None if it is installed, else the reason why it cannot be used.
 
