@@ -1,8 +1,9 @@
-"""How often a comparison cries wolf, and what it hears: `python benchmarks/false_alarms.py [RERUNS] [PLAN]`.
+"""How often a comparison of true reruns alarms, and what it tells: `python benchmarks/false_alarms.py [RERUNS] [PLAN]`.
 
-The plan is run with seed 0 and with as many other seeds, each of which measures the same motions with other roundings.
-Each rerun is compared with seed 0: anything but "same" is a false alarm. Then every error of each rerun is made larger
-by a planted factor: what part of the metrics is worse, and is the report worse every time?
+The plan is run with seed 0 and with as many other seeds, each of which measures the same motions, the starts of
+an ensemble too, with other roundings (`benchmarks/few_starts.toml` is a plan of ensembles of 16 starts).  Each rerun is
+compared with seed 0: anything but "same" is a false alarm.  Then every error of each rerun is made larger by a planted
+factor: what part of the metrics is worse, and is the report worse every time?
 """
 
 from __future__ import annotations

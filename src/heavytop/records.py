@@ -113,10 +113,11 @@ class Law(msgspec.Struct, gc=False):
     """How a quantity grows with |t|: a fit to its RMS over an ensemble of starts.
 
     growth: the class; exponent of |t| (or rate of e^(rate |t|) where exponential) with its 95 % bootstrap interval over
-    starts, null where unresolved.
+    starts, null where there is too little to fit.
     first, last: the span of |t| that was fitted, which ends before saturation.
     detects: decimal text; the smallest relative fault a step that this ensemble would have told from the healthy law.
     lost_at: |t| from which the format holds no digit, reached or extrapolated; null where no law says so.
+    bend: 95 % interval of how much larger the exponent of the later half of the span is than that of the earlier half.
     """
 
     growth: Growth
@@ -128,6 +129,7 @@ class Law(msgspec.Struct, gc=False):
     last: str | None = None
     detects: str | None = None
     lost_at: str | None = None
+    bend: tuple[float, float] | None = None
     quantity: Quantity | None = None
 
 

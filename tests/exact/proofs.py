@@ -64,7 +64,7 @@ def assert_attitude(solution, time, step=Fraction(1, 10**12)):
 def assert_meets(solution, times, bits=170):
     """The attitude is that of the enclosure, both from the exact start."""
     enclosure = Validated(solution.top, solution.start)
-    _, attitude = attitude_of(solution, bits)
+    _, attitude = attitude_of(solution, max(times, key=abs), bits)
     for time in times:
         pairs = list(zip(attitude(time, bits), enclosure.attitude(time, bits), strict=True))
         with working_precision(2 * bits):

@@ -46,7 +46,7 @@ def test_the_azimuth_of_the_angular_momentum_is_proven_by_polynomials():
 
 @pytest.mark.parametrize("motion", [TILTED, DOUBLE, RESTING], ids=["tilted", "double root", "resting"])
 def test_the_enclosure_holds_the_attitude(motion):
-    assert "validated" not in attitude_of(motion, 170)[0]
+    assert "validated" not in attitude_of(motion, F(2), 170)[0]
     assert_meets(motion, (F(0), F(3, 2), F(-4)))
     assert_attitude(motion, F(-(10**6)))
 
@@ -68,7 +68,7 @@ def test_the_size_of_gamma_and_the_unit_of_time_do_not_matter():
 @pytest.mark.parametrize("axes", ALL)
 def test_every_naming_of_the_axes_has_the_closed_form(axes):
     found = find(renamed_top(TILTED.top, axes), renamed_state(TILTED.start, axes))
-    assert "validated" not in attitude_of(found, 60)[0]
+    assert "validated" not in attitude_of(found, F(2), 60)[0]
 
 
 def test_where_it_is_not_done_the_attitude_is_the_enclosures():
@@ -76,7 +76,7 @@ def test_where_it_is_not_done_the_attitude_is_the_enclosures():
         ASYMPTOTIC.attitude(F(1), 100)
     assert_meets(ASYMPTOTIC, (F(1),))
     # 1,000 digits would take minutes
-    assert "validated" in attitude_of(PLAIN, 3400)[0]
+    assert "validated" in attitude_of(PLAIN, F(1), 3400)[0]
 
 
 def upwards(a, h, side):

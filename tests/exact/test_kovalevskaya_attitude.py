@@ -87,7 +87,7 @@ def test_every_naming_of_the_axes_has_the_attitude_of_its_enclosure(axes):
     top = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
     start = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))
     found = find(renamed_top(top, axes), renamed_state(start, axes))
-    assert "validated" not in attitude_of(found, 170)[0]
+    assert "validated" not in attitude_of(found, F(3, 2), 170)[0]
     assert_meets(found, (F(3, 2),))
 
 
@@ -104,7 +104,7 @@ def test_with_a_variable_at_rest_the_attitude_is_the_enclosures():
     motion = motion_from((0, F(-4, 3), 0), UP)
     with pytest.raises(OutOfReach, match="at rest"):
         motion.attitude(F(1), 100)
-    assert "validated" in attitude_of(motion, 170)[0]
+    assert "validated" in attitude_of(motion, F(2), 170)[0]
     assert_meets(motion, (F(2),))
 
 

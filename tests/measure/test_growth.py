@@ -6,7 +6,8 @@ import math
 import numpy
 import pytest
 
-from heavytop.measure.growth import FEWEST_STARTS, Ensemble, band, finite_time_rates, law, median_interval
+from heavytop.measure.growth import BENT, FEWEST_STARTS, Ensemble, band, finite_time_rates, law, median_interval
+from heavytop.report.laws import inconsistent
 from synthetic_ensembles import EPS, EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic, walks
 
 
@@ -78,7 +79,15 @@ def test_a_bounded_error_has_no_horizon() -> None:
 def test_a_power_between_the_classes_is_unresolved(power: float) -> None:
     rng = numpy.random.default_rng(4)
     errors = EPS * TIMES**power * numpy.exp(0.5 * rng.normal(size=(64, 1)) + 0.2 * rng.normal(size=(64, len(TIMES))))
-    assert law(Ensemble(TIMES, errors, STEP)).growth == "unresolved"
+    found = law(Ensemble(TIMES, errors, STEP))
+    assert found.growth == "unresolved"
+    # what a comparison needs of it
+    assert found.low <= found.exponent <= found.high
+    assert power == pytest.approx(found.exponent, abs=0.05)
+    assert found.bend[0] <= 0.05
+    assert found.bend[1] >= -0.05
+    assert power == 3 or (found.first, found.last, found.lost_at) == ("100", "100000", None)
+    assert inconsistent(found) == ""
 
 
 @pytest.mark.parametrize("second", ["linear", "integrated", "quadratic"])
@@ -87,7 +96,10 @@ def test_two_laws_that_cross_are_not_taken_for_one(second: str) -> None:
     walk, later = synthetic("walk", rng), synthetic(second, rng)
     middle = numpy.searchsorted(TIMES, 10**3.5)
     crossing = walk + later * (_rms(walk[:, middle]) / _rms(later[:, middle]))
-    assert law(Ensemble(TIMES, crossing, STEP)).growth == "unresolved"
+    found = law(Ensemble(TIMES, crossing, STEP))
+    assert found.growth == "unresolved"
+    assert found.bend[1] > BENT  # steeper towards the end
+    assert inconsistent(found) == ""
     # a second law that is far below the first throughout leaves it alone
     hidden = walk + later * (_rms(walk[:, -1]) / _rms(later[:, -1]) / 30)
     assert law(Ensemble(TIMES, hidden, STEP)).growth == "t^0.5"

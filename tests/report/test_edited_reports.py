@@ -193,6 +193,52 @@ def test_what_a_law_says_follows_the_noise_of_its_error(change: dict, noise: flo
     assert judge_law(LAW, replace(LAW, **change), noise)[0].value == verdict
 
 
+STRAIGHT = Law("t^1.5", 16, 1.4, 1.3, 1.5, "100", "1e5", "1e-19", "1e30", (-0.3, 0.2))
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        # of two ensembles of one motion one bends by a little more than a law may, or is between two classes
+        ({"bend": (-0.7, -0.251)}, "same"),
+        ({"bend": (-0.7, -0.31)}, "better"),
+        ({"exponent": 1.25, "low": 1.13, "high": 1.37}, "same"),
+        ({"exponent": 1.2, "low": 1.13, "high": 1.29}, "better"),
+        ({"exponent": 1.65, "low": 1.501, "high": 2.1}, "worse"),
+        # its interval counts as no wider than that of the baseline, and is worse where it is five times as wide
+        ({"exponent": 1.58, "low": 1.2, "high": 2.1}, "same"),
+        ({"exponent": 1.6, "low": 1.2, "high": 2.1}, "worse"),
+        ({"exponent": 1.4, "low": 0.9, "high": 1.91}, "worse"),
+        # what the class says needs no number more, all else does
+        ({"bend": (0.251, 0.9)}, "worse"),
+        ({"bend": (0.26, 0.3)}, "worse"),
+        ({"bend": None}, "incomparable"),
+        ({"bend": None, "exponent": 1.25, "low": 1.13, "high": 1.37}, "incomparable"),
+        ({"bend": (-0.5, -0.249)}, "incomparable"),
+        ({"bend": (0.9, 0.251)}, "incomparable"),
+        ({"bend": (float("-inf"), -0.3)}, "incomparable"),
+        ({"exponent": None, "low": None, "high": None, "bend": None}, "incomparable"),
+        ({"exponent": 1.25, "low": 1.13, "high": 1.37, "starts": 15}, "incomparable"),
+        ({"exponent": 1.25, "low": 1.13, "high": 1.37, "detects": None}, "incomparable"),
+        ({"exponent": 1.25, "low": 1.13, "high": 1.37, "detects": "8.1e-19"}, "worse"),
+        ({"exponent": 1.25, "low": 1.13, "high": 1.37, "last": "4.9e4"}, "incomparable"),
+        ({"exponent": 1.25, "low": 1.13, "high": 1.37, "lost_at": "4.9e29"}, "worse"),
+    ],
+)
+def test_a_law_that_is_resolved_in_one_report_only_is_judged_by_its_intervals(change: dict, verdict: str) -> None:
+    new = replace(STRAIGHT, growth="unresolved", **({"lost_at": None} | change))
+    assert judged(one(laws={"drift_area": STRAIGHT}), one(laws={"drift_area": new}))[0] == verdict
+    if verdict == "same":
+        assert judged(one(laws={"drift_area": new}), one(laws={"drift_area": STRAIGHT}))[0] == "same"
+
+
+def test_an_exponential_has_a_rate_and_no_power_has_one_to_compare_with_it() -> None:
+    chaos = Law("exponential", 16, 0.05, 0.04, 0.06, "1", "1e3", None, "700")
+    power = Law("unresolved", 16, 0.05, -0.1, 0.52, "1", "1e3", None, "700", (-0.1, 0.1))
+    for two in ((chaos, power), (power, chaos)):
+        assert judge_law(*two)[0].value == "incomparable"
+
+
 KNOWN = Against("proven", "closed form: Euler", "6.02E-36", (Certified("100", 50, "validated"),))
 
 

@@ -97,11 +97,12 @@ def test_the_same_task_gives_the_same_row(tmp_path: Path) -> None:
     assert one == two
 
 
-def test_other_starts_are_the_same_law_and_no_alarm(tmp_path: Path) -> None:
+def test_other_roundings_of_the_same_starts_are_the_same_law_and_no_alarm(tmp_path: Path) -> None:
     text = 'horizon = "1e4", starts = 16'
     (task,) = tasks(tmp_path, '"lagrange"', f'precision = "double", {text}')
     rows = [measure(replace(task, seed=seed)) for seed in (0, 5)]
     assert rows[0].metrics != rows[1].metrics
+    assert rows[0].key == rows[1].key
     reports = [Report("heavytop-report/2", {}, {}, [row]) for row in rows]
     assert compare(*reports, Policy()).verdict == "same"
 

@@ -35,7 +35,7 @@ def propagate(
     gamma: Gamma,
     times: Times,
     precision: Annotated[str, typer.Option(help="double, extended, double-double, quad or real:BITS.")] = "double",
-    integrator: Annotated[str, typer.Option(help="heyoka or words.")] = "heyoka",
+    integrator: Annotated[str, typer.Option(help="Any that `heavytop list` shows.")] = "heyoka",
     system: SystemName = "heavy_top",
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     normalize: Normalize = False,

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 from flint import arb
 
+from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.motion import initial_xi
 from heavytop.exact.solution import ExactSolution
@@ -41,20 +43,21 @@ def turned_to_start(solution: ExactSolution, own: Attitude, time: Fraction, bits
     return to_bits(evaluate, bits)
 
 
-def has_attitude(solution: ExactSolution, bits: int) -> bool:
-    """Whether its closed form has an attitude to so many bits."""
-    return hasattr(solution, "attitude") and getattr(solution, "has_attitude", lambda _bits: True)(bits)
-
-
-def attitude_of(solution: ExactSolution, bits: int) -> tuple[str, Attitude]:
+def attitude_of(solution: ExactSolution, latest: Fraction, bits: int) -> tuple[str, Attitude]:
     """How the attitude of ``solution`` is known, and ξ at (time, bits), from ``initial_xi`` of its γ.
 
-    By the closed form where it has an attitude to so many bits, else by the validated enclosure of the same motion up
-    to its reach.
+    By the closed form where that gives so many bits at the time ``latest``, else by the validated enclosure of the same
+    motion up to its reach.
     ξ raises OutOfReach where the bits cannot be proven, InputError for an enclosure of |γ| ≠ 1.
     """
-    if not has_attitude(solution, bits):
-        enclosure = Validated(solution.top, solution.start, solution.system)
-        return enclosure.method, enclosure.attitude
-    own: Attitude = getattr(solution, "attitude")  # noqa: B009 - not every solution has it
-    return solution.method, lambda time, bits: turned_to_start(solution, own, time, bits)
+    own: Attitude | None = getattr(solution, "attitude", None)
+    if own is not None:
+        attitude = partial(turned_to_start, solution, own)
+        try:
+            attitude(latest, bits)
+        except (NotInClass, OutOfReach):
+            pass
+        else:
+            return solution.method, attitude
+    enclosure = Validated(solution.top, solution.start, solution.system)
+    return enclosure.method, enclosure.attitude

@@ -21,7 +21,7 @@ from typing import Any
 from flint import arb, arb_series
 
 from heavytop.errors import NotInClass, OutOfReach
-from heavytop.exact.attitude import has_attitude, turned_to_start
+from heavytop.exact.attitude import turned_to_start
 from heavytop.exact.closed_form import series_length
 from heavytop.exact.solution import ExactSolution
 from heavytop.top.equations import System
@@ -77,10 +77,6 @@ class Renamed:
         """The solution's own, and the names its axes have here."""
         there = inverse(self.axes)
         return f"{self.solution.method}, axes {there[0] + 1}{there[1] + 1}{there[2] + 1}"
-
-    def has_attitude(self, bits: int) -> bool:
-        """Whether the solution has one to so many bits."""
-        return has_attitude(self.solution, bits)
 
     @property
     def system(self) -> System:

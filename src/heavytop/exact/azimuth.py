@@ -9,21 +9,17 @@ A vector ξ ⟂ γ fixed in space then stands at the angle δ − Λ from h, δ 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from flint import arb
 
-from heavytop.errors import OutOfReach
-from heavytop.exact.balls import Undecided, to_bits, working_precision
+from heavytop.exact.balls import to_bits
 from heavytop.exact.closed_form import Evaluated
-from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.gaps import Gap
 from heavytop.exact.motion import kept
 from heavytop.top.heavy_top import cross, dot
-
-_GUARD = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,16 +96,3 @@ class WithBearing(Evaluated):
 @kept
 def _began(case: WithBearing, _bits: int) -> Bearing:
     return case.bearing(Fraction(0))
-
-
-@whole_evaluation
-def within_reach(make: Callable[[], object], bits: int) -> bool:
-    """Whether ``make`` does not raise OutOfReach where so many bits are wanted."""
-    with working_precision(bits + _GUARD):
-        try:
-            make()
-        except Undecided:
-            return True
-        except OutOfReach:
-            return False
-    return True

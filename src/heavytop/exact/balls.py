@@ -15,7 +15,7 @@ from types import SimpleNamespace
 from flint import arb, fmpq
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.flint_context import whole_evaluation
+from heavytop.exact.flint_context import at_precision, whole_evaluation
 from heavytop.exact.flint_context import working_precision as working_precision
 from heavytop.precision import decimal_text, exact, quotient_text
 
@@ -141,8 +141,8 @@ def to_bits(
     """``evaluate(working bits)`` repeated at growing working precision until every ball has ``bits`` bits.
 
     Bits count relative to a value above 1 and absolutely below it; none are right where it raises Undecided.
-    time: what it is evaluated at; it costs its own
-    bits, and the precision then comes in steps, so that lattices are made once.  length: of power series meanwhile.
+    time: what it is evaluated at; it costs its own bits, and the precision then comes in steps, so that lattices are
+    made once.  length: of power series meanwhile.
     Raises OutOfReach where even a precision of 16 times the asked bits plus 4096, or of 32768, does not give them.
     """
     extra = -1 if time is None else _GUARD + (abs(time.numerator) // time.denominator).bit_length()
@@ -150,15 +150,14 @@ def to_bits(
     most = max(-smallest, _ENOUGH)
     while True:
         inside = working if extra < 0 else -(-(working + extra) // _STEP) * _STEP
-        with working_precision(inside, length):
-            try:
-                values = evaluate(inside)
-            except Undecided:
-                values = [arb("nan")]
-            except ValueError as error:
-                if str(error) not in _SERIES_DIVISION:
-                    raise
-                values = [arb("nan")]
+        try:
+            values = at_precision(inside, length, evaluate)
+        except Undecided:
+            values = [arb("nan")]
+        except ValueError as error:
+            if str(error) not in _SERIES_DIVISION:
+                raise
+            values = [arb("nan")]
         right = [value.rel_one_accuracy_bits() for value in values]
         if min(right) >= bits:
             # only exact, infinite and very small values have more bits right than that

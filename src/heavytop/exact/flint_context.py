@@ -170,6 +170,24 @@ class series_length(_Block):  # noqa: N801 - reads as a verb
         self.precision, self.length = None, length
 
 
+def at_precision(bits: int, length: int, evaluate: Callable[[int], Found]) -> Found:
+    """``evaluate(bits)`` as inside :class:`working_precision`, for the thread that evaluates already.
+
+    It spares the block that every state would make.  Raises ContextChanged as the block does.
+    """
+    before = _held.context
+    _held.context = ctx.prec, ctx.cap = bits, length
+    try:
+        found = evaluate(bits)
+    finally:
+        if (ctx.prec, ctx.cap) != _held.context:
+            _note()
+        _held.context = ctx.prec, ctx.cap = before
+    if _held.disturbed:
+        raise ContextChanged
+    return found
+
+
 def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
     """``function`` with the context for itself from beginning to end, and again where another thread changed it.
 
@@ -196,7 +214,8 @@ def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
                         interval = getswitchinterval()
                         setswitchinterval(max(interval, _UNHURRIED * 4**attempt))
                     found = function(*args, **kwargs)
-                    require_undisturbed()
+                    if _held.disturbed or (ctx.prec, ctx.cap) != _held.context:
+                        require_undisturbed()
                     return found
                 except ContextChanged:
                     _held.ever = True

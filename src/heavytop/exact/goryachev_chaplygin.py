@@ -21,13 +21,13 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import LevelNotDone, NotInClass
-from heavytop.exact.azimuth import Bearing, WithBearing, within_reach
+from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.gaps import distance_of_others
 from heavytop.exact.goryachev_chaplygin_abel import Motion
-from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude, Torus
+from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude
 from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, roots, separated_start
 from heavytop.exact.motion import initial_xi, kept
 from heavytop.exact.separated import REMEDY, decide, require_plane_centre
@@ -66,12 +66,8 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         return _motion(self, current_precision()).at(time, current_length())
 
-    def has_attitude(self, bits: int) -> bool:
-        """Whether :meth:`attitude` holds: not for asymptotic motions, nor for very many digits."""
-        return within_reach(lambda: Torus.of(_motion(self, current_precision())), bits)
-
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.azimuth.WithBearing`."""
+        """See :class:`heavytop.exact.azimuth.WithBearing`: not for asymptotic motions, nor to very many digits."""
         return _attitude(self, current_precision()).bearing(time)
 
     def initial(self, began: Bearing) -> list[arb]:

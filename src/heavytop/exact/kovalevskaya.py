@@ -30,7 +30,7 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
-from heavytop.exact.azimuth import Bearing, WithBearing, within_reach
+from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import to_bits
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
@@ -77,12 +77,8 @@ class Kovalevskaya(WithBearing, ClosedForm):
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         return _motion(self, current_precision()).at(time, current_length())
 
-    def has_attitude(self, bits: int) -> bool:
-        """Whether :meth:`attitude` holds: not where a variable rests, nor very near M·γ = 0 and degenerate levels."""
-        return within_reach(lambda: _attitude(self, current_precision()), bits)
-
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.azimuth.WithBearing`."""
+        """See :class:`heavytop.exact.azimuth.WithBearing`: not where a variable rests, nor very near M·γ = 0."""
         return _attitude(self, current_precision()).bearing(time)
 
     def initial(self, began: Bearing) -> list[arb]:

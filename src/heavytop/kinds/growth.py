@@ -150,7 +150,7 @@ class Growth(Kind):
         Raises InputError for data outside the range of the format, OutOfReach where a first integral is not resolved.
         """
         case, precision, run = task.given, task.precision, task.options
-        starts = random_starts(case, run.starts, run.seed + task.seed)
+        starts = random_starts(case, run.starts, run.seed)
         true = [Problem.of(case.top, start, precision, case.system) for start in starts]
         given = [_biased(problem, run.bias) for problem in true]
         times = [exact(number(time, precision)) for time in task.times]

@@ -1,16 +1,15 @@
 """What a reference is certified by: a second source that shares no formula with the first, and the digits both give.
 
 The second source of a closed form is the validated integration from the same exact start.  Where that is out of reach,
-it is any other motion that is handed in (a heyoka run at twice the precision, say: computed, not proven), and where
-none is, the closed form is compared with the validated integration at an early time from the start, and over the last
-unit of time before t from its own state there: a formula that is a motion near 0 and near t, and in between the same
-analytic function.  The unit is 1, or that of the motion (:func:`heavytop.exact.scales.unit_of_time`) where its rates
+the closed form is compared with the validated integration at an early time from the start, and over the last unit of
+time before t from its own state there: a formula that is a motion near 0 and near t, and in between the same analytic
+function.  The unit is 1, or that of the motion (:func:`heavytop.exact.scales.unit_of_time`) where its rates
 are far from 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, log2
@@ -28,9 +27,6 @@ from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import State
 from heavytop.top.integrals import holding
 
-SecondSource = Callable[[Fraction, int], Sequence[arb]]
-"""Six balls at (time, bits), computed elsewhere."""
-
 EXACTLY = 10**6
 """More digits than anyone may ask for: those of two sources without any gap between them."""
 _EARLY = Fraction(4)
@@ -47,13 +43,13 @@ class Certificate:
     method, second_source: in words.  agreed_digits: digits that both give, relative above 1 and absolute below;
     :data:`EXACTLY` where both are the same numbers without a radius, as at t = 0 and at rest.
     kind: ``proven`` if both are balls that hold the motion at the time itself, ``proven at both ends`` if the second is
-    one near 0 and over the last unit of time only, ``computed`` if the second is no ball.
+    one near 0 and over the last unit of time only.
     """
 
     method: str
     second_source: str
     agreed_digits: int
-    kind: Literal["proven", "proven at both ends", "computed"]
+    kind: Literal["proven", "proven at both ends"]
 
 
 def bits_of(digits: int) -> int:
@@ -74,12 +70,10 @@ def certify(
     solution: ExactSolution,
     time: Fraction,
     digits: int,
-    second: tuple[str, SecondSource] | None = None,
     enclosure: Validated | None = None,
 ) -> Certificate:
     """The certificate of ``solution`` at ``time`` for ``digits`` digits.
 
-    second: name and values of a computed source, taken where validated integration does not reach.
     enclosure: :func:`enclosure_of` the solution, to be used again for many times; None for a new one.
     Raises Contradiction where two proven sources exclude each other: one of them is wrong.  Raises OutOfReach where no
     second source reaches.
@@ -87,15 +81,11 @@ def certify(
     bits = bits_of(digits)
     values = solution.state(time, bits)
     if isinstance(solution, Validated):
-        if second is None:
-            return Certificate(solution.method, "its own proven tail", agreed_digits(values, values), "proven")
-        return Certificate(solution.method, second[0], agreed_digits(values, second[1](time, bits)), "computed")
+        return Certificate(solution.method, "its own proven tail", agreed_digits(values, values), "proven")
     try:
         enclosure = enclosure or enclosure_of(solution)
         other = enclosure.state(time, bits)
     except OutOfReach:
-        if second is not None:
-            return Certificate(solution.method, second[0], agreed_digits(values, second[1](time, bits)), "computed")
         if enclosure is None:
             raise
         return _early_and_last(solution, enclosure, time, values, bits)

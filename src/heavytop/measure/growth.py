@@ -19,6 +19,7 @@ from heavytop.records import Growth, Law
 
 Array = NDArray[Any]
 
+Interval = tuple[float, float]
 CLASSES: dict[Growth, float] = dict(zip(get_args(Growth)[:5], (0.0, 0.5, 1.0, 1.5, 2.0), strict=True))
 FEWEST_STARTS = 8
 FEWEST_DECADES = 3.0
@@ -31,6 +32,7 @@ LOST = 0.1
 """An error of this part of the size of a quantity leaves no digit of it."""
 RESOLVED = 10
 """Times the error of the reference, below which an error is unresolved."""
+_DECIMALS = 6
 _RESAMPLES = 1000
 _ROUNDS = 3
 _SEED = 20261121
@@ -99,7 +101,7 @@ def band(values: Array) -> float | None:
     return float(high - low) / 2
 
 
-def _interval(estimates: Array, starts: int) -> tuple[float, float]:
+def _interval(estimates: Array, starts: int) -> Interval:
     """The 95 % percentile interval, expanded for few starts (T. Hesterberg, Am. Stat. 69, 2015, 371).
 
     By √(n/(n − 1)), for resamples scatter about the sample and not the truth, and by the ratio of the 97.5 % points of
@@ -119,7 +121,7 @@ def law(ensemble: Ensemble) -> Law:
     that wins in the end may hide behind another.  Each start counts by its share of the RMS relative to its own mean
     share, so that the few starts with the largest errors do not make the exponent alone.  Its class is the nearest,
     and must be in the interval (to ±0.12) with its neighbours out of it; and the exponents of its two halves
-    must not surely differ by more than a quarter, as they do where one law takes over from another.
+    must not surely differ by more than a quarter (bend), as they do where one law takes over from another.
 
     An exponential needs three decades of error, a power fit of log RMS steeper than t², and a line over |t|, each
     sample counting as much as the time it stands for, that fits better than the power in 95 % of the resamples.  Its
@@ -127,7 +129,8 @@ def law(ensemble: Ensemble) -> Law:
     fitted span; its interval is that of the median of such rates (:func:`median_interval`).  The few starts with the
     largest rates, which lead the RMS in the end, do not make it.
 
-    Anything else is unresolved.  An error that is exactly 0 throughout is bounded, without an exponent.
+    Anything else is unresolved, with the exponent and interval of the power fit where there are three decades for one,
+    so that it can be compared.  An error that is exactly 0 throughout is bounded, without an exponent.
 
     detects: the smallest ε, a systematic relative fault a step, that would have been told: its n-th sum f lifts the
     RMS r at the last fitted time to √(r² + f²), and the lower end of that ensemble's 95 % interval, about
@@ -149,22 +152,23 @@ def law(ensemble: Ensemble) -> Law:
     found = _exponential(times, rms, shares) or _power(times, rms, shares)
     if found is None:
         return unresolved
-    growth, first, slope, (low, high) = found
+    growth, first, slope, (low, high), bend = found
     logs = numpy.log(rms[-1]) + numpy.log(resampled(starts) @ shares[:, -1]) / 2
     return Law(
         growth,
         starts,
-        round(slope, 6),
-        round(low, 6),
-        round(high, 6),
+        slope,
+        low,
+        high,
         first=f"{first:.6g}",
         last=f"{times[-1]:.6g}",
         detects=None if growth == "exponential" else _detects(ensemble, times[-1], _interval(logs, starts)),
         lost_at=_lost(ensemble, growth, times, rms),
+        bend=bend,
     )
 
 
-def _detects(ensemble: Ensemble, last: float, logs: tuple[float, float]) -> str:
+def _detects(ensemble: Ensemble, last: float, logs: Interval) -> str:
     """As :func:`law` says, from the interval of log RMS at the ``last`` time."""
     low, high = numpy.exp(logs)
     n, order = last / ensemble.step, ensemble.accumulates
@@ -188,8 +192,8 @@ def _fit(x: Array, y: Array, weights: Array | None = None) -> tuple[Any, Any]:
     return slopes, (rest - slopes[..., numpy.newaxis] * centred) ** 2 @ w
 
 
-_Found = tuple[Growth, float, float, tuple[float, float]]
-"""The class, the first fitted time, the exponent or rate, its interval."""
+_Found = tuple[Growth, float, float, Interval, Interval | None]
+"""The class, the first fitted time, the exponent or rate, its interval; of a power that of its bend."""
 
 
 def _power(times: Array, rms: Array, shares: Array) -> _Found | None:
@@ -203,17 +207,27 @@ def _power(times: Array, rms: Array, shares: Array) -> _Found | None:
     slope, scatter = float(slopes[0]), float(squares[0] / (len(x) - 2) / ((x - x.mean()) ** 2).sum()) ** 0.5
     logs = y + _levelled(shares, resampled(starts))
     low, high = _widened(slope, _interval(_fit(x, logs)[0], starts), scatter)
-    bends = _interval(_fit(x[half:], logs[:, half:])[0] - _fit(x[:half], logs[:, :half])[0], starts)
-    if bends[0] > BENT or bends[1] < -BENT:
-        return None
-    growth = min(CLASSES, key=lambda name: abs(CLASSES[name] - slope))
+    begin, end = _interval(_fit(x[half:], logs[:, half:])[0] - _fit(x[:half], logs[:, :half])[0], starts)
+    # the class is that of the numbers as they are written
+    slope, low, high, begin, end = (round(each, _DECIMALS) for each in (slope, low, high, begin, end))
+    growth = "unresolved" if bent((begin, end)) else nearest_class(slope, low, high)
+    return growth, times[late][0], slope, (low, high), (begin, end)
+
+
+def bent(bend: Interval) -> bool:
+    """Whether the exponents of the two halves surely differ by more than a law may bend."""
+    return bend[0] > BENT or bend[1] < -BENT
+
+
+def nearest_class(exponent: float, low: float, high: float) -> Growth:
+    """The class nearest to an exponent, if it alone is in the interval ``low`` to ``high``; else unresolved."""
+    growth = min(CLASSES, key=lambda name: abs(CLASSES[name] - exponent))
     others = (value for name, value in CLASSES.items() if name != growth)
-    if not low - NEAR <= CLASSES[growth] <= high + NEAR or any(low <= value <= high for value in others):
-        return None
-    return growth, times[late][0], slope, (low, high)
+    alone = low - NEAR <= CLASSES[growth] <= high + NEAR and not any(low <= value <= high for value in others)
+    return growth if alone else "unresolved"
 
 
-def _widened(slope: float, interval: tuple[float, float], scatter: float) -> tuple[float, float]:
+def _widened(slope: float, interval: Interval, scatter: float) -> Interval:
     """The interval of an exponent, such that 95 % hold the truth for every law.
 
     The bootstrap alone knows nothing of what all starts share: an error that oscillates is seen at a few phases, the
@@ -249,7 +263,8 @@ def _exponential(times: Array, rms: Array, shares: Array) -> _Found | None:
     if _interval(powers, starts)[0] <= CLASSES["t^2"] or (off_exponential < off_power).mean() < 0.95:
         return None
     rates = finite_time_rates(times, numpy.sqrt(shares) * rms)
-    return "exponential", times[0], float(numpy.median(rates)), median_interval(rates)
+    rate, low, high = (round(each, _DECIMALS) for each in (float(numpy.median(rates)), *median_interval(rates)))
+    return "exponential", times[0], rate, (low, high), None
 
 
 def finite_time_rates(times: Array, errors: Array) -> Array:
@@ -267,7 +282,7 @@ def finite_time_rates(times: Array, errors: Array) -> Array:
     return rates
 
 
-def median_interval(values: Array) -> tuple[float, float]:
+def median_interval(values: Array) -> Interval:
     """The narrowest pair of order statistics, equally far from both ends, that holds the median in 95 % or more.
 
     Each value is above the median of its distribution with probability 1/2, whatever the distribution is: so the
@@ -285,11 +300,11 @@ def median_interval(values: Array) -> tuple[float, float]:
 
 
 def _lost(ensemble: Ensemble, growth: Growth, times: Array, rms: Array) -> str | None:
-    """When the RMS is a tenth of the size: the first sample where it is, else by the class from the last samples on."""
+    """When the RMS is a tenth of the size: the first sample where it is, else by the class, if that says when."""
     beyond = numpy.flatnonzero(ensemble.rms() >= LOST * ensemble.size)
     if len(beyond):
         return f"{ensemble.times[beyond[0]]:.3g}"
-    if growth == "bounded":
+    if growth in ("bounded", "unresolved"):
         return None
     # the last quarter of the samples: there the law is nearest
     late = slice(-(len(times) // 4), None)

@@ -107,7 +107,8 @@ def reference(
     instants = [exact(time) for time in times]
     require_handy(top, start, instants)
     solution = finder(top, start, system)
-    method, xi = attitude_of(solution, bits_of(digits)) if attitude else (None, None)
+    latest = max(instants, key=abs, default=Fraction(0))
+    method, xi = attitude_of(solution, latest, bits_of(digits)) if attitude else (None, None)
     return Reference(
         method=solution.method,
         digits=digits,

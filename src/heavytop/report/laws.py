@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from heavytop.measure.growth import CLASSES, NEAR
+from heavytop.measure.growth import CLASSES, NEAR, Interval, bent, nearest_class
 from heavytop.precision import exact, log10
 from heavytop.records import Law
 from heavytop.report.verdicts import SAME, Judged, Verdict
 
 _GROWTH = (*CLASSES, "exponential")
-_ROUNDED = 1e-6
-"""Exponents are written to six decimals."""
+_HALF_WAY = 0.25 - NEAR
+"""Half of an interval that holds one class and no other, wherever it is: what is known of an exponent without one."""
 _WIDER = 5.0
 """The interval of a rerun may be wider by that factor: of 1,400 pairs of ensembles of 16 starts, none is by 4.2."""
 _SPAN = 2.0
@@ -31,59 +31,49 @@ def law_text(law: Law) -> str:
 
 
 def inconsistent(law: Law) -> str:
-    """Why a law contradicts itself: class, exponent, interval and span; empty where it does not."""
+    """Why a law contradicts itself: class, exponent, intervals and span; empty where it does not."""
     if (law.low is None) != (law.high is None) or (law.exponent is None and law.low is not None):
         return "half an interval, or one without its exponent"
-    if not all(math.isfinite(number) for number in (law.exponent, law.low, law.high) if number is not None):
-        return "an exponent or an interval that is not finite"
-    if law.low is not None and law.high is not None and law.exponent is not None:
-        if law.low > law.high:
-            return f"an interval from {law.low:g} to {law.high:g}"
-        if not law.low - _ROUNDED <= law.exponent <= law.high + _ROUNDED:
-            return f"an interval from {law.low:g} to {law.high:g} without its exponent {law.exponent:g}"
     if law.first is not None and law.last is not None and exact(law.first) > exact(law.last):
         return f"a span from {law.first} to {law.last}"
-    return "" if law.exponent is None else _another_class(law, law.exponent)
-
-
-def _another_class(law: Law, exponent: float) -> str:
-    """Why an exponent is not one of its class; empty where it is."""
-    said = f"{law.growth} with the exponent {exponent:g}"
-    if law.growth == "unresolved":
-        return said
+    if law.exponent is None:
+        return "" if law.bend is None else "a bend without an exponent"
+    low, high = _interval(law)
+    bend = law.bend or (0.0, 0.0)
+    if not all(map(math.isfinite, (law.exponent, low, high, *bend))):
+        return "an exponent or an interval that is not finite"
+    if not low <= law.exponent <= high or bend[0] > bend[1]:
+        return f"an interval from {low:g} to {high:g} without its exponent {law.exponent:g}, or a bend that ends first"
+    said = f"{law.growth} with the exponent {law.exponent:g} in [{low:g}, {high:g}]"
     if law.growth == "exponential":
-        return "" if exponent > 0 else said
-    others = [value for name, value in CLASSES.items() if name != law.growth]
-    own = CLASSES[law.growth]
-    if any(abs(value - exponent) < abs(own - exponent) - _ROUNDED for value in others):
-        return said
-    if law.low is None or law.high is None:
-        return ""
-    inside = law.low - NEAR - _ROUNDED <= own <= law.high + NEAR + _ROUNDED
-    if not inside or any(law.low <= value <= law.high for value in others):
-        return f"{said} in [{law.low:g}, {law.high:g}]"
-    return ""
+        return "" if law.exponent > 0 and law.bend is None else said
+    if law.low is None:
+        low, high = low - _HALF_WAY, high + _HALF_WAY
+    expected = "unresolved" if bent(bend) else nearest_class(law.exponent, low, high)
+    return "" if law.growth == expected else said
 
 
 def judge_law(old: Law, new: Law, noise: float = 0.0) -> Judged:
-    """A change of class is never noise; within a class, exponents whose intervals do not meet.
+    """A change of class is never noise; within a class, exponents or bends whose intervals do not meet.
 
-    The interval of the candidate counts as no wider than that of the baseline; one that is wider by more than chance
-    is worse, and so is a lost power to detect.  An exponent without an interval is the same as one that it equals or
-    whose interval holds it; else nobody can tell.
+    A law that is resolved in one report only is judged as within a class: of two ensembles of one motion one may bend
+    by a little more than a law may.  What it says less of than the other is judged too.
     noise: decades by which noise alone may move the error that the law is about.
     """
     for law in (old, new):
         if problem := inconsistent(law):
             return Verdict.INCOMPARABLE, problem
     if old.growth != new.growth:
-        if "unresolved" in (old.growth, new.growth):
+        if "unresolved" not in (old.growth, new.growth):
+            worse = _GROWTH.index(new.growth) > _GROWTH.index(old.growth)
+            return (Verdict.WORSE if worse else Verdict.BETTER), f"grows like {new.growth}, not {old.growth}"
+        if "exponential" in (old.growth, new.growth) or None in (old.exponent, new.exponent):
             return Verdict.INCOMPARABLE, "the growth is resolved in one report only"
-        worse = _GROWTH.index(new.growth) > _GROWTH.index(old.growth)
-        return (Verdict.WORSE if worse else Verdict.BETTER), f"grows like {new.growth}, not {old.growth}"
     if new.starts < old.starts:
         return Verdict.INCOMPARABLE, f"{old.starts} starts against {new.starts}"
-    judged = _exponents(old, new)
+    for judged in (_exponents(old, new), _bends(old, new)):
+        if judged[0] is not Verdict.SAME:
+            break
     if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
         return judged
     return _power_of_law(old, new, noise) or judged
@@ -93,39 +83,58 @@ def _exponents(old: Law, new: Law) -> Judged:
     if old.exponent is None or new.exponent is None:
         known = old.exponent is not None or new.exponent is not None
         return (Verdict.INCOMPARABLE, "an exponent in one report only") if known else SAME
-    low, high = _interval(old, math.inf)
-    width = high - low if old.low is not None else math.inf
-    new_low, new_high = _interval(new, width)
+    if old.low is not None and new.low is not None:
+        return _apart("exponent", _interval(old), _interval(new), new.exponent)
+    (low, high), (new_low, new_high) = _interval(old), _interval(new)
     if new_low > high or new_high < low:
-        if old.low is None or new.low is None:
-            return Verdict.INCOMPARABLE, "another exponent, and no interval to tell noise from it"
-        return (Verdict.WORSE, "a larger exponent") if new_low > high else (Verdict.BETTER, "a smaller exponent")
-    if new.low is None and old.low is not None:
-        return SAME
-    if new.low is not None and new.high is not None and old.low is not None and new.high - new.low > _WIDER * width:
-        return Verdict.WORSE, f"noise: the interval is {new.high - new.low:.2g} wide, not {width:.2g}"
+        return Verdict.INCOMPARABLE, "another exponent, and no interval to tell noise from it"
     return SAME
 
 
-def _interval(law: Law, width: float) -> tuple[float, float]:
-    """That of the exponent, shrunk about it to at most ``width``; where it has none, the exponent alone."""
+def _bends(old: Law, new: Law) -> Judged:
+    """Where the class of one alone is known: of two laws of one class neither bends by more than a law may."""
+    if old.growth == new.growth:
+        return SAME
+    if old.bend is None or new.bend is None:
+        return Verdict.INCOMPARABLE, "the growth is resolved in one report only, and how it bends is not known of both"
+    return _apart("bend towards the end", old.bend, new.bend, sum(new.bend) / 2)
+
+
+def _apart(what: str, old: Interval, new: Interval, middle: float) -> Judged:
+    """Two intervals, that of the candidate about ``middle``, which counts as no wider than that of the baseline.
+
+    One that is wider by more than chance is worse.
+    """
+    width, own = (interval[1] - interval[0] for interval in (old, new))
+    part = min(1.0, width / own) if own > 0 else 1.0
+    low, high = (middle + (end - middle) * part for end in new)
+    if low > old[1]:
+        return Verdict.WORSE, f"a larger {what}"
+    if high < old[0]:
+        return Verdict.BETTER, f"a smaller {what}"
+    if own > _WIDER * width:
+        return Verdict.WORSE, f"noise: the interval of the {what} is {own:.2g} wide, not {width:.2g}"
+    return SAME
+
+
+def _interval(law: Law) -> Interval:
+    """That of the exponent; where it has none, the exponent alone."""
     assert law.exponent is not None
-    if law.low is None or law.high is None:
-        return law.exponent, law.exponent
-    part = min(1.0, width / (law.high - law.low)) if law.high > law.low else 1.0
-    return law.exponent - (law.exponent - law.low) * part, law.exponent + (law.high - law.exponent) * part
+    return (law.exponent, law.exponent) if law.low is None or law.high is None else (law.low, law.high)
 
 
 def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
     """What the law of the candidate says less of: its detection power, its span, the time of the last digit."""
     for name in ("first", "last", "detects"):
         if getattr(old, name) is not None and getattr(new, name) is None:
-            return Verdict.INCOMPARABLE, f"the law no longer says {name.replace('_', ' ')}"
+            return Verdict.INCOMPARABLE, f"the law no longer says {name}"
     spans = [_log(law.first) - _log(law.last) for law in (old, new)]
     if _log(new.last) < _log(old.last) - math.log10(_SPAN) or spans[1] > spans[0] + math.log10(_SPAN):
         return Verdict.INCOMPARABLE, f"fitted from {new.first} to {new.last}, not from {old.first} to {old.last}"
     if _log(new.detects) > _log(old.detects) + max(_DETECTS, noise):
         return Verdict.WORSE, f"detects a fault of {new.detects} a step, not of {old.detects}"
+    if "unresolved" in (old.growth, new.growth) and None in (old.lost_at, new.lost_at):
+        return None  # it is not extrapolated
     if new.lost_at is not None:
         power = CLASSES.get(new.growth, math.inf)
         earlier = (math.inf if old.lost_at is None else _log(old.lost_at)) - _log(new.lost_at)

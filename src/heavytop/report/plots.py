@@ -272,8 +272,8 @@ def _band(metrics: dict[str, Metric], quantity: Quantity) -> float | None:
 
 
 def _law(axes: Any, colour: str, law: Law, x: Sequence[float], y: Sequence[float]) -> bool:
-    """Draw the law through the mean of its samples, and the fan of its interval; False where it has no slope."""
-    if law.exponent is None:
+    """Draw the law through the mean of its samples, and the fan of its interval; False where there is none."""
+    if law.exponent is None or law.growth == "unresolved":
         return False
     ends = [logarithm(end) for end in (law.first, law.last)]
     low, high = (given if given is not None else other for given, other in zip(ends, (x[0], x[-1]), strict=True))
