@@ -12,7 +12,9 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.measure.drift import Drift
 from heavytop.measure.scalar import metric, of_fraction, text, to_ball
 from heavytop.measure.solution_error import SolutionError, root, split
+from heavytop.measure.truth import Truth
 from heavytop.precision import DOUBLE, QUAD, exact, number, real
+from heavytop.records import Against
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import holding
 
