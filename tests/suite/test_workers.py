@@ -84,7 +84,7 @@ def test_every_kind_of_truth_is_the_same_in_one_process_and_in_two(tmp_path: Pat
     one, two = (msgspec.json.decode(msgspec.json.encode(each), type=list[Row]) for each in found)
     assert msgspec.json.encode(one) == msgspec.json.encode(two)
     proven, far, lost, many = one
-    assert [row.reference.how for row in (proven, far, lost, many)] == ["proven", "computed", "computed", "computed"]
+    assert [row.reference.how for row in (proven, far, lost, many)] == ["proven", "proven", "computed", "computed"]
     assert [bool(row.reference.until) for row in (proven, far, lost, many)] == [False, False, True, False]
     for row in (proven, far, many):
         assert digits_kept(row) > 3
