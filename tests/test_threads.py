@@ -24,7 +24,6 @@ from heavytop.exact.lagrange import Lagrange
 from heavytop.exact.validated import Validated
 from heavytop.integrate.engines import compiled
 from heavytop.integrate.ensemble import propagate_ensemble
-from heavytop.integrate.peers import run as run_peer
 from heavytop.integrate.taylor import first_steps, propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.drift import Drift
@@ -35,6 +34,7 @@ from heavytop.suite.rows import time_text
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import holding
+from helpers import run_peer
 
 F = Fraction
 FORMATS = (DOUBLE, EXTENDED, QUAD, real(100))

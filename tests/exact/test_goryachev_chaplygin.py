@@ -119,7 +119,7 @@ def test_levels_too_near_to_one_that_is_not_done_are_left_to_the_enclosure(power
     beside = State((F(4, 15), F(-1, 5), -step), (F(3, 5), F(4, 5), 0))
     asymptotic = State((step, F(1, 4), -3 * step), (F(3, 5), 0, F(4, 5)))
     for start in (beside, asymptotic):
-        with pytest.raises(NotInClass, match=r"degenerate but for \d.*, the distance|too near"):
+        with pytest.raises(NotInClass, match=r"degenerate but for [1-9].*, the distance"):
             GoryachevChaplygin(top, start)
         assert reference(top, start, [1, -3], 20).method.startswith("validated")
 
@@ -142,5 +142,5 @@ def test_near_a_degenerate_level_every_digit_comes_out(exponent):
 def test_nearer_the_motion_is_refused_with_the_distance():
     for exponent in (12, 100):
         spin = F(1, 10**exponent)
-        with pytest.raises(NotInClass, match=r"degenerate but for .*, the distance|too near"):
+        with pytest.raises(NotInClass, match=r"degenerate but for [1-9].*, the distance"):
             motion_from((F(1), F(0)), (0, F(1, 4), spin), (F(3, 5), -spin * F(4, 5), F(4, 5)))

@@ -21,7 +21,7 @@ def problems(system) -> list[Scaled]:
     return [Scaled.of(system, p, (Fraction(k, 8), Fraction(1, 5), Fraction(k, 3) - 1, *rest)) for k in range(1, 9)]
 
 
-def in_lanes(system, lanes: list[Scaled | None], ladder=FINE, low_order=22, processor=None, forwards=True) -> Eight:
+def in_lanes(system, lanes: list[Scaled | None], ladder=FINE, low_order=26, processor=None, forwards=True) -> Eight:
     eight = Eight(system, ladder, low_order, processor)
     for lane, problem in enumerate(lanes):
         if problem is not None:

@@ -70,7 +70,9 @@ def product_code(grid: Grid) -> Machine:
     return compiled(module, {"products": (None, [DOUBLES, DOUBLES, ctypes.c_int64, DOUBLES, DOUBLES])})
 
 
-@pytest.mark.parametrize("grid", [grid_of(3), grid_of(6), Grid(3, 51)], ids=lambda grid: f"{grid.words}x{grid.bits}")
+@pytest.mark.parametrize(
+    "grid", [grid_of(3), grid_of(6), Grid(3, 51), Grid(4, 46, whole=True)], ids=lambda grid: f"{grid.words}x{grid.bits}"
+)
 @pytest.mark.parametrize("kind", ["random", "largest", "alternating"])
 def test_sums_of_products_are_exact_but_for_the_last_level_or_are_caught(grid: Grid, kind: str) -> None:
     """|Σ a b − S| <= n (K + 1) units of the last word, whatever the words; or an exponent bit says that it may not be.

@@ -73,7 +73,7 @@ def used(motion: ScaledMotion, carrier: Carrier, centre: list[int], halvings: in
     ids=lambda value: getattr(value, "name", value),
 )
 def test_what_coefficients_lack_is_within_the_bound(words: int, system, attitude: bool) -> None:
-    random, grid = Random(words), grid_of(words)
+    random, grid = Random(words), grid_of(words, whole=True)
     shares = []
     for _ in range(6):
         motion = some_motion(random, system, attitude, decades=random.choice([0, 3, 100]))
@@ -92,7 +92,7 @@ def test_what_coefficients_lack_is_within_the_bound(words: int, system, attitude
 def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:
     random, refused = Random(3), 0
     for bits in (49, 50, 51):
-        grid = Grid(3, bits)
+        grid = Grid(3, bits, whole=True)
         for _ in range(6):
             motion = some_motion(random)
             carrier = Carrier(motion.scaled, grid, motion.forwards)
@@ -106,7 +106,7 @@ def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
     motion = some_motion(Random(5), attitude=True)
-    grid = grid_of(4)
+    grid = grid_of(4, whole=True)
     one, other = (Carrier(motion.scaled, grid, True, processor=each) for each in (None, processor))
     found, same = (carrier.series(rounded(motion, grid), 3) for carrier in (one, other))
     assert found is not None
@@ -116,7 +116,7 @@ def test_the_bits_are_those_of_every_processor(processor) -> None:
 
 
 def test_a_carrier_travels_between_processes() -> None:
-    motion, grid = some_motion(Random(6)), grid_of(3)
+    motion, grid = some_motion(Random(6)), grid_of(3, whole=True)
     carrier = Carrier(motion.scaled, grid, True)
     again = pickle.loads(pickle.dumps(carrier))
     centre = rounded(motion, grid)

@@ -220,13 +220,13 @@ class FourierBound:
         return arb(0, (factor * self.largest * self.farthest**order).upper())
 
 
-def distance_of_others(points: Sequence[acb], ends: tuple[int, int]) -> float:
+def distance_of_others(points: Sequence[acb], ends: tuple[int, int]) -> arb:
     """cosh β − 1 of the root nearest to the gap between two of the points; 0 for no gap."""
     low, high = (points[i].real for i in ends)
     if not low < high:
-        return 0.0
+        return arb(0)
     scaled = [(2 * b - low - high) / (high - low) for i, b in enumerate(points) if i not in ends]
-    return min(float(_cosh(z) - 1) for z in scaled)
+    return min((_cosh(z) - 1 for z in scaled), key=arb.mid)
 
 
 def _cosh(z: acb) -> arb:

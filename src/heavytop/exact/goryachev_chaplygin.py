@@ -30,7 +30,7 @@ from heavytop.exact.goryachev_chaplygin_abel import Motion
 from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude
 from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, roots, separated_start
 from heavytop.exact.motion import initial_xi, kept
-from heavytop.exact.separated import REMEDY, decide, require_plane_centre
+from heavytop.exact.separated import REMEDY, decide, refuse, require_plane_centre
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
@@ -105,8 +105,8 @@ def _require_done(level: Level) -> None:
         moving = [(low, high) for low, high in ends if low != high]
         if resting is not None and all(_passes(curve, pair, resting) for pair in moving):
             raise LevelNotDone("The level is degenerate: one variable rests, and the other passes it.", REMEDY)
-        apart = min(distance_of_others([root.value for root in curve], pair) for pair in moving)
-        if apart < _DISTANCE:
-            raise LevelNotDone(f"The level is degenerate but for {apart:.2g}, the distance of a root to a gap.", REMEDY)
+        apart = min((distance_of_others([root.value for root in curve], pair) for pair in moving), key=arb.mid)
+        if not apart > _DISTANCE:
+            refuse("The level is degenerate", apart, "a root to a gap")
 
     decide(test)

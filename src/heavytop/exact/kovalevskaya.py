@@ -40,7 +40,7 @@ from heavytop.exact.kovalevskaya_gaps import Interval, intervals, ordered, pole
 from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
 from heavytop.exact.motion import initial_xi, kept
-from heavytop.exact.separated import REMEDY, decide, require_plane_centre
+from heavytop.exact.separated import REMEDY, decide, refuse, require_plane_centre
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -154,6 +154,8 @@ def _require_done(level: Level) -> None:
         raise LevelNotDone("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", REMEDY)
     name = "The level is degenerate"
     if double * double == level.fourth:
+        if _both_rest(level, double):
+            raise LevelNotDone(f"{name}, and both separated variables rest at e = {shown(double)}.", REMEDY)
         name = f"{name}: l^2 = 2 |gamma|^2 (h + e) with e = {shown(double)}, e^2 = k^2"
 
     def test() -> None:
@@ -161,6 +163,12 @@ def _require_done(level: Level) -> None:
         _require_apart(curve, intervals(level, curve, start_of(level)), name)
 
     decide(test)
+
+
+def _both_rest(level: Level, double: Fraction) -> bool:
+    """Whether w1 = w2 = e: a double root of the quadratic of both."""
+    beside = level.separated(double + 1), level.separated(double - 1)
+    return level.separated(double) == 0 and beside[0] == beside[1]
 
 
 def _require_apart(curve: Sequence[Root], ends: Sequence[Interval], name: str) -> None:
@@ -174,5 +182,5 @@ def _require_apart(curve: Sequence[Root], ends: Sequence[Interval], name: str) -
         if resting and order.index(high) < order.index(resting[0]) < order.index(low):
             raise LevelNotDone(f"{name}, one separated variable rests at e, and the other passes it.", REMEDY)
     nearest = separation([root.value for root in curve])
-    if nearest < SEPARATION and pole(curve, ends)[1] < _DISTANCE:
-        raise LevelNotDone(f"{name} but for {nearest:.2g}, the distance of two roots over the largest.", REMEDY)
+    if not nearest >= SEPARATION and pole(curve, ends)[1] < _DISTANCE:
+        refuse(name, nearest, "two roots over the largest")

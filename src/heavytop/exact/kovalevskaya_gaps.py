@@ -84,7 +84,7 @@ def pole(curve: Sequence[Root], occupied: Sequence[Interval]) -> tuple[arb, floa
 
     def distance(mu: arb) -> float:
         points = [acb(0), *(1 / (root.value - mu) for root in curve)]
-        return min(distance_of_others(points, (low, high)) for low, high in occupied if low != high)
+        return min(float(distance_of_others(points, (low, high))) for low, high in occupied if low != high)
 
     distances = [distance(mu.mid()) for mu in candidates]
     best = max(range(len(candidates)), key=distances.__getitem__)

@@ -187,10 +187,10 @@ def _from_infinity(found: Sequence[acb], w: arb, y: arb) -> Pair:
     return -2 * w * one / y, -2 * w * w * two / y
 
 
-def separation(values: Sequence[acb]) -> float:
+def separation(values: Sequence[acb]) -> arb:
     """The smallest distance of two roots over the largest root."""
     nearest = min((abs(a - b) for a, b in combinations(values, 2)), key=arb.mid)
-    return float(nearest / max((abs(e) for e in values), key=arb.mid))
+    return nearest / max((abs(e) for e in values), key=arb.mid)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 from flint import arb, arb_series
 
@@ -24,7 +24,7 @@ from heavytop.precision import shown
 from heavytop.top.heavy_top import HeavyTop, State
 
 REMEDY = "The validated enclosure holds for every motion."
-_DECISIONS = (64, 256, 1024, 4096)
+_DECISIONS, _RIGHT = (64, 256, 1024, 4096), 10
 
 
 def require_plane_centre(name: str, ratio: int, top: HeavyTop, start: State) -> None:
@@ -51,7 +51,16 @@ def decide(test: Callable[[], None]) -> None:
             except Undecided:
                 continue
         return
-    raise LevelNotDone("The motion is too near to one on a degenerate level to tell them apart.", REMEDY)
+    raise LevelNotDone(
+        f"The level is degenerate but for less than about 1e-300: {_DECISIONS[-1]} bits do not tell.", REMEDY
+    )
+
+
+def refuse(name: str, apart: arb, of: str) -> NoReturn:
+    """Raises LevelNotDone with the distance, Undecided where the working precision does not tell it."""
+    if apart.rel_accuracy_bits() < _RIGHT:
+        raise Undecided
+    raise LevelNotDone(f"{name} but for {apart.str(2, radius=False)}, the distance of {of}.", REMEDY)
 
 
 def variable_between(low: arb, high: arb, double: tuple[bool, bool], rest: Roots, most: int) -> Variable:

@@ -13,9 +13,9 @@ _BITS_OF_A_WORD = ((2, 48), (4, 46), (6, 45), (12, 44), (24, 43))
 MOST_WORDS = 24
 
 
-def grid_of(words: int) -> Grid:
-    """The grid of so many words, 2 to 24."""
-    return Grid(words, next(bits for most, bits in _BITS_OF_A_WORD if words <= most))
+def grid_of(words: int, whole: bool = False) -> Grid:
+    """The grid of so many words, 2 to 24; whole: as in :class:`heavytop.words.kernels.Grid`."""
+    return Grid(words, next(bits for most, bits in _BITS_OF_A_WORD if words <= most), whole)
 
 
 def grid_for(bits: int) -> Grid | None:

@@ -18,7 +18,7 @@ from llvmlite import ir
 from heavytop.top.equations import System
 from heavytop.words.lanes import turned
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
-from heavytop.words.pairs import add, log2, multiply, power_of_two, times
+from heavytop.words.pairs import add, covered, later, log2, polynomial, step_length, times
 from heavytop.words.recurrence import Layout, Recurrence
 from heavytop.words.stepping import Stepping
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, POINTER, Index, Pair, function
@@ -29,8 +29,6 @@ direction; log2 of the rounding allowed above n0, in units of 2^-53; log2 of h/Ï
 ORDER, LOW_ORDER, LEAST, MOST, STATUS, USED, COUNTS = range(7)
 """Places of the counts: N, n0 of the next step, bounds of n0, how the last step ended, its n0."""
 FINE, NON_FINITE, TOO_SMALL = range(3)
-STEP_BITS = 10
-LARGEST_STEP = 6
 _HYSTERESIS = 3.0
 _TOLERATED = 1.0
 
@@ -62,18 +60,12 @@ def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:
     made, code = function(module, "sample", ir.VoidType(), [POINTER, INT, DOUBLE, DOUBLE, POINTER])
     scratch, order, time, low, result = made.args
     rows = Recurrence(code, layout, system, None, scratch)
-    at = code.spread(time), code.spread(low)
 
-    def term(k: Any, words: list[Any]) -> list[Any]:
-        row = rows.row(code.builder.sub(order, k))
-        found: list[Any] = []
-        for v in rows.vectors:
-            total = multiply(code, (words[2 * v], words[2 * v + 1]), at)
-            found += code.quick_two_sum(*add(code, total, rows.pair(row, layout.value(v))))
-        return found
+    def row(n: Any) -> list[Pair]:
+        at = rows.row(n)
+        return [rows.pair(at, layout.value(v)) for v in rows.vectors]
 
-    count = code.builder.add(order, code.integer(1))
-    words = code.loop(0, count, term, [code.zero] * (2 * layout.vectors))
+    words = polynomial(code, order, (code.spread(time), code.spread(low)), layout.vectors, row)
     for index, word in enumerate(words):
         code.store(word, result, 8 * index)
     code.builder.ret_void()
@@ -91,10 +83,8 @@ class _Step(Stepping):
         self.series = Recurrence(self.code, layout, system, table, scratch)
 
     def covered(self) -> Any:
-        b = self.code.builder
         time, low, target, target_low = (self.time(k) for k in (TIME, TIME_LOW, TARGET, TARGET_LOW))
-        level = b.and_(b.fcmp_ordered("==", time, target), b.fcmp_ordered(">=", low, target_low))
-        return b.or_(b.fcmp_ordered(">", time, target), level)
+        return covered(self.code, (time, low), (target, target_low))
 
     def write_step(self) -> Any:
         """One step; whether it stands."""
@@ -124,9 +114,8 @@ class _Step(Stepping):
         def radius(n: Any) -> Any:
             return b.fdiv(b.fsub(start, log2(self.code, self._norm(n))), b.sitofp(n, DOUBLE))
 
-        one, two = radius(order), radius(b.sub(order, self.code.integer(1)))
-        least = b.select(b.fcmp_ordered("<", one, two), one, two)
-        return power_of_two(self.code, b.fadd(least, self.time(REACH)), LARGEST_STEP, STEP_BITS)
+        radii = radius(order), radius(b.sub(order, self.code.integer(1)))
+        return step_length(self.code, radii, self.time(REACH))
 
     def _sum(self, order: Any, low_order: Any, step: Any) -> list[Pair]:
         """Î£ y_n h^n: four sums in h^4 side by side, each from its highest order, then those of h^2 and h."""
@@ -199,8 +188,7 @@ class _Step(Stepping):
             for vector, pair in enumerate(result):
                 for word in range(2):
                     code.store(pair[word], self.state, 16 * vector + 8 * word)
-            total, error = code.two_sum(time, length)
-            total, rest = code.quick_two_sum(total, code.add(error, low))
+            total, rest = later(code, (time, low), length)
             for value, place in ((time, BEGAN), (low, BEGAN_LOW), (total, TIME), (rest, TIME_LOW)):
                 b.store(value, code.address(self.clock, place))
             self.set_count(low_order, USED)

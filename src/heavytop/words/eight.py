@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from threading import Lock
 from typing import Any
 
 import numpy
@@ -11,23 +10,17 @@ import numpy
 from heavytop.top.equations import System
 from heavytop.words import lane_steps as steps
 from heavytop.words.floating import LARGEST_TIME, Ladder
-from heavytop.words.machine import Doubles, Machine, Processor, doubles, pointer
+from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
 from heavytop.words.pairs import split
 from heavytop.words.run import Status, Steps
 from heavytop.words.scaled import Scaled
 from heavytop.words.vector import LANES
 
-_machines: dict[tuple[str, Processor | None], Machine] = {}
-_making = Lock()
 _NO_LIMIT = 2.0**53
 
 
-def machine(system: System, processor: Processor | None = None) -> Machine:
-    """The machine code for this system, compiled at its first use."""
-    with _making:
-        if (system.name, processor) not in _machines:
-            _machines[system.name, processor] = steps.build(system, processor)
-        return _machines[system.name, processor]
+machine = once(steps.build)
+"""The machine code, compiled at its first use."""
 
 
 class Eight:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from threading import Lock
 from typing import Any
 
 import numpy
 
-from heavytop.top.equations import System
 from heavytop.words import grid as steps
 from heavytop.words.digits import digits, exact
 from heavytop.words.grid_series import most_orders
 from heavytop.words.kernels import Grid
-from heavytop.words.machine import Doubles, Machine, Processor, doubles, pointer
+from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
 from heavytop.words.run import Run, Status
 from heavytop.words.scaled import Scaled
 
@@ -23,17 +21,9 @@ _MOST_HALVINGS = 40
 _HALVED_SAMPLES = 4
 _LARGEST_TIME = Fraction(2) ** 1000
 
-_machines: dict[tuple[Grid, str, bool, Processor | None], tuple[Machine, int]] = {}
-_making = Lock()
 
-
-def machine(grid: Grid, system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, int]:
-    """The machine code for this grid and system, compiled at its first use."""
-    key = (grid, system.name, attitude, processor)
-    with _making:
-        if key not in _machines:
-            _machines[key] = steps.build(grid, system, attitude, processor)
-        return _machines[key]
+machine = once(steps.build)
+"""The machine code, compiled at its first use."""
 
 
 def excess(problem: Scaled) -> int:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from threading import Lock
 
 import numpy
 
-from heavytop.top.equations import System
 from heavytop.words import double_double as dd
-from heavytop.words.machine import Doubles, Machine, Processor, doubles, pointer
+from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
 from heavytop.words.pairs import split
 from heavytop.words.recurrence import LEAST_LOW_ORDER, Layout
 from heavytop.words.run import Run, Status
@@ -20,15 +18,11 @@ from heavytop.words.scaled import Scaled
 BITS = 106
 FALL_ALONE, FALL_IN_LANES = 1.45, 2.0
 _MARGIN = 6.0
-_DEEPEST = 75.0
+_DEEPEST = 84.0
 _DOUBLE_BITS = 53
-_ROUNDING_BITS = 10
-_LEAST_ROOM = -58.0
-_QUOTIENT_BITS = 140
+_ROUNDING_BITS = 4
+_LEAST_ROOM = -66.0
 LARGEST_TIME = Fraction(2) ** 1000
-
-_machines: dict[tuple[str, bool, Processor | None], tuple[Machine, Layout]] = {}
-_making = Lock()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,19 +46,16 @@ class Ladder:
         are faster.
         """
         log_tolerance = math.log(tolerance.numerator) - math.log(tolerance.denominator)
-        depth = min(_MARGIN - log_tolerance, _DEEPEST)
+        # what is left out errs in the same way at every step: it shall not show beside roundings after 10^7 steps
+        finest = tolerance <= Fraction(1, 2 ** (BITS - 1))
+        depth = _DEEPEST if finest else _MARGIN - log_tolerance
         order = math.ceil(depth / fall)
         reach = -(depth / order + 0.7 / (order - 1)) / math.log(2)
         return cls(order, reach, max(_DOUBLE_BITS - depth / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM))
 
 
-def machine(system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, Layout]:
-    """The machine code for this system, compiled at its first use."""
-    key = (system.name, attitude, processor)
-    with _making:
-        if key not in _machines:
-            _machines[key] = dd.build(system, attitude, processor)
-        return _machines[key]
+machine = once(dd.build)
+"""The machine code, compiled at its first use."""
 
 
 class Floating(Run):
@@ -161,25 +152,18 @@ def _exact_state(words: Doubles, size: int) -> tuple[Fraction, ...]:
 
 
 def _table(problem: Scaled, order: int, layout: Layout) -> Doubles:
-    """A/(n + 1) and B/(n + 1) in two words each, for n = 0, 1, ..., N - 1."""
-    table = doubles(order * layout.table_row)
-    rows = table.reshape(order, layout.table_row // 16, 2, 8)
+    """A and each B in two words; then for n = 0, 1, ..., N - 1: n + 1 and 1/(n + 1) in two words, A/(n + 1) and each
+    B/(n + 1) in one.
+    """
     flat = [row for vector in problem.coefficients.vectors for row in vector]
+    begin = 16 * layout.constants
+    table = doubles(begin + order * layout.table_row)
+    constants = table[:begin].reshape(layout.constants, 2, 8)
+    rows = table[begin:].reshape(order, 1 + layout.constants, 8)
+    after = numpy.arange(1, order + 1)
+    rows[:, 0, :3] = [(n, *split(Fraction(1, int(n)))) for n in after]
     for index, row in enumerate(flat):
         for lane, c in enumerate(row):
-            if c:
-                rows[:, index, :, lane] = _quotients(c, order)
+            constants[index, :, lane] = split(c)
+            rows[:, 1 + index, lane] = float(c) / after
     return table
-
-
-def _quotients(c: Fraction, count: int) -> list[tuple[float, float]]:
-    """c/1, c/2, ... in two words each."""
-    exponent = c.numerator.bit_length() - c.denominator.bit_length()
-    shift = _QUOTIENT_BITS - exponent
-    numerator, denominator = c.numerator << max(shift, 0), c.denominator << max(-shift, 0)
-    found = []
-    for n in range(1, count + 1):
-        whole = numerator // (denominator * n)
-        high = float(whole)
-        found.append((math.ldexp(high, -shift), math.ldexp(float(whole - int(high)), -shift)))
-    return found

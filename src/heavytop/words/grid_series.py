@@ -2,7 +2,7 @@
 
 Coefficients carry h^n, so that the step is a sum.  Words that have become 0 in all lanes are skipped: from some order
 on the first u words of every coefficient are 0, which is most of the speed.  The series ends where two coefficients in
-a row are below two units of the last word.
+a row are below :attr:`heavytop.words.kernels.Grid.smallest`.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Series:
         after = b.add(n, code.integer(1))
         self._put(after, following)
         size = self._size(following)
-        limit = ir.Constant(DOUBLE, 2 * self.grid.unit(self.grid.words - 1))
+        limit = ir.Constant(DOUBLE, self.grid.smallest)
         counted = b.add(small, code.integer(1))
         small_after = b.select(b.fcmp_ordered("<=", size, limit), counted, code.integer(0))
         sums = [code.add(a, c) for a, c in zip(total, following, strict=True)]

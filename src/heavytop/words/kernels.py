@@ -7,9 +7,9 @@ with i + j = k:
 
     S' = fma(a_i, b_j, S_k),   d = S' − S_k,   l = fma(a_i, b_j, −d),   S_(k+1) += l.
 
-d and l are exact, and l is a multiple of g_(k+1): nothing is lost but the last level's own roundings, as long as each
-S_k stays between 2^52 g_k and 2^53 g_k wherever a low part is added to it.  That is checked there, by the exponent: the
-bits of S ^ C are gathered, and a set exponent bit says that the step must not stand.
+d and l are exact, and l is a multiple of g_(k+1): nothing is lost but in the last level, as long as each S_k stays
+between 2^52 g_k and 2^53 g_k wherever a low part is added to it.  That is checked there, by the exponent: the bits of
+S ^ C are gathered, and a set exponent bit says that the step must not stand.
 """
 
 from __future__ import annotations
@@ -27,10 +27,21 @@ EXPONENT_BITS = 0x7FF << 52
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """words: K.  bits: b, of each."""
+    """words: K.  bits: b, of each.
+
+    whole: whether the last word is a whole multiple of its unit too, as proofs need it.  Else its sums begin at 0: it
+    keeps some bits below the unit, and coefficients below the unit are not rounded away, which would err in the same
+    way at every step.
+    """
 
     words: int
     bits: int
+    whole: bool = False
+
+    @property
+    def smallest(self) -> float:
+        """What two coefficients in a row are below where the series ends."""
+        return self.unit(self.words - 1) * (2.0 if self.whole else 2.0**-12)
 
     @property
     def total(self) -> int:
@@ -43,6 +54,8 @@ class Grid:
 
     def centre(self, k: int) -> float:
         """C_k, to which a sum for level k is added."""
+        if k == self.words - 1 and not self.whole:
+            return 0.0
         return 1.5 * 2.0**52 * self.unit(k)
 
 

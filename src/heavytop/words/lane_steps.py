@@ -16,10 +16,9 @@ from typing import Any
 from llvmlite import ir
 
 from heavytop.top.equations import System
-from heavytop.words.double_double import LARGEST_STEP, STEP_BITS
 from heavytop.words.lanes import ZERO, turned
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
-from heavytop.words.pairs import add, log2, multiply, power_of_two, times
+from heavytop.words.pairs import add, covered, divided, later, log2, multiply, polynomial, step_length, times
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER, Pair, function
 
 FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
@@ -69,17 +68,12 @@ def _write_sample(module: ir.Module) -> None:
     made, code = function(module, "sample", ir.VoidType(), [POINTER, INT, POINTER, POINTER])
     scratch, order, times_, result = made.args
     b = code.builder
-    at = code.load(times_, 0), code.load(times_, 8)
 
-    def term(k: Any, words: list[Any]) -> list[Any]:
-        row = code.address(scratch, b.mul(b.sub(order, k), code.integer(ROW)))
-        found: list[Any] = []
-        for i in range(6):
-            total = multiply(code, (words[2 * i], words[2 * i + 1]), at)
-            found += code.quick_two_sum(*add(code, total, (code.load(row, 16 * i), code.load(row, 16 * i + 8))))
-        return found
+    def row(n: Any) -> list[Pair]:
+        at = code.address(scratch, b.mul(n, code.integer(ROW)))
+        return [(code.load(at, 16 * i), code.load(at, 16 * i + 8)) for i in range(6)]
 
-    words = code.loop(0, b.add(order, code.integer(1)), term, [code.zero] * 12)
+    words = polynomial(code, order, (code.load(times_, 0), code.load(times_, 8)), 6, row)
     for index, word in enumerate(words):
         code.store(word, result, 8 * index)
     b.ret_void()
@@ -141,6 +135,7 @@ class _Round:
             words = code.loop(0, b.add(n, code.integer(1)), partial(self._pair_products, n, group), [code.zero] * 6)
             sums += [(words[2 * i], words[2 * i + 1]) for i in range(3)]
         y, following, quotient = self._row(n), self._row(b.add(n, code.integer(1))), self._quotient(n)
+        after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
         for i in range(6):
             total = code.quick_two_sum(*sums[i])
             if i < 3:
@@ -148,7 +143,7 @@ class _Round:
             for k, component, source in self.terms:
                 if component == i:
                     total = add(code, total, multiply(code, self._coefficient(k), self._pair(y, source)))
-            high, low = code.quick_two_sum(*multiply(code, total, quotient))
+            high, low = code.quick_two_sum(*divided(code, total, after, quotient))
             code.store(high, following, 16 * i)
             code.store(low, following, 16 * i + 8)
 
@@ -205,9 +200,8 @@ class _Round:
         def radius(n: Any) -> Any:
             return b.fdiv(b.fsub(start, self._norm(n)), code.spread(b.sitofp(n, DOUBLE)))
 
-        one, two = radius(self.order), radius(b.sub(self.order, code.integer(1)))
-        least = b.select(b.fcmp_ordered("<", one, two), one, two)
-        return power_of_two(code, b.fadd(least, code.load(self.clock, 8 * REACH)), LARGEST_STEP, STEP_BITS)
+        radii = radius(self.order), radius(b.sub(self.order, code.integer(1)))
+        return step_length(code, radii, code.load(self.clock, 8 * REACH))
 
     def _sum(self, i: int, h: Any) -> Pair:
         """Σ y_n h^n of one component, from the highest order."""
@@ -232,25 +226,19 @@ class _Round:
         step = b.fmul(length, code.load(self.clock, 8 * SIGN))
         results = [self._sum(i, step) for i in range(6)]
         time, low = (code.load(self.clock, 8 * (TIME + k)) for k in range(2))
-        total, error = code.two_sum(time, length)
-        total, rest = code.quick_two_sum(total, code.add(error, low))
-        covered = self._reached(total, rest)
+        total, rest = later(code, (time, low), length)
+        target, target_low = (code.load(self.clock, 8 * (TARGET + k)) for k in range(2))
+        behind = covered(code, (total, rest), (target, target_low))
         flags = self._judged(start, length, results, b.fcmp_ordered(">", total, time))
         fine = b.icmp_signed("==", flags, ir.Constant(INT_VECTOR, [0] * 8))
         left = code.load(self.clock, 8 * LEFT)
-        going = b.and_(b.and_(fine, b.not_(covered)), b.fcmp_ordered(">", left, code.zero))
+        going = b.and_(b.and_(fine, b.not_(behind)), b.fcmp_ordered(">", left, code.zero))
         old = [(self.state, 16 * i + 8 * word, results[i][word]) for i in range(6) for word in range(2)]
         old += [(self.clock, 8 * TIME, total), (self.clock, 8 * (TIME + 1), rest)]
         old += [(self.clock, 8 * LEFT, b.fsub(left, code.constant(1.0)))]
         for base, place, value in old:
             code.store(b.select(going, value, code.load(base, place)), base, place)
         return b.icmp_unsigned("!=", b.bitcast(going, ir.IntType(8)), ir.Constant(ir.IntType(8), 0))
-
-    def _reached(self, time: Any, low: Any) -> Any:
-        code, b = self.code, self.code.builder
-        target, target_low = (code.load(self.clock, 8 * (TARGET + k)) for k in range(2))
-        level = b.and_(b.fcmp_ordered("==", time, target), b.fcmp_ordered(">=", low, target_low))
-        return b.or_(b.fcmp_ordered(">", time, target), level)
 
     def _judged(self, start: Any, length: Any, results: list[Pair], moves: Any) -> Any:
         """The flags of all lanes, with those that this step sets; a lane without steps left gets none."""

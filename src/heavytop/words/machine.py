@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+import inspect
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Lock
 from time import perf_counter
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy
 from llvmlite import binding, ir
@@ -18,6 +19,9 @@ Integers = NDArray[numpy.int64]
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 INTEGERS = ctypes.POINTER(ctypes.c_int64)
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 _building = Lock()
 _started = False
@@ -49,6 +53,21 @@ class Processor:
     def here(cls) -> Processor:
         """The one that this runs on."""
         return cls(binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())
+
+
+def once(make: Callable[P, T]) -> Callable[P, T]:
+    """``make``, called once for the same arguments: other threads that ask for them wait."""
+    making, made, signature = Lock(), dict[tuple[Any, ...], T](), inspect.signature(make)
+
+    def found(*arguments: P.args, **named: P.kwargs) -> T:
+        bound = signature.bind(*arguments, **named)
+        bound.apply_defaults()
+        with making:
+            if bound.args not in made:
+                made[bound.args] = make(*arguments, **named)
+            return made[bound.args]
+
+    return found
 
 
 def compiled(

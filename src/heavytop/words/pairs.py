@@ -6,6 +6,7 @@ Logarithms are taken from the bits of the exponent and a cubic: + - × only, the
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -19,6 +20,7 @@ _BIAS = 1023
 _LOG = (0.43807325, -0.23669342, 0.0803073)
 _POWER = (-0.30407153, -0.07912522)
 _LEAST_EXPONENT = -900.0
+_STEP_BITS, _LARGEST_STEP = 10, 6
 
 
 def add(code: Code, a: Pair, b: Pair) -> Pair:
@@ -37,6 +39,50 @@ def times(code: Code, a: Pair, factor: Any) -> Pair:
     """a times a double."""
     product, error = code.two_product(a[0], factor)
     return product, code.fma(a[1], factor, error)
+
+
+def divided(code: Code, a: Pair, divisor: Any, inverse: Pair) -> Pair:
+    """a over a whole number whose inverse is given in two words.
+
+    A product with the inverse would be wrong in the same way at every step, which adds up where roundings average out;
+    the quotient of the exact remainder is not.
+    """
+    high = code.multiply(a[0], inverse[0])
+    rest = code.add(code.fma(code.negative(high), divisor, a[0]), a[1])
+    return high, code.fma(rest, inverse[0], code.multiply(rest, inverse[1]))
+
+
+def later(code: Code, time: Pair, length: Any) -> Pair:
+    """time + length, in order."""
+    total, error = code.two_sum(time[0], length)
+    return code.quick_two_sum(total, code.add(error, time[1]))
+
+
+def covered(code: Code, time: Pair, target: Pair) -> Any:
+    """Whether time is the target or behind it."""
+    b = code.builder
+    level = b.and_(b.fcmp_ordered("==", time[0], target[0]), b.fcmp_ordered(">=", time[1], target[1]))
+    return b.or_(b.fcmp_ordered(">", time[0], target[0]), level)
+
+
+def polynomial(code: Code, order: Any, at: Pair, count: int, row: Callable[[Any], list[Pair]]) -> list[Any]:
+    """The words of Σ row(n) at^n, for each of the ``count`` numbers of a row, from the highest order."""
+
+    def term(k: Any, words: list[Any]) -> list[Any]:
+        found: list[Any] = []
+        for i, coefficient in enumerate(row(code.builder.sub(order, k))):
+            total = multiply(code, (words[2 * i], words[2 * i + 1]), at)
+            found += code.quick_two_sum(*add(code, total, coefficient))
+        return found
+
+    return code.loop(0, code.builder.add(order, code.integer(1)), term, [code.zero] * (2 * count))
+
+
+def step_length(code: Code, radii: Sequence[Any], reach: Any) -> Any:
+    """h, from log2 of the radius of convergence as the last two coefficients have it; in a few bits."""
+    b = code.builder
+    least = b.select(b.fcmp_ordered("<", radii[0], radii[1]), radii[0], radii[1])
+    return power_of_two(code, b.fadd(least, reach), _LARGEST_STEP, _STEP_BITS)
 
 
 def split(value: Fraction) -> tuple[float, float]:

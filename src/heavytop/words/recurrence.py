@@ -10,11 +10,11 @@ from typing import Any
 
 from heavytop.top.equations import System
 from heavytop.words.lanes import GATHERED, LEFT, RIGHT, Sum, turned
-from heavytop.words.pairs import add, multiply
+from heavytop.words.pairs import add, divided, multiply
 from heavytop.words.vector import Code, Index, Pair
 
 LEAST_LOW_ORDER = 2
-MOST_ORDER = 56
+MOST_ORDER = 60
 """n0 is at least the one, N at most the other."""
 _NONE = 8
 """A lane of the second operand of a shuffle, which is 0."""
@@ -36,9 +36,14 @@ class Layout:
         return 8 * (2 + 4 * self.vectors)
 
     @property
+    def constants(self) -> int:
+        """A and each B of every vector."""
+        return (1 + self.linear) * self.vectors
+
+    @property
     def table_row(self) -> int:
-        """Doubles of one order of the table: both words of A/(n + 1) and each B/(n + 1), for each vector."""
-        return 16 * (1 + self.linear) * self.vectors
+        """Doubles of one order of the table: n + 1 and its inverse in two words, then A/(n + 1) and each B/(n + 1)."""
+        return 8 * (1 + self.constants)
 
     def left(self, vector: int) -> int:
         """Where L of a vector is in a row; its low word is 8 behind, as all low words are."""
@@ -53,7 +58,7 @@ class Layout:
 class Recurrence:
     """Writes the recurrence y_(n+1) = (A ∘ gathered S_n + Σ B_l ∘ permuted y_n)/(n + 1).
 
-    table: A/(n + 1) and B_l/(n + 1) as pairs.  scratch: a row of R, L and y for each order.
+    table: A and B_l as pairs, then a row for each order.  scratch: a row of R, L and y for each order.
     """
 
     code: Code
@@ -114,7 +119,8 @@ class Recurrence:
             a, a_low = self.pair(left, self.layout.left(vector))
             product, error = code.two_product(a, high)
             s, rounding = code.two_sum(s, product)
-            c = code.add(code.add(c, rounding), code.fma(a, low, code.fma(a_low, high, error)))
+            # c comes last: the next product waits for one addition alone
+            c = code.add(c, code.add(rounding, code.fma(a, low, code.fma(a_low, high, error))))
             found += [s, c]
         return found
 
@@ -134,38 +140,44 @@ class Recurrence:
         signs = [sign for _, sign in GATHERED[part]]
         return value if min(signs) >= 0 else self.code.multiply(value, self.code.constant([*signs, 0, 0]))
 
-    def _table_place(self, n: Index, vector: int, row: int) -> tuple[Any, int]:
-        offset = self.code.builder.mul(self.code.integer(n), self.code.integer(self.layout.table_row))
-        return self.code.address(self.table, offset), 16 * ((1 + self.layout.linear) * vector + row)
+    def _constant(self, vector: int, row: int) -> Pair:
+        """A, or B of a row from 1 on."""
+        return self.pair(self.table, 16 * ((1 + self.layout.linear) * vector + row))
+
+    def _table_row(self, n: Index) -> Any:
+        code = self.code
+        offset = code.builder.mul(code.integer(n), code.integer(self.layout.table_row))
+        return code.address(self.table, code.builder.add(offset, code.integer(16 * self.layout.constants)))
+
+    def _over(self, n: Index, vector: int, row: int) -> Any:
+        """A constant over n + 1, a double."""
+        return self.code.load(self._table_row(n), 8 * (1 + (1 + self.layout.linear) * vector + row))
 
     def _next_pair(self, n: Index, vector: int, total: Pair, y: Pair) -> Pair:
-        """y_(n+1) = A/(n + 1) ∘ gathered S_n + Σ B/(n + 1) ∘ permuted y_n."""
-        code = self.code
+        """y_(n+1) = (A ∘ gathered S_n + Σ B ∘ permuted y_n)/(n + 1)."""
+        code, base = self.code, self._table_row(n)
         parts = []
         for k in range(4):
             high, low = (self._signed(self._gather(word, k), k) for word in total)
             parts.append((high, low))
         result = add(code, add(code, parts[0], parts[1]), add(code, parts[2], parts[3]))
-        base, place = self._table_place(n, vector, 0)
-        result = multiply(code, self.pair(base, place), result)
+        result = multiply(code, self._constant(vector, 0), result)
         linear: Pair | None = None
         for k, lanes in enumerate(turned(self.system), 1):
-            base, place = self._table_place(n, vector, k)
             moved = tuple(code.shuffle(word, code.zero, lanes) for word in y)
-            term = multiply(code, self.pair(base, place), (moved[0], moved[1]))
+            term = multiply(code, self._constant(vector, k), (moved[0], moved[1]))
             linear = term if linear is None else add(code, linear, term)
         if linear is not None:
             result = add(code, result, linear)
-        return code.quick_two_sum(*result)
+        after, high, low = (code.spread(code.builder.load(code.address(base, k))) for k in range(3))
+        return code.quick_two_sum(*divided(code, result, after, (high, low)))
 
     def _next(self, n: Index, vector: int, total: Any, y: Any) -> Any:
         code = self.code
         linear = code.zero
         for k, lanes in enumerate(turned(self.system), 1):
-            base, place = self._table_place(n, vector, k)
-            linear = code.fma(code.load(base, place), code.shuffle(y, code.zero, lanes), linear)
-        base, place = self._table_place(n, vector, 0)
-        a = code.load(base, place)
+            linear = code.fma(self._over(n, vector, k), code.shuffle(y, code.zero, lanes), linear)
+        a = self._over(n, vector, 0)
         # two sums side by side, the signs in the factors
         first, second, third, fourth = ((self._gather(total, k), self._signed(a, k)) for k in range(4))
         one = code.fma(*second, code.fma(*first, linear))

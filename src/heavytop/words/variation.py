@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-from functools import lru_cache
-from threading import Lock
 from typing import Any
 
 import numpy
 from llvmlite import ir
 
-from heavytop.words.machine import DOUBLES, Doubles, Machine, compiled, doubles, pointer
+from heavytop.words.machine import DOUBLES, Doubles, Machine, compiled, doubles, once, pointer
 from heavytop.words.vector import DOUBLE, INT, LANES, POINTER, Code, function
-
-_making = Lock()
 
 
 def variation(slopes: Doubles) -> Doubles:
@@ -23,8 +19,7 @@ def variation(slopes: Doubles) -> Doubles:
     """
     orders, size, _ = slopes.shape
     width = _width(size)
-    with _making:
-        made = _machine(size)
+    made = _machine(size)
     given, found = doubles(slopes.size), doubles((orders + 1) * size * width)
     given[:] = slopes.ravel()
     table = found.reshape(orders + 1, size, width)
@@ -38,7 +33,7 @@ def _width(size: int) -> int:
     return -(-size // LANES) * LANES
 
 
-@lru_cache(maxsize=4)
+@once
 def _machine(size: int) -> Machine:
     """variation(slopes, powers, orders) for matrices of ``size`` rows."""
     module = ir.Module("variation")
