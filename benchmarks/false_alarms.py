@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from fractions import Fraction
 from multiprocessing import get_context
 
 import msgspec
 
 from heavytop.kinds import KINDS
-from heavytop.measure.scalar import of_fraction
-from heavytop.precision import exact
-from heavytop.records import SCHEMA, Report
+from heavytop.measure.scalar import UNRESOLVED, of_fraction
+from heavytop.precision import decimal_text, exact
+from heavytop.records import SCHEMA, Report, Series
 from heavytop.report.compare import compare
 from heavytop.report.comparison_text import headline
 from heavytop.report.names import row_name
@@ -55,6 +56,7 @@ PLAN = {
         },
     ],
 }
+_WORDS = ("nan", "missing", UNRESOLVED)
 FACTORS = ("2", "5", "10", "30", "100", "1000")
 
 
@@ -65,7 +67,7 @@ def report(seed: int, plan: Plan) -> Report:
 
 
 def spoiled(good: Report, factor: str) -> Report:
-    """Every error larger by ``factor``."""
+    """Every error larger by ``factor``, its series too: else the report contradicts itself."""
     rows = []
     for row in good.rows:
         metrics = dict(row.metrics)
@@ -73,8 +75,15 @@ def spoiled(good: Report, factor: str) -> Report:
             if metric.kind == "error" and metric.log10 is not None:
                 found = of_fraction(exact(metric.value) * exact(factor))
                 metrics[name] = msgspec.structs.replace(found, band=metric.band)
-        rows.append(msgspec.structs.replace(row, metrics=metrics))
+        series = {name: _larger(each, exact(factor)) for name, each in row.series.items()}
+        rows.append(msgspec.structs.replace(row, metrics=metrics, series=series))
     return Report(good.schema, good.plan, good.environment, rows)
+
+
+def _larger(series: Series, factor: Fraction) -> Series:
+    """The numbers of a series of errors, multiplied."""
+    values = [value if value in _WORDS else decimal_text(exact(value) * factor, 6) for value in series.values]
+    return msgspec.structs.replace(series, values=values)
 
 
 def main(reruns: int, plan: Plan) -> int:

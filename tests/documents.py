@@ -82,5 +82,5 @@ def run_shell(text: str, folder: Path, environment: dict[str, str]) -> subproces
     script = _EXIT_CODE.sub(r'code=0; \1 || code=$?; [ "$code" -eq \2 ]', text)
     return subprocess.run(
         ["bash", "-eu", "-o", "pipefail", "-c", script],
-        cwd=folder, env=environment, capture_output=True, text=True, timeout=240, check=False,
+        cwd=folder, env=environment, capture_output=True, text=True, timeout=600, check=False,
     )  # fmt: skip

@@ -14,14 +14,17 @@ from typer.testing import CliRunner
 
 import heavytop as ht
 from heavytop.cli import app
+from heavytop.errors import InputError
+from heavytop.integrate.taylor import propagate
 from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE
 from heavytop.report.score_page import score_page
-from heavytop.report.score_text import score_text
+from heavytop.report.score_text import guessed, score_text
 from heavytop.suite.cases import CASES
 from heavytop.suite.given import Given, of_arrays
 from heavytop.suite.plan import read
 from heavytop.suite.score import assess
+from heavytop.suite.trajectory_file import read as read_file
 
 CASE = CASES["lagrange"]
 TIMES = [Fraction(k) for k in range(1, 9)]
@@ -76,7 +79,7 @@ def test_there_is_no_sentence_about_heyoka_where_it_did_not_run(name: str, monke
 
 def test_without_a_reference_and_without_a_sample_no_digits_are_said() -> None:
     case = CASES["generic"]
-    found = assess(given(case, [Fraction(150)]))
+    found = assess(given(case, [Fraction(3000)]))
     assert (found.digits_right, found.peer, found.direction) == (None, None, None)
     assert printed(found)[0].startswith("How many digits are right is not known")
     lost = assess(given(spoilt=lambda i, state: [float("nan")] * 6))
@@ -118,7 +121,7 @@ def test_the_page_draws_both_parts_and_is_the_same_every_time() -> None:
     assert page == score_page(found, {"commit": "x"})
     assert page.count("<svg") >= 1
     assert "along the flow (phase)" in page
-    no_reference = assess(given(CASES["generic"], [Fraction(150)]))
+    no_reference = assess(given(CASES["generic"], [Fraction(3000)]))
     assert "Digits lost over time" not in score_page(no_reference, {})
 
 
@@ -165,3 +168,22 @@ def test_list_names_everything_once() -> None:
     assert {case["name"] for case in listed["cases"]} == set(CASES)
     with pytest.raises(ht.InputError, match="Unknown case"):
         command("list", "--case", "nothing")
+
+
+def test_numbers_of_single_precision_are_noticed(tmp_path: Path) -> None:
+    import numpy
+
+    case = CASES["lagrange"]
+    run = propagate(case.top, case.start, range(1, 6), DOUBLE)
+    off = (run.to_numpy() * (1 + 1e-5)).astype(numpy.float32).astype(float)
+    lines = ["t,omega1,omega2,omega3,gamma1,gamma2,gamma3"]
+    lines += [",".join(map(repr, [k + 1.0, *map(float, state)])) for k, state in enumerate(off)]
+    (tmp_path / "m.csv").write_text("\n".join(lines))
+    found = assess(read_file(tmp_path / "m.csv", case))
+    assert found.diagnoses == []
+    assert "single precision (24 bits)" in (guessed(found) or "")
+    decimal = "\n".join([lines[0], *(line.replace(".", ",") for line in lines[1:])])
+    (tmp_path / "comma.csv").write_text(decimal)
+    with pytest.raises(InputError) as caught:
+        read_file(tmp_path / "comma.csv", case)
+    assert caught.value.remedy == "Are these decimal commas? Separate the columns by semicolons."

@@ -167,6 +167,25 @@ def test_one_state_that_is_off_is_pointed_at() -> None:
     assert (told.kind, float(told.numbers["t"])) == ("one_state", float(times[4]))
 
 
+@pytest.mark.parametrize("row", [1, 3, 7])
+def test_a_row_that_is_missing_or_stands_twice_is_found(row: int) -> None:
+    top, start, times = problem(8)
+    times = [Fraction(k, 2) for k in range(1, 12)]
+    y = motion(top, start, HEAVY_TOP, times)
+    assert y is not None
+    (missing,) = found(top, start, times[:-1], np.delete(y, row, axis=0))
+    assert (missing.kind, float(missing.numbers["t"])) == ("row_missing", float(times[row]))
+    (twice,) = found(top, start, times, np.insert(y, row, y[row], axis=0)[:-1])
+    assert (twice.kind, float(twice.numbers["t"])) == ("row_twice", float(times[row + 1]))
+    assert diagnosis_text(twice).startswith(f"A row too many: from t = {twice.numbers['t']} on")
+
+
+def test_states_that_do_not_move_are_no_other_clock() -> None:
+    top, start, times = problem(8)
+    (told,) = found(top, start, times, np.tile([float(value) for value in start.flat], (len(times), 1)))
+    assert diagnosis_text(told) == "Every state is the same: nothing moves."
+
+
 @pytest.mark.parametrize(("digits", "kind"), [(5, "decimals"), (7, "significant"), (24, "single")])
 def test_rounded_states_are_told_where_rounding_is_the_error(digits: int, kind: str) -> None:
     top, start, times = problem(9)

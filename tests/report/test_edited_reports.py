@@ -237,6 +237,8 @@ def test_an_exponential_has_a_rate_and_no_power_has_one_to_compare_with_it() -> 
     power = Law("unresolved", 16, 0.05, -0.1, 0.52, "1", "1e3", None, "700", (-0.1, 0.1))
     for two in ((chaos, power), (power, chaos)):
         assert judge_law(*two)[0].value == "incomparable"
+    bending = replace(chaos, bend=(-0.1, 0.1))
+    assert judge_law(bending, bending)[0].value == "incomparable"
 
 
 KNOWN = Against("proven", "closed form: Euler", "6.02E-36", (Certified("100", 50, "validated"),))

@@ -12,12 +12,14 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
+from heavytop.measure.digits import RELATIVE
 from heavytop.records import SCHEMA, Law, Metric, Report, Series
 from heavytop.report import plots
+from heavytop.report.answers import digits_headline, laws_headline
 from heavytop.report.html import MOST_ROWS
 from heavytop.report.policy import Policy
 from heavytop.report.section import MOST_PLOTS, Section, points
-from heavytop.report.svg import decades, finish, new_axes
+from heavytop.report.svg import apart, decades, finish, new_axes
 from report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row, work
 from reports import compare, html, replace, store
 
@@ -267,6 +269,7 @@ def test_a_comparison_draws_both_and_lists_the_worst_first(pages: dict[str, Page
     assert "Not everything could be compared" not in text
     assert "Something is worse than in the baseline." in text
     table = text[text.index("worst first") :]
+    assert "3.0 digits lost" in table
     assert table.index("bits lost") < table.index("the baseline ended as time_limit")
 
 
@@ -332,3 +335,49 @@ def test_ticks_of_long_and_short_logarithmic_axes(low: float, high: float, words
     found = [tick.get_text() for tick in axes.get_xticklabels()]
     assert words <= set(found)
     assert len(set(found)) == len(found)
+
+
+def test_the_digits_of_an_integrator_stand_beside_those_of_heyoka() -> None:
+    mine = row(integrator="mine:rk", metrics={RELATIVE.text: error("1e-4")})
+    alone = row(case="far", horizon="9000", integrator="mine:rk", metrics={RELATIVE.text: error("1e-2")})
+    said = "mine:rk has 4.0 of 16 digits left at T = 1000 (euler in double), heyoka 10.0."
+    assert digits_headline([row(), mine, alone]) == ("", said)
+    assert digits_headline([row(horizon="10"), row()]) == (
+        "",
+        "heyoka has 10.0 of 16 digits left at T = 1000 (euler in double).",
+    )
+    only = {"solution_error_omega_max": error("1e-5"), "solution_error_gamma_max": error("1e-3")}
+    (_, least) = digits_headline([row(metrics=only)])
+    assert least == "heyoka has at least 3.0 of 16 digits left at T = 1000 (euler in double)."
+    assert digits_headline([row(outcome="time_limit")]) is None
+
+
+@pytest.mark.parametrize(
+    ("law", "said"), [("t", "All 1 planted faults are told. "), ("t^1.5", "0 of 1 planted faults are told. ")]
+)
+def test_whether_planted_faults_are_told_opens_the_page_of_growth(law: str, said: str) -> None:
+    healthy = row(measure="growth", starts=32)
+    faulty = row(measure="growth", starts=32, laws={"solution_error_along": Law(law, 32, 1.0, 0.9, 1.1)})
+    subject = replace(faulty.key.subject, bias="1e-12")
+    faulty = replace(faulty, key=replace(faulty.key, subject=subject))
+    _, found = laws_headline([healthy, faulty])
+    assert found == f"{said}errors along the flow grow like t^1.5."
+
+
+def test_one_chart_a_case_and_quantity_has_all_variants_with_their_laws() -> None:
+    healthy = row(measure="growth")
+    slow = replace(healthy, laws={"solution_error_along": Law("t^2", 32, 2.0, 1.9, 2.1)})
+    slow = replace(slow, key=replace(slow.key, subject=replace(slow.key.subject, tolerance="1e-9")))
+    section = section_of("growth", Report("", {}, {}, [healthy, slow]))
+    assert [picture.title.partition(":")[0] for picture in section.pictures] == ["euler"] * 3
+    assert all(f">{law}</text>" in section.pictures[1].svg for law in ("t^1.5 (1.50)", "t^2 (2.00)"))
+    assert list(section.legend) == ["double", "double, tolerance 1e-9", "fitted law"]
+
+
+@pytest.mark.parametrize("heights", [[0.0, 0.1, 0.2, 5.0], [9.9, 10.0, 10.0], [0.0] * 5, [3.0]])
+def test_names_beside_curves_are_apart_and_on_the_axes(heights: list[float]) -> None:
+    placed = apart(heights, 1.0, 0.0, 10.0)
+    assert all(b - a >= 1 - 1e-9 for a, b in pairwise(placed))
+    assert placed[0] >= 0
+    assert placed[-1] <= 10
+    assert apart([1.0, 3.0], 1.0, 0.0, 10.0) == [1.0, 3.0]

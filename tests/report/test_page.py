@@ -19,8 +19,8 @@ from heavytop.report.history_page import history_page
 from heavytop.report.policy import Policy
 from heavytop.report.score_page import score_page
 from heavytop.suite.cases import CASES
+from heavytop.suite.given import of_arrays
 from heavytop.suite.score import Assessment, assess
-from heavytop.suite.trajectory_file import of_arrays
 from report_helpers import HOSTILE, error, full_report
 from reports import compare, history, html, replace, store
 
@@ -132,7 +132,7 @@ def smoke(default: Report) -> Report:
 def gate(default: Report, growth: Report, peers: Report) -> Report:
     """An integrator of a user beside heyoka, as plan gate has it: drift, one ladder, growth."""
     drift = [each for each in default.rows if each.key.kind == "drift" and each.precision == "double"]
-    work = [each for each in peers.rows if each.case == "euler/T=1000" and each.key.subject.name == "heyoka"]
+    work = [each for each in peers.rows if each.case == "lagrange/T=1000" and each.key.subject.name == "heyoka"]
     rows = [*drift, *work, growth.rows[0]]
     theirs = [mine(each) for each in (drift[0], work[0], growth.rows[0])]
     return replace(default, plan={"name": "gate"}, rows=[*rows, *theirs])

@@ -28,6 +28,7 @@ _CONSTANT = 100.0
 """Integrals are constant but off if they are off by so many times what they vary by."""
 _OFF = 1e-3
 """... and by so much of what they may be."""
+_FEWEST_ROWS = 4
 _ALONE = 1000.0
 """A state is alone in being off if it is off by so many times as much as any other."""
 
@@ -76,9 +77,11 @@ def diagnose(
 
 def _mistake(given: Suspect, truth: Array | None, error: float) -> Diagnosis | None:
     """The simplest mistake among those that explain the states about as well as the best."""
+    if len(given.all_states) > 2 and not numpy.ptp(given.all_states, axis=0).any():
+        return Diagnosis("constant")
     explained = [each for each in _suppositions(given, truth) if each[2] * each[3] <= error]
     if not explained:
-        return _lone_state(given, error) or _integrals_off(given, error)
+        return _lone_state(given, error) or _lost_row(given) or _integrals_off(given, error)
     best = min(max(left, FLOOR) for *_, left, _ in explained)
     kind, numbers, left, _ = next(each for each in explained if each[2] <= ALIKE * best)
     return Diagnosis(kind, numbers, error, left)
@@ -142,6 +145,29 @@ def _lone_state(given: Suspect, error: float) -> Diagnosis | None:
     if not 0 < worst < len(errors) - 1 or left * _ALONE > errors[worst]:
         return None
     return Diagnosis("one_state", {"t": _text(every.times[worst], given.units.time)}, float(errors[worst]), left)
+
+
+def _lost_row(given: Suspect) -> Diagnosis | None:
+    """States that are right up to a time, and from there on those of the next sample, or of the one before."""
+    every = given.widened()
+    times = every.times
+    if len(times) < _FEWEST_ROWS:
+        return None
+    ends = {"row_missing": [*times[1:], 2 * times[-1] - times[-2]], "row_twice": [Fraction(0), *times[:-1]]}
+    found = [(kind, every.supposed(moved)) for kind, moved in ends.items()]
+    truth = every.supposed(times)
+    if truth is None:
+        return None
+    own = every.errors(truth)
+    for kind, moved_truth in found:
+        if moved_truth is None:
+            continue
+        moved = every.errors(moved_truth)
+        left = [max(own[:row].max(), moved[row:].max()) for row in range(1, len(times) - 1)]
+        row = int(numpy.argmin(left))
+        if left[row] * _ALONE <= own.max():
+            return Diagnosis(kind, {"t": _text(times[row + 1], given.units.time)}, float(own.max()), float(left[row]))
+    return None
 
 
 def _integrals_off(given: Suspect, error: float) -> Diagnosis | None:

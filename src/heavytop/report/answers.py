@@ -60,7 +60,8 @@ def fastest(rows: Sequence[Row]) -> tuple[str, str] | None:
         won = [(lead, 1 / ratio) for lead, ratio in found if ratio < 1]
         names = Counter(lead.peer for lead, _ in won)
         ratios, others = [ratio for _, ratio in won], Counter(lead.name for lead, _ in won)
-    where = f"all {len(found)} motions" if len(won) == len(found) else f"{len(won)} of {len(found)} motions"
+    where = f"{len(won)} of {len(found)} motions" if len(won) < len(found) else f"all {len(found)} motions"
+    where = clip(found[0][0].case, 40) if len(found) == 1 else where
     low, high = (f"{pick(ratios):.1f}" for pick in (min, max))
     times = low if low == high else f"{low} to {high}"
     (name, _), (other, _) = names.most_common(1)[0], others.most_common(1)[0]
@@ -85,7 +86,11 @@ def _followed(rows: Sequence[Row], drifts: bool) -> str:
     laws = Counter(growth for row in rows for growth in {law.growth for law in _laws(row, drifts)})
     of = sum(bool(_laws(row, drifts)) for row in rows)
     what = "First integrals drift like" if drifts else "errors along the flow grow like"
-    return f"{what} " + ", ".join(f"{name} ({n} of {of} ensembles)" for name, n in laws.most_common()) if laws else ""
+    return (
+        f"{what} " + ", ".join(f"{name} ({n} of {of} ensembles)" if of > 1 else name for name, n in laws.most_common())
+        if laws
+        else ""
+    )
 
 
 def _laws(row: Row, drifts: bool) -> list[Law]:

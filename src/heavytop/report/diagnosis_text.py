@@ -36,6 +36,8 @@ def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
     said = _said(found, system)
     if found.left is None or found.error is None:
         return said
+    if found.kind == "one_state":
+        return f"{said}; without it the largest error relative to the size of Ω and γ is {_size(found.left)}."
     fall = f"the largest error relative to the size of Ω and γ falls from {_size(found.error)} to {_size(found.left)}"
     return f"{said}; {fall}."
 
@@ -73,7 +75,13 @@ def _said(found: Diagnosis, system: str) -> str:
         case "top":
             return f"The states fit another top: {named}"
         case "one_state":
-            return f"Only the state at t = {numbers['t']} is off; without it"
+            return f"Only the state at t = {numbers['t']} is off"
+        case "row_missing":
+            return f"A row is missing: from t = {numbers['t']} on, the states are those of the next times"
+        case "row_twice":
+            return f"A row too many: from t = {numbers['t']} on, the states are those of the times before"
+        case "constant":
+            return "Every state is the same: nothing moves."
         case "rounded":
             return _rounded(numbers)
     return _integrals_off(numbers)

@@ -34,11 +34,12 @@ _GREY = 5
 _FITTED = Key("fitted law", _GREY, "", "6 3")
 
 
-def variant(row: Row) -> str:
-    """The integrator and what is asked of it; "" for heyoka as it is."""
+def variant(row: Row, sources: Sources) -> str:
+    """The integrator and what is asked of it; "" for heyoka.  Many starts are named where single ones are too."""
     subject = row.key.subject
     name = "" if subject.name == HEYOKA else subject.name
-    return " ".join(part for part in (name, subject.variant) if part)
+    mixed = row.starts > 1 and any(other.starts == 1 for _, report in sources for other in report.rows)
+    return " ".join(part for part in (name, subject.variant, "many starts" if mixed else "") if part)
 
 
 def digits_lost(row: Row) -> float | None:
@@ -53,7 +54,7 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     for source, report in sources:
         for row in report.rows:
             if RELATIVE.text in row.metrics:
-                lanes.setdefault((row.case, variant(row)), []).append((source, row))
+                lanes.setdefault((row.case, variant(row, sources)), []).append((source, row))
     if not lanes:
         return None
     section = Section(
@@ -177,7 +178,9 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     for source, report in sources:
         for row in report.rows:
             if row.bits and any(column.of(row) for column in _COLUMNS):
-                label = _with(", ".join(part for part in (clip(row.precision, 20), variant(row)) if part), source)
+                label = _with(
+                    ", ".join(part for part in (clip(row.precision, 20), variant(row, sources)) if part), source
+                )
                 key = keys.setdefault(label, numbered(label, len(keys), source == "baseline"))
                 cases.setdefault(row.case, []).append((key, row))
     if not cases:

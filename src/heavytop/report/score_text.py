@@ -36,7 +36,7 @@ def answer(found: Assessment) -> list[str]:
     if digits is None:
         return [*lines, _without_digits(row)]
     where = "every sample up to" if row.samples > 1 else "its one sample,"
-    said = f"{digits_text(digits)} of {found.of_digits} digits right at {where} T = {row.time_reached}"
+    said = f"{digits_text(digits)} of {found.of_digits} digits right at {where} T = {short(row.time_reached)}"
     if found.peer is not None:
         said += f"; {found.peer.integrator} in {found.peer.precision} keeps {digits_text(found.peer.digits_right)}"
     lines.append(f"{said}.")
@@ -55,7 +55,9 @@ def guessed(found: Assessment) -> str | None:
     """That the format was not named, and what it was taken for."""
     if not found.format_guessed:
         return None
-    return f"No format is named; {found.row.precision} is the narrowest that holds the digits written."
+    said = f"No format is named; {found.row.precision} is the narrowest that holds the digits written."
+    single = " Every number in the states is one of single precision (24 bits): perhaps they were computed in it."
+    return said + (single if found.single else "")
 
 
 def told(found: Assessment) -> list[str]:

@@ -17,6 +17,7 @@ from heavytop.measure.digits import RELATIVE, digits_kept, digits_of
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
 from heavytop.measure.truth import truth
+from heavytop.measure.written import rounding
 from heavytop.precision import DOUBLE_DOUBLE, exact, round_to
 from heavytop.records import Against, Metric, Row, RowKey, Subject
 from heavytop.suite.cases import Case
@@ -49,13 +50,14 @@ class Assessment:
 
     row: what was measured.  peer: heyoka's run; None without a reference, and where heyoka does not get there.
     diagnoses: what explains the error; empty where nothing does.  format_guessed: whether the format is not named in
-    the file, but read off the digits written.
+    the file, but read off the digits written.  single: whether every number of the states is one of single precision.
     """
 
     row: Row
     peer: Peer | None
     diagnoses: list[Diagnosis]
     format_guessed: bool = False
+    single: bool = False
 
     @property
     def digits_right(self) -> float | None:
@@ -107,7 +109,9 @@ def assess(given: Given, progress: Progress = lambda: None) -> Assessment:
     states = _finite(given)
     times = given.times[: len(states)]
     diagnoses = diagnose(given.top, given.start, given.system, times, states, given.precision, _size(row))
-    return Assessment(row, _peer(given, scorer, len(states), progress), diagnoses, given.format_guessed)
+    written = rounding(states, given.precision)
+    single = written is not None and written.kind == "single"
+    return Assessment(row, _peer(given, scorer, len(states), progress), diagnoses, given.format_guessed, single)
 
 
 def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Scorer]:

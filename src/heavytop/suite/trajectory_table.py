@@ -133,7 +133,9 @@ def _in_order(body: list[str], separator: str | None, places: list[int], width: 
     for index, line in enumerate(body, 1):
         cells = _cells(line, separator)
         if len(cells) != width:
-            raise InputError(f"Row {index} has {len(cells)} columns, not {width}.", REMEDY)
+            decimal_commas = separator == "," and len(cells) == 2 * width
+            remedy = "Are these decimal commas? Separate the columns by semicolons." if decimal_commas else REMEDY
+            raise InputError(f"Row {index} has {len(cells)} columns, not {width}.", remedy)
         # where a semicolon separates, a comma is the point of a decimal
         rows.append([cells[place].replace(",", ".") if separator == ";" else cells[place] for place in places])
     return rows
