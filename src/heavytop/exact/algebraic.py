@@ -11,7 +11,7 @@ farther.  :meth:`AlgebraicMotion.departure` encloses how far the two motions are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -87,12 +87,8 @@ class AlgebraicMotion(WithBearing):
         return [*motion[:3], *(component / size for component in motion[3:])]
 
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.azimuth.WithBearing`."""
+        """See :class:`heavytop.exact.azimuth.WithBearing`: of M, and of what M/x tends to in Chaplygin's at rest."""
         return _motion(self, current_precision()).bearing(_azimuth(self, current_precision()), ball(time))
-
-    def initial(self, began: Bearing) -> Sequence[arb]:
-        """Along the level part of M; of Chaplygin's motion at rest, of what M/x tends to."""
-        return began.along
 
     def rounded(self, bits: int = _ROUNDED_BITS) -> tuple[HeavyTop, State]:
         """A top of weight 1 and a start, exact, within 2^(3 − bits) of this one's, relative to sizes above 1; |γ| = 1.

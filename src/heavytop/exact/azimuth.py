@@ -3,7 +3,7 @@
 Let h be the level part of a vector that the motion knows, and Λ its azimuth in space about γ.  Where Λ' = f(v) with a
 rational f of the variable v, Λ is an Abel integral over its phase: a polynomial over √g times the denominator of f,
 which counts as roots of multiplicity two (:mod:`heavytop.exact.gaps`).  It grows by a fixed angle with every turn.
-A vector ξ ⟂ γ fixed in space then stands at the angle δ − Λ from h, δ its angle at t = 0 (:class:`WithBearing`).
+The vector that is along h at t = 0 and fixed in space then stands at the angle Λ(0) − Λ from h (:class:`WithBearing`).
 """
 
 from __future__ import annotations
@@ -53,12 +53,10 @@ class Bearing:
         along = [v / length for v in level]
         return cls(tuple(along), cross([g / square.sqrt() for g in gamma], along), azimuth)
 
-    def carried(self, began: Bearing, xi: Sequence[arb]) -> list[arb]:
-        """The body components here of a level vector fixed in space that has the components ``xi`` at ``began``."""
-        cosine, sine = dot(xi, began.along), dot(xi, began.across)
-        turned_sine, turned_cosine = (self.azimuth - began.azimuth).sin_cos()
-        first, second = cosine * turned_cosine + sine * turned_sine, sine * turned_cosine - cosine * turned_sine
-        return [first * a + second * b for a, b in zip(self.along, self.across, strict=True)]
+    def carried(self, azimuth: arb) -> list[arb]:
+        """The body components here of the unit vector fixed in space that h had when Λ was ``azimuth``."""
+        sine, cosine = (self.azimuth - azimuth).sin_cos()
+        return [cosine * a - sine * b for a, b in zip(self.along, self.across, strict=True)]
 
 
 class WithBearing(Evaluated):
@@ -76,23 +74,19 @@ class WithBearing(Evaluated):
         Raises Undecided where that does not suffice, OutOfReach where the azimuth is not known.
         """
 
-    @abstractmethod
-    def initial(self, began: Bearing) -> Sequence[arb]:
-        """ξ at t = 0."""
-
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 :meth:`initial`.
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 along the level part of
+        that vector.
 
         Raises OutOfReach where it is not known.
         """
 
         def evaluate(working: int) -> list[arb]:
-            began = _began(self, working)
-            return self.bearing(time).carried(began, self.initial(began))
+            return self.bearing(time).carried(_began(self, working))
 
         return to_bits(evaluate, bits, self.own_time(time))
 
 
 @kept
-def _began(case: WithBearing, _bits: int) -> Bearing:
-    return case.bearing(Fraction(0))
+def _began(case: WithBearing, _bits: int) -> arb:
+    return case.bearing(Fraction(0)).azimuth

@@ -29,7 +29,7 @@ from heavytop.exact.gaps import distance_of_others
 from heavytop.exact.goryachev_chaplygin_abel import Motion
 from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude
 from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, roots, separated_start
-from heavytop.exact.motion import initial_xi, kept
+from heavytop.exact.motion import kept
 from heavytop.exact.separated import REMEDY, decide, refuse, require_plane_centre
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
@@ -69,10 +69,6 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
     def bearing(self, time: Fraction) -> Bearing:
         """See :class:`heavytop.exact.azimuth.WithBearing`: not for asymptotic motions, nor to very many digits."""
         return _attitude(self, current_precision()).bearing(time)
-
-    def initial(self, began: Bearing) -> list[arb]:
-        """:func:`initial_xi` of γ."""
-        return initial_xi(self.start.gamma)
 
 
 @kept

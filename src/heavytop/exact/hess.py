@@ -39,7 +39,7 @@ from heavytop.exact.flint_context import current_length, current_precision, whol
 from heavytop.exact.gaps import Gap, Roots
 from heavytop.exact.hess_level import Level, require_hess
 from heavytop.exact.hess_transfer import System2, Transfer
-from heavytop.exact.motion import initial_xi, kept
+from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import in_units
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
@@ -86,10 +86,6 @@ class Hess(WithBearing, ClosedForm):
         """See :class:`heavytop.exact.azimuth.WithBearing`."""
         motion = _motion(self, current_precision())
         return motion.bearing(_azimuth(self, current_precision()), ball(motion.level.rate * time))
-
-    def initial(self, began: Bearing) -> list[arb]:
-        """:func:`initial_xi` of γ."""
-        return initial_xi(self.start.gamma)
 
 
 @kept

@@ -39,7 +39,7 @@ from heavytop.exact.kovalevskaya_attitude import KovalevskayaAttitude
 from heavytop.exact.kovalevskaya_gaps import Interval, intervals, ordered, pole
 from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
-from heavytop.exact.motion import initial_xi, kept
+from heavytop.exact.motion import kept
 from heavytop.exact.separated import REMEDY, decide, refuse, require_plane_centre
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
@@ -80,10 +80,6 @@ class Kovalevskaya(WithBearing, ClosedForm):
     def bearing(self, time: Fraction) -> Bearing:
         """See :class:`heavytop.exact.azimuth.WithBearing`: not where a variable rests, nor very near M·γ = 0."""
         return _attitude(self, current_precision()).bearing(time)
-
-    def initial(self, began: Bearing) -> list[arb]:
-        """:func:`initial_xi` of γ."""
-        return initial_xi(self.start.gamma)
 
     def exponent(self, bits: int) -> arb:
         """The rate λ of an asymptotic motion, > 0: its distance from the motion that it tends to goes like e^(−λ|t|).

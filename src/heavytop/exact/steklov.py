@@ -18,14 +18,12 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from flint import arb
-
 from heavytop.errors import InputError, LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
 from heavytop.exact.balls import Undecided, ball, working_precision
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_precision, whole_evaluation
-from heavytop.exact.motion import initial_xi, kept
+from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import Curve, OneGapMotion, in_units, value
 from heavytop.exact.reduced import polynomial
 from heavytop.exact.scales import unit_of_time
@@ -79,10 +77,6 @@ class Steklov(WithBearing, ClosedForm):
         """See :class:`heavytop.exact.azimuth.WithBearing`."""
         rate, _ = _units(self.top, self.start)
         return _motion(self, current_precision()).bearing(_azimuth(self, current_precision()), ball(rate * time))
-
-    def initial(self, began: Bearing) -> list[arb]:
-        """:func:`initial_xi` of γ."""
-        return initial_xi(self.start.gamma)
 
 
 @kept
