@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 
+from heavytop.measure.computed_reference import seconds_a_step as words_seconds
 from heavytop.measure.integrator import HEYOKA, Integrator
 from heavytop.measure.rounding_noise import reroll
 from heavytop.precision import Precision, parse
@@ -77,8 +78,9 @@ class Task:
 
     @property
     def run_seconds(self) -> float:
-        """Seconds that heyoka takes for such a motion, roughly."""
-        return float(abs(self.times[-1])) * 4 * seconds_a_step(self.precision.bits) + len(self.times) * 1e-4
+        """Seconds that words, or heyoka for all others, take for such a motion, roughly."""
+        step = (words_seconds if self.key.subject.name == "words" else seconds_a_step)(self.precision.bits)
+        return float(abs(self.times[-1])) * 4 * step + len(self.times) * 1e-4
 
 
 def computed(name: str, **setting: Any) -> Subject:
