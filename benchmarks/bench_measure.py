@@ -13,7 +13,9 @@ from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.drift import Drift
 from heavytop.measure.solution_error import SolutionError
+from heavytop.measure.truth import Truth
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
+from heavytop.records import Against
 from heavytop.suite.cases import CASES
 from heavytop.top.integrals import holding
 
@@ -32,7 +34,9 @@ def test_drift_of_one_state(benchmark, precision) -> None:
 @pytest.mark.parametrize("precision", FORMATS, ids=lambda p: p.name)
 def test_solution_error_of_one_state(benchmark, precision) -> None:
     known = DeloneHomoclinic(Fraction(5, 4), Fraction(3))
-    error = SolutionError(Problem.of(known.top, known.start, precision), known)
+    error = SolutionError(
+        Problem.of(known.top, known.start, precision), Truth(Against("proven", known.method), known.state)
+    )
     state = propagate(known.top, known.start, [3], precision).states[0]
     benchmark(error, Fraction(3), state)
     benchmark.extra_info["error_of_omega"] = error.metrics()["solution_error_omega_final"].value

@@ -221,17 +221,24 @@ def round_to(value: Fraction, bits: int) -> Fraction:
     if value == 0:
         return value
     significand, exponent = _significand(value, bits)
-    return significand * Fraction(2) ** exponent
+    return Fraction(significand << exponent) if exponent >= 0 else Fraction(significand, 1 << -exponent)
 
 
 def _significand(value: Fraction, bits: int) -> tuple[int, int]:
     """Integers (m, e) with m 2^e the nearest to ``value`` that has ``bits`` bits."""
     exponent = value.numerator.bit_length() - value.denominator.bit_length() - bits
-    significand = round(value / Fraction(2) ** exponent)
+    significand = _nearest(value, exponent)
     if abs(significand) >= 1 << bits:
         exponent += 1
-        significand = round(value / Fraction(2) ** exponent)
+        significand = _nearest(value, exponent)
     return significand, exponent
+
+
+def _nearest(value: Fraction, exponent: int) -> int:
+    """value/2^exponent rounded to the nearest integer, ties to even."""
+    above, below = value.numerator << max(0, -exponent), value.denominator << max(0, exponent)
+    whole, rest = divmod(above, below)
+    return whole + (2 * rest > below or (2 * rest == below and whole % 2))
 
 
 def number(value: Fraction, precision: Precision) -> Any:

@@ -12,7 +12,9 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.measure.drift import Drift
 from heavytop.measure.scalar import metric, of_fraction, text, to_ball
 from heavytop.measure.solution_error import SolutionError, root, split
+from heavytop.measure.truth import Truth
 from heavytop.precision import DOUBLE, QUAD, exact, number, real
+from heavytop.records import Against
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import holding
 
@@ -72,11 +74,15 @@ def test_a_nan_is_never_a_number() -> None:
     assert drift.metrics()["drift_energy_rms"].value == "nan"
 
 
+def true(known: DeloneHomoclinic) -> Truth:
+    return Truth(Against("proven", known.method), known.state)
+
+
 def test_solution_error_of_a_run_started_on_a_known_motion() -> None:
     known = DeloneHomoclinic(Fraction(5, 4), Fraction(3))
     for precision in (DOUBLE, QUAD, real(237)):
         problem = Problem.of(known.top, known.start, precision)
-        error = SolutionError(problem, known, threshold=Fraction(1, 1000))
+        error = SolutionError(problem, true(known), threshold=Fraction(1, 1000))
         propagate(known.top, known.start, [1, 2, 3, 4], precision, observer=error)
         values = {k: exact(m.value) for k, m in error.metrics().items()}
         assert 0 < values["solution_error_omega_max"] < 2000 * precision.eps
@@ -87,7 +93,7 @@ def test_a_perturbed_start_is_charged_to_the_solution_error_with_its_size() -> N
     known = DeloneHomoclinic(Fraction(1), Fraction(2))
     off = Fraction(1, 2**30)
     moved = State((known.start.omega[0] + off, *known.start.omega[1:]), known.start.gamma)
-    error = SolutionError(Problem.of(known.top, known.start, QUAD), known)
+    error = SolutionError(Problem.of(known.top, known.start, QUAD), true(known))
     propagate(known.top, moved, ["1/1000"], QUAD, observer=error)
     assert exact(error.metrics()["solution_error_omega_max"].value) == pytest.approx(off, rel=1e-2)
 

@@ -8,12 +8,20 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from fractions import Fraction
+from io import StringIO
 from multiprocessing import active_children
 from pathlib import Path
 
+import msgspec
 import pytest
+from rich.console import Console
 
 from heavytop.errors import HeavyTopError, InputError
+from heavytop.kinds import KINDS
+from heavytop.measure.digits import digits_kept
+from heavytop.records import Row
+from heavytop.report.consistency import contradictions
 from heavytop.suite import workers
 from heavytop.suite.task import Task
 from reports import expand, load, rows
@@ -53,6 +61,45 @@ def measured(tasks, processes: int, scheduler: str | None = None, after_first: C
     return [found[index] for index in range(len(tasks))]
 
 
+TRUTHS = """name = "truths"
+[[measure]]
+kind = "drift"
+cases = ["generic"]
+runs = [
+    { precision = "double", horizon = "30", samples = 6 },
+    { precision = "double", horizon = "180", samples = 6 },
+    { precision = "double", horizon = "4000", samples = 40 },
+]
+[[measure]]
+kind = "growth"
+cases = ["generic"]
+runs = [{ precision = "double", horizon = "20", starts = 3, samples = 4 }]
+"""
+
+
+def test_every_kind_of_truth_is_the_same_in_one_process_and_in_two(tmp_path: Path) -> None:
+    tasks = tasks_of(tmp_path, TRUTHS)
+    found = [measured(tasks, processes) for processes in (1, 2)]
+    # as reports are written: from rows that were read again
+    one, two = (msgspec.json.decode(msgspec.json.encode(each), type=list[Row]) for each in found)
+    assert msgspec.json.encode(one) == msgspec.json.encode(two)
+    proven, far, lost, many = one
+    assert [row.reference.how for row in (proven, far, lost, many)] == ["proven", "proven", "computed", "computed"]
+    assert [bool(row.reference.until) for row in (proven, far, lost, many)] == [False, False, True, False]
+    for row in (proven, far, many):
+        assert digits_kept(row) > 3
+    # the row names the time, scores what is before it, and keeps no digit
+    ends = Fraction(lost.reference.until)
+    assert 200 <= ends <= 600
+    assert all(Fraction(time) < ends for time in lost.series["solution_error_along"].times)
+    assert Fraction(lost.series["drift_energy"].times[-1]) == 4000
+    assert lost.finite
+    assert digits_kept(lost) == 0
+    assert list(contradictions(lost, KINDS["drift"])) == []
+    for surface in (summary_of([lost]), "\n".join(KINDS["drift"].brief([lost]))):
+        assert str(ends) in surface
+
+
 class Poison:
     """Ends the process that reads it."""
 
@@ -60,6 +107,12 @@ class Poison:
 
     def __reduce__(self):
         return os._exit, (9,)
+
+
+def summary_of(found: list[Row]) -> str:
+    console = Console(width=200, file=StringIO())
+    console.print(*KINDS["drift"].summary(found))
+    return console.file.getvalue()
 
 
 def poisoned(tasks) -> list[Task]:

@@ -44,7 +44,8 @@ _KEPT_NODES = 512
 _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
 _FAR = Fraction(10**12)
-_HOPELESS = 100
+_TRIED = 100
+_HOPELESS = 8
 
 
 @dataclass(slots=True)
@@ -130,14 +131,15 @@ class Pilot:
     def forecast(self, span: Fraction, effort: float) -> tuple[float, float]:
         """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go.
 
-        The pilot is given up early where a hundred times ``effort`` seconds of the model of the cost would not do.
+        The pilot is given up after a hundred steps where eight times ``effort`` seconds of the model of the cost would
+        not do.
         """
         node, known, bits = self.ahead
         times, losses = list(known), list(bits)
         a_step = _seconds_a_step(self.precision, self.carrier is not None)
         while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
             forecast = len(times) * _times_as_far(span, times[-1]) * a_step if times else 0.0
-            if len(times) >= _HOPELESS and forecast > _HOPELESS * effort:
+            if len(times) >= _TRIED and forecast > _HOPELESS * effort:
                 break
             found = step(self.motion, node, self.precision, self.carrier)
             if found is None:

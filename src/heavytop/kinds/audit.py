@@ -8,7 +8,8 @@ from typing import Literal
 from rich.console import RenderableType
 from rich.text import Text
 
-from heavytop.claims.audit import audit as audit_of
+from heavytop.claims.audit import find_claim
+from heavytop.claims.judge import judge
 from heavytop.kinds.base import Kind
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.records import Against, Metric, Quantity, Row, RowKey, Subject, by_name
@@ -20,7 +21,7 @@ from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import exact_row
 from heavytop.suite.task import Task
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
 
 NAME = "audit"
 _SMOOTH = "smooth"
@@ -52,14 +53,14 @@ class Audit(Kind):
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """Of the branches of a claim about the gyrostat the smooth one alone, which the formulas solve."""
-        report = audit_of(task.key.case, task.key.system)
+        claim, about = find_claim(task.key.case), system(task.key.system)
+        asked = [each for each in claim.statements(about) if about is HEAVY_TOP or each.branch == _SMOOTH]
         metrics = {
             Quantity(f"({row.equation})", str(row.component), "", row.branch, row.domain): _value(row.holds)
-            for row in report.rows
-            if row.branch == _SMOOTH or report.system == HEAVY_TOP.name
+            for row in judge(asked, claim.setting)
         }
         against = Against("equations", f"the equations of {task.key.system}")
-        return exact_row(task, f"claimed: {report.source}", against, by_name(metrics))
+        return exact_row(task, f"claimed: {claim.source}", against, by_name(metrics))
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line for each claim and system."""

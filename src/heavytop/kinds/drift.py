@@ -102,7 +102,7 @@ class Drift(Kind):
         assert task.case is not None
         plain = Problem.of(task.case.top, case.start, DOUBLE, case.system)
         reruns = Reruns(plain, task.integrator, task.seed)
-        metrics = reruns.drift_bands(run, task.times[-1], scorer.metrics(), scorer.error is not None)
+        metrics = reruns.drift_bands(run, task.times[-1], scorer.metrics(), scorer.truth)
         return computed_row(task, run, metrics, scorer.series(time_text), scorer.against)
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:

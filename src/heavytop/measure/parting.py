@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, lru_cache
 
 from flint import arb
 
@@ -40,6 +40,7 @@ _EFFORT = 20.0
 """Seconds that a validated truth may cost."""
 
 
+@lru_cache(maxsize=4)
 def true_solution(case: PartialCase) -> DeloneHomoclinic | Validated:
     """The heavy-top motion from the claim's own data at t = 0: in closed form for I1 = 2 I3, else enclosed."""
     if case.i1 == 2 * case.i3:

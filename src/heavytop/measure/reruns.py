@@ -21,7 +21,7 @@ from heavytop.precision import DOUBLE, exact, number, round_to
 from heavytop.records import Metric
 from heavytop.top.equations import GYROSTAT
 
-_STEPS = 500_000
+_STEPS = 20_000
 """A longer run is rerun over about its first so many steps only."""
 _STEPS_SINGLY = 2000
 """The same for an integrator that takes one motion at a time."""
@@ -46,18 +46,20 @@ class Reruns:
         """Whether the integrator can be given the same motion with other roundings."""
         return self.problem.system is not GYROSTAT or self.integrator.takes_many
 
-    def drift_bands(self, run: Trajectory, horizon: Fraction, metrics: Metrics, known: bool) -> Metrics:
+    def drift_bands(self, run: Trajectory, horizon: Fraction, metrics: Metrics, true: Truth | str) -> Metrics:
         """``metrics`` of a run with their bands; as they are where it failed, or cannot be computed again.
 
-        known: whether the distance from the true motion is among them.
+        true: what its states were compared with, or why with nothing.
         """
         if run.outcome is not Outcome.SUCCESS or not self.possible:
             return metrics
         most = _STEPS if self.integrator.takes_many else _STEPS_SINGLY
         end = horizon if run.steps <= most else horizon * most / run.steps
+        if not isinstance(true, str) and not true.covers(end):
+            end = true.ends or end
         times = [exact(number(end * i / _SAMPLES, DOUBLE)) for i in range(1, _SAMPLES + 1)]
         problem = _short(self.problem)
-        truth: Truth | str = uncertified(problem, times) if known else "not asked for"
+        truth: Truth | str = true if isinstance(true, str) else uncertified(problem, times)
         reruns = self._of(problem, times, lambda given: Scorer(given, truth))
         return _banded(run, metrics, [scorer.metrics() for scorer in reruns])
 

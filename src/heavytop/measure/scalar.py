@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
@@ -27,6 +28,16 @@ def to_ball(value: Any) -> arb:
         return ball(exact(value))
     except InputError:
         return arb("nan")
+
+
+def exactly(value: Any) -> Any:
+    """A native number as one that :func:`to_ball` takes at once: a float or a fraction, NaN for what is not finite."""
+    if isinstance(value, float):
+        return value
+    try:
+        return exact(value)
+    except InputError:
+        return math.nan
 
 
 def resolved(value: arb) -> bool:

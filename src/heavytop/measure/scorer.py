@@ -9,6 +9,7 @@ from typing import Any
 
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.drift import Drift, Running
+from heavytop.measure.scalar import exactly
 from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
 from heavytop.measure.truth import Truth
 from heavytop.records import Against, Metric, Quantity, Series
@@ -43,6 +44,7 @@ class Scorer:
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
         """Take in one native state."""
+        state = [exactly(value) for value in state]  # once for both
         self.drift(time, state)
         if self.error is not None:
             self.error(time, state)
