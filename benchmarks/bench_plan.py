@@ -33,7 +33,6 @@ PARTS = {
     ),
     "truth": (
         "measure.truth:certified",
-        "measure.truth:Truth.evaluated",
         "kinds.homoclinic:certified",
         "kinds.claim_model:true_motion",
         "kinds.drift:truth",

@@ -30,10 +30,10 @@ from typing import Any
 
 from flint import acb, arb, arb_mat, arb_series
 
-from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
+from heavytop.errors import LevelNotDone, NotInClass
 from heavytop.exact.abel import Inversion
 from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
-from heavytop.exact.balls import Undecided, ball, working_precision
+from heavytop.exact.balls import Undecided, ball
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
 from heavytop.exact.gaps import Gap, Roots
@@ -41,12 +41,12 @@ from heavytop.exact.hess_level import Level, require_hess
 from heavytop.exact.hess_transfer import System2, Transfer
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import in_units
+from heavytop.exact.separated import REMEDY, decide
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
-_TRIALS = 256, 1024, 4096
+_LEAST = 256
 _MOST_TERMS = 1 << 14
-_REMEDY = "The validated enclosure holds for every motion."
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class Hess(WithBearing, ClosedForm):
             raise NotInClass("M·gamma = 0: the motion is elementary.", "Use HessPendulum.")
         cubic = level.cubic()
         if cubic.gcd(cubic.derivative()).degree() > 0:
-            raise LevelNotDone("The level is degenerate: P r·gamma rests at a double root.", _REMEDY)
+            raise LevelNotDone("The level is degenerate: P r·gamma rests at a double root.", REMEDY)
         _require_reach(level)
 
     def own_time(self, time: Fraction) -> Fraction:
@@ -100,17 +100,8 @@ def _motion(case: Hess, _bits: int) -> HessMotion:
 
 @whole_evaluation
 def _require_reach(level: Level) -> None:
-    """Raises NotInClass where the Fourier series of the elliptic integral is too long."""
-    for bits in _TRIALS:
-        with working_precision(bits):
-            try:
-                level.gap(_MOST_TERMS)
-            except Undecided:
-                continue
-            except OutOfReach as error:
-                raise LevelNotDone(f"The level is all but degenerate: {error.cause}", _REMEDY) from error
-            return
-    raise LevelNotDone("The level is all but degenerate: two roots of the cubic are not told apart.", _REMEDY)
+    """Raises LevelNotDone where the Fourier series of the elliptic integral is too long."""
+    decide(lambda: level.gap(_MOST_TERMS), "The level is all but degenerate", _LEAST)
 
 
 @dataclass(frozen=True, slots=True)

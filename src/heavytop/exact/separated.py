@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from flint import arb, arb_series
 
-from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.abel import Inversion, Variable
 from heavytop.exact.asymptotic import Approach
 from heavytop.exact.balls import Undecided, working_precision
@@ -42,18 +42,25 @@ def require_plane_centre(name: str, ratio: int, top: HeavyTop, start: State) -> 
         raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
 
 
-def decide(test: Callable[[], None]) -> None:
-    """``test`` at the first working precision that suffices for it.  Raises LevelNotDone where none does."""
+def decide(
+    test: Callable[[], object], name: str = "The level is degenerate but for less than about 1e-300", least: int = 64
+) -> None:
+    """``test`` at the first working precision that suffices for it, ``least`` bits or more.
+
+    Raises LevelNotDone where none does, and where the test raises OutOfReach.
+    """
     for bits in _DECISIONS:
+        if bits < least:
+            continue
         with working_precision(bits):
             try:
                 test()
             except Undecided:
                 continue
+            except OutOfReach as error:
+                raise LevelNotDone(f"{name}: {error.cause}", REMEDY) from error
         return
-    raise LevelNotDone(
-        f"The level is degenerate but for less than about 1e-300: {_DECISIONS[-1]} bits do not tell.", REMEDY
-    )
+    raise LevelNotDone(f"{name}: {_DECISIONS[-1]} bits do not tell them apart.", REMEDY)
 
 
 def refuse(name: str, apart: arb, of: str) -> NoReturn:

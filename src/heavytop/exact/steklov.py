@@ -18,23 +18,23 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from heavytop.errors import InputError, LevelNotDone, NotInClass, OutOfReach
+from heavytop.errors import InputError, NotInClass
 from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
-from heavytop.exact.balls import Undecided, ball, working_precision
+from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_precision, whole_evaluation
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import Curve, OneGapMotion, in_units, value
 from heavytop.exact.reduced import polynomial
 from heavytop.exact.scales import unit_of_time
+from heavytop.exact.separated import decide
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
-_TRIALS = 256, 1024, 4096
+_LEAST = 256
 _TERMS_A_BIT = 64
 """How long the Fourier series may be at a working precision: 2^14 terms at 256 bits."""
-_LEFT = "The validated enclosure holds for every motion."
 _REMEDY = "`steklov_motion` builds a top with such a motion."
 
 
@@ -89,24 +89,14 @@ def _motion(case: Steklov, bits: int) -> OneGapMotion:
     rate, _ = _units(case.top, case.start)
     p, q, r = (w / rate for w in case.start.omega)
     signs = (q > 0) - (q < 0), (r > 0) - (r < 0)
-    return OneGapMotion.of(_curve(case.top, case.start), p, signs, max(bits, _TRIALS[0]) * _TERMS_A_BIT)
+    return OneGapMotion.of(_curve(case.top, case.start), p, signs, max(bits, _LEAST) * _TERMS_A_BIT)
 
 
 @whole_evaluation
 def _require_reach(case: Steklov) -> None:
-    """Raises NotInClass where the Fourier series of Abel's integral is too long."""
-    for bits in _TRIALS:
-        with working_precision(bits):
-            try:
-                _motion(case, bits)
-            except Undecided:
-                continue
-            except OutOfReach as error:
-                raise LevelNotDone(
-                    f"Two moments of inertia all but satisfy an equality: {error.cause}", _LEFT
-                ) from error
-            return
-    raise LevelNotDone("The start is too near to a turning point to tell on which side of it.", _LEFT)
+    """Raises LevelNotDone where the Fourier series of Abel's integral is too long, and beside a turning point."""
+    name = "Two moments of inertia all but satisfy an equality, or the start a turning point's"
+    decide(lambda: _motion(case, current_precision()), name, _LEAST)
 
 
 def _units(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:

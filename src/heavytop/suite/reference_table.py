@@ -35,7 +35,7 @@ _EFFORT = 2.0
 _TIMES = tuple(map(Fraction, ("1", "10", "-1000", "10000", "1000000")))
 _TIMES_IN_REACH = tuple(map(Fraction, ("1", "10", "-20")))
 # of the chaotic motion: a thousand units of time take some 60 digits
-_FAR = tuple(map(Fraction, ("100", "1000")))
+_FAR = tuple(map(Fraction, ("100", "1000", "2000")))
 
 
 class Entry(msgspec.Struct, frozen=True):
