@@ -20,7 +20,8 @@ from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision,
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State, dot
-from heavytop.words import floating, recurrence
+from heavytop.words import double_double, floating, recurrence
+from heavytop.words.machine import once
 from helpers import VECTORS, start_of, top_of, unit_vector
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
@@ -281,7 +282,7 @@ def test_heyoka_refuses_double_double() -> None:
 
 def test_wrong_machine_code_is_caught_by_the_step_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wrong sign in one lane, in one of the two recurrences or in both."""
-    monkeypatch.setattr(floating, "_machines", {})
+    monkeypatch.setattr(floating, "machine", once(double_double.build))
     monkeypatch.setattr(words_engines, "_made", {})
     damaged = [list(part) for part in recurrence.GATHERED]
     damaged[2][4] = (6, -1)

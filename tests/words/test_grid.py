@@ -13,8 +13,9 @@ from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.words import fixed, kernels
 from heavytop.words.digits import digits, exact, grid_for, grid_of
 from heavytop.words.fixed import Fixed
+from heavytop.words.grid import build
 from heavytop.words.kernels import EXPONENT_BITS, Grid
-from heavytop.words.machine import DOUBLES, Machine, compiled, doubles, pointer
+from heavytop.words.machine import DOUBLES, Machine, compiled, doubles, once, pointer
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
 from heavytop.words.vector import INT, POINTER, function
@@ -154,7 +155,7 @@ def test_words_that_are_too_wide_give_no_wrong_number(bits: int) -> None:
 def test_without_the_check_some_would_be_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """The check is what makes them right: with the sums unwatched, words of 51 bits give wrong numbers."""
     monkeypatch.setattr(kernels.Accumulator, "look", lambda self, k: None)
-    monkeypatch.setattr(fixed, "_machines", {})
+    monkeypatch.setattr(fixed, "machine", once(build))
     random, grid, span, wrong = Random(51), Grid(3, 51), Fraction(HORIZON), 0
     for _ in range(15):
         scaled = random_problem(random)
