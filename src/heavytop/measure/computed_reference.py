@@ -18,11 +18,12 @@ from flint import arb
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, radius_text, working_precision
 from heavytop.exact.flint_context import whole_evaluation
+from heavytop.exact.scales import least_rate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.integrate.words import follow
 from heavytop.integrate.words_engines import accuracy, choose
 from heavytop.integrate.words_ensemble import propagate_words_ensemble
-from heavytop.precision import Precision, exact, number, real, shown
+from heavytop.precision import Precision, decimal_text, exact, number, real, shown
 from heavytop.records import Against
 from heavytop.top.times import check_times
 
@@ -33,6 +34,8 @@ EFFORT = 60.0
 EFFORT_OF_MANY = 600.0
 """The same for all the runs of an ensemble together."""
 _MOST_STEPS = 10**8
+_LONGEST_STEP = 1000
+"""Radians; steps of motions as smooth as a spin about an axis come near it in a thousand bits."""
 _SEARCH = 8
 _WORD_BITS = 1032
 _DIGIT = 10
@@ -187,6 +190,13 @@ def _runs(served: Sequence[_Served], times: Sequence[Fraction]) -> list[Trajecto
     words = max(each.bits for each in served)
     effort = EFFORT if len(problems) == 1 else EFFORT_OF_MANY / len(problems)
     limit = min(_MOST_STEPS, int(effort / seconds_a_step(words)))
+    turned = abs(times[-1]) * max(least_rate(each.parameters, each.start.flat) for each in problems)
+    if turned > limit * _LONGEST_STEP:
+        raise OutOfReach(
+            f"Until t = {decimal_text(times[-1], 6)} the motion turns by about {decimal_text(turned, 2)} radians: "
+            "no reference run follows it so far.",
+            "Ask for an earlier time.",
+        )
     if len(problems) == 1:
         runs = [follow(problems[0], targets, step_limit=limit)]
     else:
