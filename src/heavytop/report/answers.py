@@ -16,6 +16,7 @@ from heavytop.report.text import short
 from heavytop.report.work_precision import leads
 
 _ALONG = Quantity(SOLUTION_ERROR, "along")
+_HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved": "by no law that is resolved"}
 
 
 def digits_headline(rows: Sequence[Row]) -> tuple[str, str] | None:
@@ -85,12 +86,13 @@ def _followed(rows: Sequence[Row], drifts: bool) -> str:
     """``errors along the flow grow like t^1.5 (4 of 5 ensembles)``."""
     laws = Counter(growth for row in rows for growth in {law.growth for law in _laws(row, drifts)})
     of = sum(bool(_laws(row, drifts)) for row in rows)
-    what = "First integrals drift like" if drifts else "errors along the flow grow like"
-    return (
-        f"{what} " + ", ".join(f"{name} ({n} of {of} ensembles)" if of > 1 else name for name, n in laws.most_common())
-        if laws
-        else ""
-    )
+    if not laws:
+        return ""
+    parts = [
+        _HOW.get(name, f"like {name}") + (f" ({n} of {of} ensembles)" if of > 1 else "")
+        for name, n in laws.most_common()
+    ]
+    return ("First integrals drift " if drifts else "errors along the flow grow ") + ", ".join(parts)
 
 
 def _laws(row: Row, drifts: bool) -> list[Law]:
