@@ -37,3 +37,14 @@ def test_scaling_is_exact_and_brings_numbers_near_one(system, size: int) -> None
         assert max(map(abs, scaled.state)) <= 1
         flat = rates(system, scaled.coefficients, list(scaled.state))
         assert [r * size * scaled.rate for r, size in zip(flat, scaled.sizes, strict=True)] == derivative
+
+
+@pytest.mark.parametrize("scale", [Fraction(10) ** -100, Fraction(10) ** -12, Fraction(1), Fraction(10) ** 30])
+@pytest.mark.parametrize("moment", [Fraction(10) ** -100, Fraction(1), Fraction(10) ** 50])
+def test_the_bound_of_a_free_top_follows_its_rate(scale: Fraction, moment: Fraction) -> None:
+    """A bound far above |Ω| makes the steps of a run on a grid as many times shorter: it would never end."""
+    inertia = (7 * moment, 15 * moment, 14 * moment)
+    p = Parameters(inertia, (Fraction(0),) * 3, Fraction(0))
+    state = (11 * scale, -2 * scale, 3 * scale, Fraction(0), Fraction(0), Fraction(1))
+    omega = Scaled.of(HEAVY_TOP, p, state, bounded=True).state[:3]
+    assert max(map(abs, omega)) > Fraction(1, 2)

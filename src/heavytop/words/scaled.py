@@ -73,8 +73,10 @@ def _bound(system: System, p: Parameters, y: tuple[Fraction, ...]) -> Fraction:
 
 
 def _root(value: Fraction) -> Fraction:
-    """Not less than √value, and at most a millionth larger."""
-    unit = Fraction(2) ** _ROOT_BITS / (_root_above(value) or 1)
+    """Not less than √value, and at most a millionth larger; 0 for 0."""
+    if value == 0:
+        return value
+    unit = Fraction(2) ** _ROOT_BITS / _root_above(value)
     return Fraction(isqrt(int(value * unit**2)) + 1) / unit
 
 
