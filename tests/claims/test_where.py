@@ -194,3 +194,22 @@ def test_conditions_too_large_to_expand_end_at_once():
     large = f"({' + '.join(map(str, STATE))} + 1)^40 - 3"
     assert verdict("free", "Omega3", (large,)) != "holds"
     assert verdict("free", f"sin({large})*Omega3", ("Omega1",)) != "holds"
+
+
+@pytest.mark.parametrize(
+    ("value", "where"),
+    [
+        ("gamma2^2", ("gamma1 - 1",)),
+        ("gamma1*gamma2", ("gamma3 + 1",)),
+        ("gamma1", ("gamma1^2 + gamma2^2 + gamma3^2 - 2",)),
+        ("Omega1*gamma2", ("gamma1 - 2", "Omega1")),
+    ],
+)
+def test_no_witness_is_off_the_unit_sphere(value, where):
+    """Where γ1 = 1, γ is (1, 0, 0) and γ2² rests; with γ = (1, 3/5, -1/2) it does not, and that is no body's state."""
+    assert verdict("free", value, where) == "undecided"
+
+
+def test_a_witness_is_looked_for_on_the_unit_sphere():
+    assert verdict("free", "gamma2", ("gamma1 - 1",)) == "refuted"
+    assert verdict("free", "gamma2^2", ("3*gamma1 - 2",)) == "refuted"

@@ -95,6 +95,13 @@ beyond = changed(
     states=lambda run: (), times=lambda run: (), outcome=lambda run: Outcome.STEP_LIMIT,
     time_reached=lambda run: 2 * run.time_reached,
 )
+overtaken = changed(
+    states=lambda run: run.states[:1], times=lambda run: run.times[:1], outcome=lambda run: Outcome.STEP_LIMIT,
+)
+behind = changed(
+    states=lambda run: run.states[:1], times=lambda run: run.times[:1], outcome=lambda run: Outcome.STEP_LIMIT,
+    time_reached=lambda run: run.times[0] / 2,
+)
 negative = changed(steps=lambda run: -1)
 half = changed(steps=lambda run: 1.5)
 untimed = changed(seconds=lambda run: {})
@@ -186,6 +193,8 @@ FAILURES = {
     "liar": "2 of 2 states, and the outcome step_limit",
     "worded": "the outcome 'success', which is none",
     "beyond": "as reached",
+    "overtaken": "as reached, and 1 states",
+    "behind": "as reached, and 1 states",
     "negative": "a negative count of steps",
     "half": "steps that are no count",
     "untimed": "raised KeyError: 'compile' in what it returned",

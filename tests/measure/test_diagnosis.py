@@ -9,7 +9,7 @@ import pytest
 from heavytop.measure.diagnosis import diagnose
 from heavytop.measure.suspects import motion
 from heavytop.measure.written import rounding
-from heavytop.precision import DOUBLE
+from heavytop.precision import DOUBLE, QUAD
 from heavytop.report.diagnosis_text import diagnosis_text
 from heavytop.suite.cases import CASES
 from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
@@ -184,6 +184,29 @@ def test_states_that_do_not_move_are_no_other_clock() -> None:
     top, start, times = problem(8)
     (told,) = found(top, start, times, np.tile([float(value) for value in start.flat], (len(times), 1)))
     assert diagnosis_text(told) == "Every state is the same: nothing moves."
+
+
+@pytest.mark.parametrize("bits", [60, 1100])
+def test_states_that_differ_by_less_than_double_tells_are_not_the_same(bits: int) -> None:
+    top, start, times = problem(8)
+    rows = [(*start.omega, *start.gamma[:2], start.gamma[2] + Fraction(i, 2**bits)) for i in range(len(times))]
+    assert not any(told.kind == "constant" for told in diagnose(top, start, HEAVY_TOP, times, rows, QUAD, 1.0))
+
+
+def test_a_sentence_says_of_which_states_it_is_true_where_not_all_were_looked_at() -> None:
+    top, start, _ = problem(8)
+    times = [Fraction(k) for k in range(1, 101)]
+    y = motion(top, start, HEAVY_TOP, times)
+    assert y is not None
+    y[:60, 3:] *= -1
+    (told,) = found(top, start, times, y)
+    assert told.kind == "gamma_down"
+    assert told.looked_at is not None
+    looked, states, until = told.looked_at
+    assert (states, looked < 60, float(until) < 60) == (100, True, True)
+    assert diagnosis_text(told).startswith(
+        f"Looked at {looked} of the 100 states, to t = {until}. γ points down in these"
+    )
 
 
 @pytest.mark.parametrize(("digits", "kind"), [(5, "decimals"), (7, "significant"), (24, "single")])

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from heavytop.kinds import KINDS
-from heavytop.records import SCHEMA, Law, Report, Row, Series
+from heavytop.records import SCHEMA, Law, Metric, Report, Row, Series
 from heavytop.report import store
 from heavytop.report.brief import LINES, MOST_ROWS, WIDTH, brief, fitted
 from small_reports import error, row
@@ -50,6 +50,18 @@ def test_what_failed_is_named_and_counted() -> None:
     assert lines[0] == "Plan p: 9 measurements, 9 did not reach their horizon:"
     assert lines[1] == "  top-0 in double: step_limit at t = 7.5 of 100"
     assert lines[3] == "  and 7 more"
+
+
+def test_the_digits_of_a_run_that_gave_up_reach_no_further_than_it_did() -> None:
+    digits = {"solution_error_relative_max": error("1e-9")}
+    lines = said(row(metrics=digits, outcome="step_limit", time_reached="7.5", horizon="1000"))
+    assert lines[-1].endswith("9.0 to 7.5")
+
+
+def test_of_steps_that_were_not_measured_nothing_is_said() -> None:
+    unmeasured = {"local_error_ulp_max": Metric("missing", None, "error")}
+    lines = said(row(measure="local_error", outcome="step_too_small", samples=0, metrics=unmeasured))
+    assert not any("a step is off" in line for line in lines)
 
 
 def test_many_rows_are_counted() -> None:

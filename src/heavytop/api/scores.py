@@ -70,12 +70,13 @@ class Score(Tabular):
 
     def _table(self) -> Table:
         row = self.row
-        kept = "no reference"
+        kept = "no reference" if self.row.samples else "no state to score"
         if self.digits_kept is not None:
             kept = f"{digits_text(self.digits_kept)} of {self.of_digits} digits right"
             if self.peer is not None:
                 kept += f" ({self.peer.integrator} keeps {digits_text(self.peer.digits_right)})"
-        sizes = {_LABELS[part]: size for part, size in self.distance.items()}
+        until = f" before t = {short(self.row.reference.until)}" if self.row.reference.until else ""
+        sizes = {_LABELS[part] + until: size for part, size in self.distance.items()}
         sizes |= {f"drift of {name}": size for name, size in self.drift.items()}
         lines = [[label, *(short(metric.value) for metric in size)] for label, size in sizes.items()]
         title = f"{row.case} in {row.precision}: {self.outcome}, {kept}"

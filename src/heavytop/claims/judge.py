@@ -17,7 +17,7 @@ import sympy
 from flint import arb
 
 from heavytop.claims.algebra import Field
-from heavytop.claims.conditions import conditions_of
+from heavytop.claims.conditions import conditions_of, is_exactly_zero
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.proof import Condition
 from heavytop.claims.prover import Prover
@@ -169,8 +169,10 @@ def _row(
 
 def _witnesses(statement: Statement, setting: Setting, prover: Prover) -> Iterator[dict[str, Any]]:
     """Exact parameters and times in the domain, on all relations, where a ball of the residual excludes 0."""
+    always = () if statement.flow is None else statement.flow.always
+    places = [v for v in prover.places(statement) if all(is_exactly_zero(zero, v) for zero in always)]
     for bits in _BITS:
-        for values in prover.places(statement):
+        for values in places:
             ball = _ball(statement.residual, values, bits)
             if ball is not None and not ball.contains(0) and prover.is_defined(statement, values):
                 value, radius = _texts(ball)

@@ -66,12 +66,14 @@ class Flow:
 
     rate: the derivative along it.  kept: the relations that have to be invariant, with their text.
     state: the variables.  is_relation: whether the statement is that a relation stays 0.
+    always: what is 0 at every state of a body, so that a witness has to lie there.
     """
 
     rate: Callable[[sympy.Expr], sympy.Expr]
     state: frozenset[sympy.Symbol]
     kept: tuple[tuple[str, sympy.Expr], ...] = ()
     is_relation: bool = False
+    always: tuple[sympy.Expr, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,8 @@ Rate = Callable[[sympy.Expr], sympy.Expr]
 _STATES = (("1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"), ("1", "2", "-1", "3/5", "0", "4/5"))
 # states of our own, where a file gives none
 _ENOUGH = 3
+# 0 at every state of a body: |γ|² - 1
+_OFF_SPHERE = sum(x**2 for x in STATE[3:]) - 1
 
 
 @dataclass(frozen=True)
@@ -77,8 +79,10 @@ class UserIntegral(FileClaim):
 
         if any(serves(state) for state in given):
             return given
-        found = islice(filter(serves, states_on(conditions, STATE, parameters)), _ENOUGH)
-        return [*found] or given
+        for equations in ([*conditions, _OFF_SPHERE], conditions):
+            if found := [*islice(filter(serves, states_on(equations, STATE, parameters)), _ENOUGH)]:
+                return found
+        return given
 
     def statements(self, system: System) -> list[Statement]:
         """dF/dt = 0 along the field of ``system``, on the conditions."""
@@ -96,7 +100,9 @@ class UserIntegral(FileClaim):
         if self.where:
             text += ", where the conditions hold"
         value, named, names = self._with_names(rate, needs)
-        flow = Flow(rate, frozenset((*STATE, *names)), self._kept(rate), self.kind == "relation")
+        # states that the file names are taken as they are
+        always = (_OFF_SPHERE,) if self._table.states is None else ()
+        flow = Flow(rate, frozenset((*STATE, *names)), self._kept(rate), self.kind == "relation", always)
         # a condition in simpler words is the same set
         where = tuple(part for formula in self.where for part in conditions_for_zero(formula.expression))
         values = (*self._parts(value), *where)

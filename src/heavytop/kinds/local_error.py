@@ -93,7 +93,7 @@ class LocalError(Kind):
         where there are any.
         """
         theirs = [row for row in rows if row.key.subject.name != HEYOKA]
-        found = [row for row in theirs or rows if _LARGEST in row.metrics]
+        found = [row for row in theirs or rows if _LARGEST in row.metrics and row.metrics[_LARGEST].value != "missing"]
         return [line for row in found for line in wrapped(_said(row))]
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:

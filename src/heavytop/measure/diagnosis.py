@@ -7,7 +7,7 @@ decades with it, by three where a number was fitted to the states; otherwise not
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy
@@ -40,12 +40,14 @@ class Diagnosis:
     kind: which; docs/score.md lists them.  numbers: what fits, as text, by name.
     error: the largest error of the states that were looked at, relative to the size of Ω and of γ; left: what is left
     of it if the mistake is mended.  Both None where nothing was tried: then the states themselves show it.
+    looked_at: how many of the states, of how many, and the time of the last of them, as text, where not all were.
     """
 
     kind: str
     numbers: dict[str, str] = field(default_factory=dict)
     error: float | None = None
     left: float | None = None
+    looked_at: tuple[int, int, str] | None = None
 
 
 def diagnose(
@@ -67,7 +69,7 @@ def diagnose(
         truth = given.supposed(given.times)
         error = _TOO_FAR if truth is None else given.error(truth)
         with numpy.errstate(all="ignore"):  # what overflows explains nothing
-            mistake = _mistake(given, truth, error) if error > _WORTH_ASKING else None
+            mistake = _mistake(given, truth, error, states) if error > _WORTH_ASKING else None
         found += [mistake] if mistake else []
     written = rounding(states, precision)
     if written is not None and relative_error is not None and not found and explains(written, relative_error):
@@ -75,16 +77,30 @@ def diagnose(
     return found
 
 
-def _mistake(given: Suspect, truth: Array | None, error: float) -> Diagnosis | None:
+def _mistake(
+    given: Suspect, truth: Array | None, error: float, states: Sequence[Sequence[Fraction]]
+) -> Diagnosis | None:
     """The simplest mistake among those that explain the states about as well as the best."""
-    if len(given.all_states) > 2 and not numpy.ptp(given.all_states, axis=0).any():
+    if len(states) > 2 and all(list(state) == list(states[0]) for state in states):
         return Diagnosis("constant")
     explained = [each for each in _suppositions(given, truth) if each[2] * each[3] <= error]
     if not explained:
-        return _lone_state(given, error) or _lost_row(given) or _integrals_off(given, error)
+        return _of_many(given.widened()) or _looked_at(given, _integrals_off(given, error))
     best = min(max(left, FLOOR) for *_, left, _ in explained)
     kind, numbers, left, _ = next(each for each in explained if each[2] <= ALIKE * best)
-    return Diagnosis(kind, numbers, error, left)
+    return _looked_at(given, Diagnosis(kind, numbers, error, left))
+
+
+def _of_many(every: Suspect) -> Diagnosis | None:
+    return _looked_at(every, _lone_state(every) or _lost_row(every))
+
+
+def _looked_at(given: Suspect, found: Diagnosis | None) -> Diagnosis | None:
+    """The same, with how many of the states it was found in, where that is not all of them."""
+    looked, all_of_them = len(given.rows), len(given.all_times)
+    if found is None or looked == all_of_them:
+        return found
+    return replace(found, looked_at=(looked, all_of_them, _text(given.times[-1], given.units.time)))
 
 
 Supposition = tuple[str, dict[str, str], float, float]
@@ -133,9 +149,8 @@ def _of_clock(clock: mistaken_times.Clock, left: float, units: Units) -> Supposi
     return clock.kind, numbers, left, FITTED_DROP if clock.fitted else DROP
 
 
-def _lone_state(given: Suspect, error: float) -> Diagnosis | None:
+def _lone_state(every: Suspect) -> Diagnosis | None:
     """One state, neither the first nor the last, that is off while all others are right."""
-    every = given.widened()
     truth = every.supposed(every.times)
     if truth is None:
         return None
@@ -144,12 +159,11 @@ def _lone_state(given: Suspect, error: float) -> Diagnosis | None:
     left = float(numpy.delete(errors, worst).max(initial=0.0))
     if not 0 < worst < len(errors) - 1 or left * _ALONE > errors[worst]:
         return None
-    return Diagnosis("one_state", {"t": _text(every.times[worst], given.units.time)}, float(errors[worst]), left)
+    return Diagnosis("one_state", {"t": _text(every.times[worst], every.units.time)}, float(errors[worst]), left)
 
 
-def _lost_row(given: Suspect) -> Diagnosis | None:
+def _lost_row(every: Suspect) -> Diagnosis | None:
     """States that are right up to a time, and from there on those of the next sample, or of the one before."""
-    every = given.widened()
     times = every.times
     if len(times) < _FEWEST_ROWS:
         return None
@@ -166,7 +180,7 @@ def _lost_row(given: Suspect) -> Diagnosis | None:
         left = [max(own[:row].max(), moved[row:].max()) for row in range(1, len(times) - 1)]
         row = int(numpy.argmin(left))
         if left[row] * _ALONE <= own.max():
-            return Diagnosis(kind, {"t": _text(times[row + 1], given.units.time)}, float(own.max()), float(left[row]))
+            return Diagnosis(kind, {"t": _text(times[row + 1], every.units.time)}, float(own.max()), float(left[row]))
     return None
 
 

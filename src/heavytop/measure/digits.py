@@ -51,7 +51,7 @@ def digits_kept(row: Measured) -> float | None:
 
 def digits_text(kept: float) -> str:
     """Digits kept, for people: to one place, and none where the error is larger than the value."""
-    return f"{max(kept, 0.0):.1f}"
+    return f"{max(0.0, kept):.1f}"
 
 
 def digits_of(bits: int) -> int:

@@ -96,7 +96,8 @@ def digits_lines(rows: Sequence[Row], title: str) -> list[str]:
         if len(formats) == 1:
             name, column = row.key.case, row.key.subject.name
         lost = row.reference.until
-        until = logarithm((lost or row.horizon).removeprefix("-"))
+        end = row.horizon if row.outcome == "success" else row.time_reached
+        until = logarithm((lost or end).removeprefix("-"))
         cell = f"{digits_text(kept)} {'from' if lost else 'to'} {'0' if until is None else _until(until)}"
         cells = table.setdefault(name, {})
         # of two horizons the longer

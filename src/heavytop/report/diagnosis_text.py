@@ -33,13 +33,21 @@ _OWNERS = {"inertia_axes": "moments of inertia", "centre_axes": "centre of mass"
 
 def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
     """One or two sentences: what fits, and how far the error falls with it."""
-    said = _said(found, system)
+    said = _scope(found) + _said(found, system)
     if found.left is None or found.error is None:
         return said
     if found.kind == "one_state":
         return f"{said}; without it the largest error relative to the size of Ω and γ is {_size(found.left)}."
     fall = f"the largest error relative to the size of Ω and γ falls from {_size(found.error)} to {_size(found.left)}"
     return f"{said}; {fall}."
+
+
+def _scope(found: Diagnosis) -> str:
+    """Of which states the sentence is true, where not all were looked at."""
+    if found.looked_at is None:
+        return ""
+    looked, states, until = found.looked_at
+    return f"Looked at {looked} of the {states} states, to t = {until}. "
 
 
 def _size(value: float) -> str:

@@ -79,7 +79,8 @@ def to_json(found: Assessment) -> dict[str, Any]:
 
 def sizes(row: Row) -> list[list[str]]:
     """Label, largest, root mean square and final value of each error and of the drift of each first integral."""
-    names = {f"solution_error_{key}": f"error, {label}" for key, label in _PARTS.items()}
+    until = f" before t = {short(row.reference.until)}" if row.reference.until else ""
+    names = {f"solution_error_{key}": f"error{until}, {label}" for key, label in _PARTS.items()}
     names |= {name[:-4]: f"drift, {name[6:-4]}" for name in row.metrics if name[:6] == "drift_" and name[-4:] == "_max"}
     return [
         [label, *(short(row.metrics[f"{name}_{part}"].value) for part in ("max", "rms", "final"))]

@@ -175,6 +175,10 @@ class Contained:
         reached = asked[-1] if done else exact(run.time_reached)
         within = reached == 0 if asked[-1] == 0 else 0 <= reached / asked[-1] <= 1
         self._require(within, f"the time {said(run.time_reached)} as reached")
+        if not (done or self.own):
+            last, following = abs(times[-1]) if times else 0, abs(asked[len(states)])
+            what = f"the time {said(run.time_reached)} as reached, and {len(states)} states"
+            self._require(last <= abs(reached) < following, what)
         named = type(run.integrator) is str and 0 < len(run.integrator) <= _MOST_SAID and run.integrator.isprintable()
         self._require(named, "no name of an integrator")
         return Trajectory(
