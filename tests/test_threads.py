@@ -28,9 +28,8 @@ from heavytop.integrate.taylor import first_steps, propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.drift import Drift
 from heavytop.measure.reference import reference
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, real
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, real, time_text
 from heavytop.suite.cases import CASES
-from heavytop.suite.rows import time_text
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import holding

@@ -179,6 +179,15 @@ def shown(value: Fraction) -> str:
     return str(value) if short else decimal_text(value, 6)
 
 
+def time_text(time: Fraction) -> str:
+    """A time in reports: exact where 20 digits suffice, else 20 digits."""
+    text = decimal_text(time, 20)
+    if abs(time) >= 10**15:
+        return text
+    text = format(Decimal(text), "f")
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
 def exact_text(value: Fraction) -> str:
     """An exact number as ``str`` writes it; Python refuses to write whole numbers of more than 4300 digits itself."""
     numerator, denominator = Decimal(value.numerator), Decimal(value.denominator)

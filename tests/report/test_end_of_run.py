@@ -109,7 +109,7 @@ def test_the_law_of_an_integrator_of_others_is_said_with_what_it_means(growth: s
 def test_laws_that_do_not_fit_a_column_are_counted() -> None:
     drifts = {"drift_energy": "unresolved", "drift_area": "t^0.5", "drift_gamma_squared": "t"}
     (line,) = (line for line in said(law_row("t", **drifts)) if "double" in line)
-    assert line.split() == ["double:", "euler", "3", "laws", "t", "-"]
+    assert line.split() == ["mine:rk4", "double:", "euler", "3", "laws", "t", "-"]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 
 from heavytop.kinds.break_away_law import break_away_law
-from heavytop.suite.rows import time_text
+from heavytop.precision import time_text
 from heavytop.suite.task import Task
 from reports import expand, load, measure
 

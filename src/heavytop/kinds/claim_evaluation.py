@@ -15,13 +15,13 @@ from heavytop.kinds.claim_section import claim_error
 from heavytop.kinds.claim_tasks import CLAIM, EVALUATION_ERROR, claim_of, claimed
 from heavytop.measure import claim_error as errors_of
 from heavytop.measure.scalar import largest, metric, of_fraction, text
-from heavytop.precision import parse
+from heavytop.precision import parse, time_text
 from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
 from heavytop.report.consistency import CLOSE, sizes
 from heavytop.report.text import both, largest_over, short, table, title
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import exact_row, time_metric, time_text
+from heavytop.suite.rows import exact_row, time_metric
 from heavytop.suite.sampling import positive, signed
 from heavytop.suite.task import Task
 from heavytop.top.equations import GYROSTAT

@@ -24,7 +24,7 @@ from heavytop.measure.computed_reference import compute
 from heavytop.measure.parting import CLAIM_XI, parting, true_solution
 from heavytop.measure.scalar import largest, metric, text
 from heavytop.measure.truth import certified
-from heavytop.precision import exact
+from heavytop.precision import exact, time_text
 from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
 from heavytop.report.brief import wrapped
 from heavytop.report.printable import printable
@@ -32,7 +32,7 @@ from heavytop.report.section import Card, Line, clip
 from heavytop.report.text import both, short, table, title
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import exact_row, time_metric, time_text
+from heavytop.suite.rows import exact_row, time_metric
 from heavytop.suite.sampling import positive, samples, signed
 from heavytop.suite.task import Task
 from heavytop.top.angles import attitude_from_angles

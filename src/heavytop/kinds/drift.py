@@ -15,7 +15,7 @@ from heavytop.measure.integrator import HEYOKA, require
 from heavytop.measure.reruns import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
-from heavytop.precision import DOUBLE, exact, number, parse
+from heavytop.precision import DOUBLE, exact, number, parse, time_text
 from heavytop.records import Row, RowKey
 from heavytop.report.answers import digits_headline
 from heavytop.report.brief import digits_lines
@@ -23,7 +23,7 @@ from heavytop.report.plots import digits, growth
 from heavytop.report.text import DIGITS, NOISE, largest_over, motions, title
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import computed_row, time_text
+from heavytop.suite.rows import computed_row
 from heavytop.suite.sampling import positive, uniform
 from heavytop.suite.task import Task, computed
 

@@ -23,10 +23,10 @@ from heavytop.measure.integrator import HEYOKA, require
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
-from heavytop.precision import decimal_text, exact, number, parse, physical, usable_tolerance
+from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
 from heavytop.records import Law, Metric, Quantity, Row, RowKey, Series, by_name
 from heavytop.report.answers import laws_headline
-from heavytop.report.brief import named, wrapped
+from heavytop.report.brief import wrapped
 from heavytop.report.names import computed_by
 from heavytop.report.plots import digits
 from heavytop.report.plots import growth as over_time
@@ -35,12 +35,13 @@ from heavytop.report.text import short, table, title
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import input_rounding, time_text
+from heavytop.suite.rows import input_rounding
 from heavytop.suite.starts import random_starts
 from heavytop.suite.task import Task, computed
 
 NAME = "growth"
 FAILED = Quantity("starts_failed")
+_OWN = (HEYOKA, "words")
 _MEANS = {
     "t^0.5": "less than rounding noise that adds up",
     "t": "a frequency that is off by a constant, by truncation or a wrong coefficient",
@@ -205,27 +206,35 @@ class Growth(Kind):
         ]
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
-        """The laws, those of all first integrals as one; motions with the same laws together."""
-        found: dict[tuple[str, ...], list[str]] = {}
-        names = named(rows)
+        """The laws, those of all first integrals as one; formats and motions with the same laws together."""
+        formats: dict[tuple[str, str, str, tuple[str, ...]], list[str]] = {}
         for row in rows:
-            laws: dict[str, dict[str, None]] = {}
-            for law in row.laws.values():
-                quantity = law.quantity or Quantity("")
-                what = "integrals" if quantity.name == DRIFT else quantity.component
-                if what in _SUMMED_UP and (law.growth, law.exponent) != ("bounded", None):  # exactly 0
-                    laws.setdefault(what, {})[law.growth] = None
-            growths = (_either(laws.get(what, {})) for what in _SUMMED_UP)
-            found.setdefault((row.precision, row.key.subject.variant, *growths), []).append(names(row))
-        if not found:
+            name = "" if row.key.subject.name == HEYOKA else row.key.subject.name
+            what = (name, row.key.subject.variant, row.key.case, _growths(row))
+            formats.setdefault(what, []).append(row.precision)
+        if not formats:
             return []
+        cases: dict[tuple[str, ...], list[str]] = {}
+        for (name, variant, case, growths), precisions in formats.items():
+            runs = " ".join(part for part in (name, ", ".join(precisions), variant) if part)
+            cases.setdefault((runs, *growths), []).append(case)
         printed = [_columns("Grows like", "integrals", "error along", "across")]
-        for (precision, variant, *said), cases in found.items():
-            name = f"  {precision} {variant}".rstrip() + f": {', '.join(cases)}"
-            first, *rest = wrap(name, 35, subsequent_indent="    ")
+        for (runs, *said), motions in cases.items():
+            first, *rest = wrap(f"  {runs}: {', '.join(motions)}", 35, subsequent_indent="    ")
             printed += [_columns(first, *said), *rest]
-        others = [row for row in rows if row.key.subject.name != HEYOKA]
+        others = [row for row in rows if row.key.subject.name not in _OWN]
         return printed + [line for row in others for line in wrapped(_meaning(row))]
+
+
+def _growths(row: Row) -> tuple[str, ...]:
+    """The classes of the laws of the first integrals, along and across the flow; of what is exactly 0 none."""
+    laws: dict[str, dict[str, None]] = {}
+    for law in row.laws.values():
+        quantity = law.quantity or Quantity("")
+        what = "integrals" if quantity.name == DRIFT else quantity.component
+        if what in _SUMMED_UP and (law.growth, law.exponent) != ("bounded", None):
+            laws.setdefault(what, {})[law.growth] = None
+    return tuple(_either(laws.get(what, {})) for what in _SUMMED_UP)
 
 
 def _meaning(row: Row) -> str:

@@ -22,14 +22,14 @@ from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.measure.truth import Truth, certified
-from heavytop.precision import DOUBLE, exact, parse
+from heavytop.precision import DOUBLE, exact, parse, time_text
 from heavytop.records import Direction, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.brief import named, wrapped
 from heavytop.report.text import NOISE, both, short, table, title, with_noise
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import computed_row, time_metric, time_text
+from heavytop.suite.rows import computed_row, time_metric
 from heavytop.suite.sampling import samples, signed
 from heavytop.suite.task import Task, computed
 from heavytop.top.equations import Parameters

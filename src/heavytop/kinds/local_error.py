@@ -15,14 +15,14 @@ from heavytop.kinds.base import Kind
 from heavytop.measure import local_error
 from heavytop.measure.integrator import HEYOKA, require
 from heavytop.measure.single_calls import single_calls
-from heavytop.precision import parse
+from heavytop.precision import parse, time_text
 from heavytop.records import Against, Row, RowKey
 from heavytop.report.brief import wrapped
 from heavytop.report.names import computed_by
 from heavytop.report.text import short, table, title
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import computed_row, time_text
+from heavytop.suite.rows import computed_row
 from heavytop.suite.sampling import positive
 from heavytop.suite.task import Task, computed
 

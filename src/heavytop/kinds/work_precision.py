@@ -24,7 +24,7 @@ from heavytop.measure.scalar import metric, of_fraction
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.measure.truth import Truth, truth
-from heavytop.precision import DOUBLE, exact, number, parse, usable_tolerance
+from heavytop.precision import DOUBLE, exact, number, parse, time_text, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.answers import fastest
 from heavytop.report.brief import wrapped
@@ -36,7 +36,7 @@ from heavytop.report.work_plots import work_precision
 from heavytop.report.work_precision import CONSTANTS, ERRORS, LANES, OURS, beside_ours, leads, panels
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import computed_row, time_text
+from heavytop.suite.rows import computed_row
 from heavytop.suite.sampling import positive, uniform
 from heavytop.suite.task import FINEST, Task, computed
 from heavytop.top.equations import HEAVY_TOP

@@ -23,7 +23,7 @@ from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.integrate.words import follow
 from heavytop.integrate.words_engines import accuracy, choose
 from heavytop.integrate.words_ensemble import propagate_words_ensemble
-from heavytop.precision import Precision, decimal_text, exact, number, real, shown
+from heavytop.precision import Precision, decimal_text, exact, number, real, time_text
 from heavytop.records import Against
 from heavytop.top.times import check_times
 
@@ -95,7 +95,7 @@ def agreement(found: Sequence[ComputedReference]) -> Against:
     (coarse, fine), ends = found[0].words, found[0].ends
     radii = [each.radius(t) for each in found for t in each.balls if ends is None or abs(t) < abs(ends)]
     agreed = radius_text(max(radii)) if radii else ""
-    until = "" if ends is None else shown(ends)
+    until = "" if ends is None else time_text(ends)
     return Against("computed", f"words of {coarse} and {fine} bits", agreed, until=until)
 
 

@@ -27,7 +27,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.measure.certify import EXACTLY, Certificate, certify, enclosure_of
 from heavytop.measure.computed_reference import of_rounded
 from heavytop.measure.scalar import GUARD_BITS
-from heavytop.precision import shown
+from heavytop.precision import shown, time_text
 from heavytop.records import Against, Certified
 from heavytop.top.equations import GYROSTAT
 
@@ -122,7 +122,7 @@ def _computed(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
     except (InputError, OutOfReach) as error:
         return error.cause
     if found.ends == times[0]:
-        return f"no digit of the format is left at t = {shown(found.ends)}, the first sample"
+        return f"no digit of the format is left at t = {time_text(found.ends)}, the first sample"
     return Truth(found.against, found.state, found.ends)
 
 
@@ -159,7 +159,7 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
         if found is None:
             found = Validated(problem.top, problem.start, problem.system)
             if abs(horizon) > _ALWAYS_ENCLOSED and found.cost(horizon, bits) > CHEAP:
-                return f"no closed form, and an enclosure to |t| = {shown(abs(horizon))} takes too long"
+                return f"no closed form, and an enclosure to |t| = {time_text(abs(horizon))} takes too long"
         known = certified(found, horizon, bits)
     except OutOfReach as error:
         return error.cause

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from decimal import Decimal
 from fractions import Fraction
 
 from heavytop.errors import Contradiction, HeavyTopError, PeerFailed
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.scalar import of_fraction
-from heavytop.precision import decimal_text
+from heavytop.precision import decimal_text, time_text
 from heavytop.records import (
     CONTRADICTION,
     FAILED,
@@ -22,15 +21,6 @@ from heavytop.records import (
 )
 from heavytop.suite.task import Task
 from heavytop.top.heavy_top import HeavyTop, State
-
-
-def time_text(time: Fraction) -> str:
-    """A time in reports: exact where 20 digits suffice, else 20 digits."""
-    text = decimal_text(time, 20)
-    if abs(time) >= 10**15:
-        return text
-    text = format(Decimal(text), "f")
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def time_metric(time: Fraction | None, kind: MetricKind) -> Metric:

@@ -18,11 +18,11 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
 from heavytop.measure.truth import truth
 from heavytop.measure.written import rounding
-from heavytop.precision import DOUBLE_DOUBLE, exact, round_to
+from heavytop.precision import DOUBLE_DOUBLE, exact, round_to, time_text
 from heavytop.records import Against, Metric, Row, RowKey, Subject
 from heavytop.suite.cases import Case
 from heavytop.suite.given import Given
-from heavytop.suite.rows import computed_row, time_text
+from heavytop.suite.rows import computed_row
 from heavytop.suite.sampling import log_spaced
 from heavytop.suite.task import Task, seconds_a_step
 
