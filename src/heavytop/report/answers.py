@@ -108,8 +108,8 @@ def _followed(rows: Sequence[Row], drifts: bool) -> str:
     of = sum(bool(_laws(row, drifts)) for row in rows)
     if not laws:
         return ""
-    ((name, count),) = laws.most_common(1)
-    law = _HOW.get(name, f"like {name}") + (f" ({count} of {of} ensembles)" if of > 1 else "")
+    ((growth, count),) = laws.most_common(1)
+    law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {of} ensembles)" if of > 1 else "")
     name = rows[0].key.subject.name
     whose = "" if name in (HEYOKA, WORDS) else f" of {clip(name, 40)}"
     return f"first integrals drift {law}" if drifts else f"errors{whose} along the flow grow {law}"
