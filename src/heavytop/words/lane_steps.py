@@ -18,7 +18,18 @@ from llvmlite import ir
 from heavytop.top.equations import System
 from heavytop.words.lanes import ZERO, turned
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
-from heavytop.words.pairs import accumulated, add, covered, divided, later, log2, multiply, polynomial, step_length, times
+from heavytop.words.pairs import (
+    accumulated,
+    add,
+    covered,
+    divided,
+    later,
+    log2,
+    multiply,
+    polynomial,
+    step_length,
+    times,
+)
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER, Pair, function
 
 FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
