@@ -171,7 +171,7 @@ def _finer(given: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
 
 
 def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
-    """Those of the times within the horizon over 4^n, each stage longer than the one before; its end if there is none."""
+    """Those of the times within the horizon over 4^n, each longer than the one before; where there is none, its end."""
     ends = {n: times[-1] / 4**n for n in range(_PROBES if stages else 0, -1, -1)}
     counts = {n: sum(abs(time) <= abs(end) for time in times) for n, end in ends.items()}
     before = [[ends[n]] for n, count in counts.items() if not count]
