@@ -18,6 +18,7 @@ from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.quadratic import quadratic
 from heavytop.exact.validated import Validated
+from heavytop.measure.certify import bits_of
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import area, energy, gamma_squared
@@ -278,3 +279,16 @@ def test_bits_are_given_though_the_forecast_was_too_low(monkeypatch):
     solution = motion(VECTORS[0])
     for bits in range(96, 130):
         assert min(map(relative_bits, solution.state(Fraction(3), bits))) >= bits
+
+
+@pytest.mark.parametrize("effort", [0.2, 0.5, 2, 8])
+def test_the_digits_that_a_refusal_offers_are_not_refused(effort):
+    top, start = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+    generic, asked = Validated(top, start, effort=effort), 4000
+    for _ in range(3):
+        with pytest.raises(OutOfReach) as refused:
+            generic.state(Fraction(60), bits_of(asked))
+        offered = int(refused.value.remedy.split()[1])
+        assert 0 < offered < asked
+        assert generic.cost(Fraction(60), bits_of(offered)) <= effort
+        asked = next(n for n in range(offered, asked + 1) if generic.cost(Fraction(60), bits_of(n)) > effort)

@@ -352,16 +352,88 @@ def test_the_digits_of_an_integrator_stand_beside_those_of_heyoka() -> None:
     assert digits_headline([row(outcome="time_limit")]) is None
 
 
-@pytest.mark.parametrize(
-    ("law", "said"), [("t", "All 1 planted faults are told. "), ("t^1.5", "0 of 1 planted faults are told. ")]
-)
-def test_whether_planted_faults_are_told_opens_the_page_of_growth(law: str, said: str) -> None:
+@pytest.mark.parametrize(("law", "told"), [("t", 1), ("t^1.5", 0)])
+def test_whether_planted_faults_are_told_opens_the_page_of_growth(law: str, told: int) -> None:
     healthy = row(measure="growth", starts=32)
     faulty = row(measure="growth", starts=32, laws={"solution_error_along": Law(law, 32, 1.0, 0.9, 1.1)})
     subject = replace(faulty.key.subject, bias="1e-12")
     faulty = replace(faulty, key=replace(faulty.key, subject=subject))
     _, found = laws_headline([healthy, faulty])
-    assert found == f"{said}errors along the flow grow like t^1.5."
+    assert found == f"Errors along the flow grow like t^1.5; {told} of 1 planted faults show another law."
+    mine = replace(faulty, key=replace(healthy.key, subject=replace(healthy.key.subject, name="mine:rk")))
+    assert laws_headline([healthy, mine]) == ("", f"Errors of mine:rk along the flow grow like {law}.")
+
+
+ALONE = {
+    "claim_model": "The claimed Ω is off by 1 % of α from |t| = 0.002 on (ershkov-partial-6/forward, printed).",
+    "claim_evaluation": "In double the printed form is off by up to 1.11e-7 in Ω, not finite from |t| = 7.4; the "
+    "stable form is off by up to 1.03e-15 in Ω, finite throughout.",
+    "homoclinic": "heyoka stays on a homoclinic motion up to |t| = 12.3 to 63 in double, 62.8 to 321 in real:237.",
+    "break_away_law": "A bit of the format buys 0.27 to 1.5 time units before the escape: ln 2 / rate within 21 %.",
+}
+
+
+@pytest.fixture(scope="module")
+def default() -> Report:
+    return store.read(RESULTS)
+
+
+@pytest.mark.parametrize("kind", ALONE)
+def test_rows_of_one_kind_alone_open_their_page_with_their_answer(default: Report, kind: str) -> None:
+    rows = [each for each in default.rows if each.key.kind == kind]
+    assert KINDS[kind].headline(rows) == ("", ALONE[kind])
+    page = html.report_page(Report("", {}, {}, rows))
+    assert f"{ALONE[kind]}</h2>" in page
+    assert KINDS[kind].headline([replace(each, metrics={}, outcome="failed") for each in rows]) is None
+
+
+def test_kinds_that_are_mixed_answer_in_order_and_what_a_card_says_is_said_once(default: Report) -> None:
+    page = html.report_page(Report("", {}, {}, default.rows[::-1]))
+    opened, *others = re.findall(
+        r'<h2 id="verdict-heading"[^>]*>([^<]+)</h2>|<p>([^<]+)</p>', page.partition('<div class="cards">')[0]
+    )
+    assert opened[0].startswith("The claimed solution is not a motion")
+    said = [other[1] for other in others]
+    assert said[0] == "heyoka has 8.7 of 16 digits left at T = 1e5 (lagrange in double)."
+    assert said[1:] == [ALONE["homoclinic"], ALONE["break_away_law"], ALONE["claim_evaluation"]]
+
+
+def test_homoclinic_motions_of_others_stand_beside_those_of_heyoka(default: Report) -> None:
+    ours = [each for each in default.rows if each.key.kind == "homoclinic" and each.key.case == "delone"]
+    theirs = [replace(each, key=replace(each.key, subject=replace(each.key.subject, name="mine:x"))) for each in ours]
+    late = replace(
+        theirs[0], metrics={"break_away_time": replace(theirs[0].metrics["break_away_time"], value="never", log10=None)}
+    )
+    (_, found) = KINDS["homoclinic"].headline([*ours, late])
+    horizon = float(ours[0].horizon)
+    assert (
+        found
+        == f"mine:x stays on delone up to |t| = {horizon:.3g} in double; heyoka to 33.6 in double, 179 in real:237."
+    )
+
+
+def test_local_errors_alone_open_and_fill_their_page() -> None:
+    metrics = {
+        "local_error_ulp_max": error("3.25"),
+        "local_error_ulp_rms": error("1"),
+        "observed_order": Metric("4", 0.6),
+    }
+    mine = replace(row(measure="local_error", integrator="mine:rk", metrics=metrics), order=5)
+    page = html.report_page(
+        Report("", {}, {}, [row(measure="local_error", metrics={"local_error_ulp_max": error("9")}), mine])
+    )
+    said = "euler mine:rk in double: a step is off by 3.25 eps at most; its order is 4, not the 5 that it says."
+    assert f">{said}</h2>" in page
+    assert all(f">{cell}</td>" in page for cell in ("3.25", "4", "5"))
+
+
+def test_work_without_heyoka_opens_with_the_least_error() -> None:
+    rows = [
+        row(measure="work_precision", integrator="mine:rk", metrics={"error_max": error(size)})
+        for size in ("1e-3", "2e-6")
+    ]
+    rows = [replace(each, seconds={"least": 0.25}) for each in rows]
+    assert KINDS["work_precision"].headline(rows) == ("", "The least error is 2e-6: mine:rk on euler, in 250 ms.")
 
 
 def test_one_chart_a_case_and_quantity_has_all_variants_with_their_laws() -> None:

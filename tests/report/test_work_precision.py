@@ -74,10 +74,10 @@ def test_a_line_that_turns_back_takes_the_least_time() -> None:
 
 def test_the_lead_is_over_the_best_peer_that_gets_there() -> None:
     (lead,) = leads(ALL)
-    assert (lead.case, lead.peer) == ("top/T=9", "cyrk:DOP853")
+    assert (lead.case, lead.other) == ("top/T=9", "cyrk:DOP853")
     assert lead.ours == pytest.approx(2)
     assert lead.ratio == pytest.approx(4.5)
-    assert "is 4.5 times faster than the best peer that gets there, cyrk:DOP853" in lead.text
+    assert "is 4.5 times faster than the best other integrator, cyrk:DOP853" in lead.text
     assert lead.text.endswith("(2 s against 9 s); a motion in lanes takes 1 ms")
     assert lead.short == "At 1e-10 heyoka double is 4.5 × as fast as cyrk:DOP853"
 
@@ -90,7 +90,7 @@ def test_the_best_scalar_form_of_heyoka_leads_and_the_general_one_is_stated_besi
     ours = [row("heyoka tolerance=1e-8", -8, 1.0, compile=0.125), row("heyoka tolerance=1e-12", -12, 4.0, compile=0.5)]
     (lead,) = leads([*ours, compiled_in(1.0), *CYRK])
     assert lead.text == (
-        "top/T=9: heyoka:constants at error 1e-10 is 9.0 times faster than the best peer that gets there, cyrk:DOP853 "
+        "top/T=9: heyoka:constants at error 1e-10 is 9.0 times faster than the best other integrator, cyrk:DOP853 "
         "(1 s against 9 s); heyoka double, one code for every top, is 4.5 times faster (2 s); "
         "to compile, at most: heyoka double 500 ms, heyoka:constants 250 ms"
     )
@@ -116,8 +116,8 @@ def test_an_error_that_nobody_reaches_makes_no_lead() -> None:
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        (OURS + SPLITTING, "takes 2 s; no peer gets there"),
-        (OURS + FAILED, "no peer gets there"),
+        (OURS + SPLITTING, "takes 2 s; no other gets there"),
+        (OURS + FAILED, "no other gets there"),
         (OURS[:1] + CYRK, "not reached; the fastest that gets there is cyrk:DOP853 (9 s)"),
         (
             [*OURS, row("fast:x tolerance=1", -11, 0.5)],
@@ -134,7 +134,7 @@ def test_formats_beyond_extended_are_compared_where_double_ends() -> None:
     wide = [row("mpmath:odefun tolerance=eps", -33, 100.0, precision="real:113")]
     wide += [row("heyoka tolerance=eps", -33, s, precision=name) for name, s in (("quad", 4.0), ("real:113", 2.0))]
     both = leads(ALL + wide)
-    assert [(lead.log10, lead.name, lead.peer) for lead in both] == [
+    assert [(lead.log10, lead.name, lead.other) for lead in both] == [
         (-10, "heyoka double", "cyrk:DOP853"),
         (-30, "heyoka real:113", "mpmath:odefun real:113"),
     ]
@@ -171,7 +171,7 @@ def test_the_summary_says_it() -> None:
     with console.capture() as capture:
         console.print(summary(Report(SCHEMA, {"name": "peers"}, {}, ALL)))
     text = capture.get()
-    assert "4.5 times faster than the best peer that gets there, cyrk:DOP853" in text
+    assert "4.5 times faster than the best other integrator, cyrk:DOP853" in text
     assert "did not reach their horizon" not in text
     (line,) = [line for line in text.splitlines() if "sundials:CVODE" in line]
     assert line.split() == ["sundials:CVODE", "-", "-", "-", "-", "-", "1"]
@@ -213,7 +213,9 @@ def test_who_is_fastest_at_1e_10_opens_the_page() -> None:
         "",
         "fast:x is the fastest at error 1e-10 on top/T=9: 4.0 times as fast as heyoka double.",
     )
-    assert fastest(OURS[:1] + CYRK) is None
+    least = "The least error is 1e-11: cyrk:DOP853 on top/T=9, in 27 s."
+    assert fastest(OURS[:1] + CYRK) == ("", least)
+    assert fastest([]) is None
 
 
 def test_every_picture_is_a_file_as_svg_and_as_pdf(tmp_path: Path) -> None:

@@ -289,7 +289,7 @@ class Validated:
         loss, steps = self._forecast(direction, span, start)
         for _ in range(_ATTEMPTS):
             precision, in_words = motion.precision(bits + loss + 8, steps)
-            self._require_reach(time, bits, loss, steps, precision, in_words)
+            self._require_reach(time, bits, loss, steps, motion)
             run = self._run(direction, start, precision, in_words)
             found = run.at(span)
             if found is not None:
@@ -313,18 +313,19 @@ class Validated:
             self._pilots[key] = Pilot(motion.field, precision, carrier, ahead)
         return self._pilots[key].forecast(span, self.effort)
 
-    def _require_reach(
-        self, time: Fraction, bits: int, loss: float, steps: float, precision: int, in_words: bool
-    ) -> None:
-        if steps * _seconds_a_step(precision, in_words) <= self.effort:
-            return
-        affordable = precision
-        while affordable > 0 and steps * _seconds_a_step(affordable, in_words) > self.effort:
-            affordable = affordable * 15 // 16
-        raise self._refusal(time, max(0, affordable - loss))
+    def _require_reach(self, time: Fraction, bits: int, loss: float, steps: float, motion: ScaledMotion) -> None:
+        def too_long(bits: int) -> bool:
+            return steps * _seconds_a_step(*motion.precision(bits + loss + 8, steps)) > self.effort
 
-    def _refusal(self, time: Fraction, reachable: float) -> OutOfReach:
-        at, digits = decimal_text(time, 6), int(reachable * log10(2))
+        reachable = bits
+        while reachable > 0 and too_long(reachable):
+            reachable = reachable * 15 // 16
+        if reachable < bits:
+            raise self._refusal(time, reachable)
+
+    def _refusal(self, time: Fraction, reachable: int) -> OutOfReach:
+        # digits take up to five bits more, rounded up
+        at, digits = decimal_text(time, 6), int((reachable - 5) * log10(2))
         if digits < 1:
             return OutOfReach(
                 f"No digit at t = {at} is within reach of a validated integration.", "Ask for an earlier time."

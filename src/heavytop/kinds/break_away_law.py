@@ -175,6 +175,7 @@ class BreakAwayLaw(Kind):
     needed = (SLOPE.text, EXPECTED.text, OFF_BY.text)
     noise_factor = 8.0
     sections = (escape_times,)
+    place = 70
 
     def carries_band(self, metric: Metric) -> bool:
         """The slope, and how far it is off."""
@@ -195,6 +196,19 @@ class BreakAwayLaw(Kind):
             return
         if expected == 0 or abs(abs(slope / expected - 1) - off) > CLOSE / 100:
             yield f"{OFF_BY.text}: {found[2]}, where the slope is {found[0]} and {found[1]} is expected"
+
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """What a bit of the format buys, and how far that is from the law."""
+        found = [row for row in rows if row.metrics]
+        if not found:
+            return None
+        slopes, off = ([float(row.metrics[each.text]) for row in found] for each in (SLOPE, OFF_BY))
+        low, high = f"{min(slopes):.2g}", f"{max(slopes):.2g}"
+        buys = low if low == high else f"{low} to {high}"
+        return (
+            "",
+            f"A bit of the format buys {buys} time units before the escape: ln 2 / rate within {100 * max(off):.2g} %.",
+        )
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line a case."""

@@ -73,6 +73,7 @@ class ClaimEvaluation(Kind):
     )
     may_overflow = True
     sections = (claim_error,)
+    place = 90
 
     def cost(self, task: Task) -> float:
         """The same for all."""
@@ -142,3 +143,23 @@ class ClaimEvaluation(Kind):
             Text(f"  Errors are the {largest_over(rows)}."),
             table(columns, both(lines)),
         ]
+
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """How far off each form is in the narrowest format, and from when on it is not finite."""
+        bits = min((row.bits for row in rows), default=0)
+        forms: dict[str, list[Row]] = {}
+        for row in rows:
+            if row.bits == bits and row.metrics:
+                forms.setdefault(row.key.subject.form, []).append(row)
+        said = "; ".join(f"the {form} form {_said(members)}" for form, members in sorted(forms.items()))
+        return ("", f"In {next(iter(forms.values()))[0].precision} {said}.") if said else None
+
+
+def _said(rows: Sequence[Row]) -> str:
+    """``is off by up to 6.7e-8 in Ω, not finite from |t| = 37``."""
+    errors = [row.metrics[Quantity(EVALUATION_ERROR, "omega", _WORST).text] for row in rows]
+    worst = max((error for error in errors if error.log10 is not None), default=None)
+    times = [row.metrics[Quantity(_COUNT, each, _SINCE).text] for row in rows for each in _SUMMED_UP]
+    since = min((time for time in times if time.log10 is not None), default=None)
+    off = "has no finite error of Ω" if worst is None else f"is off by up to {short(worst.value)} in Ω"
+    return off + (", finite throughout" if since is None else f", not finite from |t| = {short(since.value)}")

@@ -81,6 +81,7 @@ class ClaimModel(Kind):
     table = ClaimModelTable
     needed = (PARTS.text,)
     sections = (claim_error,)
+    place = 20
 
     def cost(self, task: Task) -> float:
         """The same for all."""
@@ -142,6 +143,22 @@ class ClaimModel(Kind):
                 found.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
         said = ((case, ", ".join(f"{t} ({branch})" for branch, t in times.items())) for case, times in found.items())
         return [line for case, times in said for line in wrapped(f"{case}: Ω is off by 1 % of α at |t| = {times}")]
+
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """The first time at which a claimed Ω is off by 1 %."""
+        found = [(row.metrics[PARTS.text], row) for row in rows if PARTS.text in row.metrics]
+        parted = [(time.log10, row) for time, row in found if time.log10 is not None]
+        if parted:
+            _, row = min(parted, key=lambda each: each[0])
+            at = f"|t| = {short(row.metrics[PARTS.text].value)}"
+            return (
+                "",
+                f"The claimed Ω is off by 1 % of α from {at} on ({clip(row.case, 40)}, {row.key.subject.branch}).",
+            )
+        if not found:
+            return None
+        horizon = short(max((row.horizon.removeprefix("-") for _, row in found), key=exact))
+        return "", f"The claimed Ω stays within 1 % of α of the true motion up to |t| = {horizon}."
 
     def cards(self, rows: Sequence[Row]) -> list[Card]:
         """How wrong the claim is, forward in time, and in full on the smooth branch, where there are several."""

@@ -29,7 +29,7 @@ def claim_error(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     directions: dict[str, list[Direction]] = {}
     for _, report in sources:
         for row in report.rows:
-            if _series(row, MODEL_ERROR):
+            if _series(row, MODEL_ERROR) or _series(row, EVALUATION_ERROR):
                 directions.setdefault(row.key.case, []).append(row.key.direction)
     if not directions:
         return None

@@ -73,6 +73,7 @@ class Drift(Kind):
     table = DriftTable
     noise_factor = 5.0
     sections = (digits, growth)
+    place = 30
 
     def cost(self, task: Task) -> float:
         """The reruns that tell the rounding noise take a few seconds."""

@@ -19,7 +19,7 @@ from heavytop.kinds.base import Kind
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.ensemble import Ended, complete, growing
 from heavytop.measure.ensemble_reference import Reference, reference
-from heavytop.measure.integrator import HEYOKA, require
+from heavytop.measure.integrator import HEYOKA, WORDS, require
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
@@ -41,7 +41,7 @@ from heavytop.suite.task import Task, computed
 
 NAME = "growth"
 FAILED = Quantity("starts_failed")
-_OWN = (HEYOKA, "words")
+_OWN = (HEYOKA, WORDS)
 _MEANS = {
     "t^0.5": "less than rounding noise that adds up",
     "t": "a frequency that is off by a constant, by truncation or a wrong coefficient",
@@ -135,6 +135,7 @@ class Growth(Kind):
     table = GrowthTable
     noise_factor = 6.0
     sections = (digits, over_time)
+    place = 50
 
     def carries_band(self, metric: Metric) -> bool:
         """Every error; how many starts failed is none."""

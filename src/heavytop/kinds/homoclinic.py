@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 
 from rich.console import RenderableType
@@ -25,6 +25,7 @@ from heavytop.measure.truth import Truth, certified
 from heavytop.precision import DOUBLE, exact, parse, time_text
 from heavytop.records import Direction, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.brief import named, wrapped
+from heavytop.report.section import clip
 from heavytop.report.text import NOISE, both, short, table, title, with_noise
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
@@ -84,6 +85,7 @@ class Homoclinic(Kind):
     noise_factor = 8.0
     concludes = True
     sections = (claim_error, escape_times)
+    place = 60
 
     def carries_band(self, metric: Metric) -> bool:
         """Every error, and the time."""
@@ -129,6 +131,18 @@ class Homoclinic(Kind):
         if away is not None and away.log10 is not None and abs(exact(away.value)) > abs(exact(row.horizon)):
             yield f"{ESCAPE.text}: {away.value} is beyond the horizon {row.horizon}"
 
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """Until when the narrowest and the widest format stay; of integrators of others where there are any."""
+        known = [row for row in rows if row.outcome == Outcome.SUCCESS.value and ESCAPE.text in row.metrics]
+        theirs = [row for row in known if row.key.subject.name != HEYOKA]
+        if not known:
+            return None
+        name, cases = (theirs or known)[0].key.subject.name, dict.fromkeys(row.key.case for row in theirs or known)
+        on = "a homoclinic motion" if len(cases) > 1 else clip(next(iter(cases)), 40)
+        said = f"{clip(name, 40)} stays on {on} up to |t| = {_stays(row for row in known if _by(row, name))}"
+        ours = [row for row in known if theirs and _by(row, HEYOKA) and row.key.case in cases]
+        return "", f"{said}{f'; {HEYOKA} to {_stays(ours)}' if ours else ''}."
+
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line for each case and format."""
         lines = []
@@ -159,6 +173,24 @@ class Homoclinic(Kind):
         if not lines:
             return []
         return [*wrapped(f"Escape from a homoclinic motion at |t|, {', '.join(columns)}:"), *lines]
+
+
+def _by(row: Row, name: str) -> bool:
+    return row.key.subject.name == name
+
+
+def _stays(rows: Iterable[Row]) -> str:
+    """``12 to 63 in double, 62 to 321 in real:237``: escape times of the narrowest and the widest format."""
+    formats: dict[tuple[int, str], list[Fraction]] = {}
+    for row in rows:
+        time = row.metrics[ESCAPE.text]
+        until = abs(exact(row.horizon if time.log10 is None else time.value))
+        formats.setdefault((row.bits, row.precision), []).append(until)
+    found = []
+    for _, name in dict.fromkeys((min(formats), max(formats))):
+        low, high = (f"{float(pick(formats[_, name])):.3g}" for pick in (min, max))
+        found.append(f"{low if low == high else f'{low} to {high}'} in {name}")
+    return ", ".join(found)
 
 
 def _end(case: Case, bits: int) -> float:

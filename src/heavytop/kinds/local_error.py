@@ -19,6 +19,7 @@ from heavytop.precision import parse, time_text
 from heavytop.records import Against, Row, RowKey
 from heavytop.report.brief import wrapped
 from heavytop.report.names import computed_by
+from heavytop.report.section import Section, Sources, clip
 from heavytop.report.text import short, table, title
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
@@ -59,12 +60,44 @@ class LocalErrorTable(Table, tag=NAME):
         ]
 
 
+_TITLE = "Single steps, each against the proven motion from where it starts"
+_UNITS = "Error in eps of the format times the largest component of the state; the order as the steps show it."
+_COLUMNS = ["case", "format", "steps", "largest", "rms", "order seen", "declared", "outcome"]
+
+
+def _lines(rows: Sequence[Row]) -> list[list[str]]:
+    quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)
+    return [
+        [
+            f"{clip(row.case, 40)}{computed_by(row)}",
+            row.precision,
+            str(row.samples if row.key.subject.name != HEYOKA else row.steps),
+            *(short(row.metrics[q.text].value) if q.text in row.metrics else "-" for q in quantities),
+            "-" if row.order is None else str(row.order),
+            row.outcome,
+        ]
+        for row in rows
+    ]
+
+
+def single_steps(sources: Sources, first: Iterable[str] = ()) -> Section | None:
+    """The errors of the steps, a line a row."""
+    lines = [
+        [f"{case}{f', {source}' if source else ''}", *cells]
+        for source, report in sources
+        for case, *cells in _lines(report.rows)
+    ]
+    return Section("steps", "Single steps", [_UNITS], columns=_COLUMNS, rows=lines, place=60) if lines else None
+
+
 class LocalError(Kind):
     """Errors of steps in units of eps times the largest component of the state."""
 
     name = NAME
     table = LocalErrorTable
     samples_are_steps = True
+    sections = (single_steps,)
+    place = 80
 
     def cost(self, task: Task) -> float:
         """Each step is enclosed."""
@@ -92,31 +125,22 @@ class LocalError(Kind):
         """The largest error of a step and the order, a sentence a motion and format; of integrators of others alone
         where there are any.
         """
-        theirs = [row for row in rows if row.key.subject.name != HEYOKA]
-        found = [row for row in theirs or rows if _LARGEST in row.metrics and row.metrics[_LARGEST].value != "missing"]
-        return [line for row in found for line in wrapped(_said(row))]
+        return [line for row in _told(rows) for line in wrapped(_said(row))]
+
+    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
+        """The largest error of a step; of integrators of others where there are any."""
+        found = _told(rows)
+        return ("", _said(max(found, key=lambda row: row.metrics[_LARGEST]))) if found else None
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line a row."""
-        quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)
-        lines = [
-            [
-                f"{row.case}{computed_by(row)}",
-                row.precision,
-                str(row.samples if row.key.subject.name != HEYOKA else row.steps),
-                *(short(row.metrics[q.text].value) if q.text in row.metrics else "-" for q in quantities),
-                "-" if row.order is None else str(row.order),
-                row.outcome,
-            ]
-            for row in rows
-        ]
-        return [
-            title("Single steps, each against the proven motion from where it starts"),
-            Text(
-                "  Error in eps of the format times the largest component of the state; the order as the steps show it."
-            ),
-            table(["case", "format", "steps", "largest", "rms", "order seen", "declared", "outcome"], lines),
-        ]
+        return [title(_TITLE), Text(f"  {_UNITS}"), table(_COLUMNS, _lines(rows))]
+
+
+def _told(rows: Sequence[Row]) -> list[Row]:
+    """Those that have an error; of integrators of others alone where there are any."""
+    theirs = [row for row in rows if row.key.subject.name != HEYOKA]
+    return [row for row in theirs or rows if _LARGEST in row.metrics and row.metrics[_LARGEST].value != "missing"]
 
 
 def _said(row: Row) -> str:

@@ -21,6 +21,7 @@ class Score(Kind):
 
     name = "score"
     sections = (digits, growth)
+    place = 30
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
         """Digits right."""

@@ -128,6 +128,7 @@ class WorkPrecision(Kind):
     table = WorkPrecisionTable
     may_give_up = "work against precision"
     sections = (work_precision, method_growth)
+    place = 40
 
     def assumed_band(self, subject: Subject) -> float:
         """That of integrators of others."""

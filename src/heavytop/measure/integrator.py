@@ -18,7 +18,7 @@ from heavytop.precision import Precision
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
-HEYOKA = "heyoka"
+HEYOKA, WORDS = "heyoka", "words"
 
 
 def require(name: str) -> None:

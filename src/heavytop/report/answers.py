@@ -7,34 +7,41 @@ from collections.abc import Sequence
 
 from heavytop.measure.digits import digits_kept, digits_of, digits_text
 from heavytop.measure.drift import DRIFT
-from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.integrator import HEYOKA, WORDS
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import exact
 from heavytop.records import Law, Quantity, Row
-from heavytop.report.section import clip
+from heavytop.report.section import clip, scientific
 from heavytop.report.text import short
-from heavytop.report.work_precision import leads
+from heavytop.report.work_precision import leads, panels, seconds_text
 
 _ALONG = Quantity(SOLUTION_ERROR, "along")
 _HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved": "by no law that is resolved"}
 
 
 def digits_headline(rows: Sequence[Row]) -> tuple[str, str] | None:
-    """The fewest digits left at the longest horizon; of an integrator of others at the longest that heyoka has too."""
+    """The fewest digits left at the longest horizon: of an integrator of others beside heyoka's, else of heyoka beside
+    those of words.  A motion whose truth ends before, for the format has no digit left, counts where there is no other.
+    """
     finished = [row for row in rows if row.outcome == "success"]
     known = [(row, kept) for row in finished if (kept := digits_kept(row)) is not None]
     at_least = "" if known else "at least "
     known = known or [(row, kept) for row in finished if (kept := _at_least(row)) is not None]
-    ours = {_place(row): kept for row, kept in known if row.key.subject.name == HEYOKA}
-    both = [each for each in known if each[0].key.subject.name != HEYOKA and _place(each[0]) in ours]
-    chosen = both or known
+    known = [each for each in known if not each[0].reference.until] or known
+    theirs = [each for each in known if each[0].key.subject.name not in (HEYOKA, WORDS)]
+    ours = [each for each in known if each[0].key.subject.name == HEYOKA]
+    beside = HEYOKA if theirs else WORDS
+    second = {_place(row): kept for row, kept in known if row.key.subject.name == beside}
+    own = theirs or ours or known
+    chosen = [each for each in own if theirs and _place(each[0]) in second] or own
     if not chosen:
         return None
     last = max(abs(exact(row.horizon)) for row, _ in chosen)
     row, kept = min((each for each in chosen if abs(exact(each[0].horizon)) == last), key=lambda each: each[1])
     said = f"{clip(row.key.subject.name, 40)} has {at_least}{digits_text(kept)} of {digits_of(row.bits)} digits left"
     said += f" at T = {short(row.horizon)} ({clip(row.case, 40)} in {clip(row.precision, 20)})"
-    return "", said + (f", {HEYOKA} {digits_text(ours[_place(row)])}." if both else ".")
+    other = second.get(_place(row))
+    return "", said + ("." if other is None else f", {beside} {digits_text(other)}.")
 
 
 def _at_least(row: Row) -> float | None:
@@ -49,37 +56,50 @@ def _place(row: Row) -> tuple[str, int, str]:
 
 
 def fastest(rows: Sequence[Row]) -> tuple[str, str] | None:
-    """Who is fastest at 1e-10 and by how much, over the motions on which heyoka and a peer reach it."""
+    """Who is fastest at 1e-10 and by how much, over the motions on which heyoka and another reach it; else the least
+    error of all.
+    """
     found = [(lead, ratio) for lead in leads(rows) if lead.log10 == -10 and (ratio := lead.ratio) is not None]
     if not found:
-        return None
+        return _least_error(rows)
     won = [(lead, ratio) for lead, ratio in found if ratio >= 1]
     if len(won) * 2 >= len(found):
         names = Counter(lead.name for lead, _ in won)
-        ratios, others = [ratio for _, ratio in won], Counter(lead.peer for lead, _ in won)
+        ratios, others = [ratio for _, ratio in won], Counter(lead.other for lead, _ in won)
     else:
         won = [(lead, 1 / ratio) for lead, ratio in found if ratio < 1]
-        names = Counter(lead.peer for lead, _ in won)
+        names = Counter(lead.other for lead, _ in won)
         ratios, others = [ratio for _, ratio in won], Counter(lead.name for lead, _ in won)
     where = f"{len(won)} of {len(found)} motions" if len(won) < len(found) else f"all {len(found)} motions"
     where = clip(found[0][0].case, 40) if len(found) == 1 else where
-    low, high = (f"{pick(ratios):.1f}" for pick in (min, max))
+    low, high = (f"{ratio:.0f}" if ratio >= 100 else f"{ratio:.1f}" for ratio in (min(ratios), max(ratios)))
     times = low if low == high else f"{low} to {high}"
     (name, _), (other, _) = names.most_common(1)[0], others.most_common(1)[0]
     return "", f"{clip(name, 40)} is the fastest at error 1e-10 on {where}: {times} times as fast as {clip(other, 40)}."
 
 
+def _least_error(rows: Sequence[Row]) -> tuple[str, str] | None:
+    best = [(line.best, case, line.label) for case, lines in panels(rows).items() for line in lines if line.best]
+    if not best:
+        return None
+    point, case, label = min(best, key=lambda each: each[0].log10)
+    said = f"The least error is {scientific(point.log10)}: {clip(label, 40)} on {clip(case, 40)}"
+    return "", f"{said}, in {seconds_text(point.seconds)}."
+
+
 def laws_headline(rows: Sequence[Row]) -> tuple[str, str] | None:
-    """Which laws the healthy runs follow, and how many of the planted faults have another law than these."""
-    healthy = [row for row in rows if not row.key.subject.variant]
-    parts = [_followed(healthy, drifts=True), _followed(healthy, drifts=False)]
-    said = "; ".join(part for part in parts if part)
+    """The laws that most of the healthy runs follow, of integrators of others where there are any, and how many of the
+    planted faults have another law than these.
+    """
+    theirs = [row for row in rows if row.key.subject.name not in (HEYOKA, WORDS)]
+    healthy = theirs or [row for row in rows if not row.key.subject.variant] or rows
+    parts = [_followed(healthy, drifts=False), _followed(healthy, drifts=True)]
+    said = ", ".join(part for part in parts if part)
     faults = [row for row in rows if row.key.subject.bias]
     told = sum(_told(row, healthy) for row in faults)
-    if faults:
-        count = "All" if told == len(faults) else f"{told} of"
-        said = f"{count} {len(faults)} planted faults are told. {said}"
-    return ("", f"{said}.") if said else None
+    if faults and said:
+        said += f"; {told} of {len(faults)} planted faults show another law"
+    return ("", f"{said[0].upper()}{said[1:]}.") if said else None
 
 
 def _followed(rows: Sequence[Row], drifts: bool) -> str:
@@ -88,11 +108,11 @@ def _followed(rows: Sequence[Row], drifts: bool) -> str:
     of = sum(bool(_laws(row, drifts)) for row in rows)
     if not laws:
         return ""
-    parts = [
-        _HOW.get(name, f"like {name}") + (f" ({n} of {of} ensembles)" if of > 1 else "")
-        for name, n in laws.most_common()
-    ]
-    return ("First integrals drift " if drifts else "errors along the flow grow ") + ", ".join(parts)
+    ((growth, count),) = laws.most_common(1)
+    law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {of} ensembles)" if of > 1 else "")
+    name = rows[0].key.subject.name
+    whose = "" if name in (HEYOKA, WORDS) else f" of {clip(name, 40)}"
+    return f"first integrals drift {law}" if drifts else f"errors{whose} along the flow grow {law}"
 
 
 def _laws(row: Row, drifts: bool) -> list[Law]:

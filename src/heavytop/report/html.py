@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Container, Iterable, Sequence
-from itertools import islice
+from collections.abc import Container, Iterable, Mapping, Sequence
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -39,13 +39,14 @@ def report_page(report: Report, kinds: Kinds) -> str:
     rows, left_out = detailed(report.rows)
     failures = [row for row in report.rows if failed(row, kinds)]
     of_kind = {name: [row for row in report.rows if row.key.kind == name] for name in kinds}
-    said = [found for name, kind in kinds.items() if (found := kind.headline(of_kind[name]))]
+    cards = {name: kind.cards(of_kind[name]) for name, kind in kinds.items()}
     not_finite = [row for row in report.rows if row.outcome == "success" and not row.finite]
     return render(
         "report.html.j2",
         report=report,
-        headlines=said or [("", f"{len(report.rows)} measurements, {len(failures)} of which failed.")],
-        cards=[card for name, kind in kinds.items() for card in kind.cards(of_kind[name])],
+        headlines=_headlines(of_kind, cards, kinds)
+        or [("", f"{len(report.rows)} measurements, {len(failures)} of which failed.")],
+        cards=list(chain.from_iterable(cards.values())),
         failures=failures[:MOST_FAILURES],
         failed=len(failures),
         gave_up=Counter(kind_of(row, kinds).may_give_up for row in report.rows if _gave_up(row, kinds)),
@@ -58,6 +59,13 @@ def report_page(report: Report, kinds: Kinds) -> str:
         commands=commands(report),
         dirty=str(report.environment.get("commit")).endswith("-dirty"),
     )
+
+
+def _headlines(of_kind: Mapping[str, Sequence[Row]], cards: Mapping[str, Any], kinds: Kinds) -> list[tuple[str, str]]:
+    """The answer of each kind; one that has cards is heard once, so in a sentence where it opens the page alone."""
+    order = sorted(kinds, key=lambda name: kinds[name].place)
+    said = [(name, found) for name in order if (found := kinds[name].headline(of_kind[name]))]
+    return [found for number, (name, found) in enumerate(said) if not number or not cards[name]]
 
 
 def _gave_up(row: Row, kinds: Kinds) -> bool:

@@ -23,6 +23,7 @@ class Kind(Protocol):
     may_give_up: what its runs are called, where that one does not reach its horizon is what the rows are there to show.
     may_overflow: the same of values that are not finite.
     sections: of the page.
+    place: the answers of a page stand in the order of their places.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Kind(Protocol):
     may_give_up: str = ""
     may_overflow: bool = False
     sections: tuple[MakeSection, ...] = ()
+    place: int = 0
 
     def carries_band(self, metric: Metric) -> bool:
         """Whether its rows have a noise band at such a metric."""
@@ -68,7 +70,7 @@ class Kind(Protocol):
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
         """A word (refuted, holds, undecided; or "") and the answer of its rows in a sentence; None for no answer.
 
-        That of the first kind opens the page.
+        That of the first place opens the page.
         """
         return None
 

@@ -17,7 +17,7 @@ _LEADS = (
     "error",
     "heyoka",
     "takes",
-    "best peer",
+    "best of the others",
     "takes",
     "times as fast",
     "general code takes",
@@ -40,9 +40,11 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
             "farther left, the better. A curve is one integrator over its tolerances or steps; the time to compile is "
             "apart, in the numbers. A cross on the right edge is a run that gave up before the end, at the time it "
             "took: it has no error. heyoka:constants has the numbers of the top compiled into its code; heyoka with "
-            "general code, and the peers, are given them when they run.",
+            "general code, and the others, are given them when they run.",
         ],
-        answers=Table("Seconds that heyoka and the best peer take for an error", _LEADS, found) if found else None,
+        answers=Table("Seconds that heyoka and the best of the others take for an error", _LEADS, found)
+        if found
+        else None,
         columns=[
             "case",
             "integrator",
@@ -76,8 +78,8 @@ def _lead_cells(lead: Lead, source: str) -> list[str]:
         f"1e{lead.log10:g}",
         clip(lead.name, 40),
         said(lead.ours),
-        clip(lead.peer, 40),
-        said(lead.theirs) if lead.peer else "",
+        clip(lead.other, 40),
+        said(lead.theirs) if lead.other else "",
         "" if lead.ratio is None else f"{lead.ratio:.1f}",
         "" if lead.general is None else said(lead.general[1]),
         "" if lead.lanes is None else seconds_text(lead.lanes),

@@ -12,7 +12,7 @@ from heavytop.records import UNMEASURED, Quantity, Row
 
 _MOST_CASES, _CELL = 2, 31
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
-"""heyoka; with the numbers of the top compiled into its code; eight motions at once.  All others are peers."""
+"""heyoka; with the numbers of the top compiled into its code; eight motions at once.  Others compare with these."""
 ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
 """The largest over the samples, and that at the end."""
 
@@ -46,7 +46,7 @@ class Line:
 
     @property
     def label(self) -> str:
-        """``heyoka quad``; double goes without saying for a peer."""
+        """``heyoka quad``; double goes without saying for others."""
         plain = self.precision == "double" and self.integrator != OURS
         return self.integrator if plain else f"{self.integrator} {self.precision}"
 
@@ -69,9 +69,9 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Lead:
-    """How heyoka compares with the best peer that reaches an error, on one case.
+    """How heyoka compares with the fastest other integrator that reaches an error, on one case.
 
-    log10: of the error.  ours, theirs, lanes: seconds, None where none reaches it.  name, peer: who took them.
+    log10: of the error.  ours, theirs, lanes: seconds, None where none reaches it.  name, other: who took them.
     general: label and seconds of heyoka with one code for every top, where ``name`` is compiled for this one.
     compile: seconds to compile, at most, of each of the two forms.
     """
@@ -80,7 +80,7 @@ class Lead:
     log10: float
     name: str
     ours: float | None
-    peer: str
+    other: str
     theirs: float | None
     lanes: float | None = None
     general: tuple[str, float | None] | None = None
@@ -100,10 +100,10 @@ class Lead:
         if self.ratio is None:
             return ""
         if self.ratio < 1:
-            return f"At 1e{self.log10:g} {self.peer} is {1 / self.ratio:.1f} × as fast as {self.name}"
+            return f"At 1e{self.log10:g} {self.other} is {1 / self.ratio:.1f} × as fast as {self.name}"
         other = self.general and self._ratio(self.general[1])
         more = f" ({self.general[0]} {other:.1f} ×)" if self.general and other else ""
-        return f"At 1e{self.log10:g} {self.name} is {self.ratio:.1f} × as fast as {self.peer}{more}"
+        return f"At 1e{self.log10:g} {self.name} is {self.ratio:.1f} × as fast as {self.other}{more}"
 
     @property
     def text(self) -> str:
@@ -111,16 +111,18 @@ class Lead:
         goal = f"{self.case}: {self.name} at error 1e{self.log10:g}"
         if self.ours is None:
             theirs = "" if self.theirs is None else seconds_text(self.theirs)
-            fastest = f"; the fastest that gets there is {self.peer} ({theirs})" if theirs else ""
+            fastest = f"; the fastest that gets there is {self.other} ({theirs})" if theirs else ""
             return f"{goal}: not reached{fastest}"
         if self.ratio is None or self.theirs is None:
-            parts = [f"{goal} takes {seconds_text(self.ours)}; no peer gets there"]
+            parts = [f"{goal} takes {seconds_text(self.ours)}; no other gets there"]
         elif self.ratio < 1:
-            parts = [f"{self.case}: the fastest at error 1e{self.log10:g} is {self.peer} ({seconds_text(self.theirs)})"]
+            parts = [
+                f"{self.case}: the fastest at error 1e{self.log10:g} is {self.other} ({seconds_text(self.theirs)})"
+            ]
             parts.append(f"{self.name} is {_speed(self.ratio)} ({seconds_text(self.ours)})")
         else:
             pair = f"{seconds_text(self.ours)} against {seconds_text(self.theirs)}"
-            parts = [f"{goal} is {_speed(self.ratio)} than the best peer that gets there, {self.peer} ({pair})"]
+            parts = [f"{goal} is {_speed(self.ratio)} than the best other integrator, {self.other} ({pair})"]
         if self.general is not None:
             parts.append(f"{self.general[0]}, one code for every top, {self._general_said(self.general[1])}")
         if self.lanes is not None:
@@ -197,7 +199,7 @@ def _line(first: str, cells: Iterable[str]) -> str:
 
 
 def leads(rows: Sequence[Row]) -> list[Lead]:
-    """heyoka's best scalar line against the best peer, for each case that has both and an error that one of them
+    """heyoka's best scalar line against the best of the others, for each case that has both and an error that one
     reaches: in double at 1e-10, and beyond extended at 1e-30.
     """
     return [
@@ -211,10 +213,10 @@ def leads(rows: Sequence[Row]) -> list[Lead]:
 def _lead(case: str, log10: float, lines: Sequence[Line]) -> Lead | None:
     ours = [line for line in lines if line.integrator in (OURS, CONSTANTS)]
     lanes = [line for line in lines if line.integrator == LANES]
-    peers = [line for line in lines if line.integrator not in (OURS, CONSTANTS, LANES)]
-    if not ours or not peers:
+    others = [line for line in lines if line.integrator not in (OURS, CONSTANTS, LANES)]
+    if not ours or not others:
         return None
-    (mine, name), (theirs, peer), (side_by_side, _) = (_quickest(group, log10) for group in (ours, peers, lanes))
+    (mine, name), (theirs, other), (side_by_side, _) = (_quickest(group, log10) for group in (ours, others, lanes))
     if mine is None and theirs is None:
         return None
     name = name or ours[0].label
@@ -225,7 +227,7 @@ def _lead(case: str, log10: float, lines: Sequence[Line]) -> Lead | None:
         log10,
         name,
         mine,
-        peer,
+        other,
         theirs,
         side_by_side,
         general[0] if name == CONSTANTS and general else None,
