@@ -3,8 +3,8 @@
 Run: python benchmarks/words_random_tops.py capacity [--runs 3000]   word sizes, good and bad, against more words
      python benchmarks/words_random_tops.py formats [--runs 300] [--first 0]
 
-formats: every format, moments, weights and spins over ten decades, against the enclosure or, where that is dear, against
-a run with 60 bits more.
+formats: every format, moments, weights and spins over ten decades, against the enclosure or, where that is dear,
+against a run with 60 bits more.
 """
 
 from __future__ import annotations
