@@ -44,7 +44,7 @@ def exactly(value: Any) -> Any:
 def resolved(value: arb) -> bool:
     """Whether |value| is at least ten times its radius, or exactly 0."""
     # with so many bits right |value| is above 64 radii, whatever the rest of its bits
-    if _SURELY_RESOLVED <= value.rel_accuracy_bits():
+    if value.rel_accuracy_bits() >= _SURELY_RESOLVED:
         return bool(value.is_finite())
     return bool(value.is_finite()) and abs(midpoint(value)) >= RESOLVED_RADII * radius(value)
 
