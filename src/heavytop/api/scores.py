@@ -1,4 +1,4 @@
-"""How good a motion is, from Python: drift of its first integrals, distance from the known motion, digits kept."""
+"""How good a motion is, from Python: drift of its first integrals, distance from the known motion, digits right."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Score(Tabular):
 
     @property
     def digits_right(self) -> float | None:
-        """The digits kept: how many are right at every sample."""
+        """How many digits are right at every sample."""
         return self.digits_kept
 
     def _table(self) -> Table:
