@@ -18,7 +18,7 @@ from heavytop.measure.single_calls import single_calls
 from heavytop.precision import parse, time_text
 from heavytop.records import Against, Row, RowKey
 from heavytop.report.brief import wrapped
-from heavytop.report.names import computed_by
+from heavytop.report.names import computed_by, with_source
 from heavytop.report.section import Section, Sources, clip
 from heavytop.report.text import short, table, title
 from heavytop.suite.checkpoint import Saved
@@ -69,7 +69,7 @@ def _lines(rows: Sequence[Row]) -> list[list[str]]:
     quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)
     return [
         [
-            f"{clip(row.case, 40)}{computed_by(row)}",
+            f"{row.case}{computed_by(row)}",
             row.precision,
             str(row.samples if row.key.subject.name != HEYOKA else row.steps),
             *(short(row.metrics[q.text].value) if q.text in row.metrics else "-" for q in quantities),
@@ -83,7 +83,7 @@ def _lines(rows: Sequence[Row]) -> list[list[str]]:
 def single_steps(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """The errors of the steps, a line a row."""
     lines = [
-        [f"{case}{f', {source}' if source else ''}", *cells]
+        [with_source(clip(case), source), *map(clip, cells)]
         for source, report in sources
         for case, *cells in _lines(report.rows)
     ]
