@@ -206,26 +206,6 @@ class Certified(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
         return f"{self.starts} of {self.of_starts} starts certified at t = {self.time} {at_least}"
 
 
-class Checked(msgspec.Struct, frozen=True, gc=False):
-    """How a computed reference was checked: against a wider format, on so many starts, up to a time.
-
-    part: its error as a part of the error that it measures; all decimal text.
-    """
-
-    precision: str
-    starts: Count
-    until: str
-    part: str
-
-    @property
-    def text(self) -> str:
-        """In words."""
-        return (
-            f"against {self.precision} on {self.starts} starts up to |t| = {self.until}, "
-            f"its error is {self.part} of the error measured"
-        )
-
-
 class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """What a row was compared with.
 
@@ -239,7 +219,6 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     method: str = ""
     radius: str = ""
     certificates: tuple[Certified, ...] = ()
-    checked: Checked | None = None
     reason: str = ""
     until: str = ""
 
@@ -252,10 +231,9 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
             return self.method
         if self.how == "computed":
             agreed = f" agree within {self.radius}" if self.radius else ""
-            checked = f"; {self.checked.text}" if self.checked else ""
             ends = f", and no digit is left from t = {self.until} on" if self.until else ""
             why = f" ({self.reason})" if self.reason else ""
-            return f"computed, not proven: {self.method}{agreed}{ends}{checked}{why}"
+            return f"computed, not proven: {self.method}{agreed}{ends}{why}"
         said = ", for the first start; ".join(each.text for each in self.certificates)
         return f"known: {self.method}, radius below {self.radius}; {said}"
 

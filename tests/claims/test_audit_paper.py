@@ -11,24 +11,24 @@ import sympy
 from heavytop.claims import ershkov, ershkov_general
 from heavytop.claims.audit import audit, only_branch
 from heavytop.claims.ershkov_audit import GeneralClaim, PartialClaim
-from heavytop.claims.judge import AuditReport, Row, judge
+from heavytop.claims.judge import Audit, Row, judge
 from heavytop.errors import InputError
 from heavytop.exact.balls import FUNCTIONS, ball, working_precision
 from heavytop.top.equations import HEAVY_TOP
 
 
 @cache
-def report(name: str, system: str = "heavy_top") -> AuditReport:
+def report(name: str, system: str = "heavy_top") -> Audit:
     return audit(name, system)
 
 
-def rows(found: AuditReport, equation: str, branch: str = "smooth", domain: str = "all") -> dict[int, Row]:
+def rows(found: Audit, equation: str, branch: str = "smooth", domain: str = "all") -> dict[int, Row]:
     chosen = [r for r in found.rows if (r.equation, r.branch, r.domain) == (equation, branch, domain)]
     assert chosen, f"no row for {equation} {branch} {domain}"
     return {row.component: row for row in chosen}
 
 
-def verdicts(found: AuditReport, equation: str, branch: str = "smooth", domain: str = "all") -> list[bool | None]:
+def verdicts(found: Audit, equation: str, branch: str = "smooth", domain: str = "all") -> list[bool | None]:
     return [row.holds for _, row in sorted(rows(found, equation, branch, domain).items())]
 
 
@@ -153,7 +153,7 @@ def _steeper_psi(i1, i3, alpha, u, t, lib):
     ],
 )
 def test_a_planted_mistake_is_refuted_in_its_own_equation_and_in_no_other_step(claim, equation):
-    found = AuditReport(claim.name, "heavy_top", "", judge(claim.statements(HEAVY_TOP), claim.setting))
+    found = Audit(claim.name, "heavy_top", "", judge(claim.statements(HEAVY_TOP), claim.setting))
     clean = report(claim.name)
     broken = {
         row.equation for row, before in zip(found.rows, clean.rows, strict=True) if before.holds and not row.holds

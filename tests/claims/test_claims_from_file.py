@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from heavytop.claims.audit import audit, audit_claim
 from heavytop.claims.from_file import claim_from_table
 from heavytop.claims.guard import in_time
-from heavytop.claims.judge import AuditReport
+from heavytop.claims.judge import Audit
 from heavytop.errors import InputError
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 
@@ -45,11 +45,11 @@ def table(name: str) -> dict:
     return tomllib.loads((EXAMPLES / f"{name}.toml").read_text())
 
 
-def verdict(content: dict, system=HEAVY_TOP) -> AuditReport:
+def verdict(content: dict, system=HEAVY_TOP) -> Audit:
     return audit_claim(claim_from_table(content, "test"), system)
 
 
-def refuted(report: AuditReport) -> set[tuple[str, int]]:
+def refuted(report: Audit) -> set[tuple[str, int]]:
     return {(row.equation, row.component) for row in report.rows if row.holds is False}
 
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from heavytop.claims.audit import audit, audit_claim
 from heavytop.claims.from_file import claim_from_table
-from heavytop.claims.judge import AuditReport
+from heavytop.claims.judge import Audit
 from heavytop.errors import InputError
 from heavytop.top.equations import HEAVY_TOP
 
@@ -37,11 +37,11 @@ def free(value: str, where: tuple[str, ...] = (), kind: str = "integral", state:
     } | parts
 
 
-def judged(table: dict) -> AuditReport:
+def judged(table: dict) -> Audit:
     return audit_claim(claim_from_table(table, "test"), HEAVY_TOP)
 
 
-def open_conditions(report: AuditReport) -> str:
+def open_conditions(report: Audit) -> str:
     return "; ".join(f"{c.text} {c.reason}" for row in report.rows for c in row.conditions if not c.discharged)
 
 

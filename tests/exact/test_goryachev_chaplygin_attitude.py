@@ -95,7 +95,7 @@ def test_the_strips_are_analytic_as_far_as_they_say(seed):
     """The motion goes on upwards in s from real places, as far as |Im s| may be, within the bounds."""
     motion = random_motion(seed)
     with working_precision(128):
-        form = _motion(motion, 128)
+        form = _motion(motion)
         torus = Torus.of(form)
         a, h = float(form.size), float(ball(form.level.energy))
         for k, one in enumerate(torus.uniform):
@@ -119,7 +119,7 @@ def test_at_a_resonance_the_azimuth_grows_as_no_sum_of_integrals_of_one_variable
     A vector whose azimuth splits would make it the same for all: the term would be 0 at the resonance.
     """
     with working_precision(128):
-        integral = GoryachevChaplyginAttitude.of(_motion(RESONANT, 128)).integral
+        integral = GoryachevChaplyginAttitude.of(_motion(RESONANT)).integral
         first, second = integral.rates
         assert abs(second / first - 3).upper() < 1e-7
         # of cos cos and of sin sin

@@ -13,11 +13,12 @@ from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.validated import Validated
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Problem
+from heavytop.integrate.words import follow
 from heavytop.measure import computed_reference
 from heavytop.measure import truth as truths
 from heavytop.measure.computed_reference import of_rounded
 from heavytop.measure.truth import Truth, known_motion, truth
-from heavytop.precision import DOUBLE, QUAD, Precision, exact, real
+from heavytop.precision import DOUBLE, QUAD, Precision, exact, number, real
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -199,3 +200,38 @@ def test_what_takes_longer_than_anyone_waits_has_no_truth(monkeypatch: pytest.Mo
     with pytest.raises(OutOfReach, match="stopped at the step limit"):
         of_rounded([problem], times(200, 2))
     assert "stopped at the step limit" in truth(problem, times(200, 2))
+
+
+@pytest.mark.parametrize(("precision", "horizon"), [(DOUBLE, 10**4), (DOUBLE, -(10**8)), (DOUBLE, 10**40)])
+def test_one_late_sample_is_not_computed_where_no_digit_is_left_on_the_way(
+    precision: Precision, horizon: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor one that would take longer than its effort: neither costs more than the first steps tell."""
+    steps = 0
+
+    def counted(problem, targets, step_limit):
+        nonlocal steps
+        run = follow(problem, targets, step_limit=step_limit)
+        steps += run.steps
+        return run
+
+    monkeypatch.setattr(computed_reference, "follow", counted)
+    answer = truth(chaotic(precision), [Fraction(horizon)])
+    assert isinstance(answer, str)
+    far = abs(horizon) > 10**20
+    assert ("takes too long: its first 1000 steps end at" if far else "no digit of the format is left at") in answer
+    assert ".;" not in answer
+    assert not answer.endswith(".")
+    assert steps < 60_000
+
+
+def test_the_first_steps_forecast_a_run_up_to_its_effort_and_not_beyond(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(computed_reference, "_PILOT_STEPS", 20)
+    monkeypatch.setattr(computed_reference, "seconds_a_step", lambda bits: 1.0)
+    monkeypatch.setattr(computed_reference, "EFFORT", 40.0)
+
+    reached = follow(chaotic(real(84)), [number(Fraction(10**6), real(84))], step_limit=20).time_reached
+    for beyond, says in ((Fraction(0), "stopped at the step limit"), (Fraction(1, 2**20), "takes too long")):
+        at = exact(number(2 * reached * (1 + beyond), real(84)))
+        with pytest.raises(OutOfReach, match=says):
+            computed_reference.compute([chaotic], [at], 84)

@@ -3,34 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import fields
 
 from heavytop.api import arguments
 from heavytop.claims.audit import PAPER, only_branch
 from heavytop.claims.audit import audit as audit_named
-from heavytop.claims.judge import AuditReport
-from heavytop.display import Table, Tabular
+from heavytop.claims.judge import Audit as Audit
 from heavytop.top.equations import HEAVY_TOP, System
-
-_WORDS = {True: "holds", False: "refuted", None: "undecided"}
-
-
-class Audit(Tabular, AuditReport):
-    """The audit of a claim: ``verdict`` (holds, refuted or undecided), ``rows``, ``to_json()`` and ``exit_code``."""
-
-    __slots__ = ()
-
-    def _table(self) -> Table:
-        lines = [
-            [
-                str(row["equation"]),
-                *(str(row[key] or "") for key in ("component", "branch", "domain")),
-                _WORDS[row["holds"]],
-            ]
-            for row in self.to_json()["equations"]
-        ]
-        title = f"{self.claim} as a motion of {self.system}: {self.verdict}"
-        return Table(title, ("equation", "component", "branch", "domain", "verdict"), lines)
 
 
 def audit(claim: str | os.PathLike[str], system: System | str = HEAVY_TOP, *, branch: str | None = None) -> Audit:
@@ -50,6 +28,4 @@ def audit(claim: str | os.PathLike[str], system: System | str = HEAVY_TOP, *, br
     """
     name = claim if isinstance(claim, str) and claim in PAPER else str(arguments.path(claim, "claim"))
     found = audit_named(name, arguments.system(system).name)
-    if branch is not None:
-        found = only_branch(found, arguments.text(branch, "branch"))
-    return Audit(**{each.name: getattr(found, each.name) for each in fields(found) if each.init})
+    return found if branch is None else only_branch(found, arguments.text(branch, "branch"))

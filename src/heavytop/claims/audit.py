@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from heavytop.claims.guard import in_time
-from heavytop.claims.judge import AuditReport, Finding, Row, judge
+from heavytop.claims.judge import Audit, Finding, Row, judge
 from heavytop.claims.statement import Setting, Statement
 from heavytop.errors import InputError
 from heavytop.top.equations import HEAVY_TOP, System, system
@@ -59,7 +59,7 @@ def find_claim(name: str) -> Auditable:
 
 def audit(
     name: str, system_name: str = HEAVY_TOP.name, progress: Callable[[int, int], None] = lambda done, of: None
-) -> AuditReport:
+) -> Audit:
     """The audit of a claim of the paper, or of a TOML file, as a motion of that system.
 
     progress: hears of a claim of the paper how many equations are judged, of how many.
@@ -73,17 +73,15 @@ def audit(
     return in_time(name, about.name)
 
 
-def audit_claim(
-    claim: Auditable, about: System, progress: Callable[[int, int], None] = lambda done, of: None
-) -> AuditReport:
+def audit_claim(claim: Auditable, about: System, progress: Callable[[int, int], None] = lambda done, of: None) -> Audit:
     """The audit of a claim that is at hand, as a motion of ``about``.  progress: as in :func:`audit`."""
     rows = judge(claim.statements(about), claim.setting, progress)
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
-    return AuditReport(claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind)
+    return Audit(claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind)
 
 
-def only_branch(report: AuditReport, branch: str) -> AuditReport:
+def only_branch(report: Audit, branch: str) -> Audit:
     """The same report with the rows of one branch, and its verdict on them; raises InputError for any other name."""
     if branch not in ("smooth", "printed"):
         raise InputError(f"Unknown branch {branch[:40]!r}.", "Use smooth or printed.")

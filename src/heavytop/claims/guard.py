@@ -13,7 +13,7 @@ import sys
 
 import msgspec
 
-from heavytop.claims.judge import AuditReport
+from heavytop.claims.judge import Audit
 from heavytop.errors import HeavyTopError, InputError
 
 SECONDS = 20
@@ -32,12 +32,12 @@ class AuditEnded(HeavyTopError):
 class Answer(msgspec.Struct, frozen=True):
     """What the child says: a report, or (cause, remedy) of an error, or that its memory was used up."""
 
-    report: AuditReport | None = None
+    report: Audit | None = None
     error: tuple[str, str] | None = None
     memory: bool = False
 
 
-def in_time(path: str, system_name: str, seconds: float = SECONDS) -> AuditReport:
+def in_time(path: str, system_name: str, seconds: float = SECONDS) -> Audit:
     """The audit of the claim in a file; raises InputError where it takes longer than ``seconds`` or 3 GB.
 
     Raises AuditEnded with what happened where the process of the audit ends without an answer.

@@ -24,9 +24,13 @@ from heavytop.claims.prover import Prover
 from heavytop.claims.rational import Quotient
 from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import Formulas, Setting, Statement
+from heavytop.display import Table, Tabular
 from heavytop.exact.balls import radius as radius_of
 from heavytop.exact.balls import radius_text, value_text
 
+VERDICTS = {True: "holds", False: "refuted", None: "undecided"}
+ABOUT = {"motion": "a motion", "integral": "a first integral", "relation": "an invariant relation"}
+"""What a claim of each kind says that its formulas are."""
 _BITS = (192, 1024)
 _MOST_BITS = 300_000
 """Of the exponent of a residual that is written as exact text: those of decimal text go up to 10^100000."""
@@ -82,8 +86,8 @@ class Finding:
     holds: bool | None
 
 
-@dataclass(frozen=True, slots=True)
-class AuditReport:
+@dataclass(frozen=True, slots=True, repr=False)
+class Audit(Tabular):
     """The audit of one claim about one system.
 
     why: what explains the verdict, each step checked.  solves: the systems whose equations of motion the claim
@@ -123,6 +127,11 @@ class AuditReport:
             "why": [{"statement": finding.statement, "holds": finding.holds} for finding in self.why],
             "equations": [row.to_json() for row in self.rows],
         }
+
+    def _table(self) -> Table:
+        lines = [(r.equation, str(r.component or ""), r.branch, r.domain, VERDICTS[r.holds]) for r in self.rows]
+        title = f"{self.claim} as {ABOUT[self.kind]} of {self.system}: {self.verdict}"
+        return Table(title, ("equation", "component", "branch", "domain", "verdict"), lines)
 
 
 def judge(

@@ -68,7 +68,6 @@ def history(
     metric: Annotated[str, typer.Option(help="Only metrics that match this pattern, changed or not.")] = "",
     case: Annotated[str, typer.Option(help="Only cases that match this pattern.")] = "*",
     policy: Annotated[Path | None, typer.Option(help="TOML file of what counts as a step.")] = None,
-    svg: Annotated[Path | None, typer.Option(help="Draw the metrics shown into one picture.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page with a small chart a metric.")] = None,
     json: Json = False,
 ) -> int:
@@ -87,12 +86,10 @@ def history(
     if not metric:
         tracks = [track for track in tracks if track.steps]
     names = [str(path) for path in reports]
-    files = [] if svg is None else [(svg, over.history_svg(names, tracks))]
     if html is not None:
         from heavytop.report.history_page import history_page
 
-        files.append((html, history_page(names, read, tracks)))
-    _write(files)
+        _write([(html, history_page(names, read, tracks))])
     if json:
         print_json(over.history_json(names, tracks))
     else:

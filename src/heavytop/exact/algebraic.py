@@ -21,7 +21,7 @@ from flint import arb
 from heavytop.errors import InputError
 from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
 from heavytop.exact.balls import ball, midpoint, to_bits, working_precision
-from heavytop.exact.flint_context import current_precision, whole_evaluation
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import Curve, OneGapMotion, gaps, value
 from heavytop.exact.scales import exponent
@@ -83,12 +83,12 @@ class AlgebraicMotion(WithBearing):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.Evaluated`."""
-        motion, size = _motion(self, current_precision()).at(ball(time)), ball(self.curve.gamma_square()).sqrt()
+        motion, size = _motion(self).at(ball(time)), ball(self.curve.gamma_square()).sqrt()
         return [*motion[:3], *(component / size for component in motion[3:])]
 
     def bearing(self, time: Fraction) -> Bearing:
         """See :class:`heavytop.exact.azimuth.WithBearing`: of M, and of what M/x tends to in Chaplygin's at rest."""
-        return _motion(self, current_precision()).bearing(_azimuth(self, current_precision()), ball(time))
+        return _motion(self).bearing(_azimuth(self), ball(time))
 
     def rounded(self, bits: int = _ROUNDED_BITS) -> tuple[HeavyTop, State]:
         """A top of weight 1 and a start, exact, within 2^(3 − bits) of this one's, relative to sizes above 1; |γ| = 1.
@@ -110,12 +110,12 @@ class AlgebraicMotion(WithBearing):
 
 
 @kept
-def _azimuth(motion: AlgebraicMotion, bits: int) -> Azimuth:
-    return _motion(motion, bits).azimuth()
+def _azimuth(motion: AlgebraicMotion) -> Azimuth:
+    return _motion(motion).azimuth()
 
 
 @kept
-def _motion(motion: AlgebraicMotion, _bits: int) -> OneGapMotion:
+def _motion(motion: AlgebraicMotion) -> OneGapMotion:
     q, r = motion.curve.squares(motion.place)
     return OneGapMotion.of(motion.curve, motion.place, (motion.signs[0] * (q > 0), motion.signs[1] * (r > 0)))
 

@@ -82,11 +82,11 @@ class WithBearing(Evaluated):
         """
 
         def evaluate(working: int) -> list[arb]:
-            return self.bearing(time).carried(_began(self, working))
+            return self.bearing(time).carried(_began(self))
 
         return to_bits(evaluate, bits, self.own_time(time))
 
 
 @kept
-def _began(case: WithBearing, _bits: int) -> arb:
+def _began(case: WithBearing) -> arb:
     return case.bearing(Fraction(0)).azimuth

@@ -15,7 +15,7 @@ Source: Leimanis, The General Problem of the Motion of Coupled Rigid Bodies abou
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -24,11 +24,10 @@ from flint import arb
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm, balls, half_angle, instant, sign
-from heavytop.exact.flint_context import current_precision
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.motion import kept
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, System, heavy_top
+from heavytop.top.equations import heavy_top
 from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
 
 
@@ -36,11 +35,7 @@ from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
 class BobylevSteklov(ClosedForm):
     """Every Bobylev-Steklov motion with r on axis 1 and I1 = 2 I3.  Raises NotInClass where an equality fails."""
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: Bobylev-Steklov, Jacobi functions"
-    system: System = HEAVY_TOP
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: Bobylev-Steklov, Jacobi functions"
 
     def __post_init__(self) -> None:
         (i1, _, i3), n = self.top.inertia, self.top.moment
@@ -60,7 +55,7 @@ class BobylevSteklov(ClosedForm):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self, current_precision())
+        lattice = _lattice(self)
         if lattice is None:
             return balls(self.start.flat)
         x, slope = lattice.motion(instant(time))
@@ -98,7 +93,7 @@ def _height(case: BobylevSteklov) -> Fraction:
 
 
 @kept
-def _lattice(case: BobylevSteklov, _bits: int) -> _Lattice | None:
+def _lattice(case: BobylevSteklov) -> _Lattice | None:
     """None where nothing moves."""
     if not any(heavy_top(case.system.parameters(case.top, case.start), case.start.flat)):
         return None

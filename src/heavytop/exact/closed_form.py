@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 from flint import acb, acb_series, arb, arb_series
 
@@ -19,7 +20,7 @@ from heavytop.exact.flint_context import series_length as series_length
 from heavytop.exact.motion import initial_xi
 from heavytop.top.angles import attitude_from_angles
 from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
 Carry = Callable[[Sequence[Any]], list[Any]]
 """Takes the body components at t = 0 of a vector fixed in space to those at the time in question."""
@@ -54,10 +55,13 @@ def half_angle(tangent: Fraction) -> tuple[Fraction, Fraction]:
     return (1 - square) / (1 + square), 2 * Fraction(tangent) / (1 + square)
 
 
-def turned(vector: Sequence[Any], omega: Sequence[arb], rate: arb, time: Any) -> list[Any]:
-    """The solution of v' = v × Ω for a constant Ω of length ``rate`` > 0, at ``time``."""
+def rotate(vector: Sequence[Any], omega: Vector, time: Any) -> list[Any]:
+    """The solution of v' = v × Ω for a constant Ω at ``time``, a number or series."""
+    if not any(omega):
+        return list(vector)
+    rate = ball(dot(omega, omega)).sqrt()
     sine, cosine = (rate * time).sin_cos()
-    axis = [component / rate for component in omega]
+    axis = [component / rate for component in balls(omega)]
     along = dot(axis, vector)
     across = cross(vector, axis)
     return [along * n + cosine * (v - along * n) + sine * w for n, v, w in zip(axis, vector, across, strict=True)]
@@ -103,19 +107,26 @@ class Evaluated(ABC):
         return found
 
 
+@dataclass(frozen=True, slots=True)
 class ClosedForm(Evaluated):
-    """Mixed into the dataclass of each case, which brings ``top``, ``start`` and ``method``."""
+    """The motion of ``top`` from ``start``; the dataclass of each case brings ``method``, and its tests.
 
-    __slots__ = ()
-    system: System = HEAVY_TOP
+    made: what :func:`heavytop.exact.motion.kept` keeps.
+    """
 
-    if TYPE_CHECKING:  # a property here would become the default of the dataclass fields
+    top: HeavyTop
+    start: State
+    method: ClassVar[str]
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
-        @property
-        def top(self) -> HeavyTop: ...
+    @property
+    def system(self) -> System:
+        """The heavy top, but for the cases that say otherwise."""
+        return HEAVY_TOP
 
-        @property
-        def start(self) -> State: ...
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Without what was made: balls do not go from process to process."""
+        return type(self), tuple(getattr(self, given.name) for given in fields(self) if given.init)
 
 
 class WithAttitude(ClosedForm):
@@ -132,21 +143,17 @@ class WithAttitude(ClosedForm):
         omega, carry = self.motion(instant(time))
         return [*omega, *carry(balls(self.start.gamma))]
 
-    def attitude(self, time: Fraction, bits: int, initial: Sequence[Fraction] | None = None) -> list[arb]:
-        """ξ, a unit vector fixed in space and ⟂ γ, in body components.
-
-        ``initial``: ξ at t = 0; :func:`heavytop.exact.motion.initial_xi` of γ if not given.
-        """
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components."""
 
         def evaluate(_working: int) -> list[arb]:
-            xi = initial_xi(self.start.gamma) if initial is None else balls(initial)
-            return self.motion(instant(time))[1](xi)
+            return self.motion(instant(time))[1](initial_xi(self.start.gamma))
 
         return to_bits(evaluate, bits, time)
 
 
-class WithAngles(ClosedForm):
-    """A closed form of the Euler angles too."""
+class WithAngles(Evaluated):
+    """A motion whose Euler angles are given by formulas too."""
 
     __slots__ = ()
 

@@ -28,7 +28,7 @@ Source: Delone's class is Kovalevskaya's of the first degenerate kind, Appelrot;
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -37,11 +37,11 @@ from flint import arb
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, WithAngles, balls, constant, instant, series_length, tanh_sech
-from heavytop.exact.flint_context import current_length, current_precision
+from heavytop.exact.flint_context import current_length
 from heavytop.exact.motion import kept
 from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import kovalevskaya_xi
 
@@ -53,11 +53,7 @@ class Delone(ClosedForm):
     Raises NotInClass unless I1 = I2 = 2 I3, P c = 0, P r ≠ 0 and ξ = 0, exactly.
     """
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: Delone class of the Kovalevskaya top, Weierstrass functions"
-    system: System = HEAVY_TOP
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: Delone class of the Kovalevskaya top, Weierstrass functions"
 
     def __post_init__(self) -> None:
         (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
@@ -78,7 +74,7 @@ class Delone(ClosedForm):
         length = current_length()
         with series_length(length + 1):
             cosine, sine = self._turn(time)
-            square, along, _, weight = _prepared(self, current_precision())[1]
+            square, along, _, weight = _prepared(self)[1]
             # the component across r is −b': one more coefficient, then one less
             across = -square * (cosine * sine.derivative() - sine * cosine.derivative())
         n1, n2, _ = balls(self.top.moment)
@@ -98,7 +94,7 @@ class Delone(ClosedForm):
 
     def _turn(self, time: Fraction) -> tuple[Any, Any]:
         """cos b and sin b/|n|."""
-        motion, (square, *_) = _prepared(self, current_precision())
+        motion, (square, *_) = _prepared(self)
         point = motion.lattice.point(time, current_length())
         below, above = motion.denominator(point), motion.numerator(point)
         total = below * below + square * (above * above)
@@ -113,7 +109,7 @@ def _constants(case: Delone) -> tuple[Fraction, Fraction, Fraction, Fraction]:
 
 
 @kept
-def _prepared(case: Delone, _bits: int) -> tuple[PreparedMotion, list[arb]]:
+def _prepared(case: Delone) -> tuple[PreparedMotion, list[arb]]:
     square, along, across, weight = _constants(case)
     spin, lift = case.start.omega[2], case.start.gamma[2] / case.top.inertia[2]
     # (weight − 2 s lift y − s weight y²)(1 + s y²) − (along − spin s y − s along y²)²/s with s = |n|², over 4 s
@@ -137,8 +133,8 @@ class DeloneHomoclinic(WithAngles):
 
     alpha: Fraction
     i1: Fraction
-    method: str = "closed form: Delone homoclinic"
-    system: System = HEAVY_TOP
+    method = "closed form: Delone homoclinic"
+    system = HEAVY_TOP
 
     def __post_init__(self) -> None:
         if self.alpha <= 0 or self.i1 <= 0:

@@ -21,7 +21,7 @@ from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
 from heavytop.exact.closed_form import WithAngles, instant, tanh_sech
 from heavytop.precision import shown
-from heavytop.top.equations import GYROSTAT, System
+from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
 
@@ -46,8 +46,8 @@ class ErshkovPartial(WithAngles):
     alpha: Fraction
     i1: Fraction
     i3: Fraction
-    method: str = "closed form: gyrostat, hyperbolic (4.2)-(4.6)"
-    system: System = GYROSTAT
+    method = "closed form: gyrostat, hyperbolic (4.2)-(4.6)"
+    system = GYROSTAT
 
     def __post_init__(self) -> None:
         if self.alpha <= 0:

@@ -24,7 +24,7 @@ Sources: Whittaker, Analytical Dynamics, chapter VI; Landau and Lifshitz, Mechan
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -32,14 +32,12 @@ from flint import acb, arb
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball
-from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign, turned, unit
-from heavytop.exact.flint_context import current_precision
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, rotate, sign, unit
 from heavytop.exact.jacobi import Jacobi, Wave, jacobi, legendre_f, wave
 from heavytop.exact.motion import kept
 from heavytop.exact.weierstrass import imag, real
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from heavytop.top.heavy_top import cross, dot
 
 _EVEN = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 
@@ -48,11 +46,7 @@ _EVEN = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 class Euler(WithAttitude):
     """Every motion of a top without moment of the weight.  Raises NotInClass unless P r = 0 exactly."""
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: Euler-Poinsot, Jacobi functions"
-    system: System = HEAVY_TOP
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: Euler-Poinsot, Jacobi functions"
 
     def __post_init__(self) -> None:
         if any(self.top.moment):
@@ -69,7 +63,7 @@ class Euler(WithAttitude):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self, current_precision())
+        lattice = _lattice(self)
         if lattice is None:
             return WithAttitude.evaluate(self, time)
         omega, place = lattice.motion(instant(time))
@@ -77,15 +71,11 @@ class Euler(WithAttitude):
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self, current_precision())
+        lattice = _lattice(self)
         if lattice is not None:
             omega, place = lattice.motion(time)
             return omega, lambda vector: place(lattice.held(vector))
-        omega = balls(self.start.omega)
-        if not any(self.start.omega):
-            return omega, list
-        rate = ball(dot(self.start.omega, self.start.omega)).sqrt()
-        return omega, lambda vector: turned(vector, omega, rate, time)
+        return balls(self.start.omega), lambda vector: rotate(vector, self.start.omega, time)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +130,7 @@ class _Lattice:
 
 
 @kept
-def _lattice(case: Euler, _bits: int) -> _Lattice | None:
+def _lattice(case: Euler) -> _Lattice | None:
     """None for a steady rotation."""
     if case.steady:
         return None

@@ -14,7 +14,7 @@ Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -24,7 +24,7 @@ from heavytop.errors import LevelNotDone, NotInClass
 from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm
-from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
+from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import distance_of_others
 from heavytop.exact.goryachev_chaplygin_abel import Motion
 from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude
@@ -32,8 +32,7 @@ from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, root
 from heavytop.exact.motion import kept
 from heavytop.exact.separated import REMEDY, decide, refuse, require_plane_centre
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.top.heavy_top import dot
 
 _DISTANCE = 1e-5
 """cosh β − 1 (:mod:`heavytop.exact.gaps`) where the Fourier series take nearly 2^17 terms for 50 digits."""
@@ -46,11 +45,7 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
     Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0 and γ ≠ 0, and on the levels not done.
     """
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: Goryachev-Chaplygin, inversion of Abel's integrals"
-    system: System = HEAVY_TOP
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: Goryachev-Chaplygin, inversion of Abel's integrals"
 
     def __post_init__(self) -> None:
         require_plane_centre("Goryachev-Chaplygin", 4, self.top, self.start)
@@ -64,20 +59,20 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        return _motion(self, current_precision()).at(time, current_length())
+        return _motion(self).at(time, current_length())
 
     def bearing(self, time: Fraction) -> Bearing:
         """See :class:`heavytop.exact.azimuth.WithBearing`: not for asymptotic motions, nor to very many digits."""
-        return _attitude(self, current_precision()).bearing(time)
+        return _attitude(self).bearing(time)
 
 
 @kept
-def _attitude(case: GoryachevChaplygin, bits: int) -> GoryachevChaplyginAttitude:
-    return GoryachevChaplyginAttitude.of(_motion(case, bits))
+def _attitude(case: GoryachevChaplygin) -> GoryachevChaplyginAttitude:
+    return GoryachevChaplyginAttitude.of(_motion(case))
 
 
 @kept
-def _motion(case: GoryachevChaplygin, _bits: int) -> Motion:
+def _motion(case: GoryachevChaplygin) -> Motion:
     return Motion.of(Level.of(case.top, case.start))
 
 

@@ -23,7 +23,6 @@ from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, half_angle
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
 
@@ -31,10 +30,7 @@ from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 class Grioli(WithAttitude):
     """Every Grioli precession of a top with b = 0.  Raises NotInClass where the top, Ω or γ is not one's exactly."""
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: Grioli regular precession"
-    system: System = HEAVY_TOP
+    method = "closed form: Grioli regular precession"
 
     def __post_init__(self) -> None:
         (i1, i2, i3), n, omega = self.top.inertia, self.top.moment, self.start.omega

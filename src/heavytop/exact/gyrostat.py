@@ -21,21 +21,20 @@ Z2 = i (M3 Z1 − M1 Z3)/m.  Valid for every start; λ = 0 is Euler's free top.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
 from flint import arb
 
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.closed_form import ClosedForm
-from heavytop.exact.flint_context import current_length, current_precision, require_undisturbed
-from heavytop.exact.motion import initial_xi, kept, rotate, taylor, turned
+from heavytop.exact.closed_form import ClosedForm, balls, rotate
+from heavytop.exact.flint_context import current_length
+from heavytop.exact.motion import initial_xi, kept, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.second_kind import Winding
 from heavytop.exact.weierstrass import Point, imag, real
-from heavytop.top.equations import GYROSTAT, Parameters, System, gyrostat, rotor
+from heavytop.top.equations import GYROSTAT, Parameters, gyrostat, rotor
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
@@ -46,12 +45,9 @@ _UNITS: tuple[Vector, ...] = ((_ONE, _ZERO, _ZERO), (_ZERO, _ONE, _ZERO), (_ZERO
 class Gyrostat(ClosedForm):
     """The motion of the gyrostat with rotor λ = ``rotor`` from any start, γ of any length and direction."""
 
-    top: HeavyTop
-    start: State
     rotor: Fraction
-    method: str = "closed form: gyrostat, Weierstrass functions of M2"
-    system: System = GYROSTAT
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: gyrostat, Weierstrass functions of M2"
+    system = GYROSTAT
 
     @classmethod
     def of(cls, top: HeavyTop, start: State) -> Gyrostat:
@@ -81,40 +77,31 @@ class Gyrostat(ClosedForm):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        length = current_length()
-        return self._evaluate(time, length if length > 1 else 0, current_precision())
+        prepared = _prepared(self)
+        momentum, point, inverse = self._momentum(time)
+        omega = [m * inverse for m, inverse in zip(momentum, prepared.inverses, strict=True)]
+        if prepared.gamma is None:
+            return [*omega, *rotate(balls(self.start.gamma), self.angular_velocity, point.time)]
+        return [*omega, *prepared.gamma.at(momentum, point, inverse)]
 
-    def attitude(self, time: Fraction, bits: int, xi: Vector | None = None) -> list[arb]:
-        """ξ at ``time``; at t = 0 it is ``xi`` (any vector fixed in space) or the default one ⟂ γ."""
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components."""
 
-        def evaluate(inside: int) -> list[arb]:
-            if xi is not None:
-                return self._carried(xi, time, inside)
-            images = [self._carried(unit, time, inside) for unit in _UNITS]
-            start = initial_xi(self.start.gamma)
-            return [dot(start, [image[axis] for image in images]) for axis in range(3)]
+        def evaluate(_working: int) -> list[arb]:
+            xi = initial_xi(self.start.gamma)
+            momentum, point, inverse = self._momentum(time)
+            if self.permanent:
+                return rotate(xi, self.angular_velocity, point.time)
+            images = [unit.at(momentum, point, inverse) for unit in _units(self)]
+            return [dot(xi, components) for components in zip(*images, strict=True)]
 
         return to_bits(evaluate, bits, time)
 
-    def _evaluate(self, time: Fraction, length: int, bits: int) -> list[Any]:
-        prepared = _prepared(self, bits)
-        momentum, point, inverse = self._momentum(time, length, bits)
-        omega = [m * inverse for m, inverse in zip(momentum, prepared.inverses, strict=True)]
+    def _momentum(self, time: Fraction) -> tuple[list[Any], Point, Any]:
+        prepared, length = _prepared(self), current_length()
+        point = prepared.motion.lattice.point(time, length if length > 1 else 0)
         if prepared.gamma is None:
-            return [*omega, *rotate(self.start.gamma, self.angular_velocity, point.time)]
-        return [*omega, *prepared.gamma.at(momentum, point, inverse)]
-
-    def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[Any]:
-        momentum, point, inverse = self._momentum(time, 0, bits)
-        if self.permanent:
-            return rotate(vector, self.angular_velocity, point.time)
-        return _held(self, vector, bits).at(momentum, point, inverse)
-
-    def _momentum(self, time: Fraction, length: int, bits: int) -> tuple[list[Any], Point, Any]:
-        prepared = _prepared(self, bits)
-        point = prepared.motion.lattice.point(time, length)
-        if prepared.gamma is None:
-            return [point.time * 0 + ball(m) for m in self.momentum], point, None
+            return balls(self.momentum), point, None
         inverse = 1 / prepared.motion.denominator(point)
         first, third = map(real, prepared.momentum.at(point, inverse))
         return [first, prepared.motion.position(point, inverse), third], point, inverse
@@ -186,7 +173,7 @@ class _Prepared:
 
 
 @kept
-def _prepared(motion: Gyrostat, bits: int) -> _Prepared:
+def _prepared(motion: Gyrostat) -> _Prepared:
     prepared = motion.quartic().prepared()
     winding = Winding(motion.root(), Fraction(0), Fraction(0), Fraction(1))
     rows = taylor(gyrostat, motion.parameters, motion.start.flat, 4)
@@ -196,11 +183,10 @@ def _prepared(motion: Gyrostat, bits: int) -> _Prepared:
     return _Prepared(prepared, prepared.companions(winding, *both), inverses, gamma)
 
 
-@lru_cache(maxsize=64)
-def _held(motion: Gyrostat, vector: Vector, bits: int) -> _Fixed:
-    made = _fixed(motion, _prepared(motion, bits).motion, vector)
-    require_undisturbed()
-    return made
+@kept
+def _units(motion: Gyrostat) -> list[_Fixed]:
+    """The axes of the body at t = 0."""
+    return [_fixed(motion, _prepared(motion).motion, unit) for unit in _UNITS]
 
 
 def _fixed(motion: Gyrostat, prepared: PreparedMotion, vector: Vector) -> _Fixed:

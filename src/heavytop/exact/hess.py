@@ -24,7 +24,7 @@ Source: W. Hess, Math. Ann. 37 (1890) 153; P. A. Nekrasov, Mat. sbornik 16 (1892
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -35,15 +35,14 @@ from heavytop.exact.abel import Inversion
 from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
 from heavytop.exact.balls import Undecided, ball
 from heavytop.exact.closed_form import ClosedForm
-from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
+from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import Gap, Roots
 from heavytop.exact.hess_level import Level, require_hess
 from heavytop.exact.hess_transfer import System2, Transfer
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import in_units
 from heavytop.exact.separated import REMEDY, decide
-from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from heavytop.top.heavy_top import cross, dot
 
 _LEAST = 256
 _MOST_TERMS = 1 << 14
@@ -57,11 +56,7 @@ class Hess(WithBearing, ClosedForm):
     and where n·γ rests.
     """
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: Hess, elliptic height and the matrix of a linear system over its period"
-    system: System = HEAVY_TOP
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: Hess, elliptic height and the matrix of a linear system over its period"
 
     def __post_init__(self) -> None:
         require_hess(self.top, self.start)
@@ -79,22 +74,22 @@ class Hess(WithBearing, ClosedForm):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        motion = _motion(self, current_precision())
+        motion = _motion(self)
         return in_units(motion.at(ball(motion.level.rate * time)), motion.level.rate, motion.level.size)
 
     def bearing(self, time: Fraction) -> Bearing:
         """See :class:`heavytop.exact.azimuth.WithBearing`."""
-        motion = _motion(self, current_precision())
-        return motion.bearing(_azimuth(self, current_precision()), ball(motion.level.rate * time))
+        motion = _motion(self)
+        return motion.bearing(_azimuth(self), ball(motion.level.rate * time))
 
 
 @kept
-def _azimuth(case: Hess, bits: int) -> Azimuth:
-    return _motion(case, bits).azimuth()
+def _azimuth(case: Hess) -> Azimuth:
+    return _motion(case).azimuth()
 
 
 @kept
-def _motion(case: Hess, _bits: int) -> HessMotion:
+def _motion(case: Hess) -> HessMotion:
     return HessMotion.of(Level.of(case.top, case.start))
 
 

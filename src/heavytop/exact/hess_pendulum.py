@@ -18,7 +18,7 @@ Source: N. E. Zhukovsky, Trudy otd. fiz. nauk 5 (1893) 37 (the loxodromic pendul
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -27,12 +27,10 @@ from flint import arb, arb_series
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, constant, sign, tanh_sech
-from heavytop.exact.flint_context import current_precision
 from heavytop.exact.hess_level import require_hess
 from heavytop.exact.motion import kept
 from heavytop.exact.pendulum import Swing, swing
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
 
@@ -44,11 +42,7 @@ class HessPendulum(WithAttitude):
     and for equilibria and rotations about axis 2.
     """
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: Hess with zero area integral, Jacobi functions"
-    system: System = HEAVY_TOP
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: Hess with zero area integral, Jacobi functions"
 
     def __post_init__(self) -> None:
         require_hess(self.top, self.start)
@@ -62,7 +56,7 @@ class HessPendulum(WithAttitude):
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        path, began = _path(self, current_precision())
+        path, began = _path(self)
         frame, speed = path.at(time)
         size = path.inertia[1] * speed
 
@@ -74,7 +68,7 @@ class HessPendulum(WithAttitude):
 
 
 @kept
-def _path(case: HessPendulum, _bits: int) -> tuple[_Path, list[list[arb]]]:
+def _path(case: HessPendulum) -> tuple[_Path, list[list[arb]]]:
     path = _Path.of(case.top, case.start)
     return path, path.at(arb(0))[0]
 

@@ -23,7 +23,7 @@ Source: S. Kovalevskaya, Acta Math. 12 (1889) 177; recovery of Ω and γ without
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -33,7 +33,7 @@ from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import to_bits
 from heavytop.exact.closed_form import ClosedForm
-from heavytop.exact.flint_context import current_length, current_precision, whole_evaluation
+from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.kovalevskaya_abel import AbelMotion
 from heavytop.exact.kovalevskaya_attitude import KovalevskayaAttitude
 from heavytop.exact.kovalevskaya_gaps import Interval, intervals, ordered, pole
@@ -42,8 +42,6 @@ from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
 from heavytop.exact.motion import kept
 from heavytop.exact.separated import REMEDY, decide, refuse, require_plane_centre
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State
 
 MOST_TERMS = 1 << 14
 SEPARATION = 2.0**-27
@@ -59,27 +57,19 @@ class Kovalevskaya(WithBearing, ClosedForm):
     Raises NotInClass unless I1 = I2 = 2 I3, P c = 0, P r ≠ 0 and γ ≠ 0, and on and near the levels that are not done.
     """
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: Kovalevskaya, inversion of Abel's integrals"
-    system: System = HEAVY_TOP
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: Kovalevskaya, inversion of Abel's integrals"
 
     def __post_init__(self) -> None:
         require_plane_centre("Kovalevskaya", 2, self.top, self.start)
         _require_done(Level.of(self.top, self.start))
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Without what was made: balls do not go from process to process."""
-        return type(self), (self.top, self.start)
-
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        return _motion(self, current_precision()).at(time, current_length())
+        return _motion(self).at(time, current_length())
 
     def bearing(self, time: Fraction) -> Bearing:
         """See :class:`heavytop.exact.azimuth.WithBearing`: not where a variable rests, nor very near M·γ = 0."""
-        return _attitude(self, current_precision()).bearing(time)
+        return _attitude(self).bearing(time)
 
     def exponent(self, bits: int) -> arb:
         """The rate λ of an asymptotic motion, > 0: its distance from the motion that it tends to goes like e^(−λ|t|).
@@ -88,7 +78,7 @@ class Kovalevskaya(WithBearing, ClosedForm):
         """
 
         def evaluate(working: int) -> list[arb]:
-            motion = _motion(self, working)
+            motion = _motion(self)
             found = motion.exponents() if isinstance(motion, AbelMotion) else []
             if not found:
                 raise NotInClass("The motion is not asymptotic.", "Only asymptotic ones have an exponent.")
@@ -103,15 +93,15 @@ class Kovalevskaya(WithBearing, ClosedForm):
         """
 
         def evaluate(working: int) -> list[arb]:
-            if isinstance(_motion(self, working), ThetaMotion) or not _has_thetas(Level.of(self.top, self.start)):
+            if isinstance(_motion(self), ThetaMotion) or not _has_thetas(Level.of(self.top, self.start)):
                 raise OutOfReach("There is one closed form of this motion only.", "Certify it by the enclosure.")
-            return _thetas(self, working).at(time, 1)
+            return _thetas(self).at(time, 1)
 
         return to_bits(evaluate, bits, time, 1)
 
 
 @kept
-def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion | ThetaMotion:
+def _motion(case: Kovalevskaya) -> AbelMotion | ThetaMotion:
     level = Level.of(case.top, case.start)
     try:
         return AbelMotion.of(level, MOST_TERMS)
@@ -122,15 +112,15 @@ def _motion(case: Kovalevskaya, _bits: int) -> AbelMotion | ThetaMotion:
 
 
 @kept
-def _attitude(case: Kovalevskaya, bits: int) -> KovalevskayaAttitude:
-    motion = _motion(case, bits)
+def _attitude(case: Kovalevskaya) -> KovalevskayaAttitude:
+    motion = _motion(case)
     if isinstance(motion, ThetaMotion):
         motion = AbelMotion.of(motion.level, 8 * MOST_TERMS)
     return KovalevskayaAttitude.of(motion, 8 * MOST_TERMS)
 
 
 @kept
-def _thetas(case: Kovalevskaya, _bits: int) -> ThetaMotion:
+def _thetas(case: Kovalevskaya) -> ThetaMotion:
     return ThetaMotion.of(Level.of(case.top, case.start))
 
 

@@ -22,24 +22,23 @@ spherical pendulum (L = 0) and the motions asymptotic to a sleeping top are star
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
-from flint import acb, arb, arb_series
+from flint import acb, arb
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.closed_form import ClosedForm
-from heavytop.exact.flint_context import coefficient, current_length, current_precision, require_undisturbed
-from heavytop.exact.motion import initial_xi, kept, rotate, taylor, turned
+from heavytop.exact.closed_form import ClosedForm, balls, rotate
+from heavytop.exact.flint_context import coefficient, current_length, series_length
+from heavytop.exact.motion import initial_xi, kept, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.second_kind import Winding
 from heavytop.exact.weierstrass import imag, real
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, Parameters, System, heavy_top
-from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
+from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
+from heavytop.top.heavy_top import Vector, cross, dot
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
 
@@ -51,11 +50,7 @@ class Lagrange(ClosedForm):
     Raises NotInClass unless I1 = I2 and P a = P b = 0.
     """
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: Lagrange, Weierstrass functions of gamma3"
-    system: System = HEAVY_TOP
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: Lagrange, Weierstrass functions of gamma3"
 
     def __post_init__(self) -> None:
         i1, i2, _ = self.top.inertia
@@ -77,17 +72,11 @@ class Lagrange(ClosedForm):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        length = current_length()
-        return self._evaluate(time, length if length > 1 else 0, current_precision())
-
-    def _evaluate(self, time: Fraction, length: int, bits: int) -> list[Any]:
-        prepared = _prepared(self, bits)
-        point = prepared.motion.lattice.point(time, length)
+        prepared, length = _prepared(self), current_length()
+        point = prepared.motion.lattice.point(time, length if length > 1 else 0)
         inverse = 1 / prepared.motion.denominator(point)
         g, w = prepared.horizontal.at(point, inverse)
-        spin = prepared.spin if not length else arb_series([prepared.spin], length)
-        x = prepared.motion.position(point, inverse)
-        return [real(w), imag(w), spin, real(g), imag(g), x]
+        return [real(w), imag(w), prepared.spin, real(g), imag(g), prepared.motion.position(point, inverse)]
 
     @property
     def constants(self) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
@@ -125,44 +114,43 @@ class Lagrange(ClosedForm):
         cubic = area**3 - 2 * area * energy * i1 * square - area * spin**2 * square + 2 * i1 * spin * n * square**2
         return Winding(value, -cubic / (4 * i1**3 * square**2), area / (2 * i1 * square), square)
 
-    def attitude(self, time: Fraction, bits: int, xi: Vector | None = None) -> list[arb]:
-        """ξ at ``time``; at t = 0 it is ``xi`` (exact, ⟂ γ) or the default one ⟂ γ.
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components.
 
         Raises OutOfReach where the axis has come so near to a sleeping top (a motion asymptotic to it, at large times)
         that the angle about it is lost at any sensible precision.
         """
 
-        def evaluate(inside: int) -> list[arb]:
-            start = [ball(c) for c in xi] if xi is not None else initial_xi(self.start.gamma)
+        def evaluate(_working: int) -> list[arb]:
+            start = initial_xi(self.start.gamma)
             if time == 0:
                 return start
-            # the default ξ need not be rational: carry one exact vector ⟂ γ and its companion across it
+            # ξ need not be rational: carry one exact vector ⟂ γ and its companion across it
             basis = _across(self.start.gamma)
-            first = self._carried(basis, time, inside)
+            exact, norm = balls(basis), ball(dot(basis, basis))
             size = ball(dot(self.start.gamma, self.start.gamma)).sqrt()
-            gamma = [g / size for g in self._evaluate(time, 0, inside)[3:]]
+            with series_length(1):
+                now = self.evaluate(time)[3:]
+            unit, gamma = ([g / size for g in vector] for vector in (balls(self.start.gamma), now))
+            first = self._carried(basis, time)
             second = cross(gamma, first)
-            unit = [ball(g) / size for g in self.start.gamma]
-            exact = [ball(c) for c in basis]
-            norm = ball(dot(basis, basis))
             cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
             return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
 
         return to_bits(evaluate, bits, time, 2)
 
-    def _carried(self, vector: Vector, time: Fraction, bits: int) -> list[arb]:
-        """A vector ⟂ γ, fixed in space, at ``time``.
+    def _carried(self, basis: Vector, time: Fraction) -> list[arb]:
+        """The vector :func:`_across` γ, fixed in space, at ``time``.
 
         Z = ξ + iη, h = Z3 and Z± = Z1 ± iZ2 obey Z₊ ḡ = −h (x − s), Z₋ g = −h (x + s) and, as h' = (Z × Ω)3,
         Z₋ w − Z₊ w̄ = 2i h'.
         """
         if not any((*self.start.omega[:2], *self.start.gamma[:2])):
-            return rotate(vector, self.start.omega, ball(time))
-        prepared = _prepared(self, bits)
-        axis = _axis(self, vector, bits)
+            return rotate(balls(basis), self.start.omega, ball(time))
+        prepared = _prepared(self)
         point = prepared.motion.lattice.point(time, 2)
         inverse = 1 / prepared.motion.denominator(point)
-        (h,), (g, w) = (c.at(point, inverse) for c in (axis, prepared.horizontal))
+        (h,), (g, w) = (c.at(point, inverse) for c in (_axis(self), prepared.horizontal))
         x, size = prepared.motion.position(point, inverse)[0], ball(self.constants[4]).sqrt()
         plus, minus = _sides(h[0], coefficient(h, 1), g[0], w[0], x, size)
         return [((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real, h[0].real]
@@ -194,23 +182,22 @@ class _Prepared:
 
 
 @kept
-def _prepared(motion: Lagrange, bits: int) -> _Prepared:
+def _prepared(motion: Lagrange) -> _Prepared:
     prepared, winding = motion.quartic().prepared(), motion.winding()
     rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)
     both = (turned(rows[axis], rows[axis + 1], winding) for axis in (3, 0))
     return _Prepared(prepared, prepared.companions(winding, *both), ball(motion.start.omega[2]))
 
 
-@lru_cache(maxsize=64)
-def _axis(motion: Lagrange, vector: Vector, bits: int) -> Companions:
-    """h = Z3 of Z = ξ + iη, η = γ × ξ/s, for a vector ξ ⟂ γ fixed in space."""
+@kept
+def _axis(motion: Lagrange) -> Companions:
+    """h = Z3 of Z = ξ + iη, η = γ × ξ/s, for the vector ξ that is :func:`_across` γ at t = 0, fixed in space."""
+    vector = _across(motion.start.gamma)
     winding, square = motion.axis_winding(), dot(motion.start.gamma, motion.start.gamma)
     # s Z = s ξ + i γ × ξ, so Z = ξ + i s (γ × ξ/s²)
     normal = tuple(c / square for c in cross(motion.start.gamma, vector))
     first, second = (_derivatives(motion, fixed) for fixed in (vector, normal))
-    made = _prepared(motion, bits).motion.companions(winding, turned(first, second, winding))
-    require_undisturbed()
-    return made
+    return _prepared(motion).motion.companions(winding, turned(first, second, winding))
 
 
 def _derivatives(motion: Lagrange, fixed: tuple[Fraction, ...]) -> list[Fraction]:

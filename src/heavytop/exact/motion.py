@@ -12,31 +12,32 @@ from flint import arb, fmpq, fmpq_series
 
 from heavytop.errors import InputError
 from heavytop.exact.balls import ball
-from heavytop.exact.flint_context import coefficient, require_undisturbed, series_length
+from heavytop.exact.flint_context import coefficient, current_precision, require_undisturbed, series_length
 from heavytop.exact.quartic import Pair
 from heavytop.exact.second_kind import Winding
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import Parameters
-from heavytop.top.heavy_top import Vector, cross, dot
+from heavytop.top.heavy_top import Vector, dot
 
 Made = TypeVar("Made")
 
 
-def kept(make: Callable[[Any, int], Made]) -> Callable[[Any, int], Made]:
-    """``make(motion, bits)`` once for each motion and precision: kept in the motion's ``made``.
+def kept(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
+    """``make(motion)`` once for each motion and working precision: kept in the motion's ``made``.
 
     A cache of functools would hash a dozen Fractions at each look-up, longer than many a state takes.
     """
 
     @wraps(make)
-    def look_up(motion: Any, bits: int) -> Made:
+    def look_up(motion: Any) -> Made:
         made: dict[Any, Made] = motion.made
+        key = make, current_precision()
         try:
-            return made[make, bits]
+            return made[key]
         except KeyError:
-            found = make(motion, bits)
+            found = make(motion)
             require_undisturbed()
-            made[make, bits] = found
+            made[key] = found
             return found
 
     return look_up
@@ -77,20 +78,6 @@ def turned(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Win
             a, b = (a + weight * u, b + weight * v) if k % 2 == 0 else (a - weight * winding.square * v, b + weight * u)
         found.append((a, b))
     return found
-
-
-def rotate(vector: Vector, omega: Vector, time: Any) -> list[Any]:
-    """v' = v × ω for constant ω: v along ω, and v across it turning at |ω|."""
-    square = dot(omega, omega)
-    if square == 0:
-        return [time * 0 + ball(v) for v in vector]
-    size = ball(square).sqrt()
-    share = dot(vector, omega) / square
-    sine, cosine = (time * size).sin_cos()
-    return [
-        cosine * ball(v - share * w) + sine * (ball(c) / size) + ball(share * w)
-        for v, w, c in zip(vector, omega, cross(vector, omega), strict=True)
-    ]
 
 
 def initial_xi(gamma: Vector) -> list[arb]:

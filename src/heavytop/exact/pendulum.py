@@ -16,7 +16,7 @@ about e_k through x(t) − x(0).  Source: Whittaker, Analytical Dynamics, chapte
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -25,11 +25,9 @@ from flint import arb
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, whole
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign
-from heavytop.exact.flint_context import current_precision
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.motion import kept
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
 
 
@@ -41,11 +39,7 @@ class Pendulum(WithAttitude):
     and γ ≠ 0.
     """
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: physical pendulum, Jacobi functions"
-    system: System = HEAVY_TOP
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: physical pendulum, Jacobi functions"
 
     def __post_init__(self) -> None:
         if not any(self.top.moment) or not any(self.start.gamma):
@@ -80,7 +74,7 @@ class Pendulum(WithAttitude):
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self, current_precision())
+        lattice = _lattice(self)
         if lattice is None:
             return WithAttitude.evaluate(self, time)
         omega, carry = lattice.motion(instant(time))
@@ -88,7 +82,7 @@ class Pendulum(WithAttitude):
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
-        lattice = _lattice(self, current_precision())
+        lattice = _lattice(self)
         return ([arb(0)] * 3, list) if lattice is None else lattice.motion(time)
 
 
@@ -181,7 +175,7 @@ class _Lattice:
 
 
 @kept
-def _lattice(case: Pendulum, _bits: int) -> _Lattice | None:
+def _lattice(case: Pendulum) -> _Lattice | None:
     """None where it stands still."""
     if case.steady:
         return None

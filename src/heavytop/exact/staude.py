@@ -22,7 +22,7 @@ from flint import arb, fmpq, fmpq_mat, fmpq_poly
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball, to_bits
-from heavytop.exact.closed_form import Carry, WithAttitude, balls, turned
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, rotate
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot, vector
@@ -32,10 +32,8 @@ from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot, vector
 class Staude(WithAttitude):
     """A start that is an equilibrium of all six equations.  Raises NotInClass where the field is not exactly 0."""
 
-    top: HeavyTop
-    start: State
     system: System = HEAVY_TOP
-    method: str = "closed form: permanent rotation"
+    method = "closed form: permanent rotation"
 
     def __post_init__(self) -> None:
         field = self.system.field(self.system.parameters(self.top, self.start), self.start.flat)
@@ -48,11 +46,8 @@ class Staude(WithAttitude):
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         parameters = self.system.parameters(self.top, self.start)
-        exact = self.system.angular_velocity(parameters, self.start.flat)
-        if not any(exact):
-            return balls(self.start.omega), list
-        omega, rate = balls(exact), ball(dot(exact, exact)).sqrt()
-        return balls(self.start.omega), lambda fixed: turned(fixed, omega, rate, time)
+        omega = self.system.angular_velocity(parameters, self.start.flat)
+        return balls(self.start.omega), lambda fixed: rotate(fixed, omega, time)
 
     def evaluate(self, _time: Fraction) -> list[Any]:
         """The start, at every time."""

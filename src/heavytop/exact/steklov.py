@@ -14,7 +14,7 @@ Source: V. A. Steklov, Trudy otd. fiz. nauk 10 (1899) 1; coefficients derived he
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -29,7 +29,7 @@ from heavytop.exact.reduced import polynomial
 from heavytop.exact.scales import unit_of_time
 from heavytop.exact.separated import decide
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
 _LEAST = 256
@@ -46,11 +46,7 @@ class Steklov(WithBearing, ClosedForm):
     satisfies the equalities above exactly.
     """
 
-    top: HeavyTop
-    start: State
-    method: str = "closed form: Steklov, inversion of an elliptic integral"
-    system: System = HEAVY_TOP
-    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    method = "closed form: Steklov, inversion of an elliptic integral"
 
     def __post_init__(self) -> None:
         (a, b, c), (n1, n2, n3) = self.top.inertia, self.top.moment
@@ -71,32 +67,32 @@ class Steklov(WithBearing, ClosedForm):
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         rate, torque = _units(self.top, self.start)
-        return in_units(_motion(self, current_precision()).at(ball(rate * time)), rate, 1 / torque)
+        return in_units(_motion(self).at(ball(rate * time)), rate, 1 / torque)
 
     def bearing(self, time: Fraction) -> Bearing:
         """See :class:`heavytop.exact.azimuth.WithBearing`."""
         rate, _ = _units(self.top, self.start)
-        return _motion(self, current_precision()).bearing(_azimuth(self, current_precision()), ball(rate * time))
+        return _motion(self).bearing(_azimuth(self), ball(rate * time))
 
 
 @kept
-def _azimuth(case: Steklov, bits: int) -> Azimuth:
-    return _motion(case, bits).azimuth()
+def _azimuth(case: Steklov) -> Azimuth:
+    return _motion(case).azimuth()
 
 
 @kept
-def _motion(case: Steklov, bits: int) -> OneGapMotion:
+def _motion(case: Steklov) -> OneGapMotion:
     rate, _ = _units(case.top, case.start)
     p, q, r = (w / rate for w in case.start.omega)
     signs = (q > 0) - (q < 0), (r > 0) - (r < 0)
-    return OneGapMotion.of(_curve(case.top, case.start), p, signs, max(bits, _LEAST) * _TERMS_A_BIT)
+    return OneGapMotion.of(_curve(case.top, case.start), p, signs, max(current_precision(), _LEAST) * _TERMS_A_BIT)
 
 
 @whole_evaluation
 def _require_reach(case: Steklov) -> None:
     """Raises LevelNotDone where the Fourier series of Abel's integral is too long, and beside a turning point."""
     name = "Two moments of inertia all but satisfy an equality, or the start a turning point's"
-    decide(lambda: _motion(case, current_precision()), name, _LEAST)
+    decide(lambda: _motion(case), name, _LEAST)
 
 
 def _units(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:

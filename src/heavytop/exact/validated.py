@@ -324,8 +324,7 @@ class Validated:
             raise self._refusal(time, reachable)
 
     def _refusal(self, time: Fraction, reachable: int) -> OutOfReach:
-        # digits take up to five bits more, rounded up
-        at, digits = decimal_text(time, 6), int((reachable - 5) * log10(2))
+        at, digits = decimal_text(time, 6), int((reachable - 5) * log10(2))  # rounded up they take up to 5 bits more
         if digits < 1:
             return OutOfReach(
                 f"No digit at t = {at} is within reach of a validated integration.", "Ask for an earlier time."

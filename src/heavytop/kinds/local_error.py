@@ -69,7 +69,7 @@ def _lines(rows: Sequence[Row]) -> list[list[str]]:
     quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)
     return [
         [
-            f"{row.case}{computed_by(row)}",
+            clip(row.case + computed_by(row)),
             row.precision,
             str(row.samples if row.key.subject.name != HEYOKA else row.steps),
             *(short(row.metrics[q.text].value) if q.text in row.metrics else "-" for q in quantities),
@@ -145,7 +145,8 @@ def _told(rows: Sequence[Row]) -> list[Row]:
 
 def _said(row: Row) -> str:
     """The largest error of a step, and the order beside the one that the integrator declares."""
-    text = f"{row.case}{computed_by(row)} in {row.precision}: a step is off by {short(row.metrics[_LARGEST].value)} eps"
+    what, largest = clip(row.case + computed_by(row)), short(row.metrics[_LARGEST].value)
+    text = f"{what} in {row.precision}: a step is off by {largest} eps"
     order = row.metrics.get(local_error.ORDER.text)
     if order is None:
         return f"{text} at most."

@@ -18,7 +18,6 @@ from flint import arb
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, radius_text, working_precision
 from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.scales import least_rate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.integrate.words import follow
 from heavytop.integrate.words_engines import accuracy, choose
@@ -33,15 +32,16 @@ EFFORT = 60.0
 """Seconds of the model of the cost that each run may take; absurd starts and times would take for ever."""
 EFFORT_OF_MANY = 600.0
 """The same for all the runs of an ensemble together."""
-_MOST_STEPS = 10**8
-_LONGEST_STEP = 1000
-"""Radians; steps of motions as smooth as a spin about an axis come near it in a thousand bits."""
+_PILOT_STEPS = 1000
+"""A run that takes more is forecast from so many: what would take longer than its effort is refused at once."""
 _SEARCH = 8
 _WORD_BITS = 1032
 _DIGIT = 10
 """An error leaves a digit where it is below the size of the state over this."""
 _STAGES = 6
-"""A truth that may end is computed to the horizon over 4^6 first, and then to four times as far, until it has ended."""
+_PROBES = 12
+"""A truth that may end is computed to the horizon over 4^6 first, and then to four times as far, until it has ended;
+where that is before the first sample, to the horizon over 4^12, so that nothing runs to where no digit is left."""
 
 Given = Callable[[Precision], Problem]
 """A motion to be computed, in any format."""
@@ -132,6 +132,9 @@ def compute(
         balls = [dict(zip(early, _around(*pair, bits), strict=True)) for pair in zip(*runs, strict=True)]
         found = [ComputedReference(*each) for each in zip(words, balls, strict=True)]
         ends = None if format_bits is None else _last_digit(found, [each.accuracy - format_bits for each in first])
+        if ends is not None and ends not in times:
+            # lost on the way to the first sample
+            return [ComputedReference(each, {}, times[0]) for each in words]
         if ends is not None:
             break
     return [replace(each, ends=ends) for each in found]
@@ -168,10 +171,11 @@ def _finer(given: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
 
 
 def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
-    """Those of the times within the horizon over 4^n, each stage longer than the one before."""
-    ends = [abs(times[-1]) / 4**n for n in range(stages, -1, -1)]
-    counts = dict.fromkeys(sum(abs(time) <= end for time in times) for end in ends)
-    return [times[:count] for count in counts if count]
+    """Those of the times within the horizon over 4^n, each longer than the one before; where there is none, its end."""
+    ends = {n: times[-1] / 4**n for n in range(_PROBES if stages else 0, -1, -1)}
+    counts = {n: sum(abs(time) <= abs(end) for time in times) for n, end in ends.items()}
+    before = [[ends[n]] for n, count in counts.items() if not count]
+    return [*before, *(times[:count] for count in dict.fromkeys(counts[n] for n in range(stages, -1, -1)) if count)]
 
 
 def _last_digit(found: Sequence[ComputedReference], fewer: Sequence[int]) -> Fraction | None:
@@ -184,29 +188,34 @@ def _last_digit(found: Sequence[ComputedReference], fewer: Sequence[int]) -> Fra
 
 
 def _runs(served: Sequence[_Served], times: Sequence[Fraction]) -> list[Trajectory]:
-    """In words; one by itself is not put into lanes."""
     problems = [each.problem for each in served]
-    targets = [number(time, problems[0].precision) for time in check_times(times)]
     words = max(each.bits for each in served)
     effort = EFFORT if len(problems) == 1 else EFFORT_OF_MANY / len(problems)
-    limit = min(_MOST_STEPS, int(effort / seconds_a_step(words)))
-    turned = abs(times[-1]) * max(least_rate(each.parameters, each.start.flat) for each in problems)
-    if turned > limit * _LONGEST_STEP:
-        raise OutOfReach(
-            f"Until t = {decimal_text(times[-1], 6)} the motion turns by about {decimal_text(turned, 2)} radians: "
-            "no reference run follows it so far.",
-            "Ask for an earlier time.",
-        )
-    if len(problems) == 1:
-        runs = [follow(problems[0], targets, step_limit=limit)]
-    else:
-        runs = propagate_words_ensemble(problems, targets, step_limit=limit)
+    limit = int(effort / seconds_a_step(words))
+    runs = _followed(problems, times, min(limit, _PILOT_STEPS))
+    if limit > _PILOT_STEPS and any(run.outcome is Outcome.STEP_LIMIT for run in runs):
+        reached = min(abs(run.time_reached) for run in runs if run.outcome is Outcome.STEP_LIMIT)
+        if abs(times[-1]) * _PILOT_STEPS > limit * reached:
+            raise OutOfReach(
+                f"A reference run in words of {words} bits to t = {decimal_text(times[-1], 6)} takes too long: its "
+                f"first {_PILOT_STEPS} steps end at t = {decimal_text(reached, 3)}.",
+                "Ask for an earlier time.",
+            )
+        runs = _followed(problems, times, limit)
     for run in runs:
         if run.outcome is not Outcome.SUCCESS:
             raise OutOfReach(
                 f"A reference run in words of {words} bits {run.outcome.message}.", "Ask for an earlier time."
             )
     return runs
+
+
+def _followed(problems: Sequence[Problem], times: Sequence[Fraction], limit: int) -> list[Trajectory]:
+    """In words; one by itself is not put into lanes."""
+    targets = [number(time, problems[0].precision) for time in check_times(times)]
+    if len(problems) == 1:
+        return [follow(problems[0], targets, step_limit=limit)]
+    return propagate_words_ensemble(problems, targets, step_limit=limit)
 
 
 @whole_evaluation

@@ -17,7 +17,7 @@ from functools import cache, lru_cache
 from flint import arb
 from msgspec.structs import replace as replace_struct
 
-from heavytop.errors import InputError, OutOfReach
+from heavytop.errors import HeavyTopError, InputError, OutOfReach
 from heavytop.exact.balls import radius_text
 from heavytop.exact.catalogue import matches
 from heavytop.exact.gyrostat import Gyrostat
@@ -120,10 +120,15 @@ def _computed(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
     try:
         (found,) = of_rounded([problem], times)
     except (InputError, OutOfReach) as error:
-        return error.cause
+        return _clause(error)
     if found.ends == times[0]:
         return f"no digit of the format is left at t = {time_text(found.ends)}, the first sample"
     return Truth(found.against, found.state, found.ends)
+
+
+def _clause(error: HeavyTopError) -> str:
+    """Its cause inside a sentence."""
+    return error.cause[:1].lower() + error.cause[1:].removesuffix(".")
 
 
 def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | None:
@@ -162,5 +167,5 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
                 return f"no closed form, and an enclosure to |t| = {time_text(abs(horizon))} takes too long"
         known = certified(found, horizon, bits)
     except OutOfReach as error:
-        return error.cause
+        return _clause(error)
     return known or "certified to fewer digits than the format has"

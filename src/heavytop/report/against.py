@@ -16,8 +16,8 @@ _DIGITS_KEPT = 0.8
 """Part of the certified digits that must stay; other data of the same format lose a tenth."""
 _TIME_KEPT = 0.5
 """Part of the certified time, and of the certified starts, that must stay."""
-_PART_DECADES = 2.0
-"""The error of a computed reference, in units of the measured one, varies by a decade from one ensemble to the next."""
+_COMPUTED_DECADES = 2.0
+"""What two computed runs agree within varies by a decade from one ensemble to the next."""
 
 
 def weaker(old: Against, new: Against) -> str:
@@ -35,17 +35,15 @@ def weaker(old: Against, new: Against) -> str:
         return "the reference is no longer proven"
     if _earlier(old.until, new.until):
         return "the truth ends earlier"
-    if _grew(old.radius, new.radius, _RADIUS_DECADES if old.how == "proven" else _PART_DECADES):
+    if _grew(old.radius, new.radius, _RADIUS_DECADES if old.how == "proven" else _COMPUTED_DECADES):
         return "the radius of the reference is larger, or not said"
-    if _grew(_part(old), _part(new), _PART_DECADES):
-        return "the error of the computed reference is larger, or not said"
     if not _kept(_digits(old), _digits(new), lambda before, after: after >= _DIGITS_KEPT * before):
         return f"the reference is certified to {_digits_text(new)} digits, not {_digits_text(old)}"
     starts = _starts(old), _starts(new)
     if starts[0] is not None and (starts[1] is None or starts[1] < _TIME_KEPT * starts[0]):
-        return f"the reference is certified or checked for {starts[1] or 'no'} starts, not {starts[0]}"
+        return f"the reference is certified for {starts[1] or 'no'} starts, not {starts[0]}"
     if not _kept(_times(old), _times(new), lambda before, after: after >= before + math.log10(_TIME_KEPT)):
-        return "the reference is certified or checked at an earlier time"
+        return "the reference is certified at an earlier time"
     return ""
 
 
@@ -59,10 +57,6 @@ def _is_proven(reference: Against) -> bool:
     return reference.how == "proven" and all(each.proven != "computed" for each in reference.certificates)
 
 
-def _part(reference: Against) -> str:
-    return reference.checked.part if reference.checked else ""
-
-
 def _digits(reference: Against) -> tuple[float, ...]:
     return tuple(math.inf if each.digits is None else each.digits for each in reference.certificates)
 
@@ -72,16 +66,13 @@ def _digits_text(reference: Against) -> str:
 
 
 def _starts(reference: Against) -> int | None:
-    """How many starts are certified, or were used to check a computed reference."""
-    if reference.checked:
-        return reference.checked.starts
+    """How many starts are certified."""
     return next((each.starts for each in reference.certificates if each.starts is not None), None)
 
 
 def _times(reference: Against) -> tuple[float, ...]:
-    """log10 |t| of each certificate, or up to which a computed reference was checked."""
-    checked = (reference.checked.until,) if reference.checked else ()
-    return tuple(map(_log, (*(each.time for each in reference.certificates), *checked)))
+    """log10 |t| of each certificate."""
+    return tuple(_log(each.time) for each in reference.certificates)
 
 
 def _log(text: str) -> float:

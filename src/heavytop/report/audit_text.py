@@ -6,10 +6,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.claims.judge import AuditReport, Row
+from heavytop.claims.judge import ABOUT, VERDICTS, Audit, Row
 
-_WORDS = {True: "holds", False: "refuted", None: "undecided"}
-_KINDS = {"motion": "a motion", "integral": "a first integral", "relation": "an invariant relation"}
 _PROVEN = {
     "motion": "Its equations of motion are proven for",
     "integral": "It is proven to be constant along the motions of",
@@ -18,9 +16,9 @@ _PROVEN = {
 _STYLES = {True: "green", False: "bold red", None: "yellow"}
 
 
-def audit_text(report: AuditReport) -> RenderableType:
+def audit_text(report: Audit) -> RenderableType:
     """Verdict, a table of the equations, the witnesses of what is refuted, and why."""
-    head = Text(f"{report.claim} as {_KINDS[report.kind]} of {report.system}: ")
+    head = Text(f"{report.claim} as {ABOUT[report.kind]} of {report.system}: ")
     head.append(report.verdict, style=_STYLES[{"holds": True, "refuted": False}.get(report.verdict)])
     parts: list[RenderableType] = [head]
     if report.source:
@@ -29,18 +27,18 @@ def audit_text(report: AuditReport) -> RenderableType:
     parts += [Text(), _table(report), Text(), *_witnesses(report), *_conditions(report)]
     if report.why:
         parts += [Text(), Text("Why, each step checked by the same algebra:")]
-        parts += [Text(f"  [{_WORDS[finding.holds]}] {finding.statement}") for finding in report.why]
+        parts += [Text(f"  [{VERDICTS[finding.holds]}] {finding.statement}") for finding in report.why]
     solved = ", ".join(report.solves) or "none of the systems known here"
     parts += [Text(), Text(f"{_PROVEN[report.kind]}: {solved}")]
     return Group(*parts)
 
 
-def _table(report: AuditReport) -> Table:
+def _table(report: Audit) -> Table:
     table = Table(box=None, pad_edge=False)
     for name in ("equation", "branch", "domain", "verdict", "residual", "statement"):
         table.add_column(name, overflow="fold", no_wrap=name in ("equation", "branch", "domain", "verdict"))
     for row in report.rows:
-        verdict = Text(_WORDS[row.holds], style=_STYLES[row.holds])
+        verdict = Text(VERDICTS[row.holds], style=_STYLES[row.holds])
         cells = (Text(value) for value in (_label(row), row.branch, row.domain))
         table.add_row(*cells, verdict, Text(row.residual), Text(row.statement))
     return table
@@ -51,7 +49,7 @@ def _label(row: Row) -> str:
     return f"{number} {row.component}"
 
 
-def _witnesses(report: AuditReport) -> list[Text]:
+def _witnesses(report: Audit) -> list[Text]:
     """Where each refuted equation fails: exact parameters, an exact time, and a ball that excludes 0."""
     refuted = [row for row in report.rows if row.witness is not None]
     lines = [Text("Witnesses, with the residual as a ball that excludes 0:")] if refuted else []
@@ -66,7 +64,7 @@ def _witnesses(report: AuditReport) -> list[Text]:
     return lines
 
 
-def _conditions(report: AuditReport) -> list[Text]:
+def _conditions(report: Audit) -> list[Text]:
     """What the proofs rest on, each condition once: first what is not discharged, with the rows that it leaves open."""
     rows: dict[tuple[bool, str, str], list[str]] = {}
     for row in report.rows:

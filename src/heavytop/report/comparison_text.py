@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from heavytop.report.compare import Comparison, Finding
 from heavytop.report.names import row_name
 from heavytop.report.printable import printable
-from heavytop.report.text import short
+from heavytop.report.text import short, table
 from heavytop.report.verdicts import Verdict
 
 _MOST = 200
@@ -23,20 +22,19 @@ def comparison(result: Comparison) -> RenderableType:
     if result.tally.keys() <= {Verdict.MISSING, Verdict.NEW}:
         parts.append(Text("The two have no row in common. Were they made with the same plan?"))
     if result.changed:
-        table = Table(box=None, header_style="dim")
-        for column in ("verdict", "row", "metric", "baseline", "candidate", "why"):
-            table.add_column(column, overflow="fold")
-        for finding in result.changed[:_MOST]:
-            cells = (row_name(finding.row), metric_name(finding), *values(finding), finding.reason)
-            style = _STYLE.get(finding.verdict, "")
-            table.add_row(Text(finding.verdict.value, style=style), *map(Text, map(printable, cells)))
-        parts.append(table)
+        columns = ("verdict", "row", "metric", "baseline", "candidate", "why")
+        parts.append(table(columns, map(_cells, result.changed[:_MOST]), words=6))
         if len(result.changed) > _MOST:
             parts.append(Text(f" and {len(result.changed) - _MOST} more: --json lists all, --html FILE draws them"))
     if result.environment:
         parts.append(Text("Environments differ:", style="bold"))
         parts += [Text(printable(f"  {name}: {old} -> {new}")) for name, old, new in result.environment]
     return Group(*parts)
+
+
+def _cells(finding: Finding) -> list[str | Text]:
+    verdict = Text(finding.verdict.value, style=_STYLE.get(finding.verdict, ""))
+    return [verdict, row_name(finding.row), metric_name(finding), *values(finding), finding.reason]
 
 
 def headline(result: Comparison) -> str:

@@ -7,11 +7,8 @@ from typing import Any
 
 import msgspec
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
-from heavytop.errors import InputError
-from heavytop.precision import exact
 from heavytop.records import Identity
 from heavytop.report.compare import compare
 from heavytop.report.kind import Kinds
@@ -19,10 +16,8 @@ from heavytop.report.laws import law_text
 from heavytop.report.names import row_name
 from heavytop.report.policy import Policy
 from heavytop.report.printable import printable
-from heavytop.report.section import clip
 from heavytop.report.store import AnyReport
-from heavytop.report.svg import document, quiet_style
-from heavytop.report.text import short
+from heavytop.report.text import short, table
 from heavytop.report.verdicts import Verdict
 
 MARK = {
@@ -33,7 +28,6 @@ MARK = {
     Verdict.NEW: "+",
 }
 _LEGEND = "▲ worse than before  ▼ better  ≠ incomparable  ✗ missing  + new"
-_MOST_LINES = 12
 
 
 class Track(msgspec.Struct, frozen=True):
@@ -100,56 +94,12 @@ def history_text(names: Sequence[str], tracks: Sequence[Track]) -> RenderableTyp
             *heads,
             Text("\nNothing changed, or nothing matches. --metric '*' shows what did not change too.", style="bold"),
         )
-    table = Table(box=None, header_style="dim")
-    for column in ("row", "metric"):
-        table.add_column(column, overflow="fold")
-    for number in range(1, len(names) + 1):
-        table.add_column(str(number), justify="right", overflow="fold")
-    for track in tracks:
-        cells = [
-            f"{short(value or '-')} {MARK[track.steps[n][0]] if n in track.steps else ' '}"
-            for n, value in enumerate(track.values)
-        ]
-        cells = [row_name(track.row), track.metric or "whole row", *cells]
-        table.add_row(*(Text(printable(cell)) for cell in cells))
-    return Group(*heads, Text(_LEGEND, style="dim"), Text(), table)
+    numbers = [str(number) for number in range(1, len(names) + 1)]
+    shown = table(["row", "metric", *numbers], map(_cells, tracks), words=2)
+    return Group(*heads, Text(_LEGEND, style="dim"), Text(), shown)
 
 
-def history_svg(names: Sequence[str], tracks: Sequence[Track]) -> str:
-    """The tracks over the reports as a picture, errors on a logarithmic axis; raises InputError for more than 12."""
-    drawn = [track for track in tracks if any(_height(value) is not None for value in track.values)]
-    if not 1 <= len(drawn) <= _MOST_LINES:
-        raise InputError(
-            f"{len(drawn)} metrics cannot be drawn into one picture.",
-            f"Choose 1 to {_MOST_LINES} of them with --metric and --case.",
-        )
-    from matplotlib.figure import Figure
-
-    with quiet_style():
-        figure = Figure(figsize=(8, 4.5), layout="constrained")
-        axes = figure.subplots()
-        for track in drawn:
-            heights = [_height(value) for value in track.values]
-            points = [float("nan") if height is None else height for height in heights]
-            label = clip(f"{track.row.case} {track.metric}")
-            (line,) = axes.plot(range(1, len(names) + 1), points, marker="o", label=label)
-            steps = [number for number in track.steps if heights[number] is not None]
-            axes.plot(
-                [number + 1 for number in steps], [points[n] for n in steps], "D", markersize=11, fillstyle="none",
-                color=line.get_color(),
-            )  # fmt: skip
-        axes.set_yscale("log")
-        axes.set_xticks(range(1, len(names) + 1), [printable(name[-24:]) for name in names], rotation=20, ha="right")
-        axes.set_ylabel("value, in the units of the metric")
-        axes.set_title("Diamonds mark steps beyond noise", fontsize="medium")
-        axes.legend(fontsize="small")
-        return document(figure)
-
-
-def _height(value: str | None) -> float | None:
-    """A value on a logarithmic axis; None for 0, for words and for what a float cannot hold."""
-    try:
-        number = abs(float(exact(value or "")))
-    except (InputError, OverflowError):
-        return None
-    return number or None
+def _cells(track: Track) -> list[str]:
+    marks = [MARK[track.steps[number][0]] if number in track.steps else " " for number in range(len(track.values))]
+    values = [f"{short(value or '-')} {mark}" for value, mark in zip(track.values, marks, strict=True)]
+    return [row_name(track.row), track.metric or "whole row", *values]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -9,6 +11,8 @@ from rich.text import Text
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
 from heavytop.report.text import short
+
+_NAMES = ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3", "ξ1", "ξ2", "ξ3", "φ", "θ", "ψ")
 
 
 def motion_text(motion: Motion) -> RenderableType:
@@ -19,19 +23,12 @@ def motion_text(motion: Motion) -> RenderableType:
         f"{run.problem.system.name} in {precision.name} ({precision.bits} bits): {run.outcome.message}, "
         f"{run.steps} steps of order {run.order}"
     )
-    columns = {"Ω1": 0, "Ω2": 1, "Ω3": 2, "γ1": 3, "γ2": 4, "γ3": 5}
     parts: list[RenderableType] = [Text(head)]
     for index, time in enumerate(motion.to_json()["times"]):
-        table = Table(box=None, show_header=False)
-        table.add_row("t", Text(time))
-        for name, column in columns.items():
-            table.add_row(name, Text(motion.states[index][column]))
+        values = list(motion.states[index])
         if motion.attitude is not None and motion.angles is not None:
-            for name, value in zip(("ξ1", "ξ2", "ξ3"), motion.attitude[index], strict=True):
-                table.add_row(name, Text(value))
-            for name, value in zip(("φ", "θ", "ψ"), motion.angles[index], strict=True):
-                table.add_row(name, Text(value))
-        parts += [Text(), table]
+            values += [*motion.attitude[index], *motion.angles[index]]
+        parts += [Text(), _at(time, values)]
     if not motion.complete:
         parts += [Text(), Text(f"Reached t = {motion.to_json()['time_reached']} only.", style="bold")]
     elif motion.drift:
@@ -48,10 +45,14 @@ def reference_text(found: Reference) -> RenderableType:
     if found.attitude_method not in (None, found.method):
         parts.append(Text(f"attitude: {found.attitude_method}"))
     for index, (time, state) in enumerate(zip(found.times, found.states, strict=True)):
-        table = Table(box=None, show_header=False)
-        table.add_row("t", Text(time))
         xi = found.attitude[index] if found.attitude else []
-        for name, ball in zip(("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3", "ξ1", "ξ2", "ξ3"), [*state, *xi], strict=False):
-            table.add_row(name, Text(f"{ball.value} ± {ball.radius}", overflow="fold"))
-        parts += [Text(), table]
+        parts += [Text(), _at(time, [f"{ball.value} ± {ball.radius}" for ball in (*state, *xi)])]
     return Group(*parts)
+
+
+def _at(time: str, values: Sequence[str]) -> Table:
+    """What is known at a time, a line a component; as many as there are values."""
+    table = Table(box=None, show_header=False)
+    for name, value in zip(("t", *_NAMES), (time, *values), strict=False):
+        table.add_row(name, Text(value, overflow="fold"))
+    return table

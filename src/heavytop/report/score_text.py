@@ -9,13 +9,12 @@ from typing import Any
 
 import msgspec
 from rich.console import Console, ConsoleOptions, Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from heavytop.measure.digits import digits_text
 from heavytop.records import Row
 from heavytop.report.diagnosis_text import diagnosis_text
-from heavytop.report.text import short
+from heavytop.report.text import short, table
 from heavytop.suite.score import Assessment
 
 WIDTH = 80
@@ -92,14 +91,10 @@ def sizes(row: Row) -> list[list[str]]:
 def score_text(found: Assessment) -> RenderableType:
     """Digits right, distance from the known motion, drift of every first integral, what explains the error."""
     row = found.row
-    table = Table(box=None, header_style="dim")
-    for index, column in enumerate(("", f"largest over {row.samples} samples", "rms", "final")):
-        table.add_column(column, justify="right" if index else "left", no_wrap=True)
-    for line in sizes(row):
-        table.add_row(*map(Text, line))
+    numbers = table(["", f"largest over {row.samples} samples", "rms", "final"], sizes(row))
     about = f"{row.case}: {row.integrator}, {row.system} in {row.precision} ({row.bits} bits)"
     parts: list[RenderableType] = [_Sentence(line) for line in answer(found)]
-    parts += [Text(), table, Text(), *_wrapped(about), *_wrapped(f"Compared with {row.against}.")]
+    parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Compared with {row.against}.")]
     explained = told(found)
     if explained:
         parts += [Text(), *(line for each in explained for line in _wrapped(each))]

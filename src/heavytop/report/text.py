@@ -103,13 +103,13 @@ def title(text: str) -> Text:
     return Text(text, style="bold")
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    """A table without lines; its first column is words, the others are numbers."""
+def table(columns: Sequence[str], rows: Iterable[Sequence[str | Text]], words: int = 1) -> Table:
+    """A table without lines; its first ``words`` columns are words, the others are numbers."""
     made = Table(box=None, pad_edge=True, header_style="dim")
     for index, column in enumerate(columns):
-        made.add_column(Text(printable(column)), justify="left" if index == 0 else "right", overflow="fold")
+        made.add_column(Text(printable(column)), justify="left" if index < words else "right", overflow="fold")
     for row in rows:
-        made.add_row(*(Text(printable(cell)) for cell in row))
+        made.add_row(*(cell if isinstance(cell, Text) else Text(printable(cell)) for cell in row))
     return made
 
 

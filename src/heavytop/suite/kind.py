@@ -32,18 +32,15 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
 
 
 class Kind(Protocol):
-    """One kind of measurement, as far as it is run.
+    """One kind of measurement, as far as it is run; what it does not say is the usual.
 
     name: in a plan and in the rows.  table: its table in a plan, tagged with the name; None where no plan asks for it.
+    concludes: whether all rows of the kind together come to more rows.
     """
 
-    @property
-    def name(self) -> str:
-        """As plans and rows have it."""
-
-    @property
-    def table(self) -> type[Table] | None:
-        """Its table in a plan."""
+    name: str
+    table: type[Table] | None = None
+    concludes: bool = False
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """The row of ``task``; a run that fails is a row with its outcome.
@@ -51,16 +48,18 @@ class Kind(Protocol):
         saved: the place of an earlier, interrupted measurement of this row, and where this one keeps its own.
         Raises OutOfReach, Contradiction and PeerFailed, which are rows too.
         """
+        ...
 
     def cost(self, task: Task) -> float:
-        """Seconds it may take, roughly: for the progress bar and for running long ones first."""
+        """Seconds it may take, roughly: for the progress bar and for running long ones first.
 
-    @property
-    def concludes(self) -> bool:
-        """Whether all rows of the kind together come to more rows."""
+        Those of one run of heyoka, and a second.
+        """
+        return 1.0 + task.run_seconds
 
     def conclude(self, rows: Sequence[Row]) -> list[Row]:
         """What all rows of the kind together come to; called where it :attr:`concludes`."""
+        return []
 
 
 Kinds = Mapping[str, Kind]
