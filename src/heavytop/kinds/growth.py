@@ -36,7 +36,7 @@ from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import input_rounding
-from heavytop.suite.starts import random_starts
+from heavytop.suite.starts import ensemble_of, one_motion
 from heavytop.suite.task import Task, computed
 
 NAME = "growth"
@@ -98,7 +98,7 @@ class GrowthTable(Table, tag=NAME):
 
 
 def _task(case: Case, run: Run, integrator: str) -> Task:
-    """One row; raises InputError for an impossible value, and for a case without random starts."""
+    """One row; raises InputError for an impossible value."""
     precision = parse(run.precision)
     if precision.bits > _MOST_BITS:
         raise InputError(f"An ensemble in {precision.name}.", f"Laws of growth are fitted up to real:{_MOST_BITS}.")
@@ -114,7 +114,6 @@ def _task(case: Case, run: Run, integrator: str) -> Task:
         raise InputError(f"bias = {run.bias} in a growth run.", "Give a relative error between -1 and 1.")
     if run.reference is not None and parse(run.reference).bits <= precision.bits:
         raise InputError(f"{run.reference} is no reference for {run.precision}.", "Name a format with more bits.")
-    random_starts(case, 1, run.seed)
     steps = range(-run.samples * run.decades, 1)
     times = tuple(horizon * Fraction(f"{10 ** (step / run.samples):.4g}") for step in steps)
     asked = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}
@@ -152,8 +151,8 @@ class Growth(Kind):
         Raises InputError for data outside the range of the format, OutOfReach where a first integral is not resolved.
         """
         case, precision, run = task.given, task.precision, task.options
-        starts = random_starts(case, run.starts, run.seed)
-        true = [Problem.of(case.top, start, precision, case.system) for start in starts]
+        members = ensemble_of(case, run.starts, run.seed)
+        true = [Problem.of(*member, precision, case.system) for member in members]
         given = [_biased(problem, run.bias) for problem in true]
         times = [exact(number(time, precision)) for time in task.times]
         before = saved.load()
@@ -168,10 +167,10 @@ class Growth(Kind):
         ready = perf_counter()
         scorers = [Scorer(problem, motion, times) for problem, motion in zip(true, compared.motions, strict=True)]
         complete(done.motions, given, times, scorers, save, task.integrator, run.options)
-        motions = [done.motions[index] for index in range(len(starts))]
+        motions = [done.motions[index] for index in range(len(members))]
         seconds = {"reference": ready - began, "run": perf_counter() - ready, "compile": motions[0].compile}
-        rounding = max(input_rounding(case.top, start, p) for start, p in zip(starts, true, strict=True))
-        return _row(task, starts, motions, scorers, compared, seconds, rounding)
+        rounding = max(input_rounding(*member, p) for member, p in zip(members, true, strict=True))
+        return _row(task, [start for _, start in members], motions, scorers, compared, seconds, rounding)
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
         """The laws, and whether the planted faults are told from them."""
@@ -197,7 +196,7 @@ class Growth(Kind):
         chaotic = any(law.growth == "exponential" for row in rows for law in row.laws.values())
         return [
             title(
-                "Growth laws: root mean square over random starts, drift of the first integrals and distance from truth"
+                "Growth laws: root mean square over the starts, drift of the first integrals and distance from truth"
             ),
             Text(
                 "  Detects: the smallest relative fault a step that these starts would have told from the healthy law."
@@ -296,6 +295,7 @@ def _row(
     reached = min((abs(Fraction(motion.time_reached)) for motion in failed), default=abs(task.times[-1]))
     found = growing(starts, task.times, motions, scorers, compared, time_text)
     metrics = {FAILED: of_fraction(Fraction(len(failed)), words=str(len(failed)))} | found.metrics
+    of = "roundings of one motion" if one_motion(task.given, task.options.seed) else "random starts"
     who = f"computed: {first.integrator} in {precision.name}"
     return Row(
         case=task.title,
@@ -312,7 +312,7 @@ def _row(
         key=task.key,
         reference=compared.against,
         measure=NAME,
-        measured=f"{who}, {len(motions)} random starts, root mean square over them",
+        measured=f"{who}, {len(motions)} {of}, root mean square over them",
         against=compared.against.text,
         order=first.order,
         flags=first.flags | {"bias": task.options.bias or "none"},

@@ -11,6 +11,7 @@ from typing import Any
 from msgspec.structs import replace as replace_struct
 
 from heavytop.errors import InputError, OutOfReach
+from heavytop.exact.solution import ExactSolution
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.computed_reference import agreement, of_rounded
 from heavytop.measure.scalar import GUARD_BITS
@@ -43,10 +44,15 @@ class Reference:
 def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least: int = 0) -> Reference:
     """The closed forms where there are any, else runs in 30 bits more, or in ``least`` bits where that is more.
 
-    The rows of a plan that differ in flags share it, and every state that was worked out.
+    The rows of a plan that differ in flags share it, and every state that was worked out; so do problems that are one
+    motion.
     """
-    forms = [closed_form(problem) for problem in problems]
-    if all(forms):
+    of: dict[Any, ExactSolution | None] = {}
+    for problem in problems:
+        if (motion := _motion(problem)) not in of:
+            of[motion] = closed_form(problem)
+    forms = [form for problem in problems if (form := of[_motion(problem)]) is not None]
+    if len(forms) == len(problems):
         return _certified(forms, times, problems[0].precision.bits + GUARD_BITS)
     try:
         found = of_rounded(problems, times, least)
@@ -60,28 +66,35 @@ def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least:
     return Reference(against, list(motions), [list(map(each.blur, covered)) for each in found])
 
 
+def _motion(problem: Problem) -> tuple[Any, ...]:
+    """What the motion depends on: inertia and weight times a common factor are the same motion."""
+    p = problem.parameters
+    return problem.system.name, *(value / p.inertia[0] for value in (*p.inertia, *p.moment)), p.rotor, problem.start
+
+
 def _none(starts: int, reason: str) -> Reference:
     return Reference(Against("none", reason=reason), [reason] * starts, [])
 
 
-def _certified(forms: Sequence[Any], times: Sequence[Fraction], bits: int) -> Reference:
+def _certified(forms: Sequence[ExactSolution], times: Sequence[Fraction], bits: int) -> Reference:
     """Every closed form certified early, and the first at the horizon too."""
     horizon = times[-1]
     early = min(_CERTIFIED_AT, abs(horizon)) * (1 if horizon > 0 else -1)
-    proofs = [_proof(form, early, bits) for form in forms]
+    proofs = {id(form): _proof(form, early, bits) for form in forms}
     last = _proof(forms[0], horizon, bits)
-    done = [proof for proof in proofs if proof]
+    done = [proof for proof in proofs.values() if proof]
     if not done or last is None:
         return _none(len(forms), _TOO_FEW)
     least = min(done, key=lambda proof: proof.certificate.agreed_digits).certified
     by = done[0].certificate
-    every = replace_struct(least, source=by.second_source, proven=by.kind, starts=len(done), of_starts=len(forms))
+    starts = sum(proofs[id(form)] is not None for form in forms)
+    every = replace_struct(least, source=by.second_source, proven=by.kind, starts=starts, of_starts=len(forms))
     against = replace_struct(last.against, certificates=(last.certified, every))
-    motions = [_TOO_FEW if proof is None else proof.truth.remembered() for proof in proofs]
-    return Reference(against, motions, [[2.0**-bits] * len(times)] * len(forms))
+    truths = {key: _TOO_FEW if proof is None else proof.truth.remembered() for key, proof in proofs.items()}
+    return Reference(against, [truths[id(form)] for form in forms], [[2.0**-bits] * len(times)] * len(forms))
 
 
-def _proof(form: Any, time: Fraction, bits: int) -> Known | None:
+def _proof(form: ExactSolution, time: Fraction, bits: int) -> Known | None:
     try:
         return certified(form, time, bits)
     except OutOfReach:

@@ -19,20 +19,20 @@ from heavytop.top.heavy_top import HeavyTop
 RERUNS = 15
 """Runs with other roundings, beside the row's own."""
 MOST_SEEDS = 1000
-_BITS, _FACTORS, _STRIDE = 20, 2**14, 10125
+_BITS, FACTORS, _STRIDE = 20, 2**14, 10125
 """Factors are 1 + j/2^20 with j < 2^14, an odd stride apart so that those of one row differ in all their bits."""
 _CENTRAL = 0.95
 
 
 def factor(seed: int, rerun: int = 0) -> Fraction:
     """What inertia and weight are multiplied by; 1 for seed 0 and rerun 0."""
-    number = (seed * (RERUNS + 1) + rerun) * _STRIDE % _FACTORS
+    number = (seed * (RERUNS + 1) + rerun) * _STRIDE % FACTORS
     return 1 + Fraction(number, 2**_BITS)
 
 
-def reroll(top: HeavyTop, seed: int) -> HeavyTop:
-    """The top with the same motions and other roundings."""
-    return HeavyTop([factor(seed) * moment for moment in top.inertia], factor(seed) * top.weight, top.centre)
+def scaled(top: HeavyTop, by: Fraction) -> HeavyTop:
+    """The top with the same motions and other roundings: inertia and weight times a :func:`factor`."""
+    return HeavyTop([by * moment for moment in top.inertia], by * top.weight, top.centre)
 
 
 def least(metrics: Mapping[str, Metric], metric: Metric) -> float:

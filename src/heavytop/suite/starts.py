@@ -1,4 +1,4 @@
-"""Random starts: how they are drawn."""
+"""The members of an ensemble: random starts of a top, or one motion with other roundings."""
 
 from __future__ import annotations
 
@@ -7,28 +7,39 @@ from random import Random
 
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
+from heavytop.measure.rounding_noise import FACTORS, factor, scaled
 from heavytop.suite.cases import Case
 from heavytop.top.equations import GYROSTAT
-from heavytop.top.heavy_top import State, dot
+from heavytop.top.heavy_top import HeavyTop, State, dot
 
 _GRID = 1000
 _GAMMA_BITS = 24
+_APART = 64
+"""Roundings of one seed are so many rows of a report apart from those of the next."""
 
 
-def random_starts(case: Case, count: int, seed: int) -> list[State]:
-    """``count`` rational starts of the top of ``case`` whose motion is known in the same way; growing ``count`` keeps
-    the earlier ones.
+Member = tuple[HeavyTop, State]
 
-    Ω has components uniform up to the largest of the case's Ω, and γ is a rational point of the unit sphere, uniform
-    over it; for the gyrostat γ is M/|M| and |M| is half to three halves of the case's.
-    Raises InputError for a case that is one special motion of its top, such as a pendulum.
+
+def ensemble_of(case: Case, count: int, seed: int) -> list[Member]:
+    """``count`` tops with starts; growing ``count`` keeps the earlier ones.
+
+    Where random starts of the top are known in the same way as the case, these, of the one top: Ω has components
+    uniform up to the largest of the case's Ω, and γ is a rational point of the unit sphere, uniform over it; for the
+    gyrostat γ is M/|M| and |M| is half to three halves of the case's.
+    A case that is one motion of its top, such as a pendulum, is taken with as many other roundings
+    (:mod:`heavytop.measure.rounding_noise`); raises InputError where there are not as many.
     """
-    if _kind(case, case.start) is not _kind(case, _draw(case, seed, 0)):
-        raise InputError(
-            f"The case {case.name} is one motion, not a class with random starts.",
-            "Use a case such as euler, lagrange, kovalevskaya, generic or gyrostat.",
-        )
-    return [_draw(case, seed, index) for index in range(count)]
+    if one_motion(case, seed):
+        if count > FACTORS:
+            raise InputError(f"{count} starts of {case.name}, which is one motion.", f"Give up to {FACTORS}.")
+        return [(scaled(case.top, factor(_APART * seed, index)), case.start) for index in range(count)]
+    return [(case.top, _draw(case, seed, index)) for index in range(count)]
+
+
+def one_motion(case: Case, seed: int) -> bool:
+    """Whether the case is one special motion of its top, not of a class that random starts are of."""
+    return case.homoclinic is not None or _kind(case, case.start) is not _kind(case, _draw(case, seed, 0))
 
 
 def _draw(case: Case, seed: int, index: int) -> State:

@@ -10,7 +10,7 @@ import msgspec
 
 from heavytop.measure.computed_reference import seconds_a_step as words_seconds
 from heavytop.measure.integrator import HEYOKA, Integrator
-from heavytop.measure.rounding_noise import reroll
+from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.precision import Precision, parse
 from heavytop.records import EXACT, RowKey, Subject
 from heavytop.suite.cases import Case
@@ -65,7 +65,7 @@ class Task:
     def given(self) -> Case:
         """The case, with the roundings of the seed."""
         assert self.case is not None
-        return replace(self.case, top=reroll(self.case.top, self.seed)) if self.seed else self.case
+        return replace(self.case, top=scaled(self.case.top, factor(self.seed))) if self.seed else self.case
 
     @property
     def label(self) -> str:
