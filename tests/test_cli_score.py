@@ -160,7 +160,8 @@ def test_the_data_of_a_case_can_be_pasted_everywhere(name: str, tmp_path: Path) 
 
 def test_list_names_everything_once() -> None:
     _, text, _ = command("list")
-    names = [line.split()[0] for line in text.splitlines() if line.startswith("  ")]
+    assert max(map(len, text.splitlines())) <= 80
+    names = re.findall(r"^  (\S+)", text, re.M)
     assert len(names) == len(set(names))
     _, out, _ = command("list", "--json")
     listed = json.loads(out)

@@ -20,7 +20,6 @@ from typing import Any, Literal, NamedTuple
 from heavytop.exact.ershkov_partial import ErshkovPartial
 
 Branch = Literal["smooth", "printed"]
-BRANCHES: tuple[Branch, ...] = ("smooth", "printed")
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import Annotated, Any
 
 import typer
@@ -24,17 +25,21 @@ def list_(
         print_json(listed)
         return 0
     print("Cases (--case NAME shows the data)")
-    for each in listed["cases"]:
-        print(f"  {each['name']:20} {each['system']:10} {each['about']}")
+    _lines({each["name"]: f"{each['system']:10} {each['about']}" for each in listed["cases"]}, indent=11)
     print(f"Plans\n  {', '.join(listed['plans'])}, or a TOML file")
     print(f"Systems\n  {', '.join(listed['systems'])}")
     print("Number formats")
-    for name, note in listed["formats"].items():
-        print(f"  {name:14} {note}")
+    _lines(listed["formats"])
     print("Integrators")
-    for name, note in listed["integrators"].items():
-        print(f"  {name:16} {note}")
+    _lines(listed["integrators"])
     return 0
+
+
+def _lines(notes: dict[str, str], indent: int = 0) -> None:
+    """A name and its note a line, folded at 80 columns."""
+    width = max(map(len, notes))
+    for name, note in notes.items():
+        print(fill(note, 80, initial_indent=f"  {name:{width}} ", subsequent_indent=" " * (width + 3 + indent)))
 
 
 def _everything() -> dict[str, Any]:

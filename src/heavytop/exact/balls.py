@@ -46,9 +46,14 @@ class Undecided(ArithmeticError):
     """The working precision does not decide a discrete question."""
 
 
+def rational(value: Fraction | int) -> fmpq:
+    """``value`` as FLINT's fraction."""
+    return fmpq(value.numerator, value.denominator)
+
+
 def ball(value: Fraction | int) -> arb:
     """``value`` as a ball at the working precision; of radius 0 where it is a binary number that fits."""
-    return arb(fmpq(value.numerator, value.denominator))
+    return arb(rational(value))
 
 
 def midpoint(value: arb) -> Fraction:

@@ -71,26 +71,22 @@ class Level:
     @property
     def area(self) -> Fraction:
         """C0."""
-        found: Fraction = dot(self.angular_momentum, self.gamma)
-        return found
+        return Fraction(dot(self.angular_momentum, self.gamma))
 
     @property
     def height(self) -> Fraction:
         """s."""
-        found: Fraction = dot(self.moment, self.gamma)
-        return found
+        return Fraction(dot(self.moment, self.gamma))
 
     @property
     def energy(self) -> Fraction:
         """E."""
-        found: Fraction = dot(self.omega, self.angular_momentum) / 2 + self.height
-        return found
+        return Fraction(dot(self.omega, self.angular_momentum) / 2 + self.height)
 
     @property
     def moment_square(self) -> Fraction:
         """N²."""
-        found: Fraction = dot(self.moment, self.moment)
-        return found
+        return Fraction(dot(self.moment, self.moment))
 
     @property
     def skew(self) -> Fraction:

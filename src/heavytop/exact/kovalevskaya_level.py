@@ -67,10 +67,6 @@ class Level(Reduced):
         h, g = self.energy, self.weight
         return polynomial(h * g - self.moment_square * self.area**2 / 2, g, h, Fraction(1))
 
-    def quintic(self) -> fmpq_poly:
-        """φ."""
-        return self.cubic() * polynomial(-self.fourth, Fraction(0), Fraction(1))
-
     def double(self) -> Fraction:
         """e = ℓ²/(2|γ|²) − h, the double root of φ on the levels (2, 3); needs γ ≠ 0."""
         return self.area**2 / (2 * self.gamma_square) - self.energy

@@ -8,10 +8,10 @@ from functools import wraps
 from math import factorial, isqrt
 from typing import Any, TypeVar
 
-from flint import arb, fmpq, fmpq_series
+from flint import arb, fmpq_series
 
 from heavytop.errors import InputError
-from heavytop.exact.balls import ball
+from heavytop.exact.balls import ball, rational
 from heavytop.exact.flint_context import coefficient, current_precision, require_undisturbed, series_length
 from heavytop.exact.quartic import Pair
 from heavytop.exact.second_kind import Winding
@@ -48,18 +48,14 @@ def taylor(
 ) -> list[list[Fraction]]:
     """The exact derivatives (not divided by factorials) of each component at the start, from the field itself."""
     inertia, moment, rotor = parameters
-    exact = Parameters([_rational(i) for i in inertia], [_rational(n) for n in moment], _rational(rotor))
-    rows = [[_rational(value)] for value in start]
+    exact = Parameters([rational(i) for i in inertia], [rational(n) for n in moment], rational(rotor))
+    rows = [[rational(value)] for value in start]
     with series_length(length):
         for order in range(1, length):
             y = [fmpq_series(row, prec=length) for row in rows]
             for row, slope in zip(rows, field(exact, y), strict=True):
                 row.append(coefficient(fmpq_series(slope), order - 1) / order)
     return [[Fraction(int(c.p), int(c.q)) * factorial(n) for n, c in enumerate(row)] for row in rows]
-
-
-def _rational(value: Any) -> fmpq:
-    return fmpq(value.numerator, value.denominator)
 
 
 def turned(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:

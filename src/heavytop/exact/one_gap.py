@@ -29,7 +29,7 @@ from flint import acb, arb, arb_series, fmpq, fmpq_poly
 from heavytop.errors import NotInClass
 from heavytop.exact.abel import Inversion
 from heavytop.exact.azimuth import Azimuth, Bearing
-from heavytop.exact.balls import Undecided, ball, midpoint, working_precision
+from heavytop.exact.balls import Undecided, ball, midpoint, rational, working_precision
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
 
@@ -57,7 +57,7 @@ class Curve:
         cls, inertia: tuple[Fraction, Fraction, Fraction], second: fmpq_poly, third: fmpq_poly, power: int = 1
     ) -> Curve:
         """The motions with these Q and R; raises NotInClass where an identity fails."""
-        a, b, c = (_rational(moment) for moment in inertia)
+        a, b, c = (rational(moment) for moment in inertia)
         speed, place, factor = (b - c) / (power * a), _X**power, _X ** (power // 2)
         turning = factor.derivative()
         t = (a - b) * factor * place - c * speed * (turning * third + _HALF * factor * third.derivative())
@@ -83,10 +83,10 @@ class Curve:
         f is the rate at which M_h, the level part of M, turns about γ:
         M' = γ × n in space.  Where w is not 1, M·γ = 0, and M/w turns as M does.
         """
-        a, b, c = (_rational(moment) for moment in self.inertia)
+        a, b, c = (rational(moment) for moment in self.inertia)
         s, t, u = self.heights
         place, factor = _X**self.power, _X ** (self.power // 2)
-        square = _rational(self.gamma_square())
+        square = rational(self.gamma_square())
         area = a * place * s + factor * (b * self.second * t + c * self.third * u)
         numerator = a * place - area * s / square
         denominator = a * a * place * place + factor * factor * (b * b * self.second + c * c * self.third)
@@ -106,12 +106,8 @@ class Curve:
 
 def value(polynomial: fmpq_poly, x: Fraction) -> Fraction:
     """The polynomial at a rational place."""
-    found = polynomial(_rational(x))
+    found = polynomial(rational(x))
     return Fraction(int(found.p), int(found.q))
-
-
-def _rational(number: Fraction) -> fmpq:
-    return fmpq(number.numerator, number.denominator)
 
 
 @dataclass(frozen=True, slots=True)

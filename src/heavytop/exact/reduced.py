@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Self
 
-from flint import arb, arb_series, fmpq, fmpq_poly
+from flint import arb, arb_series, fmpq_poly
 
-from heavytop.exact.balls import ball
+from heavytop.exact.balls import ball, rational
 from heavytop.top.heavy_top import HeavyTop, State
 
 
@@ -84,7 +84,7 @@ class Reduced:
 
 def polynomial(*coefficients: Fraction) -> fmpq_poly:
     """The polynomial with these coefficients of 1, w, w², ..."""
-    return fmpq_poly([fmpq(c.numerator, c.denominator) for c in coefficients])
+    return fmpq_poly([rational(c) for c in coefficients])
 
 
 def _power_of_two(value: Fraction) -> Fraction:

@@ -18,10 +18,10 @@ from fractions import Fraction
 from math import gcd, isqrt
 from typing import Any
 
-from flint import arb, fmpq, fmpq_mat, fmpq_poly
+from flint import arb, fmpq_mat, fmpq_poly
 
 from heavytop.errors import InputError, NotInClass
-from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.balls import ball, rational, to_bits
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, rotate
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
@@ -172,12 +172,10 @@ def staude_stability(motion: Staude) -> str:
     part where any of them is negative; where one is 0 and none negative, first order does not decide.
     """
     p = motion.system.parameters(motion.top, motion.start)
-    exact = Parameters(
-        [_rational(i) for i in p.inertia], [_rational(n) for n in p.moment], _rational(Fraction(p.rotor))
-    )
+    exact = Parameters([rational(i) for i in p.inertia], [rational(n) for n in p.moment], rational(Fraction(p.rotor)))
     columns = []
     for moved in range(6):
-        y = [fmpq_poly([_rational(v), int(axis == moved)]) for axis, v in enumerate(motion.start.flat)]
+        y = [fmpq_poly([rational(v), int(axis == moved)]) for axis, v in enumerate(motion.start.flat)]
         columns.append([rate[1] for rate in motion.system.field(exact, y)])
     polynomial = fmpq_mat(6, 6, [columns[j][i] for i in range(6) for j in range(6)]).charpoly()
     a, b = polynomial[4], polynomial[2]
@@ -185,7 +183,3 @@ def staude_stability(motion: Staude) -> str:
     if any(value < 0 for value in signs):
         return "unstable"
     return "spectrally stable" if all(value > 0 for value in signs) else "degenerate"
-
-
-def _rational(value: Fraction) -> fmpq:
-    return fmpq(value.numerator, value.denominator)

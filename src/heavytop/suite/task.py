@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from heavytop.measure.computed_reference import seconds_a_step as words_seconds
-from heavytop.measure.integrator import HEYOKA, Integrator
+from heavytop.measure.integrator import HEYOKA, WORDS, Integrator
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.precision import Precision, parse
 from heavytop.records import EXACT, RowKey, Subject
@@ -79,7 +79,7 @@ class Task:
     @property
     def run_seconds(self) -> float:
         """Seconds that words, or heyoka for all others, take for such a motion, roughly."""
-        step = (words_seconds if self.key.subject.name == "words" else seconds_a_step)(self.precision.bits)
+        step = (words_seconds if self.key.subject.name == WORDS else seconds_a_step)(self.precision.bits)
         return float(abs(self.times[-1])) * 4 * step + len(self.times) * 1e-4
 
 

@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from copy import deepcopy
 from fractions import Fraction
@@ -125,6 +125,27 @@ def said(what: object) -> str:
         return ""
     line = " ".join("".join(c if c.isprintable() else " " for c in text[: 4 * _MOST_SAID]).split())
     return line if len(line) <= _MOST_SAID else f"{line[: _MOST_SAID - 1]}…"
+
+
+Run = Callable[[Problem, Sequence[Fraction], Fraction | None], Trajectory]
+"""A problem in its format, times, and a tolerance or None for the peer's own."""
+
+
+def with_tolerance(run: Run) -> Callable[..., Trajectory]:
+    """The call of :mod:`heavytop.integrate.peers` for a peer that has a tolerance."""
+
+    def propagate(
+        top: HeavyTop,
+        start: State,
+        times: Sequence[Fraction],
+        precision: Precision = DOUBLE,
+        *,
+        system: System = HEAVY_TOP,
+        tolerance: Fraction | None = None,
+    ) -> Trajectory:
+        return run(Problem.of(top, start, precision, system), times, tolerance)
+
+    return propagate
 
 
 class Contained:

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy
 
 from heavytop.errors import InputError, PeerFailed
+from heavytop.integrate.peers.contract import with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, exact, number
 from heavytop.top import heavy_top
@@ -90,18 +91,10 @@ def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") ->
     ) -> Trajectory:
         return integrate(Problem.of(top, start, precision, system), times, step)
 
-    def with_tolerance(
-        top: HeavyTop,
-        start: State,
-        times: Sequence[Fraction],
-        precision: Precision = DOUBLE,
-        *,
-        system: System = HEAVY_TOP,
-        tolerance: Fraction | None = None,
-    ) -> Trajectory:
-        return integrate(Problem.of(top, start, precision, system), times, FINEST if tolerance is None else tolerance)
+    def by_tolerance(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | None) -> Trajectory:
+        return integrate(problem, times, FINEST if tolerance is None else tolerance)
 
-    return with_step if knob == "step" else with_tolerance
+    return with_step if knob == "step" else with_tolerance(by_tolerance)
 
 
 def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Given:

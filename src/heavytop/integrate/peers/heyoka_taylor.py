@@ -9,6 +9,7 @@ from time import perf_counter
 
 from heavytop.errors import InputError
 from heavytop.integrate.ensemble import propagate_ensemble
+from heavytop.integrate.peers.contract import with_tolerance
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision
@@ -34,20 +35,12 @@ def constants(
 LANES = 8
 
 
-def lanes(
-    top: HeavyTop,
-    start: State,
-    times: Sequence[Fraction],
-    precision: Precision = DOUBLE,
-    *,
-    system: System = HEAVY_TOP,
-    tolerance: Fraction | None = None,
-) -> Trajectory:
+@with_tolerance
+def lanes(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | None) -> Trajectory:
     """The motion in one of eight SIMD lanes of one thread, the same in each; ``run`` is an eighth of their seconds."""
-    if precision != DOUBLE:
-        raise InputError(f"heyoka:lanes has no {precision.name}.", "Use double.")
-    problems = [Problem.of(top, start, precision, system)] * LANES
+    if problem.precision != DOUBLE:
+        raise InputError(f"heyoka:lanes has no {problem.precision.name}.", "Use double.")
     began = perf_counter()
-    run = propagate_ensemble(problems, times, threads=1, lanes=LANES, tolerance=tolerance)[0]
+    run = propagate_ensemble([problem] * LANES, times, threads=1, lanes=LANES, tolerance=tolerance)[0]
     share = (perf_counter() - began) / LANES
     return replace(run, integrator="heyoka:lanes", seconds=run.seconds | {"run": share})

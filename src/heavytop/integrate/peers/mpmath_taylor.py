@@ -10,22 +10,15 @@ from typing import Any
 import numpy
 
 from heavytop.errors import InputError
+from heavytop.integrate.peers.contract import with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import Precision, exact, number
-from heavytop.top.equations import HEAVY_TOP, Parameters, System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.precision import exact, number
+from heavytop.top.equations import Parameters
 from heavytop.top.times import check_times
 
 
-def odefun(
-    top: HeavyTop,
-    start: State,
-    times: Sequence[Fraction],
-    precision: Precision,
-    *,
-    system: System = HEAVY_TOP,
-    tolerance: Fraction | None = None,
-) -> Trajectory:
+@with_tolerance
+def odefun(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | None) -> Trajectory:
     """``mpmath.odefun`` at the precision's bits; states are heyoka's numbers of that format.
 
     tolerance: None for mpmath's own choice, the eps of the format.
@@ -33,10 +26,10 @@ def odefun(
     """
     import mpmath
 
+    precision, system = problem.precision, problem.system
     grid = [exact(number(time, precision)) for time in check_times(times)]
     if grid[-1] < 0:
         raise InputError("mpmath.odefun integrates forwards only.", "Give positive times.")
-    problem = Problem.of(top, start, precision, system)
     evaluations = 0
     began = perf_counter()
     # a context of this run's own: that of the module is one for all threads
@@ -55,7 +48,7 @@ def odefun(
     p = Parameters([big(v) for v in given.inertia], [big(v) for v in given.moment], big(given.rotor))
     wanted = None if tolerance is None else big(tolerance)
     solve = own.odefun(rates, 0, [big(v) for v in problem.start.flat], tol=wanted)
-    values = [[_exact(v) for v in solve(big(time))] for time in grid]
+    values = [[exact(v) for v in solve(big(time))] for time in grid]
     seconds = perf_counter() - began
     states = tuple(numpy.array([number(v, precision) for v in row]) for row in values)
     return Trajectory(
@@ -71,8 +64,3 @@ def odefun(
         {"tolerance": "eps" if tolerance is None else str(tolerance)},
         evaluations,
     )
-
-
-def _exact(value: Any) -> Fraction:
-    sign, mantissa, exponent, _ = value._mpf_
-    return (-1 if sign else 1) * int(mantissa) * Fraction(2) ** int(exponent)
