@@ -11,6 +11,8 @@ from heavytop.words.machine import Doubles
 # words up to which so many bits are safe in each: products of a few hundred orders stay inside the sums
 _BITS_OF_A_WORD = ((2, 48), (4, 46), (6, 45), (12, 44), (24, 43))
 MOST_WORDS = 24
+_NARROWER = 2
+"""By so many bits words are narrower where that is enough: fewer bits take fewer orders."""
 
 
 def grid_of(words: int, whole: bool = False) -> Grid:
@@ -19,8 +21,12 @@ def grid_of(words: int, whole: bool = False) -> Grid:
 
 
 def grid_for(bits: int) -> Grid | None:
-    """The smallest grid of at least so many bits and three words; None where there is none."""
-    return next((grid for grid in map(grid_of, range(3, MOST_WORDS + 1)) if grid.total >= bits), None)
+    """The smallest grid of at least so many bits and three words, of two widths a word; None where there is none."""
+    wide = next((grid for grid in map(grid_of, range(3, MOST_WORDS + 1)) if grid.total >= bits), None)
+    if wide is None:
+        return None
+    narrow = Grid(wide.words, wide.bits - _NARROWER)
+    return narrow if narrow.total >= bits else wide
 
 
 def digits(value: Fraction, grid: Grid) -> list[float]:

@@ -17,7 +17,7 @@ from heavytop.words.scaled import Scaled
 
 BITS = 106
 FALL_ALONE, FALL_IN_LANES = 1.45, 2.0
-_MARGIN = 6.0
+_MARGIN = 7.0
 _DEEPEST = 84.0
 _DOUBLE_BITS = 53
 _ROUNDING_BITS = 4

@@ -18,7 +18,18 @@ from llvmlite import ir
 from heavytop.top.equations import System
 from heavytop.words.lanes import ZERO, turned
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
-from heavytop.words.pairs import add, covered, divided, later, log2, multiply, polynomial, step_length, times
+from heavytop.words.pairs import (
+    accumulated,
+    add,
+    covered,
+    divided,
+    later,
+    log2,
+    multiply,
+    polynomial,
+    step_length,
+    times,
+)
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER, Pair, function
 
 FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
@@ -155,11 +166,9 @@ class _Round:
             (a, a_low), (c, c_low) = self._pair(left, first), self._pair(right, second)
             if sign < 0:
                 c, c_low = code.negative(c), code.negative(c_low)
-            product, error = code.two_product(a, c)
             at = 2 * (component % 3)
-            found[at], rounding = code.two_sum(found[at], product)
-            low = code.fma(a, c_low, code.fma(a_low, c, error))
-            found[at + 1] = code.add(code.add(found[at + 1], rounding), low)
+            total = (found[at], found[at + 1])
+            found[at : at + 2] = accumulated(code, total, (a, a_low), (c, c_low))
         return found
 
     def _plain_order(self, n: Any, _: list[Any]) -> None:

@@ -41,6 +41,16 @@ def times(code: Code, a: Pair, factor: Any) -> Pair:
     return product, code.fma(a[1], factor, error)
 
 
+def accumulated(code: Code, total: Pair, a: Pair, b: Pair) -> Pair:
+    """total + a b, its low word unordered: for long sums."""
+    high = code.add(total[0], code.multiply(a[0], b[0]))
+    part = code.subtract(high, total[0])
+    rest = code.subtract(total[0], code.subtract(high, part))
+    # the rounding of the product too
+    low = code.fma(a[0], b[1], code.fma(a[1], b[0], code.fma(a[0], b[0], code.negative(part))))
+    return high, code.add(total[1], code.add(rest, low))
+
+
 def divided(code: Code, a: Pair, divisor: Any, inverse: Pair) -> Pair:
     """a over a whole number whose inverse is given in two words.
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from heavytop.top.equations import System
 from heavytop.words.lanes import GATHERED, LEFT, RIGHT, Sum, turned
-from heavytop.words.pairs import add, divided, multiply
+from heavytop.words.pairs import accumulated, add, divided, multiply
 from heavytop.words.vector import Code, Index, Pair
 
 LEAST_LOW_ORDER = 2
@@ -112,16 +112,10 @@ class Recurrence:
     def _accumulate_pairs(self, m: Index, other: Index, sums: list[Any]) -> list[Any]:
         """Σ L_m R_other in words (s, c), c unordered."""
         code, left, right = self.code, self.row(m), self.row(other)
-        high, low = self.pair(right, 0)
         found: list[Any] = []
         for vector in self.vectors:
-            s, c = sums[2 * vector : 2 * vector + 2]
-            a, a_low = self.pair(left, self.layout.left(vector))
-            product, error = code.two_product(a, high)
-            s, rounding = code.two_sum(s, product)
-            # c comes last: the next product waits for one addition alone
-            c = code.add(c, code.add(rounding, code.fma(a, low, code.fma(a_low, high, error))))
-            found += [s, c]
+            total = (sums[2 * vector], sums[2 * vector + 1])
+            found += accumulated(code, total, self.pair(left, self.layout.left(vector)), self.pair(right, 0))
         return found
 
     def _accumulate(self, m: Index, other: Index, sums: list[Any]) -> list[Any]:
