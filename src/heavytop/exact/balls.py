@@ -11,6 +11,7 @@ from collections.abc import Callable
 from decimal import ROUND_CEILING, Decimal
 from fractions import Fraction
 from types import SimpleNamespace
+from typing import SupportsInt
 
 from flint import arb, fmpq
 
@@ -58,14 +59,18 @@ def ball(value: Fraction | int) -> arb:
 
 def midpoint(value: arb) -> Fraction:
     """The exact midpoint of a finite ball."""
-    mantissa, exponent = value.mid().man_exp()
-    return int(mantissa) * Fraction(2) ** int(exponent)
+    return _fraction(*value.mid().man_exp())
 
 
 def radius(value: arb) -> Fraction:
     """The exact radius of a finite ball."""
-    mantissa, exponent = value.rad().man_exp()
-    return int(mantissa) * Fraction(2) ** int(exponent)
+    return _fraction(*value.rad().man_exp())
+
+
+def _fraction(mantissa: SupportsInt, exponent: SupportsInt) -> Fraction:
+    """mantissa · 2^exponent."""
+    m, e = int(mantissa), int(exponent)
+    return Fraction(m << e) if e >= 0 else Fraction(m, 1 << -e)
 
 
 def radius_text(value: Fraction) -> str:

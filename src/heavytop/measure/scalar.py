@@ -18,6 +18,7 @@ DIGITS = 8
 UNRESOLVED = "unresolved"
 GUARD_BITS = 64
 RESOLVED_RADII = 10
+_SURELY_RESOLVED = 8
 
 
 def to_ball(value: Any) -> arb:
@@ -42,6 +43,9 @@ def exactly(value: Any) -> Any:
 
 def resolved(value: arb) -> bool:
     """Whether |value| is at least ten times its radius, or exactly 0."""
+    # with so many bits right |value| is above 64 radii, whatever the rest of its bits
+    if value.rel_accuracy_bits() >= _SURELY_RESOLVED:
+        return bool(value.is_finite())
     return bool(value.is_finite()) and abs(midpoint(value)) >= RESOLVED_RADII * radius(value)
 
 

@@ -60,7 +60,7 @@ class SolutionError:
             return
         sums, left = self._following(state, self.truth.state(time, self.bits))
         keep = time in self.keep
-        counts = float(abs(time)) <= self.until
+        counts = math.isinf(self.until) or float(abs(time)) <= self.until
         for running, part in zip(self.running.values(), sums, strict=True):
             (running.take if counts else running.remember)(time, part, keep)
         if left and self.escape is None:
