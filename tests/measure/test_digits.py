@@ -1,4 +1,4 @@
-"""Digits kept: one definition, recomputed here exactly from the samples, and the same on every surface."""
+"""Digits right: one definition, recomputed here exactly from the samples, and the same on every surface."""
 
 import json
 import math
@@ -134,7 +134,7 @@ def test_the_summary_of_many_rows_names_the_fewest() -> None:
     ]
     console = Console(width=160, record=True, file=StringIO())
     console.print(worst(Report(SCHEMA, {"name": "many"}, {}, []), rows, "hint"))
-    (line,) = [line for line in console.export_text().splitlines() if "digits kept, fewest" in line]
+    (line,) = [line for line in console.export_text().splitlines() if "digits right, fewest" in line]
     assert line.split()[-2:] == ["4.5", "top[1]"]
 
 

@@ -89,6 +89,26 @@ def test_what_coefficients_lack_is_within_the_bound(words: int, system, attitude
     assert 1e-5 < max(shares) <= 1
 
 
+@pytest.mark.parametrize("words", [3, 12])
+def test_coefficients_that_are_smaller_than_the_state_by_several_words(words: int) -> None:
+    """Near an equilibrium, near a permanent rotation, and with moments that hardly differ."""
+    grid, e_x = grid_of(words, whole=True), (Fraction(1), Fraction(0), Fraction(0))
+    for digits in (12, 16, 30, 40, 90, 140):
+        off = Fraction(1, 10**digits)
+        for moments, moment, state in (
+            ((3, 2, 1), e_x, (0, off, 0, *e_x)),
+            ((3, 2, 1), e_x, (1, off, -off, *e_x)),
+            ((3, 2, 1), (off, 0, 0), (1, 0, 0, *e_x)),
+            ((2 + off, 2, 2 - off), (0, 0, 0), (1, Fraction(1, 3), Fraction(2, 3), *e_x)),
+        ):
+            p = Parameters(tuple(map(Fraction, moments)), tuple(map(Fraction, moment)), Fraction(0))
+            motion = ScaledMotion.of(HEAVY_TOP, p, tuple(map(Fraction, state)), True)
+            carrier = Carrier(motion.scaled, grid, True)
+            for halvings in (2, 5):
+                share = used(motion, carrier, rounded(motion, grid), halvings)
+                assert share is None or share <= 1
+
+
 def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:
     random, refused = Random(3), 0
     for bits in (49, 50, 51):

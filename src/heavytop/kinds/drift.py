@@ -117,9 +117,7 @@ class Drift(Kind):
             title(
                 "Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals"
             ),
-            Text(
-                f"  Both absolute, {largest_over(rows)}: an invariant that holds is no proof that the motion is right."
-            ),
+            Text(f"  Both absolute, {largest_over(rows)}: a first integral that is kept proves no motion right."),
             Text(f"  {DIGITS}"),
             Text(f"  {NOISE}"),
             motions(rows),

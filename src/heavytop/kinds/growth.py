@@ -198,9 +198,7 @@ class Growth(Kind):
             title(
                 "Growth laws: root mean square over the starts, drift of the first integrals and distance from truth"
             ),
-            Text(
-                "  Detects: the smallest relative fault a step that these starts would have told from the healthy law."
-            ),
+            Text("  Detects: the smallest relative fault a step that these starts tell from rounding noise."),
             *([Text("  Rate: the median over the starts of their finite-time rates.")] if chaotic else []),
             table([*columns, "lost at |t|"], lines),
         ]

@@ -41,7 +41,7 @@ def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         "digits",
         "Digits lost over a run",
         [
-            "Digits lost: those of the format less the digits kept, −log10 of the largest |error|/max(1, |true value|) "
+            "Digits lost: digits of the format less those right, −log10 of the largest |error|/max(1, |true value|) "
             "of a component of Ω or γ over the samples, against the known motion, or for many starts without one "
             "against runs in a wider format, which prove nothing; of many starts the root mean square over them. A bar "
             "is the interval in which rounding noise alone moves it.",
