@@ -19,7 +19,8 @@ from heavytop.precision import DOUBLE, exact, number, parse, time_text
 from heavytop.records import Row, RowKey
 from heavytop.report.answers import digits_headline
 from heavytop.report.brief import digits_lines
-from heavytop.report.plots import digits, growth
+from heavytop.report.digits_chart import digits
+from heavytop.report.plots import growth
 from heavytop.report.text import DIGITS, NOISE, largest_over, motions, title
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table

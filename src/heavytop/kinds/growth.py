@@ -27,8 +27,8 @@ from heavytop.precision import decimal_text, exact, number, parse, physical, tim
 from heavytop.records import Law, Metric, Quantity, Row, RowKey, Series, by_name
 from heavytop.report.answers import laws_headline
 from heavytop.report.brief import wrapped
+from heavytop.report.digits_chart import digits
 from heavytop.report.names import computed_by
-from heavytop.report.plots import digits
 from heavytop.report.plots import growth as over_time
 from heavytop.report.section import points
 from heavytop.report.text import short, table, title
