@@ -147,13 +147,17 @@ def test_the_data_of_a_case_can_be_pasted_everywhere(name: str, tmp_path: Path) 
     names: dict = {}
     exec(data["python"], names)
     assert (names["top"], names["start"]) == (case.top, case.start)
+    # CSV
+    from heavytop.suite.trajectory_file import read as read_trajectory
+
+    rows = [",".join([time, *state]) for time, state in zip(made["times"], made["states"], strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join([data["csv"], *rows]))
+    assert read_trajectory(tmp_path / "a.csv").start == case.start
     # JSON
     _, text, _ = command("list", "--case", name)
     pasted = json.loads(re.search(r"^\{.*?^\}", text, re.S | re.M)[0])
     pasted |= {key: made[key] for key in ("times", "states")}
     (tmp_path / "a.json").write_text(json.dumps(pasted))
-    from heavytop.suite.trajectory_file import read as read_trajectory
-
     assert read_trajectory(tmp_path / "a.json").start == case.start
     assert tomllib.loads(data["toml"])
 

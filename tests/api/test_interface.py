@@ -139,6 +139,7 @@ def test_everything_prints_as_a_small_table() -> None:
         run,
         ht.reference(TOP, START, TIMES, digits=20),
         ht.score(TIMES, ht.propagate(TOP, START, TIMES).states, top=TOP, start=START),
+        ht.drift(run),
         ht.read_report(ROOT / "results" / "default"),
     ]
     for each in shown:

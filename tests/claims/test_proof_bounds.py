@@ -8,13 +8,18 @@ import pytest
 import sympy
 
 from heavytop.claims.algebra import Assumptions, Field
+from heavytop.claims.audit import audit_claim
 from heavytop.claims.conditions import Kind, Need, condition, conditions_of, is_exactly_zero
+from heavytop.claims.from_file import claim_from_table
 from heavytop.claims.judge import judge
 from heavytop.claims.proof import Region
 from heavytop.claims.prover import Prover
+from heavytop.claims.real_zeros import conditions_for_zero
 from heavytop.claims.regularity import Regularity
 from heavytop.claims.sign import Sign
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
+from heavytop.claims.structure import sign_of as sign_by_structure
+from heavytop.top.equations import system
 
 T, A = sympy.Symbol("t", real=True), sympy.Symbol("a", real=True)
 P = sympy.Symbol("p", positive=True)
@@ -117,6 +122,7 @@ def test_every_part_of_a_formula_is_asked(expression: sympy.Expr, needs: set[str
         (sympy.sqrt(1 - T) * (T - 2), 2, None),
         (sympy.log(T - 1) * (T - 1), 1, None),
         (sympy.log(T * 6) - sympy.log(2) - sympy.log(3) + sympy.Rational(1, 10**200), 1, None),
+        ((T - 1) * sympy.sqrt(sympy.log(T * 6) - sympy.log(2) - sympy.log(3) - sympy.Rational(1, 10**200)), 1, None),
     ],
 )
 def test_0_is_proven_and_what_is_off_by_1e_200_is_off(expression, value, expected) -> None:
@@ -171,6 +177,11 @@ SIN, COS, ROOT = sympy.sin(T), sympy.cos(T), sympy.sqrt(1 + T**2)
         (sympy.sqrt(3 + 2 * sympy.sqrt(2)) - 1 - sympy.sqrt(2), 0, (0, False)),
         (sympy.exp(T) + sympy.exp(-T) - 2, 0, (1, False)),
         (sympy.tanh(T) + 1, 0, (1, True)),
+        # arcs go to pi and pi/2, which lie between 3 and 22/7
+        (sympy.acos(SIN) - 3, 0, (0, False)),
+        (sympy.acos(SIN) - sympy.Rational(22, 7), 0, (-1, False)),
+        (sympy.asin(COS) - sympy.Rational(3, 2), 0, (0, False)),
+        (sympy.atan(T) + sympy.Rational(3, 2), 0, (0, False)),
     ],
 )
 def test_a_sign_is_what_it_is_or_unknown_and_strict_only_where_it_is_never_0(expression, sign, expected) -> None:
@@ -316,3 +327,124 @@ def test_a_place_where_a_formula_is_undefined_is_no_witness(need: Need) -> None:
         (row,) = judge([Statement("1", 1, "smooth", ALL, 1 + T**2, "", formulas)], setting)
         assert row.holds is holds
         assert [c.discharged for c in row.conditions if c.text == need.text] == [False] * len(needs)
+
+
+# --- what is 0 on no open set, and what is 0 nowhere ------------------------------------------------------------------
+
+
+def region(expression: sympy.Expr, flow: Flow | None = None, **known) -> tuple[Region, object]:
+    """The region of a claim with its sample at a = -2, and the numerator of the expression there."""
+    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(-2)},), **known)
+    statement = Statement("1", 1, "smooth", ALL, T, "", flow=flow)
+    field = Field(setting.assumptions(0), [expression])
+    return Region(field, setting, statement, list(setting.places(statement))), field.enter(expression).numerator
+
+
+@pytest.mark.parametrize("known", [{"facts": (A**2 - 1,)}, {"nonzero": (A,)}, {"facts": (A**2 - 1, -A)}])
+def test_a_function_that_is_not_0_at_a_sample_may_be_0_on_another_part_of_a_domain_in_parts(known: dict) -> None:
+    """|a| - a is 0 where a > 0."""
+    where, p = region(sympy.sqrt(A**2) - A, **known)
+    assert where.is_zero_nowhere_dense(p) is (-A in known.get("facts", ()))
+
+
+def test_an_identity_that_the_algebra_does_not_know_may_be_0_all_over() -> None:
+    gudermannian = sympy.asin(sympy.tanh(A)) - 2 * sympy.atan(sympy.tanh(A / 2))
+    for expression, expected in ((gudermannian, False), (gudermannian + 1, True)):
+        where, p = region(expression)
+        assert where.is_zero_nowhere_dense(p) is expected
+    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(-2)},))
+    (row,) = judge([Statement("1", 1, "smooth", ALL, gudermannian, "")], setting)
+    assert row.residual.startswith("|residual| < ")
+
+
+@pytest.mark.parametrize(("rate", "kept"), [(A, True), (A**2, True), (sympy.Integer(1), False), (A / (A - P), False)])
+def test_what_the_flow_does_not_keep_may_become_0(rate: sympy.Expr, kept: bool) -> None:
+    flow = Flow(lambda e: sympy.diff(e, A) * rate, frozenset({A}))
+    where, p = region(A, flow)
+    assert where.is_nowhere_zero(p) is kept
+
+
+def test_a_half_alone_proves_nothing_of_the_whole() -> None:
+    for residual in (sympy.sqrt(T**2) - T, sympy.sqrt(T**2) + T):
+        assert verdict(residual) is False
+
+
+def test_both_halves_are_asked_what_they_divide_by() -> None:
+    """For one sign of t the divisor is |t|; for the other it is |t| (|a| - a), 0 for all a > 0."""
+    size, setting = sympy.sqrt(T**2), Setting(T, (P,), ({P: Fraction(2), A: Fraction(-2)},))
+    for sign in (1, -1):
+        divisor = (size - sign * T) / 2 + (size + sign * T) / 2 * (sympy.sqrt(A**2) - A)
+        residual = sympy.Mul(HALVES, 1 / divisor, evaluate=False)
+        (row,) = judge([Statement("1", 1, "smooth", ALL, residual, "", Formulas(values=(T,)))], setting)
+        assert row.holds is None
+        assert {c.discharged for c in row.conditions if c.text.startswith("the algebra divides")} == {False}
+
+
+@pytest.mark.parametrize(("is_relation", "holds"), [(True, None), (False, True)])
+def test_a_power_of_a_rate_in_the_ideal_keeps_no_relation(is_relation: bool, holds: bool | None) -> None:
+    """a² = 0 forces a = 0 at each point, which does not make a double zero one that stays."""
+    flow = Flow(lambda e: sympy.Integer(0), frozenset({A}), is_relation=is_relation)
+    setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(0)},), relations=(A**2,))
+    (row,) = judge([Statement("1", 1, "smooth", ALL, A, "", Formulas(values=(A,)), flow)], setting)
+    assert row.holds is holds
+
+
+# --- the structure, the zeros and the context of a claim --------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        (sympy.atan(T) + sympy.Rational(3, 2), (0, False)),
+        (sympy.atan(T) + sympy.Rational(8, 5), (1, True)),
+        (2 * SIN + 1, (0, False)),
+        (2 * SIN + 3, (1, True)),
+        (sympy.tanh(T) + 2, (1, True)),
+    ],
+)
+def test_a_bounded_function_counts_with_its_bound(expression: sympy.Expr, expected: tuple[int, bool]) -> None:
+    value, strict = sign_by_structure(expression)
+    assert value == expected[0]
+    assert strict <= expected[1]
+
+
+@pytest.mark.parametrize(
+    ("expression", "zeros"),
+    [
+        (sympy.sqrt(T) - 2, {T - 4}),
+        (sympy.sqrt(T) + 2, {sympy.sqrt(T) + 2}),
+        (T**2 * A, {A * T}),
+        ((1 + T**2) * A, {A}),
+        (sympy.exp(A) - 2, {sympy.exp(A) - 2}),
+        (sympy.exp(A) - 1, {A}),
+    ],
+)
+def test_simpler_conditions_hold_at_the_same_points(expression: sympy.Expr, zeros: set[sympy.Expr]) -> None:
+    assert set(conditions_for_zero(expression)) == zeros
+
+
+def test_a_place_is_one_only_where_the_relations_are_proven_to_be_0() -> None:
+    for extra, expected in ((0, 1), (Fraction(1, 10**200), 0)):
+        relation = sympy.log(A * 6) - sympy.log(2) - sympy.log(3) + sympy.Rational(str(extra))
+        setting = Setting(T, (P,), ({A: Fraction(1)},), relations=(relation,))
+        domain = Domain("all", 0, (Fraction(0),))
+        assert len(list(setting.places(Statement("1", 1, "smooth", domain, T, "")))) == expected
+
+
+def audited(about: str, value: str, **changes: object):
+    top = {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["0", "1", "0"], **changes.pop("top", {})}
+    table = {"name": "x", "kind": "integral", "top": top, "integral": {"value": value}, **changes}
+    return audit_claim(claim_from_table(table, "x"), system(about))
+
+
+def test_what_is_above_a_negative_number_is_not_positive() -> None:
+    given = {"parameters": {"a": ["1/2"]}, "assume": ["a > -1"]}
+    assert audited("heavy_top", "(sqrt(a^2) - a)*Omega1", **given).verdict == "undecided"
+    given["assume"] = ["a > 0"]
+    assert audited("heavy_top", "(sqrt(a^2) - a)*Omega1", **given).verdict == "holds"
+
+
+def test_what_the_rotor_needs_is_asked_of_the_gyrostat_alone() -> None:
+    for about, asked in (("gyrostat", True), ("heavy_top", False)):
+        found = audited(about, "Omega1*0 + gamma1^2 + gamma2^2 + gamma3^2", top={"rotor": "1/a"}, parameters={"a": "2"})
+        assert ("a ≠ 0" in {c.text for row in found.rows for c in row.conditions}) is asked

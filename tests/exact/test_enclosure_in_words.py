@@ -154,3 +154,12 @@ def test_a_step_that_words_cannot_hold_is_shortened():
     assert found.node.halvings > -3
     assert isinstance(found.series, Series)
     assert isinstance(carrier, Carrier)
+
+
+@pytest.mark.parametrize("digits", [20, 40, 70])
+def test_balls_near_an_equilibrium_hold_what_exact_integers_find(digits, monkeypatch):
+    """Coefficients are smaller than the state by several words at once."""
+    top = HeavyTop((3, 2, 1), 1, (1, 0, 0))
+    start = State((0, Fraction(1, 10**digits), 0), (1, 0, 0))
+    balls = Validated(top, start).state(Fraction(40), 120)
+    require_inside(balls, in_integers(monkeypatch, Validated(top, start), Fraction(40), 120))

@@ -33,12 +33,19 @@ def problem(seed: int) -> tuple[HeavyTop, State, list[Fraction]]:
     return HeavyTop(inertia, number(source, 1, 4, 12), centre), start, [step * k for k in range(1, 13)]
 
 
-def runge_kutta(top: HeavyTop, start: State, times: list[Fraction], step: float = 0.02) -> np.ndarray:
-    """The states by the classical method of order 4: an honest motion, off by its own error."""
+def runge_kutta(
+    top: HeavyTop, start: State, times: list[Fraction], step: float = 0.02, signs: tuple[int, int] = (1, 1)
+) -> np.ndarray:
+    """The states by the classical method of order 4: an honest motion, off by its own error.
+
+    signs: of the products M × Ω and γ × Ω.
+    """
     given = Parameters([float(v) for v in top.inertia], [float(v) for v in top.moment], 0)
+    free = Parameters(given.inertia, [0.0] * 3, 0)
 
     def slope(y: np.ndarray) -> np.ndarray:
-        return np.array(heavy_top(given, y))
+        whole, products = np.array(heavy_top(given, y)), np.array(heavy_top(free, y))
+        return whole + products * np.repeat(np.subtract(signs, 1), 3)
 
     state, at, found = np.array([float(v) for v in start.flat]), 0.0, []
     for time in times:
@@ -123,6 +130,55 @@ def test_a_planted_mistake_is_named(kind: str, seed: int) -> None:
     sentence = diagnosis_text(told)
     assert sentence.endswith(".")
     assert len(sentence) < 240
+
+
+@pytest.mark.parametrize(
+    ("signs", "kind"), [((1, -1), "kinematic_sign"), ((-1, 1), "gyroscopic_sign"), ((-1, -1), "both_signs")]
+)
+def test_a_sign_in_the_equations_is_told(signs: tuple[int, int], kind: str) -> None:
+    top, start, times = problem(41)
+    (told,) = found(top, start, times, runge_kutta(top, start, times, signs=signs))
+    assert (told.kind, told.numbers) == (kind, {})
+    assert told.left < 1e-5 * told.error
+    assert "sign" in diagnosis_text(told)
+
+
+def test_columns_in_any_order_are_named() -> None:
+    top, start, times = problem(42)
+    states = runge_kutta(top, start, times)[:, [0, 3, 1, 4, 2, 5]] * [1, 1, 1, -1, 1, 1]
+    (told,) = found(top, start, times, states)
+    assert told.kind == "column_order"
+    assert "they are Ω1, γ1, Ω2, −γ2, Ω3, γ3;" in diagnosis_text(told)
+
+
+@pytest.mark.parametrize(("of", "axis"), [("omega", 2), ("both", 1)])
+def test_vectors_in_axes_of_space_are_told(of: str, axis: int) -> None:
+    """Each state turned so that γ is that axis, and about it by any angle."""
+    top, start, times = problem(43)
+    states = runge_kutta(top, start, times)
+    source, turned = np.random.default_rng(5), states.copy()
+    for row, state in enumerate(states):
+        gamma = state[3:]
+        across = np.cross(gamma, source.normal(size=3))
+        across /= np.linalg.norm(across)
+        frame = np.roll([np.cross(gamma, across), gamma, across][::-1], axis - 1, axis=0)
+        turned[row, :3] = frame @ state[:3]
+        turned[row, 3:] = frame @ gamma if of == "both" else gamma
+    assert np.allclose(frame @ gamma, np.eye(3)[axis])
+    (told,) = found(top, start, times, turned)
+    assert (told.kind, told.numbers) == ("axes_of_space", {"of": of, "vertical": str(axis + 1)})
+    assert "axes fixed in space" in diagnosis_text(told)
+
+
+def test_a_motion_that_stands_still_from_some_time_on_is_told() -> None:
+    top, start, times = problem(44)
+    states = runge_kutta(top, start, times)
+    states[8:] = states[8]
+    (told,) = found(top, start, times, states, 0.5)
+    assert (told.kind, told.numbers["states"]) == ("frozen", "4 of 12")
+    assert Fraction(told.numbers["t"]) == times[8]
+    assert diagnosis_text(told).endswith("nothing moves: 4 of 12 states are the same.")
+    assert found(top, start, times, states, 1e-12) != [told]
 
 
 @pytest.mark.parametrize(("seed", "step"), [(3, 0.3), (4, 0.05)])

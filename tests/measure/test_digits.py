@@ -1,4 +1,4 @@
-"""Digits kept: one definition, recomputed here exactly from the samples, and the same on every surface."""
+"""Digits right: one definition, recomputed here exactly from the samples, and the same on every surface."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
 from heavytop.measure.truth import known_motion
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import SCHEMA, Metric, Report
-from heavytop.report import plots
+from heavytop.report import digits_chart
 from heavytop.report.overview import worst
 from heavytop.suite.cases import CASES
 from heavytop.suite.given import Given
@@ -119,7 +119,7 @@ def test_every_surface_says_the_same(tmp_path: Path) -> None:
     lines = [line.split() for line in command("show", tmp_path / "out").splitlines()]
     assert [said in line for line in lines if line[:1] == ["motion"]] == [True]
     report = Report(SCHEMA, {"name": "one"}, {}, [score(motion)])
-    (drawn,) = plots.digits([("", report)]).rows
+    (drawn,) = digits_chart.digits([("", report)]).rows
     assert said in drawn
     assert f"{said} of 16 digits left at T = 4" in html.report_page(report)
 
@@ -134,7 +134,7 @@ def test_the_summary_of_many_rows_names_the_fewest() -> None:
     ]
     console = Console(width=160, record=True, file=StringIO())
     console.print(worst(Report(SCHEMA, {"name": "many"}, {}, []), rows, "hint"))
-    (line,) = [line for line in console.export_text().splitlines() if "digits kept, fewest" in line]
+    (line,) = [line for line in console.export_text().splitlines() if "digits right, fewest" in line]
     assert line.split()[-2:] == ["4.5", "top[1]"]
 
 

@@ -62,7 +62,7 @@ class Report(Tabular, records.Report):
             worst = max(found, key=lambda m: m.log10 or -1e9).value if found else ""
             cells = (row_name(row.identity), row.outcome, "" if kept is None else f"{max(kept, 0):.1f}", short(worst))
             body.append(list(map(printable, cells)))
-        return Table(printable(title), ("row", "outcome", "digits kept", "largest drift"), body)
+        return Table(printable(title), ("row", "outcome", "digits right", "largest drift"), body)
 
 
 class Comparison(Tabular, comparing.Comparison):

@@ -1,7 +1,8 @@
-"""How good a motion is, from Python: drift of its first integrals, distance from the known motion, digits kept."""
+"""How good a motion is, from Python: drift of its first integrals, distance from the known motion, digits right."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -25,6 +26,7 @@ from heavytop.top.times import check_times
 
 _PARTS = ("omega", "gamma", "along", "across")
 _LABELS = {"omega": "error of Ω", "gamma": "error of γ", "along": "along the flow", "across": "across the flow"}
+_HEADER = ("", "largest", "rms", "final")
 _STATES = "Give an array of shape (n, 6), in the order Ω1 Ω2 Ω3 γ1 γ2 γ3."
 
 
@@ -65,7 +67,7 @@ class Score(Tabular):
 
     @property
     def digits_right(self) -> float | None:
-        """The digits kept: how many are right at every sample."""
+        """How many digits are right at every sample."""
         return self.digits_kept
 
     def _table(self) -> Table:
@@ -78,9 +80,8 @@ class Score(Tabular):
         until = f" before t = {short(self.row.reference.until)}" if self.row.reference.until else ""
         sizes = {_LABELS[part] + until: size for part, size in self.distance.items()}
         sizes |= {f"drift of {name}": size for name, size in self.drift.items()}
-        lines = [[label, *(short(metric.value) for metric in size)] for label, size in sizes.items()]
         title = f"{row.case} in {row.precision}: {self.outcome}, {kept}"
-        return Table(title, ("", "largest", "rms", "final"), lines, [f"compared with {self.against}", *self.diagnosis])
+        return Table(title, _HEADER, _lines(sizes), [f"compared with {self.against}", *self.diagnosis])
 
 
 def score(
@@ -132,7 +133,18 @@ def score(
     )
 
 
-def drift(run: Trajectory) -> dict[str, Summary]:
+class Drifts(Tabular, dict[str, Summary]):
+    """The drift of each first integral by its name."""
+
+    def _table(self) -> Table:
+        return Table("Drift of the first integrals", _HEADER, _lines(self))
+
+
+def _lines(sizes: Mapping[str, Summary]) -> list[list[str]]:
+    return [[label, *(short(metric.value) for metric in size)] for label, size in sizes.items()]
+
+
+def drift(run: Trajectory) -> Drifts:
     """How far the first integrals of a computed motion move from their values at the start.
 
     Arguments:
@@ -155,7 +167,7 @@ def drift(run: Trajectory) -> dict[str, Summary]:
     measure = Drift(run.problem, run.problem.integrals())
     for time, state in zip(run.times, run.states, strict=True):
         measure(time, state)
-    return _summaries(measure.metrics(), DRIFT)
+    return Drifts(_summaries(measure.metrics(), DRIFT))
 
 
 def _rows(states: Any) -> list[list[Any]]:

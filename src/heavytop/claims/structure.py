@@ -99,5 +99,6 @@ class Names:
     def _name(self, e: sympy.Expr) -> sympy.Expr:
         if e not in self._names:
             constant = e.is_polynomial(*self._state) and self._is_constant(e)
-            self._names[e] = sympy.Dummy(f"integral{len(self.symbols) + 1}", real=True) if constant else None
+            # no name of a file has brackets
+            self._names[e] = sympy.Symbol(f"({e})", real=True) if constant else None
         return self._names[e] or e

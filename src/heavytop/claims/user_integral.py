@@ -123,7 +123,7 @@ class UserIntegral(FileClaim):
         """The side conditions with their rates; a relation has none of its own where it is as simple as can be."""
         simpler = {formula: conditions_for_zero(formula.expression) for formula in self._zero}
         return tuple(
-            (str(formula.expression), self._on_relations(rate(part)))
+            (str(formula.expression if len(parts) == 1 else part), self._on_relations(rate(part)))
             for formula, parts in simpler.items()
             for part in parts
             if formula in self.where or parts != (self.value.expression,)

@@ -9,7 +9,13 @@ import typer
 
 from heavytop.cli.app import Json, command, print_json
 
-_FORMS = {"command": "Command line", "toml": "TOML, in a plan", "json": "JSON, in a trajectory", "python": "Python"}
+_FORMS = {
+    "command": "Command line",
+    "csv": "CSV, above the states of a trajectory",
+    "json": "JSON, in a trajectory",
+    "toml": "TOML, in a plan",
+    "python": "Python",
+}
 
 
 @command
@@ -74,7 +80,7 @@ def _one_case(name: str, json: bool) -> int:
         print_json(
             case_data(found)
             | {"about": found.about}
-            | {key: forms(found)[key] for key in ("command", "toml", "python")}
+            | {key: forms(found)[key] for key in ("command", "csv", "toml", "python")}
         )
         return 0
     print(f"{found.name}: {found.about}")

@@ -19,7 +19,8 @@ from heavytop.precision import DOUBLE, exact, number, parse, time_text
 from heavytop.records import Row, RowKey
 from heavytop.report.answers import digits_headline
 from heavytop.report.brief import digits_lines
-from heavytop.report.plots import digits, growth
+from heavytop.report.digits_chart import digits
+from heavytop.report.plots import growth
 from heavytop.report.text import DIGITS, NOISE, largest_over, motions, title
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
@@ -116,9 +117,7 @@ class Drift(Kind):
             title(
                 "Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals"
             ),
-            Text(
-                f"  Both absolute, {largest_over(rows)}: an invariant that holds is no proof that the motion is right."
-            ),
+            Text(f"  Both absolute, {largest_over(rows)}: a first integral that is kept proves no motion right."),
             Text(f"  {DIGITS}"),
             Text(f"  {NOISE}"),
             motions(rows),

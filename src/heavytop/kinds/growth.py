@@ -27,8 +27,8 @@ from heavytop.precision import decimal_text, exact, number, parse, physical, tim
 from heavytop.records import Law, Metric, Quantity, Row, RowKey, Series, by_name
 from heavytop.report.answers import laws_headline
 from heavytop.report.brief import wrapped
+from heavytop.report.digits_chart import digits
 from heavytop.report.names import computed_by
-from heavytop.report.plots import digits
 from heavytop.report.plots import growth as over_time
 from heavytop.report.section import points
 from heavytop.report.text import short, table, title
@@ -198,9 +198,7 @@ class Growth(Kind):
             title(
                 "Growth laws: root mean square over the starts, drift of the first integrals and distance from truth"
             ),
-            Text(
-                "  Detects: the smallest relative fault a step that these starts would have told from the healthy law."
-            ),
+            Text("  Detects: the smallest relative fault a step that these starts tell from rounding noise."),
             *([Text("  Rate: the median over the starts of their finite-time rates.")] if chaotic else []),
             table([*columns, "lost at |t|"], lines),
         ]

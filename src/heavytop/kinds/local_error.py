@@ -18,7 +18,7 @@ from heavytop.measure.single_calls import single_calls
 from heavytop.precision import parse, time_text
 from heavytop.records import Against, Row, RowKey
 from heavytop.report.brief import wrapped
-from heavytop.report.names import computed_by
+from heavytop.report.names import computed_by, with_source
 from heavytop.report.section import Section, Sources, clip
 from heavytop.report.text import short, table, title
 from heavytop.suite.checkpoint import Saved
@@ -83,7 +83,7 @@ def _lines(rows: Sequence[Row]) -> list[list[str]]:
 def single_steps(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """The errors of the steps, a line a row."""
     lines = [
-        [f"{case}{f', {source}' if source else ''}", *cells]
+        [with_source(clip(case), source), *map(clip, cells)]
         for source, report in sources
         for case, *cells in _lines(report.rows)
     ]

@@ -12,7 +12,8 @@ from heavytop.kinds.base import Kind
 from heavytop.records import Row
 from heavytop.report.answers import digits_headline
 from heavytop.report.brief import digits_lines
-from heavytop.report.plots import digits, growth
+from heavytop.report.digits_chart import digits
+from heavytop.report.plots import growth
 from heavytop.report.text import DIGITS, largest_over, motions, title
 
 

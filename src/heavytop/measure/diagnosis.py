@@ -12,7 +12,7 @@ from fractions import Fraction
 
 import numpy
 
-from heavytop.measure import mistaken_data, mistaken_states, mistaken_times
+from heavytop.measure import mistaken_data, mistaken_equations, mistaken_states, mistaken_times
 from heavytop.measure.suspects import ALIKE, DROP, FITTED_DROP, FLOOR, Array, Suspect, Units, suspect
 from heavytop.measure.written import explains, rounding
 from heavytop.precision import Precision, decimal_text
@@ -22,6 +22,8 @@ from heavytop.top.integrals import holding
 
 _WORTH_ASKING = 1e-10
 """Relative errors below it are no mistake of this kind."""
+_WRONG = 1e-3
+"""Smaller ones are not those of other equations."""
 _TOO_FAR = 1.0
 """Taken for the error where heyoka does not get to the times."""
 _CONSTANT = 100.0
@@ -29,6 +31,7 @@ _CONSTANT = 100.0
 _OFF = 1e-3
 """... and by so much of what they may be."""
 _FEWEST_ROWS = 4
+_FEWEST_FROZEN = 3
 _ALONE = 1000.0
 """A state is alone in being off if it is off by so many times as much as any other."""
 
@@ -64,6 +67,10 @@ def diagnose(
     relative_error: the largest |error|/max(1, |value|) that was measured; None without a reference.
     """
     found: list[Diagnosis] = []
+    if relative_error is None or relative_error > _WRONG:
+        found += _frozen(times, states)
+    if found:
+        return found
     given = suspect(top, start, system, times, states)
     if given is not None:
         truth = given.supposed(given.times)
@@ -84,11 +91,22 @@ def _mistake(
     if len(states) > 2 and all(list(state) == list(states[0]) for state in states):
         return Diagnosis("constant")
     explained = [each for each in _suppositions(given, truth) if each[2] * each[3] <= error]
+    if not explained and error > _WRONG:
+        others = mistaken_equations.suppositions(given, truth)
+        explained = [(*each, FITTED_DROP) for each in others if each[2] * FITTED_DROP <= error]
     if not explained:
         return _of_many(given.widened()) or _looked_at(given, _integrals_off(given, error))
     best = min(max(left, FLOOR) for *_, left, _ in explained)
     kind, numbers, left, _ = next(each for each in explained if each[2] <= ALIKE * best)
     return _looked_at(given, Diagnosis(kind, numbers, error, left))
+
+
+def _frozen(times: Sequence[Fraction], states: Sequence[Sequence[Fraction]]) -> list[Diagnosis]:
+    """From some time on every state is the same, which are three at least, and not all."""
+    same = next((n for n, state in enumerate(reversed(states)) if list(state) != list(states[-1])), len(states))
+    if same < _FEWEST_FROZEN or same == len(states):
+        return []
+    return [Diagnosis("frozen", {"t": decimal_text(times[-same], 6), "states": f"{same} of {len(states)}"})]
 
 
 def _of_many(every: Suspect) -> Diagnosis | None:

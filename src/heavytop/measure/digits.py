@@ -13,7 +13,7 @@ from heavytop.precision import exact, log10
 from heavytop.records import Against, Metric, Quantity
 
 RELATIVE = Quantity("solution_error", "relative", "max")
-"""The metric behind the digits kept: the largest |error|/max(1, |true value|) of a component of Ω or γ over the
+"""The metric behind the digits right: the largest |error|/max(1, |true value|) of a component of Ω or γ over the
 samples."""
 
 
@@ -50,7 +50,7 @@ def digits_kept(row: Measured) -> float | None:
 
 
 def digits_text(kept: float) -> str:
-    """Digits kept, for people: to one place, and none where the error is larger than the value."""
+    """Digits right, for people: to one place, and none where the error is larger than the value."""
     return f"{max(0.0, kept):.1f}"
 
 

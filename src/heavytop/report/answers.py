@@ -45,7 +45,7 @@ def digits_headline(rows: Sequence[Row]) -> tuple[str, str] | None:
 
 
 def _at_least(row: Row) -> float | None:
-    """Digits kept that the absolute error of Ω and γ proves, for it is no smaller than the relative one."""
+    """Digits right that the absolute error of Ω and γ proves, for it is no smaller than the relative one."""
     errors = [row.metric(SOLUTION_ERROR, part, "max") for part in ("omega", "gamma")]
     sizes = [error.log10 for error in errors if error is not None and error.log10 is not None]
     return -max(sizes) if len(sizes) == len(errors) else None

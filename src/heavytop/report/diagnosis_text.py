@@ -24,6 +24,9 @@ _SENTENCES = {
     "time_reversed": "The states are those of the times with the other sign",
     "start_row_missing": "The first state is the start: the states are one row late, and the row t = 0 is missing",
     "rows_off_by_one": "Each state is that of the next time: the states are one row early",
+    "kinematic_sign": "The states solve γ' = Ω × γ: the equation of γ has the other sign",
+    "gyroscopic_sign": "The states solve M' = Ω × M + P γ × r: the product of M and Ω has the other sign",
+    "both_signs": "The states solve M' = Ω × M + P γ × r and γ' = Ω × γ: both products with Ω have the other sign",
     "rows_reversed": "The states are listed from the last time to the first",
 }
 """Of the kinds that need no number."""
@@ -88,6 +91,13 @@ def _said(found: Diagnosis, system: str) -> str:
             return f"A row is missing: from t = {numbers['t']} on, the states are those of the next times"
         case "row_twice":
             return f"A row too many: from t = {numbers['t']} on, the states are those of the times before"
+        case "column_order":
+            return f"The columns stand in another order: they are {numbers['columns']}"
+        case "axes_of_space":
+            whose = {"omega": "Ω is", "both": "Ω and γ are"}[numbers["of"]]
+            return f"{whose} given in axes fixed in space, of which axis {numbers['vertical']} is vertical"
+        case "frozen":
+            return f"From t = {numbers['t']} on nothing moves: {numbers['states']} states are the same."
         case "constant":
             return "Every state is the same: nothing moves."
         case "rounded":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from heavytop.report.history import MARK, Track
 from heavytop.report.names import row_name
@@ -30,7 +30,7 @@ def history_page(names: Sequence[str], reports: Sequence[AnyReport], tracks: Seq
     from heavytop.report.html import render
 
     with quiet_style():
-        sections = list(_sections(names, tracks))
+        changed, unchanged = _sections(names, tracks)
     steps = [verdict for track in tracks for verdict, _ in track.steps.values()]
     return render(
         "history.html.j2",
@@ -40,7 +40,8 @@ def history_page(names: Sequence[str], reports: Sequence[AnyReport], tracks: Seq
         ],
         tally={verdict.value: steps.count(verdict) for verdict in Verdict if verdict in steps},
         count=len(tracks),
-        sections=sections,
+        changed=changed,
+        unchanged=unchanged,
     )
 
 
@@ -50,8 +51,9 @@ def _made(report: AnyReport) -> tuple[str, str]:
     return clip(str(version)), clip(str(report.environment.get("commit") or "")[:12])
 
 
-def _sections(names: Sequence[str], tracks: Sequence[Track]) -> Iterator[Section]:
-    """One a row of the reports, in their order."""
+def _sections(names: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Section], list[Section]]:
+    """One a row of the reports, in their order: those with a step, and those without."""
+    found: tuple[list[Section], list[Section]] = [], []
     rows: dict[str, list[Track]] = {}
     for track in tracks:
         rows.setdefault(row_name(track.row), []).append(track)
@@ -67,7 +69,8 @@ def _sections(names: Sequence[str], tracks: Sequence[Track]) -> Iterator[Section
         missing = sum(len(_points(track)) > 1 for track in own) - len(section.pictures)
         if missing:
             section.notes.append(f"{missing} more in the table alone; --metric and --case choose which are drawn.")
-        yield section
+        found[not any(track.steps for track in own)].append(section)
+    return found
 
 
 def _cells(track: Track) -> list[str]:
@@ -79,7 +82,9 @@ def _cells(track: Track) -> list[str]:
 
 
 def _points(track: Track) -> dict[int, float]:
-    """log10 |value| by the number of the report, where there is one."""
+    """log10 |value| by the number of the report, where there is one; none for verdicts, which are 0 or 1."""
+    if set(track.values) <= {"0", "1", None}:
+        return {}
     logs = {number: logarithm(value) for number, value in enumerate(track.values)}
     return {number: value for number, value in logs.items() if value is not None}
 

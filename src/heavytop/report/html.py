@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
+from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
 from heavytop.measure.digits import RELATIVE, digits_kept
@@ -195,6 +197,11 @@ def commands(report: Report) -> list[str]:
     return lines
 
 
+def unbroken(text: str) -> Markup:
+    """The text escaped, each number such as 6.85E-49 in one piece, which browsers would break behind its sign."""
+    return Markup(re.sub(r"[\d.]+[eE]-\d+", r'<span class="number">\g<0></span>', str(escape(text))))
+
+
 def render(template: str, **context: Any) -> str:
     """A template of this room as text, everything escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -209,6 +216,7 @@ def render(template: str, **context: Any) -> str:
     )
     environment.filters |= {
         "clip": clip,
+        "unbroken": unbroken,
         "short": short,
         "row_name": row_name,
         "main_metric": main_metric,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from heavytop.measure.integrator import HEYOKA
-from heavytop.records import Identity, Row
+from heavytop.records import Identity, Report, Row
 from heavytop.top.equations import HEAVY_TOP
 
 
@@ -18,3 +20,16 @@ def row_name(row: Identity, with_kind: bool = True) -> str:
     system = "" if row.system == HEAVY_TOP.name else row.system
     parts = (row.key.kind if with_kind else "", row.case, system, row.integrator, row.precision)
     return " ".join(part for part in parts if part)
+
+
+def variant(row: Row, sources: Iterable[tuple[str, Report]]) -> str:
+    """The integrator and what is asked of it; "" for heyoka.  Many starts are named where single ones are too."""
+    subject = row.key.subject
+    name = "" if subject.name == HEYOKA else subject.name
+    mixed = row.starts > 1 and any(other.starts == 1 for _, report in sources for other in report.rows)
+    return " ".join(part for part in (name, subject.variant, "many starts" if mixed else "") if part)
+
+
+def with_source(name: str, source: str) -> str:
+    """A label with the report that it is of, where there are several."""
+    return f"{name}, {source}" if source else name

@@ -20,8 +20,8 @@ MOST_LISTED = 5000
 
 
 def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
-    """The largest error of each metric with its rounding noise, the fewest digits kept, and how many rows ended how, by
-    measure and format; then the hint.
+    """The largest error of each metric with its rounding noise, the fewest digits right, and how many rows ended how,
+    by measure and format; then the hint.
     """
     counts: dict[tuple[str, str], Counter[str]] = {}
     largest: dict[tuple[str, str], dict[str, tuple[float, Metric, str]]] = {}
@@ -58,7 +58,7 @@ def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
             for name, (_, metric, case) in found.items()
         ]
         if group in fewest:
-            lines.append(["digits kept, fewest", digits_text(fewest[group][0]), fewest[group][1], ""])
+            lines.append(["digits right, fewest", digits_text(fewest[group][0]), fewest[group][1], ""])
         parts.append(table(["metric", "largest", "in", "not available"], lines))
     return Group(*parts, Text(), Text(hint))
 

@@ -1,4 +1,4 @@
-"""The sections of a page about computed motions: digits lost by the horizon, and drift and state error over time."""
+"""The section of a page about computed motions over time: drift, distance from the truth, and their laws."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
-from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
 from heavytop.measure.drift import DRIFT
-from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.records import Law, Metric, Quantity, Row, Series
+from heavytop.report.names import variant, with_source
 from heavytop.report.section import (
     DASHED,
     MOST_PLOTS,
@@ -26,119 +25,11 @@ from heavytop.report.section import (
     points,
     scientific,
 )
-from heavytop.report.svg import COLOURS, MARKERS, End, decades, finish, new_axes, room, spoken
+from heavytop.report.svg import COLOURS, End, decades, finish, new_axes, room, spoken
 from heavytop.report.text import short
 
-MOST_LANES = 40
 _GREY = 5
 _FITTED = Key("fitted law", _GREY, "", "6 3")
-
-
-def variant(row: Row, sources: Sources) -> str:
-    """The integrator and what is asked of it; "" for heyoka.  Many starts are named where single ones are too."""
-    subject = row.key.subject
-    name = "" if subject.name == HEYOKA else subject.name
-    mixed = row.starts > 1 and any(other.starts == 1 for _, report in sources for other in report.rows)
-    return " ".join(part for part in (name, subject.variant, "many starts" if mixed else "") if part)
-
-
-def digits_lost(row: Row) -> float | None:
-    """Of the digits that the format has; None for a run that failed, and where nothing says."""
-    kept = digits_kept(row) if row.outcome == "success" else None
-    return None if kept is None else row.bits * math.log10(2) - max(kept, 0.0)
-
-
-def digits(sources: Sources, first: Iterable[str] = ()) -> Section | None:
-    """Digits lost against the horizon: a line a motion, a marker a format."""
-    lanes: dict[tuple[str, str], list[tuple[str, Row]]] = {}
-    for source, report in sources:
-        for row in report.rows:
-            if RELATIVE.text in row.metrics:
-                lanes.setdefault((row.case, variant(row, sources)), []).append((source, row))
-    if not lanes:
-        return None
-    section = Section(
-        "digits",
-        "Digits lost over a run",
-        [
-            "Digits lost: those of the format less the digits kept, −log10 of the largest |error|/max(1, |true value|) "
-            "of a component of Ω or γ over the samples, against the known motion, or for many starts without one "
-            "against runs in a wider format, which prove nothing; of many starts the root mean square over them. A bar "
-            "is the interval in which rounding noise alone moves it."
-        ],
-        columns=["case", "format", "T", "samples", "of digits", "lost", "kept", "± digits"],
-        place=10,
-    )
-    wanted = set(first)
-    names = sorted(lanes, key=lambda lane: lane[0] not in wanted)[:MOST_LANES]
-    left_out(section, len(lanes) - len(names), "case")
-    labels = [clip(name[0], 30) + (f" ({clip(name[1], 30)})" if name[1] else "") for name in names]
-    height = 1 + 0.17 * max(14, len(names))
-    axes = new_axes("T (time units of the data)", "digits lost (decimal digits)", height, room(labels))
-    decades(axes.xaxis)
-    formats = _formats(sources)
-    heard: list[str] = []
-    ends = []
-    for index, (name, label) in enumerate(zip(names, labels, strict=True)):
-        end = _lane(section, axes, index % _GREY, label, lanes[name], formats, heard)
-        if end:
-            ends.append(end)
-    for key in sorted(section.legend.values(), key=lambda key: MARKERS.index(key.marker)):
-        section.legend[key.label] = section.legend.pop(key.label)
-    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    low, high = axes.dataLim.intervalx
-    axes.set_xlim(math.floor(low - 0.1), math.ceil(high + 0.1))
-    section.pictures.append(finish(axes, section.title, spoken(heard, 24), "digits", ends=ends))
-    if any(cell[5] == "" for cell in section.rows):
-        section.notes.append("A cross at the top is a run that failed, or one whose error is not available.")
-    return section
-
-
-def _formats(sources: Sources) -> dict[str, int]:
-    """Formats by their bits, each with its place: its marker."""
-    bits = {row.precision: row.bits for _, report in sources for row in report.rows if row.bits}
-    return {name: place for place, name in enumerate(sorted(bits, key=lambda name: (bits[name], name)))}
-
-
-def _lane(
-    section: Section,
-    axes: Any,
-    colour: int,
-    label: str,
-    members: Sequence[tuple[str, Row]],
-    formats: dict[str, int],
-    heard: list[str],
-) -> End | None:
-    """Draw one motion in its formats, and list it; where its last point is."""
-    ink, found = COLOURS[colour], []
-    for source, row in sorted(members, key=lambda each: logarithm(each[1].horizon) or 0.0):
-        lost, until = digits_lost(row), logarithm(row.horizon)
-        marker = MARKERS[formats[row.precision] % len(MARKERS)] if row.precision in formats else "o"
-        old = source == "baseline"
-        key = section.key(Key(_with(clip(row.precision, 20), source), _GREY, marker, old=old, line=False))
-        band = row.metrics[RELATIVE.text].band or 0.0
-        if until is not None and lost is None:
-            axes.plot([until], [1], "x", transform=axes.get_xaxis_transform(), color=ink, mew=1.6, ms=6, clip_on=False)
-        elif until is not None and lost is not None:
-            face = "none" if old else ink
-            axes.plot([until], [lost], key.marker, ms=6, color=ink, mfc=face, mec=ink, label=key.label)
-            axes.plot([until] * 2, [lost - band, lost + band], "-", color=ink, lw=3, alpha=0.3)
-            found.append((source, until, lost))
-        full = row.bits * math.log10(2)
-        metric = row.metrics[RELATIVE.text].value
-        said = row.outcome if row.outcome != "success" else metric if lost is None else digits_text(full - lost)
-        shown = "" if lost is None else f"{lost:.1f}"
-        heard.append(f"{label}, {key.label}: {shown or said} of {full:.1f} lost at {short(row.horizon)}.")
-        cells = [label, key.label, short(row.horizon), str(row.samples or ""), f"{full:.1f}", shown, said]
-        section.rows.append([*cells, f"{band:.2f}" if band else ""])
-    for source in dict.fromkeys(source for source, _, _ in found):
-        own = [(x, y) for other, x, y in found if other == source]
-        axes.plot(*zip(*own, strict=True), "-", color=ink, lw=1.2, alpha=0.5 if source == "baseline" else 1)
-    return End(label, ink, *found[-1][1:]) if found else None
-
-
-def _with(name: str, source: str) -> str:
-    return f"{name}, {source}" if source else name
 
 
 class _Column(NamedTuple):
@@ -157,8 +48,8 @@ class _Column(NamedTuple):
 
 _COLUMNS = (
     _Column(Quantity(DRIFT), "drift of a first integral", "|I(t) − I(0)| (units of ε)"),
-    _Column(Quantity(SOLUTION_ERROR, "along"), "state error along the flow", "error along (units of ε)"),
-    _Column(Quantity(SOLUTION_ERROR, "across"), "state error across the flow", "error across (units of ε)"),
+    _Column(Quantity(SOLUTION_ERROR, "along"), "error along the flow", "error along (units of ε)"),
+    _Column(Quantity(SOLUTION_ERROR, "across"), "error across the flow", "error across (units of ε)"),
 )
 
 
@@ -178,7 +69,7 @@ def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     for source, report in sources:
         for row in report.rows:
             if row.bits and any(column.of(row) for column in _COLUMNS):
-                label = _with(
+                label = with_source(
                     ", ".join(part for part in (clip(row.precision, 20), variant(row, sources)) if part), source
                 )
                 key = keys.setdefault(label, numbered(label, len(keys), source == "baseline"))

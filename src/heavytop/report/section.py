@@ -138,8 +138,8 @@ def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6, every: float | 
     colour = COLOURS[key.colour]
     style: dict[str, Any] = {"lw": 4.5, "alpha": 0.5, "mfc": "none", "ms": size + 2} if key.old else {"ms": size}
     spread = every if key.line and len(x) > 1 else None
-    shape = "-" if key.line else ""
-    axes.plot(x, y, shape, marker=key.marker, color=colour, mec=colour, markevery=spread, label=key.label, **style)
+    style |= {"ls": "-" if key.line else "none", "marker": key.marker, "mec": colour, "markevery": spread}
+    axes.plot(x, y, color=colour, label=key.label, **style)
 
 
 def left_out(section: Section, count: int, what: str) -> None:

@@ -54,7 +54,7 @@ def largest_over(rows: Iterable[Row]) -> str:
     return f"largest over {counts[0]}{f' to {counts[-1]}' if len(counts) > 1 else ''} samples"
 
 
-DIGITS = "Digits kept: −log10 of the largest |error|/max(1, |true value|) of a component of Ω or γ."
+DIGITS = "Digits right: −log10 of the largest |error|/max(1, |true value|) of a component of Ω or γ."
 NOISE = "± is the rounding noise in decades: half the interval that holds 95 % of it."
 
 
@@ -122,7 +122,7 @@ def both(lines: Iterable[tuple[Row, Sequence[str]]]) -> list[list[str]]:
 
 
 def motions(rows: Sequence[Row]) -> Table:
-    """Digits kept, distance from the true motion and drift of every integral, a line a row."""
+    """Digits right, distance from the true motion and drift of every integral, a line a row."""
     lines = []
     for row in rows:
         cells = "  ".join(f"{name} {with_noise(metric, 2)}" for name, metric in drifts(row))
@@ -151,7 +151,7 @@ def motions(rows: Sequence[Row]) -> Table:
         "T",
         "steps",
         "outcome",
-        "digits kept",
+        "digits right",
         "error along",
         "across",
         "drift of each integral",

@@ -1,4 +1,4 @@
-"""The data of a case, ready to paste: as options of the command line, TOML of a plan, JSON of a trajectory, Python."""
+"""The data of a case, ready to paste: options of the command line, CSV, JSON, TOML of a plan, Python."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 from heavytop.suite.cases import Case
+from heavytop.suite.trajectory_table import COLUMNS
 from heavytop.top.heavy_top import data_texts
 
 _TIMES = ("1", "5", "10")
@@ -17,9 +18,10 @@ def case_data(case: Case) -> dict[str, Any]:
 
 
 def forms(case: Case) -> dict[str, str]:
-    """The data of a case in each form: ``command`` (line), ``toml``, ``json`` and ``python``."""
+    """The data of a case in each form: ``command`` (line), ``csv``, ``json``, ``toml`` and ``python``."""
     data = case_data(case)
-    return {"command": _command(data), "toml": _toml(data), "json": _json(data), "python": _python(data)}
+    texts = {"csv": _csv(data), "json": _json(data), "toml": _toml(data), "python": _python(data)}
+    return {"command": _command(data)} | texts
 
 
 def _command(data: dict[str, Any]) -> str:
@@ -30,6 +32,11 @@ def _command(data: dict[str, Any]) -> str:
 
 def _joined(value: str | list[str]) -> str:
     return value if isinstance(value, str) else ",".join(value)
+
+
+def _csv(data: dict[str, Any]) -> str:
+    """The comments above the columns of a table, and the header."""
+    return "\n".join([*(f"# {key}: {_joined(value)}" for key, value in data.items()), ",".join(COLUMNS)])
 
 
 def _toml(data: dict[str, Any]) -> str:

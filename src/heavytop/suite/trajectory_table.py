@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from heavytop.errors import InputError, quoted
 from heavytop.top.equations import VARIABLES
 
-REMEDY = "docs/score.md shows both forms of the file."
+REMEDY = "docs/score.md shows both forms of the file, `heavytop list --case lagrange` one to paste."
 COLUMNS = ("t", *VARIABLES)
 VECTORS = ("inertia", "centre", "omega", "gamma")
 _COMMENT = ("#", "%", "!", "//")

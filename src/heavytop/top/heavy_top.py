@@ -50,7 +50,7 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
             raise
         except Exception:  # what is no iterable, an array without dimensions, a generator that fails
             pass
-    raise InputError(f"{what}: {quoted(values)} is a {type(values).__name__}, not a list.", remedy)
+    raise InputError(f"{what} = {quoted(values)} is not a list.", remedy)
 
 
 def dot(a: Any, b: Any) -> Any:

@@ -150,8 +150,12 @@ class Series:
             found += quotient
         zeros_after = self._leading_zeros(found, zeros)
         b, places = code.builder, self.made.args[5]
-        with b.if_then(b.icmp_signed(">", zeros_after, zeros)):
-            b.store(b.add(n, code.integer(1)), code.address(places, zeros_after))
+
+        def begin(k: Any, _: list[Any]) -> None:
+            b.store(b.add(n, code.integer(1)), code.address(places, b.add(k, code.integer(1))))
+
+        # several at once, where the first order is far smaller than the state
+        code.loop(zeros, zeros_after, begin, [])
         folded: list[Any] = []
         for v in range(self.vectors):
             one, wide = self._folded(found[words * v : words * (v + 1)], zeros_after, wide)
