@@ -80,8 +80,9 @@ def _require_count(integrator: Integrator, runs: Sequence[Trajectory], most: int
 def _rate_squared(problem: Problem) -> Fraction:
     """The square of the largest rate of the motion: |Ω|, or the root of |P r||γ|/I."""
     p, start = problem.parameters, problem.start.flat
-    turning = max(*map(abs, start[:3]), abs(Fraction(p.rotor))) ** 2
-    return max(turning, max(map(abs, p.moment)) * max(map(abs, start[3:])) / max(p.inertia))
+    turning: Fraction = max(*map(abs, start[:3]), abs(Fraction(p.rotor))) ** 2
+    falling: Fraction = max(map(abs, p.moment)) * max(map(abs, start[3:])) / max(p.inertia)
+    return max(turning, falling)
 
 
 def _reached(runs: dict[int, list[Trajectory]], place: int) -> dict[int, Any]:
