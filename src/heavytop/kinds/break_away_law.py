@@ -26,6 +26,7 @@ NAME = "break_away_law"
 ESCAPE = Quantity("break_away_time")
 SLOPE, EXPECTED, OFF_BY = (Quantity("break_away_slope", statistic=part) for part in ("", "expected", "off_by"))
 _AGAINST = Against("proven", "ln 2 / rate of the saddle")
+_LAW = Key("law, ln 2 / rate per bit", 5, "", "6 3")
 _LARGEST = 150.0
 """log10 of the longest time that is drawn."""
 
@@ -136,14 +137,13 @@ def escape_times(sources: Sources, first: Iterable[str] = ()) -> Section | None:
         measured, expected = slopes.get(place, ("", ""))
         if logarithm(expected) is not None and not old:
             slope, middle = float(exact(expected)), (sum(bits) / len(bits), sum(times) / len(times))
-            axes.plot(
-                bits, [middle[1] + slope * (b - middle[0]) for b in bits], color=COLOURS[number], lw=1.2, ls=DASHED
-            )
+            line = [middle[1] + slope * (b - middle[0]) for b in bits]
+            axes.plot(bits, line, color=COLOURS[number], lw=1.2, ls=DASHED, label=_LAW.label)
         listed = ", ".join(f"{t:g} at {b:g}" for b, t in zip(bits, times, strict=True))
         heard.append(f"{label}: {listed} bits.")
         section.rows.append([label, listed, short(measured), short(expected)])
     if slopes:
-        section.key(Key("law, ln 2 / rate per bit", 5, "", "6 3"))
+        section.key(_LAW)
     axes.set_xlim(left=0)
     axes.set_ylim(bottom=0)
     section.pictures.append(finish(axes, "Escape time against bits", spoken(heard), "break-away"))
