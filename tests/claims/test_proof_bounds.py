@@ -8,13 +8,18 @@ import pytest
 import sympy
 
 from heavytop.claims.algebra import Assumptions, Field
+from heavytop.claims.audit import audit_claim
 from heavytop.claims.conditions import Kind, Need, condition, conditions_of, is_exactly_zero
+from heavytop.claims.from_file import claim_from_table
 from heavytop.claims.judge import judge
 from heavytop.claims.proof import Region
 from heavytop.claims.prover import Prover
+from heavytop.claims.real_zeros import conditions_for_zero
 from heavytop.claims.regularity import Regularity
 from heavytop.claims.sign import Sign
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
+from heavytop.claims.structure import sign_of as sign_by_structure
+from heavytop.top.equations import system
 
 T, A = sympy.Symbol("t", real=True), sympy.Symbol("a", real=True)
 P = sympy.Symbol("p", positive=True)
@@ -382,3 +387,64 @@ def test_a_power_of_a_rate_in_the_ideal_keeps_no_relation(is_relation: bool, hol
     setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(0)},), relations=(A**2,))
     (row,) = judge([Statement("1", 1, "smooth", ALL, A, "", Formulas(values=(A,)), flow)], setting)
     assert row.holds is holds
+
+
+# --- the structure, the zeros and the context of a claim --------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        (sympy.atan(T) + sympy.Rational(3, 2), (0, False)),
+        (sympy.atan(T) + sympy.Rational(8, 5), (1, True)),
+        (2 * SIN + 1, (0, False)),
+        (2 * SIN + 3, (1, True)),
+        (sympy.tanh(T) + 2, (1, True)),
+    ],
+)
+def test_a_bounded_function_counts_with_its_bound(expression: sympy.Expr, expected: tuple[int, bool]) -> None:
+    value, strict = sign_by_structure(expression)
+    assert value == expected[0]
+    assert strict <= expected[1]
+
+
+@pytest.mark.parametrize(
+    ("expression", "zeros"),
+    [
+        (sympy.sqrt(T) - 2, {T - 4}),
+        (sympy.sqrt(T) + 2, {sympy.sqrt(T) + 2}),
+        (T**2 * A, {A * T}),
+        ((1 + T**2) * A, {A}),
+        (sympy.exp(A) - 2, {sympy.exp(A) - 2}),
+        (sympy.exp(A) - 1, {A}),
+    ],
+)
+def test_simpler_conditions_hold_at_the_same_points(expression: sympy.Expr, zeros: set[sympy.Expr]) -> None:
+    assert set(conditions_for_zero(expression)) == zeros
+
+
+def test_a_place_is_one_only_where_the_relations_are_proven_to_be_0() -> None:
+    for extra, expected in ((0, 1), (Fraction(1, 10**200), 0)):
+        relation = sympy.log(A * 6) - sympy.log(2) - sympy.log(3) + sympy.Rational(str(extra))
+        setting = Setting(T, (P,), ({A: Fraction(1)},), relations=(relation,))
+        domain = Domain("all", 0, (Fraction(0),))
+        assert len(list(setting.places(Statement("1", 1, "smooth", domain, T, "")))) == expected
+
+
+def audited(about: str, value: str, **changes: object):
+    top = {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["0", "1", "0"], **changes.pop("top", {})}
+    table = {"name": "x", "kind": "integral", "top": top, "integral": {"value": value}, **changes}
+    return audit_claim(claim_from_table(table, "x"), system(about))
+
+
+def test_what_is_above_a_negative_number_is_not_positive() -> None:
+    given = {"parameters": {"a": ["1/2"]}, "assume": ["a > -1"]}
+    assert audited("heavy_top", "(sqrt(a^2) - a)*Omega1", **given).verdict == "undecided"
+    given["assume"] = ["a > 0"]
+    assert audited("heavy_top", "(sqrt(a^2) - a)*Omega1", **given).verdict == "holds"
+
+
+def test_what_the_rotor_needs_is_asked_of_the_gyrostat_alone() -> None:
+    for about, asked in (("gyrostat", True), ("heavy_top", False)):
+        found = audited(about, "Omega1*0 + gamma1^2 + gamma2^2 + gamma3^2", top={"rotor": "1/a"}, parameters={"a": "2"})
+        assert ("a ≠ 0" in {c.text for row in found.rows for c in row.conditions}) is asked

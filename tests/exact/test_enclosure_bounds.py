@@ -357,3 +357,41 @@ def test_a_start_is_rounded_by_at_most_half_an_ulp():
         node = start_node(FIELD, start, 70)
         for value, whole, error in zip(start, node.centre, node.errors.radii, strict=True):
             assert abs(value * 2**70 - int(whole)) <= Fraction(float(error))
+
+
+def test_the_roundings_of_horners_scheme_are_paid_for_where_every_one_is_half_an_ulp():
+    """Each total is half a denominator, so that each product is rounded up by half: N/2 ulps in all, for tau near 1."""
+    order, denominator = 40, 1 << 30
+    tau, total, values = Fraction(denominator - 1, denominator), 0, []
+    for _ in range(order + 1):
+        moved = (2 * total * tau.numerator + denominator) // (2 * denominator)
+        values.append((denominator // 2 - moved) % denominator)
+        total = moved + values[-1]
+    values.reverse()
+    found = step(FIELD, node_with(128, 1.0), 128)
+    made = replace(found, series=Whole([values] * 6, 128), precision=128)
+    (ball, *_) = made.around(tau, np.zeros(6))
+    true = sum(value * tau**n for n, value in enumerate(values)) * ulp(made)
+    with working_precision(400):
+        off = abs(midpoint(ball) - true)
+    assert Fraction(order - 2, 2) * ulp(made) < off <= radius(ball)
+
+
+def test_the_sum_and_the_product_of_the_variation_have_room_for_their_roundings():
+    """A row that cancels in binary64, whichever product is rounded first, and not in exact numbers."""
+    found = step(FIELD, node_with(128, 1.0), 128)
+    terms = enclosure._VARIATIONAL_ORDER + 1
+    assert found._summed_error >= found.variation_error + terms * 2.0**-53 * found.powers
+    near, off = 1 + 2.0**-30, 1 + 2.0**-29
+    variation, frame = np.zeros((1, 6, 6)), np.zeros((6, 6))
+    variation[0, 0, :2], variation[0, 1, :2] = (near, -off), (-off, near)
+    frame[:2, 0], frame[:2, 1] = (near, 1), (1, near)
+    errors = Errors(frame, np.array([1.0, 1.0, 0, 0, 0, 0]), 0)
+    made = replace(
+        found, node=replace(found.node, errors=errors), variation=variation, powers=2.1, variation_error=0.0, local=0.0
+    )
+    exact = [[Fraction(value) for value in row] for row in variation[0].tolist()]
+    columns = [[Fraction(value) for value in column] for column in frame.T.tolist()]
+    for row, bound in zip(exact, made.radii(Fraction(1)), strict=True):
+        sizes = [abs(sum(a * b for a, b in zip(row, column, strict=True))) for column in columns]
+        assert Fraction(float(bound)) >= sum(sizes[:2])

@@ -4,12 +4,14 @@ import pickle
 from fractions import Fraction
 from random import Random
 
+import numpy
 import pytest
 from words_helpers import LEVELS
 
 from heavytop.exact.scaled_motion import ScaledMotion
 from heavytop.exact.step_series import lacking
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.words import proven
 from heavytop.words.digits import grid_of
 from heavytop.words.kernels import Grid
 from heavytop.words.proven import Carrier
@@ -107,6 +109,54 @@ def test_coefficients_that_are_smaller_than_the_state_by_several_words(words: in
             for halvings in (2, 5):
                 share = used(motion, carrier, rounded(motion, grid), halvings)
                 assert share is None or share <= 1
+
+
+@pytest.mark.parametrize("words", [3, 12])
+def test_the_bound_is_the_theorem_in_exact_numbers(words: int) -> None:
+    """ε(T) with all words as wide as b bits, and (2) summed over the orders."""
+    grid, orders, scale = grid_of(words, whole=True), 40, 2.0**20
+    wide = [Fraction(2) ** grid.bits] * words
+    ulp = [Fraction(2) ** (grid.bits * (words - 1 - k)) for k in range(words)]
+    last = Fraction(2) ** (grid.bits * words)
+    m = {(i, j): wide[i] * wide[j] * ulp[i] * ulp[j] / last for i in range(words) for j in range(words)}
+    kept, dropped = (sum(v for (i, j), v in m.items() if (i + j >= words) is off) for off in (False, True))
+    level = sum(v for (i, j), v in m.items() if i + j == words - 1)
+    assert kept > level
+    column = numpy.full((words, 1), 2.0**grid.bits)
+    each, once = proven._error(grid, proven._levels(grid, column, column)[1], orders)
+    largest = Fraction(3, 2) * 2**52 + orders * (level + words * 2**grid.bits)
+    rounding = largest / 2**53
+    for terms in (1, orders):
+        assert each * terms + once >= terms * ((words + 1) * rounding + dropped) + rounding
+    motion = some_motion(Random(2))
+    carrier = Carrier(motion.scaled, grid, True)
+    table, components = numpy.zeros((orders + 1, 2, words, 8)), numpy.zeros((6, orders + 1, words))
+    each, once = proven._error(grid, numpy.zeros(2 * words - 1), orders)
+    parts = [
+        (Fraction(scale) * (2 * Fraction(each * (n + 1) + once) + Fraction(carrier._of_constants)) + Fraction(1, 2))
+        / (n + 1)
+        + Fraction(3, 4)
+        for n in range(orders)
+    ]
+    assert sum(parts) <= Fraction(carrier._rounding(table, components, scale)) <= 2 * sum(parts)
+
+
+def test_sums_have_room_for_the_largest_products_between_two_looks() -> None:
+    """(1): four products of 2^50 units are one too many."""
+    grid = grid_of(3, whole=True)
+    carrier = Carrier(some_motion(Random(2)).scaled, grid, True)
+    for share, fine in ((1 - 2.0**-10, True), (1.0, False)):
+        table, components = numpy.zeros((3, 2, 3, 8)), numpy.zeros((6, 3, 3))
+        table[0, 0, 0], table[0, 1, 0] = (
+            2.0 ** (48 - grid.bits) * part for part in (1.0, 2.0 ** (grid.bits - 46) * share)
+        )
+        assert (carrier._rounding(table, components, 1.0) is not None) is fine
+    # and the sum of all coefficients stays exact
+    for share, fine in ((0.5, True), (2.0, False)):
+        components = numpy.full((6, 3, 3), share * 2.0**52 / 3)
+        components[:, :, 0] *= 2.0**-grid.bits
+        components[:, :, 1:] = 0
+        assert (carrier._rounding(numpy.zeros((3, 2, 3, 8)), components, 1.0) is not None) is fine
 
 
 def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:
