@@ -7,6 +7,8 @@ from itertools import accumulate, pairwise
 import numpy
 import pytest
 
+from heavytop.errors import PeerFailed
+from heavytop.integrate import registry
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.taylor import first_steps, propagate
 from heavytop.integrate.trajectory import Outcome
@@ -117,3 +119,37 @@ def test_an_integrator_with_a_tolerance_is_called_over_its_mean_step_and_shows_n
     assert float(calls[0][1].length) == pytest.approx(4 / run.steps)
     assert found.keys() == {"local_error_ulp_max", "local_error_ulp_rms"}
     assert 0 < float(found["local_error_ulp_max"].value) < 2
+
+
+@pytest.mark.parametrize(("name", "times"), [("splitting:2", 1000), ("words", 1000), ("splitting:2", 2), ("words", 0)])
+def test_a_count_of_steps_that_cannot_be_is_refused(name, times, monkeypatch) -> None:
+    """Steps a thousand times too many make calls so short that each is right to an ulp."""
+    propagate, propagate_many = Integrator.propagate, Integrator.propagate_many
+
+    def miscounted(self, *given, **options):
+        run = propagate(self, *given, **options)
+        return replace(run, steps=run.steps * times)
+
+    def all_miscounted(self, *given, **options):
+        return [replace(run, steps=run.steps * times) for run in propagate_many(self, *given, **options)]
+
+    monkeypatch.setattr(Integrator, "propagate", miscounted)
+    if name in registry.INTEGRATORS:  # others call propagate for each
+        monkeypatch.setattr(Integrator, "propagate_many", all_miscounted)
+    case = CASES["lagrange"]
+    said = "counts its steps wrongly" if times else "moved, and says that it took no step"
+    with pytest.raises(PeerFailed, match=f"{name} {said}"):
+        single_calls(Integrator(name), case.top, case.start, Fraction(4), DOUBLE, case.system)
+
+
+def test_longer_steps_do_not_depend_on_the_unit_of_time() -> None:
+    """Ω → s Ω, t → t/s, P → s² P is the same motion."""
+    case = CASES["generic"]
+    asked = []
+    for scale in (Fraction(1), Fraction(10) ** 30, Fraction(3, 10**20)):
+        top = HeavyTop(case.top.inertia, scale**2 * case.top.weight, case.top.centre)
+        start = State([scale * omega for omega in case.start.omega], case.start.gamma)
+        integrator = Integrator("splitting:4", setting=("step", Fraction(1, 10) / scale))
+        _, calls = single_calls(integrator, top, start, 2 / scale, DOUBLE, case.system)
+        asked.append([tuple(call.further) for _, call in calls])
+    assert asked == [[(2, 4, 8, 16)] * 16] * 3

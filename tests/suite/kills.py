@@ -23,7 +23,7 @@ cases = ["euler"]
 runs = [{ precision = "double", horizon = "50", samples = 200 }, { precision = "quad", horizon = "2", samples = 40 }]
 [[measure]]
 kind = "growth"
-cases = ["generic"]
+cases = ["gyrostat"]
 runs = [{ precision = "double", horizon = "2e4", starts = 24 }]
 [[measure]]
 kind = "homoclinic"

@@ -24,7 +24,7 @@ from heavytop.measure.scalar import metric, of_fraction
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.measure.truth import Truth, truth
-from heavytop.precision import DOUBLE, exact, number, parse, time_text, usable_tolerance
+from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.answers import fastest
 from heavytop.report.brief import wrapped
@@ -71,10 +71,13 @@ class Ladder(msgspec.Struct, forbid_unknown_fields=True):
         peers.require(self.integrator)
         if not self.tolerances and not self.steps:
             raise InputError(f"The ladder of {self.integrator} is empty.", "Give it tolerances, or steps.")
-        for text in self.tolerances + self.steps:
+        for text in self.steps:
+            if text != FINEST and physical(exact(text), "step") <= 0:
+                raise InputError(f"A step of {text[:60]!r}.", "Give numbers above 0.")
+        for text in self.tolerances:
             if text != FINEST and not 0 < exact(text) <= 1:
-                raise InputError(f"A tolerance or step of {text[:60]!r}.", "Give numbers above 0, up to 1.")
-            if self.integrator in (OURS, CONSTANTS, LANES) and text in self.tolerances and text != FINEST:
+                raise InputError(f"A tolerance of {text[:60]!r}.", "Give numbers above 0, up to 1.")
+            if self.integrator in (OURS, CONSTANTS, LANES) and text != FINEST:
                 usable_tolerance(text, parse(self.precision))
         yield from (computed(self.integrator, tolerance=text) for text in self.tolerances)
         yield from (computed(self.integrator, step=text) for text in self.steps)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
+from heavytop.errors import PeerFailed
 from heavytop.integrate import peers, registry
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.integrator import Integrator
@@ -18,6 +19,10 @@ from heavytop.top.heavy_top import HeavyTop, State
 _CALLS = 16
 _LONGER = (2, 4, 8, 16, 32, 64)
 """Lengths, in steps, of the single steps in which the order of a method with fixed steps shows."""
+_LONGEST = 2
+"""Radians: in longer steps no order shows."""
+_MOST_STEPS = 64
+"""Steps in one call over the mean step: CVODE and LSODA, which begin with order 1 and small steps, take 18."""
 
 
 def single_calls(
@@ -27,7 +32,7 @@ def single_calls(
 
     A call starts at one of 16 states of the run, evenly spread from the start on, and goes over the mean step of the
     run, which a method with fixed steps takes as its step.  Raises PeerFailed for whatever an integrator of others
-    does wrong, and for a gyrostat unless it takes many motions.
+    does wrong, also where its count of steps cannot be, and for a gyrostat unless it takes many motions.
     """
     whole = integrator.propagate(top, start, [until], precision, system)
     times = [exact(number(until * i / _CALLS, precision)) for i in range(1, _CALLS)]
@@ -46,12 +51,38 @@ def single_calls(
     failed = next((run for run in (whole, sampled, *own) if run.outcome is not Outcome.SUCCESS), None)
     if failed is not None:
         return failed, []
-    longer = {n: over(n) for n in (_LONGER if fixed else ()) if n * length <= 1}
+    _require_count(integrator, [whole], whole.steps)
+    _require_count(integrator, own, 1 if fixed else _MOST_STEPS)
+    turned = length**2 * _rate_squared(whole.problem)
+    longer = {n: over(n) for n in (_LONGER if fixed else ()) if n**2 * turned <= _LONGEST**2}
     calls = [
         Call(begin, exact(number(length, precision)), own[i].states[0], _reached(longer, i))
         for i, begin in enumerate(begins)
     ]
     return whole, [(time + call.length, call) for time, call in zip((Fraction(0), *times), calls, strict=True)]
+
+
+def _require_count(integrator: Integrator, runs: Sequence[Trajectory], most: int) -> None:
+    """Raises PeerFailed where a run moved in no step, or took more than ``most`` over one mean step.
+
+    A mean step follows from the count of steps: one too many times too large would make every call look exact.
+    """
+    for run in runs:
+        moved = any(tuple(map(exact, state)) != run.problem.start.flat for state in run.states)
+        if moved and run.steps == 0:
+            raise PeerFailed(f"{integrator.name} moved, and says that it took no step")
+        if run.steps > most:
+            raise PeerFailed(
+                f"{integrator.name} counts its steps wrongly: {run.steps} in a call over the mean step of its own run"
+            )
+
+
+def _rate_squared(problem: Problem) -> Fraction:
+    """The square of the largest rate of the motion: |Ω|, or the root of |P r||γ|/I."""
+    p, start = problem.parameters, problem.start.flat
+    turning: Fraction = max(*map(abs, start[:3]), abs(Fraction(p.rotor))) ** 2
+    falling: Fraction = max(map(abs, p.moment)) * max(map(abs, start[3:])) / max(p.inertia)
+    return max(turning, falling)
 
 
 def _reached(runs: dict[int, list[Trajectory]], place: int) -> dict[int, Any]:

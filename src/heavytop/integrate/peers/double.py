@@ -15,7 +15,7 @@ import numpy
 from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate.peers.contract import with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision, exact, number
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
 from heavytop.top import heavy_top
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -100,8 +100,9 @@ def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") ->
 def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Given:
     if problem.precision != DOUBLE:
         raise InputError(f"{name} has no {problem.precision.name}.", "Use double.")
-    if not 0 < setting <= 1:
-        raise InputError(f"{name} cannot use the {knob} {float(setting):.6g}.", "Give one between 0 and 1.")
+    if setting <= 0 or (knob == "tolerance" and setting > 1):
+        limits = "between 0 and 1" if knob == "tolerance" else "above 0"
+        raise InputError(f"{name} cannot use the {knob} {decimal_text(setting, 6)}.", f"Give one {limits}.")
     grid = numpy.array([number(time, DOUBLE) for time in check_times(times)])
     p = problem.parameters
     numbers = numpy.array(problem.native([*p.inertia, *p.moment, p.rotor]), dtype=float)
