@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import pytest
 import sympy
+from flint import arb
 
 from heavytop.claims.algebra import Assumptions, Field
 from heavytop.claims.audit import audit_claim
@@ -16,7 +17,7 @@ from heavytop.claims.proof import Region
 from heavytop.claims.prover import Prover
 from heavytop.claims.real_zeros import conditions_for_zero
 from heavytop.claims.regularity import Regularity
-from heavytop.claims.sign import Sign
+from heavytop.claims.sign import Sign, used
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
 from heavytop.claims.structure import sign_of as sign_by_structure
 from heavytop.top.equations import system
@@ -347,14 +348,33 @@ def test_a_function_that_is_not_0_at_a_sample_may_be_0_on_another_part_of_a_doma
     assert where.is_zero_nowhere_dense(p) is (-A in known.get("facts", ()))
 
 
+def test_a_condition_of_degree_2_may_part_a_domain() -> None:
+    """Where a b > 1, atan a + atan b is atan of (a + b)/(1 - a b) and pi more or less: a > 0 and a < 0 are two parts."""
+    b = sympy.Symbol("b", real=True)
+    expression = sympy.atan(A) + sympy.atan(b) - sympy.atan((A + b) / (1 - A * b)) - sympy.pi
+    setting = Setting(T, (), ({A: Fraction(-2), b: Fraction(-2)},), facts=(A * b - 1,))
+    field = Field(setting.assumptions(0), [expression])
+    statement = Statement("1", 1, "smooth", ALL, T, "")
+    where = Region(field, setting, statement, list(setting.places(statement)))
+    p = field.enter(expression).numerator
+    assert not where.regularity.obstacle_of_generators(used(p), analytic=True)
+    assert not where.is_zero_nowhere_dense(p)
+
+
 def test_an_identity_that_the_algebra_does_not_know_may_be_0_all_over() -> None:
     gudermannian = sympy.asin(sympy.tanh(A)) - 2 * sympy.atan(sympy.tanh(A / 2))
     for expression, expected in ((gudermannian, False), (gudermannian + 1, True)):
         where, p = region(expression)
         assert where.is_zero_nowhere_dense(p) is expected
+
+
+def test_what_is_said_of_an_undecided_residual_holds_all_balls(monkeypatch) -> None:
     setting = Setting(T, (P,), ({P: Fraction(2), A: Fraction(-2)},))
-    (row,) = judge([Statement("1", 1, "smooth", ALL, gudermannian, "")], setting)
-    assert row.residual.startswith("|residual| < ")
+    statement = Statement("1", 1, "smooth", ALL, sympy.asin(sympy.tanh(A)) - 2 * sympy.atan(sympy.tanh(A / 2)), "")
+    for ball in (arb(0.5, 0.75), arb(-0.5, 0.75), arb(0, 1.25)):
+        monkeypatch.setattr("heavytop.claims.judge.evaluate", lambda *_, ball=ball: ball)
+        (row,) = judge([statement], setting)
+        assert 1.25 <= float(row.residual.removeprefix("|residual| < ").removesuffix(" at the sample points")) < 1.27
 
 
 @pytest.mark.parametrize(("rate", "kept"), [(A, True), (A**2, True), (sympy.Integer(1), False), (A / (A - P), False)])
@@ -432,9 +452,14 @@ def test_a_place_is_one_only_where_the_relations_are_proven_to_be_0() -> None:
 
 
 def audited(about: str, value: str, **changes: object):
+    return audited_as("integral", about, {"value": value}, **changes)
+
+
+def audited_as(kind: str, about: str, said: dict, **changes: object):
     top = {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["0", "1", "0"], **changes.pop("top", {})}
-    table = {"name": "x", "kind": "integral", "top": top, "integral": {"value": value}, **changes}
-    return audit_claim(claim_from_table(table, "x"), system(about))
+    return audit_claim(
+        claim_from_table({"name": "x", "kind": kind, "top": top, kind: said, **changes}, "x"), system(about)
+    )
 
 
 def test_what_is_above_a_negative_number_is_not_positive() -> None:
@@ -444,7 +469,14 @@ def test_what_is_above_a_negative_number_is_not_positive() -> None:
     assert audited("heavy_top", "(sqrt(a^2) - a)*Omega1", **given).verdict == "holds"
 
 
-def test_what_the_rotor_needs_is_asked_of_the_gyrostat_alone() -> None:
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("integral", {"value": "Omega1*0 + gamma1^2 + gamma2^2 + gamma3^2"}),
+        ("motion", {"omega": ["0", "0", "0"], "gamma": ["0", "1", "0"]}),
+    ],
+)
+def test_what_the_rotor_needs_is_asked_of_the_gyrostat_alone(kind: str, said: dict) -> None:
     for about, asked in (("gyrostat", True), ("heavy_top", False)):
-        found = audited(about, "Omega1*0 + gamma1^2 + gamma2^2 + gamma3^2", top={"rotor": "1/a"}, parameters={"a": "2"})
+        found = audited_as(kind, about, said, top={"rotor": "1/a"}, parameters={"a": "2"})
         assert ("a ≠ 0" in {c.text for row in found.rows for c in row.conditions}) is asked

@@ -261,7 +261,7 @@ class Transcendental:
             number *= abs(Fraction(int(constant.p), int(constant.q))) ** (1 - 2 * side)
             for factor, power in factors:
                 known = t.signs.of(factor)
-                if known.value and known.strict:
+                if known.value:  # where it is 0, the logarithm of the whole is none
                     sign *= known.value ** int(power)
                     weight = t.number(int(power) * (1 - 2 * side))
                     total = t.sum((total, t.product((weight, self._logarithm_of_factor(factor * known.value)))))
