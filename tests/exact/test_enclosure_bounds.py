@@ -395,3 +395,16 @@ def test_the_sum_and_the_product_of_the_variation_have_room_for_their_roundings(
     for row, bound in zip(exact, made.radii(Fraction(1)), strict=True):
         sizes = [abs(sum(a * b for a, b in zip(row, column, strict=True))) for column in columns]
         assert Fraction(float(bound)) >= sum(sizes[:2])
+
+
+@pytest.mark.parametrize(("quadratic", "linear"), [(0.0, 0.75), (0.75, 0.0), (0.5, 0.25)])
+def test_both_parts_of_the_defect_beyond_the_last_order_count(quadratic, linear):
+    values = [1 << 127, *[0] * 18, 1 << 101, 1 << 100]
+    found, order, unit = Whole([values] * 6, 128), 20, Fraction(1, 2**128)
+    products = sum(
+        Fraction(values[j] * values[n - j], n + 1) * unit
+        for n in range(order, 2 * order + 1)
+        for j in range(n - order, order + 1)
+    )
+    beyond = Fraction(quadratic) * products + Fraction(linear) * Fraction(values[-1], order + 1)
+    assert Fraction(order, 2) + beyond <= Fraction(enclosure._defect(found, 128, quadratic, linear))

@@ -55,9 +55,13 @@ def test_words_hold_numbers_to_half_a_unit_and_add_up_exactly() -> None:
                 assert k == 0 or abs(word) <= grid.unit(k - 1) / 2
 
 
-@pytest.mark.parametrize(("bits", "words"), [(100, 3), (138, 3), (139, 4), (276, 7), (528, 12), (1000, 24), (1032, 24)])
-def test_the_smallest_grid_that_has_the_bits_is_taken(bits: int, words: int) -> None:
-    assert grid_for(bits) == grid_of(words)
+_SERVED = [(100, 3, 44), (132, 3, 44), (133, 3, 46), (138, 3, 46), (139, 4, 44), (276, 7, 42), (295, 7, 44)]
+
+
+@pytest.mark.parametrize(("bits", "words", "width"), [*_SERVED, (528, 12, 44), (1000, 24, 43), (1032, 24, 43)])
+def test_the_smallest_grid_that_has_the_bits_is_taken(bits: int, words: int, width: int) -> None:
+    assert grid_for(bits) == Grid(words, width)
+    assert width <= grid_of(words).bits
     assert grid_for(1033) is None
 
 

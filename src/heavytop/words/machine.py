@@ -58,8 +58,11 @@ class Processor:
 def once(make: Callable[P, T]) -> Callable[P, T]:
     """``make``, called once for the same arguments: other threads that ask for them wait."""
     making, made, signature = Lock(), dict[tuple[Any, ...], T](), inspect.signature(make)
+    full = len(signature.parameters)
 
     def found(*arguments: P.args, **named: P.kwargs) -> T:
+        if len(arguments) == full and arguments in made:
+            return made[arguments]
         bound = signature.bind(*arguments, **named)
         bound.apply_defaults()
         with making:
