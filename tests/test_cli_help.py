@@ -61,6 +61,15 @@ def test_the_completion_script_is_printed_and_completes(shell: str) -> None:
     assert "selftest" not in done.stdout
 
 
+@pytest.mark.parametrize(
+    ("line", "names"),
+    [("run --plan g", {"growth", "gate"}), ("list --case eu", {"euler"}), ("score --case eu", {"euler"})],
+)
+def test_names_of_plans_and_cases_are_completed(line: str, names: set[str]) -> None:
+    done = heavytop(_HEAVYTOP_COMPLETE="complete_bash", COMP_WORDS=f"heavytop {line}", COMP_CWORD="3")
+    assert set(done.stdout.split()) == names
+
+
 def test_bash_reads_its_script_and_another_shell_is_refused() -> None:
     script = heavytop("--completion", "bash").stdout
     checked = subprocess.run(["bash", "-n"], input=script, text=True, capture_output=True, check=False)

@@ -64,6 +64,20 @@ def _common(
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output and nothing else there.")]
 
 
+def plans(begun: str) -> list[str]:
+    """Plans whose names begin so, for completion."""
+    from heavytop.suite.plan import BUILT_IN
+
+    return [name for name in BUILT_IN if name.startswith(begun)]
+
+
+def cases(begun: str) -> list[str]:
+    """The same of cases."""
+    from heavytop.suite.cases import CASES
+
+    return [name for name in CASES if name.startswith(begun)]
+
+
 def command(function: Callable[..., int]) -> Callable[..., None]:
     """A command of the program that ends with the exit code which ``function`` returns."""
 

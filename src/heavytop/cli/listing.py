@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, command, print_json
+from heavytop.cli.app import Json, cases, command, print_json
 
 _FORMS = {
     "command": "Command line",
@@ -20,7 +20,9 @@ _FORMS = {
 
 @command
 def list_(
-    case: Annotated[str | None, typer.Option(help="Show the data of that case, ready to paste.")] = None,
+    case: Annotated[
+        str | None, typer.Option(help="Show the data of that case, ready to paste.", autocompletion=cases)
+    ] = None,
     json: Json = False,
 ) -> int:
     """List cases, plans, formats and integrators."""

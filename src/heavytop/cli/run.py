@@ -12,13 +12,15 @@ from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import command
+from heavytop.cli.app import command, plans
 from heavytop.cli.progress import Progress
 
 
 @command
 def run(
-    plan: Annotated[str, typer.Option(help="smoke, default, growth, long, peers, gate, or a TOML file.")] = "default",
+    plan: Annotated[
+        str, typer.Option(help="smoke, default, growth, long, peers, gate, or a TOML file.", autocompletion=plans)
+    ] = "default",
     integrator: Annotated[str, typer.Option(help="Measure this one beside heyoka.")] = "",
     out: Annotated[Path | None, typer.Option(help="New folder for the report.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the rows that --out already holds.")] = False,

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, command, print_json, require_new, show_on_terminal, writing
+from heavytop.cli.app import Json, cases, command, print_json, require_new, show_on_terminal, writing
 from heavytop.cli.progress import counted
 from heavytop.errors import InputError
 
@@ -19,7 +19,7 @@ _STATE_SECONDS = 1e-3
 @command
 def score(
     trajectory: Annotated[Path, typer.Argument(help="A motion computed elsewhere: .json, .csv, or - to read it.")],
-    case: Annotated[str | None, typer.Option(help="Built-in case of its top and start.")] = None,
+    case: Annotated[str | None, typer.Option(help="Built-in case of its top and start.", autocompletion=cases)] = None,
     out: Annotated[Path | None, typer.Option(help="New folder for a report with its row.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page about it to that file.")] = None,
     json: Json = False,
