@@ -26,7 +26,7 @@ from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
 NAME = "audit"
 _SMOOTH = "smooth"
 _SYSTEMS = {HEAVY_TOP.name: "the heavy top", GYROSTAT.name: "the gyrostat"}
-_SECONDS = 5.0
+_SECONDS = 1.5
 
 
 class AuditTable(Table, tag=NAME):

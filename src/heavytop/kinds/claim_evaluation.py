@@ -29,7 +29,7 @@ from heavytop.top.equations import GYROSTAT
 NAME = "claim_evaluation"
 _COUNT = "claim_evaluation"
 _WORST, _LOST, _SINCE = "max_finite", "samples_not_finite", "not_finite_from"
-_SECONDS = 1.0
+_SECONDS = 0.02
 _SUMMED_UP = ("omega", "theta", "psi")
 
 

@@ -41,7 +41,7 @@ from heavytop.top.equations import HEAVY_TOP
 NAME = "claim_model"
 PARTS = Quantity("claim_parts_by_1_percent_at")
 _SHOWN = ("0.1", "1", "2", "5")
-_SECONDS = 5.0
+_SECONDS = 1.0
 _BRANCHES: dict[Direction, tuple[Branch, ...]] = {"forward": ("smooth", "printed"), "backward": ("smooth",)}
 
 

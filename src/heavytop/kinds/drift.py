@@ -77,8 +77,8 @@ class Drift(Kind):
     place = 30
 
     def cost(self, task: Task) -> float:
-        """The reruns that tell the rounding noise take a few seconds."""
-        return 3.0 + task.run_seconds
+        """The reruns that tell the rounding noise and the truth take about a second."""
+        return 0.8 + task.run_seconds
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """Of one run.  Raises Contradiction where two proofs of the known motion exclude each other, InputError for a
