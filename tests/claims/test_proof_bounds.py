@@ -349,7 +349,7 @@ def test_a_function_that_is_not_0_at_a_sample_may_be_0_on_another_part_of_a_doma
 
 
 def test_a_condition_of_degree_2_may_part_a_domain() -> None:
-    """Where a b > 1, atan a + atan b is atan of (a + b)/(1 - a b) and pi more or less: a > 0 and a < 0 are two parts."""
+    """Where a b > 1, atan a + atan b is atan((a + b)/(1 - a b)), and pi more where a > 0, pi less where a < 0."""
     b = sympy.Symbol("b", real=True)
     expression = sympy.atan(A) + sympy.atan(b) - sympy.atan((A + b) / (1 - A * b)) - sympy.pi
     setting = Setting(T, (), ({A: Fraction(-2), b: Fraction(-2)},), facts=(A * b - 1,))

@@ -4,14 +4,15 @@ import random
 from fractions import Fraction
 
 import pytest
-from flint import arb
+from flint import acb, acb_series, arb
 from proofs import assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import ball, midpoint, working_precision
+from heavytop.exact.balls import Undecided, ball, midpoint, working_precision
+from heavytop.exact.closed_form import series_length
 from heavytop.exact.kovalevskaya import Kovalevskaya
-from heavytop.exact.kovalevskaya_abel import AbelMotion
-from heavytop.exact.kovalevskaya_level import Level, start_of
+from heavytop.exact.kovalevskaya_abel import AbelMotion, _fourth_root
+from heavytop.exact.kovalevskaya_level import ORDERS, Level, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion
 from heavytop.exact.resting import Rest
 from heavytop.exact.validated import Validated
@@ -251,3 +252,14 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
 def test_levels_that_are_not_done_are_named(omega, gamma, name):
     with pytest.raises(NotInClass, match=name):
         motion_from((F(1), F(0)), omega, gamma)
+
+
+def test_a_factor_is_told_only_where_one_alone_is_possible():
+    with working_precision(128), series_length(ORDERS):
+        right = acb_series([arb(0, 1), acb(2, 1), 3])
+        for unit in (acb(1), acb(0, 1), acb(-1), acb(0, -1)):
+            assert _fourth_root(right * unit, right) == unit
+        both, none = acb_series([acb(arb(0, 3), arb(0, 3))]), acb_series([2])
+        for left in (both, none):
+            with pytest.raises(Undecided):
+                _fourth_root(left, acb_series([1]))

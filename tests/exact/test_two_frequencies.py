@@ -84,6 +84,25 @@ def test_the_bound_holds_and_is_not_far_off(terms):
         assert off * 8 > limit
 
 
+def test_the_bound_is_twice_what_is_left_out():
+    """4W times the sum of e^(−η1|m| − η2|n|) over all |m| ≥ n1 or, counted again, |n| ≥ n2."""
+    with working_precision(BITS):
+        widths, terms = (arb("0.9"), arb("0.4")), (5, 9)
+        first, second = ([(-width * abs(n)).exp() for n in range(-400, 401)] for width in widths)
+        tails = [sum(row[: 401 - n]) + sum(row[400 + n :]) for row, n in zip((first, second), terms, strict=True)]
+        wanted = 2 * (tails[0] * sum(second) + sum(first) * tails[1])
+        assert abs(error_of(arb(1), widths, terms) / wanted - 1) < arb("1e-30")
+
+
+def test_every_pair_adds_its_own_error():
+    with working_precision(BITS):
+        one = Factor(Symmetry(False, False), [arb(1)] * 4)
+        flat = arb_mat([[arb(1)] * 4] * 4)
+        for count in (1, 3):
+            found = LineIntegral.of([(one, one)] * count, flat, [arb(1), arb(2)], [arb(0)] * 2, arb(1), arb(1) / 8)
+            assert abs(found.error - arb(count) / 8) < arb(2) ** (10 - BITS)
+
+
 def test_too_many_terms_are_out_of_reach():
     with working_precision(BITS), pytest.raises(OutOfReach, match=r"\d+ x \d+ Fourier terms"):
         counts([arb(0.01), arb(0.02)])
