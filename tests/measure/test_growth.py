@@ -229,3 +229,23 @@ def test_what_all_starts_share_widens_the_interval_of_a_power() -> None:
     expected = 2 * 0.3 / 2**0.5 / ((x - x.mean()) ** 2).sum() ** 0.5
     assert (shared.high - shared.low) / 2 == pytest.approx(expected, rel=0.25)
     assert (plain.high - plain.low) / 2 < expected / 2
+
+
+@pytest.mark.parametrize("decades", [1, 3, 8])
+@pytest.mark.parametrize("kind", ["bounded", "walk"])
+def test_an_error_that_jumps_has_no_law(kind: str, decades: int) -> None:
+    """In the middle of the span a jump of 3 decades has the slope of t^1.5, and one of 8 rises like an exponential."""
+    for part in (0.25, 0.5, 0.8, 0.95):
+        errors = synthetic(kind, numpy.random.default_rng(23))
+        # the law is fitted to the last three decades
+        errors[:, TIMES[-1] / 10 ** (3 * (1 - part)) < TIMES] *= 10**decades
+        found = law(Ensemble(TIMES, errors, STEP))
+        assert found.growth == "unresolved"
+        assert not inconsistent(found)
+
+
+def test_an_error_that_jumps_late_in_time_is_no_exponential() -> None:
+    for part in (0.1, 0.3, 0.5, 0.7, 0.9):
+        errors = synthetic("bounded", numpy.random.default_rng(29))
+        errors[:, part * TIMES[-1] < TIMES] *= 1e8
+        assert law(Ensemble(TIMES, errors, STEP)).growth == "unresolved"

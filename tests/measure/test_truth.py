@@ -5,6 +5,7 @@ import random
 from fractions import Fraction
 
 import pytest
+from flint import arb
 
 from heavytop.errors import OutOfReach
 from heavytop.exact import validated
@@ -16,7 +17,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.integrate.words import follow
 from heavytop.measure import computed_reference
 from heavytop.measure import truth as truths
-from heavytop.measure.computed_reference import of_rounded
+from heavytop.measure.computed_reference import ComputedReference, of_rounded
 from heavytop.measure.truth import Truth, known_motion, truth
 from heavytop.precision import DOUBLE, QUAD, Precision, exact, number, real
 from heavytop.top.equations import GYROSTAT
@@ -235,3 +236,21 @@ def test_the_first_steps_forecast_a_run_up_to_its_effort_and_not_beyond(monkeypa
         at = exact(number(2 * reached * (1 + beyond), real(84)))
         with pytest.raises(OutOfReach, match=says):
             computed_reference.compute([chaotic], [at], 84)
+
+
+def test_runs_that_agree_to_the_last_bit_are_off_by_a_rounding_of_the_coarser() -> None:
+    state = [Fraction(n, 8) for n in (1, -5, 3, 2, 0, -1)]
+    for bits in (60, 100):
+        balls = computed_reference._group_balls(state, [*state[:5], Fraction(-9, 8)], bits)
+        found = [radius(ball) * 2**bits for ball in balls]
+        assert all(Fraction(5, 8) <= each < Fraction(6, 8) for each in found[:3])
+        assert all(2**bits < each < 2**bits * (1 + Fraction(1, 2**28)) for each in found[3:])
+
+
+def test_what_is_uncertain_by_more_than_a_part_of_the_largest_is_beyond() -> None:
+    balls = {
+        Fraction(t): [arb(size, wide)] * 3 + [arb(1, "1e-20")] * 3
+        for t, size, wide in ((1, 1, "1e-9"), (2, 10, "2e-8"))
+    }
+    found = ComputedReference((106, 138), balls)
+    assert [found.beyond(Fraction(part)) for part in ("9e-11", "11e-11", "21e-10")] == [{1, 2}, {2}, set()]

@@ -95,6 +95,14 @@ def test_a_known_motion_that_is_known_to_less_is_weaker(known, part: str, change
         assert weaker(less.against, each.against) == ""
 
 
+def test_a_certificate_less_is_weaker(known) -> None:
+    one = known[0].against
+    both = msgspec.structs.replace(one, certificates=one.certificates * 2)
+    for fewer in (one, msgspec.structs.replace(one, certificates=())):
+        assert weaker(both, fewer)
+        assert not weaker(fewer, both)
+
+
 def test_runs_that_agree_say_their_radius() -> None:
     coarse, fine = (of_rounded([problem("generic")], [ONE / 8], bits)[0].against for bits in (100, 160))
     assert (coarse.how, coarse.certificates) == ("computed", ())

@@ -411,6 +411,13 @@ def test_so_many_samples_may_no_longer_be_resolved(lost: int, verdict: str) -> N
     assert judge_series(two[1], two[1], 0.6, -16.0, exactly=False)[0].value == "same"
 
 
+@pytest.mark.parametrize("word", ["nan", "missing"])
+def test_a_sample_that_was_a_number_stays_one(word: str) -> None:
+    old, new = (Series(TIMES, ["1e-13", last, "1e-13"]) for last in ("1e-13", word))
+    assert judge_series(old, new, 0.6, -16.0, exactly=False)[0].value == "incomparable"
+    assert judge_series(new, new, 0.6, -16.0, exactly=False)[0].value == "same"
+
+
 @pytest.mark.parametrize(("value", "verdict"), [("3.0003", "same"), ("2.9997", "same"), ("3.0005", "worse")])
 def test_a_series_that_must_agree_is_off_by_a_part_of_its_largest(value: str, verdict: str) -> None:
     old, new = (Series(["1", "2"], [each, "-4"]) for each in ("3", value))

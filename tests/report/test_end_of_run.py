@@ -131,3 +131,37 @@ def test_escapes_in_one_format_stand_by_integrator() -> None:
     metrics = {"break_away_time": error("33.6")}
     rows = [row(measure="homoclinic", integrator=name, metrics=metrics) for name in ("heyoka", "mine:rk4")]
     assert said(*rows)[1:] == ["Escape from a homoclinic motion at |t|, heyoka, mine:rk4:", "  euler: 33.6, 33.6"]
+
+
+def escaping(integrator: str, time: str, gamma: str, drift: str) -> Row:
+    errors = {"solution_error_omega_max": "1e-12", "solution_error_gamma_max": gamma, "drift_energy_max": drift}
+    metrics = {name: error(value) for name, value in errors.items()}
+    return row(measure="homoclinic", integrator=integrator, metrics=metrics | {"break_away_time": error(time)})
+
+
+@pytest.mark.parametrize(
+    ("time", "gamma", "drift", "words"),
+    [
+        ("33.6", "1e-12", "2e-6", "the drift of mine:rk4 is 2e-6, heyoka's 1e-14."),
+        ("40", "3e-9", "1e-13", "the error of γ of mine:rk4 is 3e-9, heyoka's 1e-12."),
+        ("33.6", "5e-11", "9e-13", ""),
+        # that it is worse is seen already
+        ("20", "1e-3", "1e-3", ""),
+    ],
+)
+def test_an_escape_time_hides_no_error(time: str, gamma: str, drift: str, words: str) -> None:
+    lines = said(escaping("heyoka", "33.6", "1e-12", "1e-14"), escaping("mine:rk4", time, gamma, drift))
+    assert lines[3:] == [f"  euler: {words}"] * bool(words)
+
+
+def test_a_row_of_many_integrators_is_whole() -> None:
+    lines = said(*(escaping(f"mine:{i}", "33.609", "1e-12", "1e-14") for i in range(20)))
+    assert "".join(lines).count("33.609") == 20
+
+
+@pytest.mark.parametrize(("end", "words"), [("5e-6", " At the end it is 5e-6, heyoka's 1e-12."), ("9e-11", "")])
+def test_a_law_hides_no_size(end: str, words: str) -> None:
+    rows = [law_row("unresolved", "heyoka"), law_row("unresolved")]
+    for each, value in zip(rows, ("1e-12", end), strict=True):
+        each.metrics["solution_error_along_final"] = error(value)
+    assert " ".join(line.strip() for line in said(*rows)[4:]).endswith(f"like t^1.7.{words}")

@@ -39,6 +39,7 @@ def drift(value: str, band: float | None = None, **changes) -> Row:
         ("flags = 'sometimes'", "Invalid enum value 'sometimes'"),
         ("[timings]\ncompare = 'no'", "Invalid enum value 'no'"),
         ("[timings]\nratio = 0.5", "not 1 or more"),
+        ("[timings]\nratio = inf", "not 1 or more"),
         ("[[rule]]\nmetric = ''", "no glob pattern"),
         ("[[rule]]\nmetric = 'drift_[ab'", "no glob pattern"),
         ("[[rule]]\nlimit = '-1e-9'", "limit = -1e-9 is negative"),
@@ -87,6 +88,13 @@ def test_a_limit_holds_whatever_the_baseline_was(tmp_path: Path) -> None:
     assert verdicts(row(), row(), given)["break_away_time"] is Verdict.SAME
     tight = policy(tmp_path, "[[rule]]\nmetric = 'break*'\nlimit = 70")
     assert verdicts(row(), row(), tight)["break_away_time"] is Verdict.WORSE
+
+
+def test_a_limit_of_0_admits_no_error_and_one_below_the_floor_those_below_it(tmp_path: Path) -> None:
+    none, tiny = (policy(tmp_path, f"[[rule]]\nmetric = 'drift_*'\nlimit = '{limit}'") for limit in ("0", "1e-30"))
+    for value, at_none, at_tiny in (("0", "same", "same"), ("1e-40", "worse", "same"), ("1e-29", "worse", "worse")):
+        found = [verdicts(drift(value), drift(value), given)["drift_energy_max"].value for given in (none, tiny)]
+        assert found == [at_none, at_tiny]
 
 
 def test_what_is_ignored_is_left_out_even_where_it_is_missing_or_worse(tmp_path: Path) -> None:

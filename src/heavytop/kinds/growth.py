@@ -32,6 +32,7 @@ from heavytop.report.names import computed_by
 from heavytop.report.plots import growth as over_time
 from heavytop.report.section import points
 from heavytop.report.text import short, table, title
+from heavytop.report.verdicts import size
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
@@ -52,6 +53,8 @@ _MEANS = {
 """Laws of the error along the flow."""
 _SUMMED_UP = ("integrals", "along", "across")
 _WIDE = 16
+_FAR = 2.0
+"""Decades."""
 _MOST_BITS = 900
 """Errors of more bits underflow in the floats that laws of growth are fitted with."""
 _LIMITS = {"starts": range(1, 100_001), "samples": range(4, 1001), "decades": range(1, 13)}
@@ -221,7 +224,9 @@ class Growth(Kind):
             first, *rest = wrap(f"  {runs}: {', '.join(motions)}", 35, subsequent_indent="    ")
             printed += [_columns(first, *said), *rest]
         others = [row for row in rows if row.key.subject.name not in _OWN]
-        return printed + [line for row in others for line in wrapped(_meaning(row))]
+        ours = {(row.key.case, row.precision): row for row in rows if row.key.subject.name == HEYOKA}
+        said = [_meaning(row) + _larger(row, ours.get((row.key.case, row.precision), row)) for row in others]
+        return printed + [line for sentence in said for line in wrapped(sentence)]
 
 
 def _growths(row: Row) -> tuple[str, ...]:
@@ -247,6 +252,14 @@ def _meaning(row: Row) -> str:
     }.get(growth, f"grows like {growth}")
     means = f": {_MEANS[growth]}" if growth in _MEANS else ""
     return f"{row.key.case}: the error of {row.key.subject.name} along the flow {grows}{means}."
+
+
+def _larger(row: Row, ours: Row) -> str:
+    """What no law shows: an error that is far larger than heyoka's of the same motion; "" where it is not."""
+    error, known = (each.metric(SOLUTION_ERROR, "along", "final") for each in (row, ours))
+    if error is None or known is None or size(error) - size(known) < _FAR:
+        return ""
+    return f" At the end it is {short(error.value)}, heyoka's {short(known.value)}."
 
 
 def _lately(series: Series | None) -> str:

@@ -26,7 +26,8 @@ from heavytop.precision import DOUBLE, exact, parse, time_text
 from heavytop.records import Direction, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.brief import named, wrapped
 from heavytop.report.section import clip
-from heavytop.report.text import NOISE, both, short, table, title, with_noise
+from heavytop.report.text import NOISE, both, drifts, short, table, title, with_noise
+from heavytop.report.verdicts import size
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
@@ -40,6 +41,8 @@ ESCAPED = Fraction(1, 1000)
 """A computed homoclinic motion has escaped when Ω is wrong by this, in units of α."""
 WINDOW = 10
 """The error of a homoclinic run is a number only while rate·|t| is below this; later the saddle amplifies rounding."""
+_AS_LONG, _WORSE = 0.05, 2.0
+"""Decades of the escape time, and of an error."""
 _CERTIFIED_AT = 4
 """The closed form of a homoclinic case is certified at this |t|."""
 
@@ -147,15 +150,18 @@ class Homoclinic(Kind):
         """A line for each case and format."""
         lines = []
         for row in rows:
-            names = (name for name in (INTEGRATION_ERROR, SOLUTION_ERROR) if row.metric(name, "omega", "max"))
-            error = row.metric(next(names, SOLUTION_ERROR), "omega", "max")
-            cells = [row.precision, with_noise(error), with_noise(row.metrics[ESCAPE.text]), row.outcome]
+            error, *others = _errors(row).values()
+            escape = with_noise(row.metrics[ESCAPE.text])
+            cells = [row.precision, with_noise(error), *map(_value, others), escape, row.outcome]
             lines.append((row, cells))
         return [
             title("Integrators on a homoclinic motion, against its closed form"),
-            Text("  Ω error: the largest over the samples with rate·|t| <= 10; escape: Ω wrong by 1e-3 α, where"),
-            Text(f"  all significant digits are lost. {NOISE}"),
-            table(["case", "format", "Ω error", "escape |t|", "outcome"], both(lines)),
+            Text(
+                "  Errors of Ω and γ: the largest over the samples with rate·|t| <= 10; drift: the largest of a first"
+            ),
+            Text("  integral, of all samples; escape: Ω wrong by 1e-3 α, where all significant digits are lost."),
+            Text(f"  {NOISE}"),
+            table(["case", "format", "Ω error", "γ error", "drift", "escape |t|", "outcome"], both(lines)),
         ]
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
@@ -172,7 +178,45 @@ class Homoclinic(Kind):
         lines = [f"  {case}: {', '.join(times.get(name, '-') for name in columns)}" for case, times in found.items()]
         if not lines:
             return []
-        return [*wrapped(f"Escape from a homoclinic motion at |t|, {', '.join(columns)}:"), *lines]
+        said = [f"Escape from a homoclinic motion at |t|, {', '.join(columns)}:", *lines, *_hidden(rows)]
+        return [part for line in said for part in wrapped(line, "    " if line.startswith(" ") else "  ")]
+
+
+def _errors(row: Row) -> dict[str, Metric | None]:
+    """The errors of Ω and γ, and the largest drift of a first integral, by what is said of them."""
+    names = (name for name in (INTEGRATION_ERROR, SOLUTION_ERROR) if row.metric(name, "omega", "max"))
+    name = next(names, SOLUTION_ERROR)
+    drift = max((metric for _, metric in drifts(row)), key=size, default=None)
+    found = {f"error of {symbol}": row.metric(name, part, "max") for part, symbol in (("omega", "Ω"), ("gamma", "γ"))}
+    return found | {"drift": drift}
+
+
+def _value(metric: Metric | None) -> str:
+    return "-" if metric is None else short(metric.value)
+
+
+def _hidden(rows: Iterable[Row]) -> Iterator[str]:
+    """What an escape time does not show: a run that stays as long as heyoka's and is worse in another way."""
+    ours = {(row.key.case, row.precision): row for row in rows if _by(row, HEYOKA)}
+    for row in rows:
+        own = ours.get((row.key.case, row.precision), row)
+        if _stayed(row) < _stayed(own) - _AS_LONG:
+            continue
+        pairs = zip(_errors(row).items(), _errors(own).values(), strict=True)
+        worse = [(size(mine) - size(known), what, mine, known) for (what, mine), known in pairs if mine and known]
+        lost, what, mine, known = max(worse, key=lambda each: each[0], default=(0.0, "", None, None))
+        if lost > _WORSE:
+            yield f"  {row.key.case}: the {what} of {row.key.subject.name} is {_value(mine)}, heyoka's {_value(known)}."
+
+
+def _stayed(row: Row) -> float:
+    """log10 of the escape time; of none that of the horizon."""
+    return math.log10(abs(exact(_until(row))))
+
+
+def _until(row: Row) -> str:
+    time = row.metrics[ESCAPE.text]
+    return row.horizon if time.log10 is None else time.value
 
 
 def _by(row: Row, name: str) -> bool:
@@ -183,9 +227,7 @@ def _stays(rows: Iterable[Row]) -> str:
     """``12 to 63 in double, 62 to 321 in real:237``: escape times of the narrowest and the widest format."""
     formats: dict[tuple[int, str], list[Fraction]] = {}
     for row in rows:
-        time = row.metrics[ESCAPE.text]
-        until = abs(exact(row.horizon if time.log10 is None else time.value))
-        formats.setdefault((row.bits, row.precision), []).append(until)
+        formats.setdefault((row.bits, row.precision), []).append(abs(exact(_until(row))))
     found = []
     for _, name in dict.fromkeys((min(formats), max(formats))):
         low, high = (f"{float(pick(formats[_, name])):.3g}" for pick in (min, max))

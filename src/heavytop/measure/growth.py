@@ -28,6 +28,8 @@ NEAR = 0.12
 """A class exponent this far outside the interval still names the law: samples see a power only up to a transient."""
 BENT = 0.25
 """Half the way from a class to the next: an exponent that surely changes by this within the span is no law."""
+STRAIGHT = 0.1
+"""Of the variance of log |error|, what a line over |t| may leave: of a jump it leaves a quarter at least."""
 LOST = 0.1
 """An error of this part of the size of a quantity leaves no digit of it."""
 RESOLVED = 10
@@ -121,13 +123,15 @@ def law(ensemble: Ensemble) -> Law:
     that wins in the end may hide behind another.  Each start counts by its share of the RMS relative to its own mean
     share, so that the few starts with the largest errors do not make the exponent alone.  Its class is the nearest,
     and must be in the interval (to ±0.12) with its neighbours out of it; and the exponents of its two halves
-    must not surely differ by more than a quarter (bend), as they do where one law takes over from another.
+    must not surely differ by more than a quarter (bend), as they do where one law takes over from another.  Where the
+    exponent of the whole surely differs by as much from the mean of those of its halves, the error jumps, and has none.
 
     An exponential needs three decades of error, a power fit of log RMS steeper than t², and a line over |t|, each
-    sample counting as much as the time it stands for, that fits better than the power in 95 % of the resamples.  Its
-    number is the median over the starts of their finite-time rates, each the slope of log |error| over |t| within the
-    fitted span; its interval is that of the median of such rates (:func:`median_interval`).  The few starts with the
-    largest rates, which lead the RMS in the end, do not make it.
+    sample counting as much as the time it stands for, that fits better than the power in 95 % of the resamples, and
+    leaves less than a tenth of the variance, as of a jump it does not.  Its number is the median over the starts of
+    their finite-time rates, each the slope of log |error| over |t| within the fitted span; its interval is that of the
+    median of such rates (:func:`median_interval`).  The few starts with the largest rates, which lead the RMS in the
+    end, do not make it.
 
     Anything else is unresolved, with the exponent and interval of the power fit where there are three decades for one,
     so that it can be compared.  An error that is exactly 0 throughout is bounded, without an exponent.
@@ -206,8 +210,12 @@ def _power(times: Array, rms: Array, shares: Array) -> _Found | None:
     slopes, squares = _fit(x, y + _levelled(shares, numpy.full((1, starts), 1 / starts)))
     slope, scatter = float(slopes[0]), float(squares[0] / (len(x) - 2) / ((x - x.mean()) ** 2).sum()) ** 0.5
     logs = y + _levelled(shares, resampled(starts))
-    low, high = _widened(slope, _interval(_fit(x, logs)[0], starts), scatter)
-    begin, end = _interval(_fit(x[half:], logs[:, half:])[0] - _fit(x[:half], logs[:, :half])[0], starts)
+    whole, first, second = (_fit(x[part], logs[:, part])[0] for part in (slice(None), slice(half), slice(half, None)))
+    # where the error jumps, the halves do not have the slope of the whole
+    if bent(_interval(whole - (first + second) / 2, starts)):
+        return None
+    begin, end = _interval(second - first, starts)
+    low, high = _widened(slope, _interval(whole, starts), scatter)
     # the class is that of the numbers as they are written
     slope, low, high, begin, end = (round(each, _DECIMALS) for each in (slope, low, high, begin, end))
     growth = "unresolved" if bent((begin, end)) else nearest_class(slope, low, high)
@@ -260,7 +268,9 @@ def _exponential(times: Array, rms: Array, shares: Array) -> _Found | None:
     logs = numpy.log(rms) + numpy.log(drawn[(drawn > 0).all(axis=1)]) / 2
     powers, off_power = _fit(numpy.log(times), logs, weights)
     _, off_exponential = _fit(times, logs, weights)
-    if _interval(powers, starts)[0] <= CLASSES["t^2"] or (off_exponential < off_power).mean() < 0.95:
+    centred = logs - numpy.average(logs, axis=-1, weights=weights)[:, numpy.newaxis]
+    better = (off_exponential < off_power) & (off_exponential < STRAIGHT * (centred**2 @ weights))
+    if _interval(powers, starts)[0] <= CLASSES["t^2"] or better.mean() < 0.95:
         return None
     rates = finite_time_rates(times, numpy.sqrt(shares) * rms)
     rate, low, high = (round(each, _DECIMALS) for each in (float(numpy.median(rates)), *median_interval(rates)))

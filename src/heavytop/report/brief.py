@@ -56,7 +56,12 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
     if bad > len(failures):
         failures[-1:] = [f"and {bad - len(failures) + 1} more"]
     lines = [head, *(line for each in failures for line in wrapped(f"  {each}", "    ")[:_MOST_OF_ONE])]
-    return "\n".join(printable(line)[:WIDTH] for line in [*lines, *fitted(parts, LINES - len(lines))])
+    return "\n".join(_cut(printable(line)) for line in [*lines, *fitted(parts, LINES - len(lines))])
+
+
+def _cut(line: str) -> str:
+    """A number that is cut says so."""
+    return line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}…"
 
 
 def fitted(parts: Sequence[Sequence[str]], most: int) -> list[str]:
