@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
@@ -34,9 +34,8 @@ _DIGITS = 100
 _EFFORT = 2.0
 _TIMES = tuple(map(Fraction, ("1", "10", "-1000", "10000", "1000000")))
 _TIMES_IN_REACH = tuple(map(Fraction, ("1", "10", "-20")))
-# of the chaotic motion: a thousand units of time take some 60 digits, and the last of these 20 minutes
-_FAR = tuple(map(Fraction, ("100", "1000", "2000", "5000")))
-_FAR_EFFORT = 3600.0
+# of the chaotic motion: a thousand units of time take some 60 digits
+_FAR = tuple(map(Fraction, ("100", "1000", "2000", "3000")))
 
 
 class Entry(msgspec.Struct, frozen=True):
@@ -134,9 +133,7 @@ def motion(case: Case, digits: int) -> Motion:
     ``beyond``.
     """
     solution = find(case.top, case.start, case.system)
-    times = _TIMES
-    if isinstance(solution, Validated):
-        solution, times = replace(solution, effort=_FAR_EFFORT), _TIMES_IN_REACH
+    times = _TIMES_IN_REACH if isinstance(solution, Validated) else _TIMES
     enclosure = enclosure_of(solution, effort=_EFFORT)
     entries = [
         Entry(
