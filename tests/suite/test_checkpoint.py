@@ -129,6 +129,15 @@ def test_what_was_saved_comes_back_and_what_was_damaged_does_not(tmp_path: Path)
     assert not Saved().due()
 
 
+def test_the_place_of_one_row_is_none_of_another(tmp_path: Path) -> None:
+    with suppress(KeyboardInterrupt), checkpoint(tmp_path / "out") as kept:
+        kept.saved(1).save({"x": ["1"]})
+        one, two = (tmp_path / "out" / f"row-{index}.partial" for index in (1, 2))
+        two.write_bytes(one.read_bytes())
+        assert [kept.saved(index).load() for index in (1, 2)] == [{"x": ["1"]}, None]
+        raise KeyboardInterrupt
+
+
 def test_rows_come_back_but_for_those_that_were_cut_short_or_damaged(tmp_path: Path) -> None:
     file = killed(tmp_path / "out", 3)
     lines = file.read_bytes().splitlines(keepends=True)

@@ -122,7 +122,7 @@ class Checkpoint:
 
     def saved(self, index: int) -> Saved:
         """Where the row of that index keeps its place."""
-        return Saved(self._place(index), self._digest, self.every)
+        return Saved(self._place(index), f"{self._digest} row {index}", self.every)
 
     def _place(self, index: int) -> Path:
         return self.directory / f"row-{index}.partial"
