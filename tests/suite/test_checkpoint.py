@@ -16,6 +16,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Metric, Report
 from heavytop.suite.checkpoint import Checkpoint, Saved, locked
+from heavytop.suite.files import line
 from reports import Row, expand, load, measure, replace, store
 
 IDENTITY = {"plan name": "tiny", "heavytop": "0.1.0"}
@@ -148,6 +149,23 @@ def test_rows_come_back_but_for_those_that_were_cut_short_or_damaged(tmp_path: P
         kept.add(1, row("case 1"))
         assert [each.case for each in kept.rows(range(3))] == ["case 0", "case 1", "case 2"]
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("forged", [b"[1]", b'["1", {}]', b"{", b'[1, {"case": 1}]'])
+def test_a_forged_line_with_its_checksum_is_measured_again_or_refused(tmp_path: Path, forged: bytes) -> None:
+    file = killed(tmp_path / "out", 3)
+    lines = file.read_bytes().splitlines(keepends=True)
+    lines[2] = line(forged)
+    file.write_bytes(b"".join(lines))
+    with suppress(KeyboardInterrupt), checkpoint(tmp_path / "out") as kept:
+        if 1 in kept.offsets:
+            with pytest.raises(InputError, match="a line that is no row"):
+                list(kept.rows(range(3)))
+        assert [each.case for each in kept.rows([0, 2])] == ["case 0", "case 2"]
+        raise KeyboardInterrupt
+    file.write_bytes(line(forged) + b"".join(lines[1:]))
+    with pytest.raises(InputError, match="damaged in its first line"), checkpoint(tmp_path / "out"):
+        pass
 
 
 def test_what_was_cut_short_is_gone_before_a_shorter_row_is_added(tmp_path: Path) -> None:

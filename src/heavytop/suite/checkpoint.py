@@ -51,8 +51,10 @@ class Saved:
         content = verified(self.path.read_bytes().removesuffix(b"\n"))
         if content is None:
             return None
-        identity, saved = msgspec.json.decode(content, type=tuple[str, dict[str, Any]])
-        return saved if identity == self.identity else None
+        with suppress(msgspec.MsgspecError):
+            identity, saved = msgspec.json.decode(content, type=tuple[str, dict[str, Any]])
+            return saved if identity == self.identity else None
+        return None
 
     def due(self) -> bool:
         """Whether the last save is long enough ago.  No result depends on it."""
@@ -106,13 +108,17 @@ class Checkpoint:
             first = verified(file.readline().removesuffix(b"\n"))
             if first is None:
                 raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.")
-            require_same(msgspec.json.decode(first, type=dict[str, str]), self.identity, self.path)
+            try:
+                require_same(msgspec.json.decode(first, type=dict[str, str]), self.identity, self.path)
+            except msgspec.MsgspecError:
+                raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.") from None
             end = file.tell()
             for whole in file:
                 content = verified(whole[:-1]) if whole.endswith(b"\n") else None
                 if content is not None:
-                    index, _ = msgspec.json.decode(content, type=tuple[int, msgspec.Raw])
-                    self.offsets[index] = end
+                    with suppress(msgspec.MsgspecError):
+                        index, _ = msgspec.json.decode(content, type=tuple[int, msgspec.Raw])
+                        self.offsets[index] = end
                 elif not whole.endswith(b"\n"):
                     break
                 end += len(whole)
@@ -148,7 +154,10 @@ class Checkpoint:
                 content = verified(file.readline().removesuffix(b"\n"))
                 if content is None:
                     raise InputError(f"{self.path} was changed while it was in use.", "Go on with --resume.")
-                yield msgspec.json.decode(content, type=tuple[int, Row])[1]
+                try:
+                    yield msgspec.json.decode(content, type=tuple[int, Row])[1]
+                except msgspec.MsgspecError as error:
+                    raise InputError(f"{self.path} has a line that is no row: {error}", "Give another --out.") from None
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
