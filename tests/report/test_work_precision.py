@@ -213,6 +213,11 @@ def test_who_is_fastest_at_1e_10_opens_the_page() -> None:
         "",
         "fast:x is the fastest at error 1e-10 on top/T=9: 4.0 times as fast as heyoka double.",
     )
+    # each is named with the motions that it wins, and is compared with the next of these alone
+    other = [row(f"{name} tolerance=1", -11, seconds, case="b") for name, seconds in (("heyoka", 1.0), ("fast:x", 3.0))]
+    third = [row(f"{name} tolerance=1", -11, seconds, case="c") for name, seconds in (("heyoka", 6.0), ("fast:x", 3.0))]
+    said = "heyoka double is the fastest at error 1e-10 on 2 of 3 motions: 3.0 to 4.5 times as fast as the next"
+    assert fastest(ALL + other + third) == ("", f"{said}; fast:x on 1.")
     least = "The least error is 1e-11: cyrk:DOP853 on top/T=9, in 27 s."
     assert fastest(OURS[:1] + CYRK) == ("", least)
     assert fastest([]) is None

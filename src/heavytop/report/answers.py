@@ -62,20 +62,17 @@ def fastest(rows: Sequence[Row]) -> tuple[str, str] | None:
     found = [(lead, ratio) for lead in leads(rows) if lead.log10 == -10 and (ratio := lead.ratio) is not None]
     if not found:
         return _least_error(rows)
-    won = [(lead, ratio) for lead, ratio in found if ratio >= 1]
-    if len(won) * 2 >= len(found):
-        names = Counter(lead.name for lead, _ in won)
-        ratios, others = [ratio for _, ratio in won], Counter(lead.other for lead, _ in won)
-    else:
-        won = [(lead, 1 / ratio) for lead, ratio in found if ratio < 1]
-        names = Counter(lead.other for lead, _ in won)
-        ratios, others = [ratio for _, ratio in won], Counter(lead.name for lead, _ in won)
-    where = f"{len(won)} of {len(found)} motions" if len(won) < len(found) else f"all {len(found)} motions"
+    ends = [(lead.name, lead.other) if ratio >= 1 else (lead.other, lead.name) for lead, ratio in found]
+    (first, count), *rest = Counter(winner for winner, _ in ends).most_common()
+    ratios = [max(ratio, 1 / ratio) for (winner, _), (_, ratio) in zip(ends, found, strict=True) if winner == first]
+    behind = {other for winner, other in ends if winner == first}
+    where = f"{count} of {len(found)} motions" if rest else f"all {len(found)} motions"
     where = clip(found[0][0].case, 40) if len(found) == 1 else where
     low, high = (f"{ratio:.0f}" if ratio >= 100 else f"{ratio:.1f}" for ratio in (min(ratios), max(ratios)))
     times = low if low == high else f"{low} to {high}"
-    (name, _), (other, _) = names.most_common(1)[0], others.most_common(1)[0]
-    return "", f"{clip(name, 40)} is the fastest at error 1e-10 on {where}: {times} times as fast as {clip(other, 40)}."
+    other = clip(behind.pop(), 40) if len(behind) == 1 else "the next"
+    said = f"{clip(first, 40)} is the fastest at error 1e-10 on {where}: {times} times as fast as {other}"
+    return "", "; ".join([said, *(f"{clip(name, 40)} on {n}" for name, n in rest)]) + "."
 
 
 def _least_error(rows: Sequence[Row]) -> tuple[str, str] | None:
