@@ -32,12 +32,13 @@ def run(
 ) -> int:
     """Run a plan of measurements and write its report.
 
-    It goes to DIR/report.json and DIR/report.html.  On two cores smoke takes about 20 seconds, default and gate
-    two minutes, peers five, growth ten, long an hour.
+    It goes to DIR/report.json and DIR/report.html.  On two cores smoke takes about 20 seconds, default a minute,
+    gate two, peers seven, growth ten, long an hour.
     """
     from heavytop.api.run_folder import PAGE, prepare
     from heavytop.kinds import KINDS
     from heavytop.report.store import FILE as REPORT
+    from heavytop.suite.checkpoint import FILE as ROWS
 
     asked = prepare(
         plan,
@@ -64,7 +65,9 @@ def run(
         with _stopped_by_signals(), Progress(asked.tasks, KINDS, asked.workers) as advance:
             ended = asked.measure(advance)
     except KeyboardInterrupt as stop:
-        print(f"heavytop: interrupted; finished rows are kept: --out {directory} --resume goes on", file=sys.stderr)
+        kept = f"finished rows are kept: --out {directory} --resume goes on"
+        said = kept if (directory / ROWS).exists() else "no row was finished"
+        print(f"heavytop: interrupted; {said}", file=sys.stderr)
         return 143 if isinstance(stop, _Terminated) else 130
     print(ended.summary)
     page = directory / PAGE

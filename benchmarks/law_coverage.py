@@ -1,4 +1,4 @@
-"""How often the 95 % interval of a law of growth holds its exponent: `python benchmarks/coverage.py [ENSEMBLES]`.
+"""How often the 95 % interval of a law of growth holds its exponent: `python benchmarks/law_coverage.py [ENSEMBLES]`.
 
 Ensembles of 16 and of 64 starts are drawn for each law.  An ensemble whose class is not recognised counts as not
 covered.  Exit code 1 where fewer than 92 % are: 184 of 200.
