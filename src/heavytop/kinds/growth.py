@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from textwrap import wrap
 from time import perf_counter
 from typing import Any
 
@@ -19,20 +18,17 @@ from heavytop.kinds.base import Kind
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.ensemble import Ended, complete, growing
 from heavytop.measure.ensemble_reference import Reference, reference
-from heavytop.measure.integrator import HEYOKA, WORDS, require
+from heavytop.measure.integrator import HEYOKA, require
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import Scorer
-from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
-from heavytop.records import Law, Metric, Quantity, Row, RowKey, Series, by_name
+from heavytop.records import Law, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.answers import laws_headline
-from heavytop.report.brief import wrapped
 from heavytop.report.digits_chart import digits
+from heavytop.report.law_lines import law_lines
 from heavytop.report.names import computed_by
 from heavytop.report.plots import growth as over_time
-from heavytop.report.section import points
 from heavytop.report.text import short, table, title
-from heavytop.report.verdicts import size
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
@@ -42,19 +38,6 @@ from heavytop.suite.task import Task, computed
 
 NAME = "growth"
 FAILED = Quantity("starts_failed")
-_OWN = (HEYOKA, WORDS)
-_MEANS = {
-    "t^0.5": "less than rounding noise that adds up",
-    "t": "a frequency that is off by a constant, by truncation or a wrong coefficient",
-    "t^1.5": "rounding noise alone, the least there is",
-    "t^2": "every step errs in the same way and a first integral drifts; a smaller step or tolerance helps",
-    "exponential": "the motion amplifies every error",
-}
-"""Laws of the error along the flow."""
-_SUMMED_UP = ("integrals", "along", "across")
-_WIDE = 16
-_FAR = 2.0
-"""Decades."""
 _MOST_BITS = 900
 """Errors of more bits underflow in the floats that laws of growth are fitted with."""
 _LIMITS = {"starts": range(1, 100_001), "samples": range(4, 1001), "decades": range(1, 13)}
@@ -207,79 +190,8 @@ class Growth(Kind):
         ]
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
-        """The laws, those of all first integrals as one; formats and motions with the same laws together."""
-        formats: dict[tuple[str, str, str, tuple[str, ...]], list[str]] = {}
-        for row in rows:
-            name = "" if row.key.subject.name == HEYOKA else row.key.subject.name
-            what = (name, row.key.subject.variant, row.key.case, _growths(row))
-            formats.setdefault(what, []).append(row.precision)
-        if not formats:
-            return []
-        cases: dict[tuple[str, ...], list[str]] = {}
-        for (name, variant, case, growths), precisions in formats.items():
-            runs = " ".join(part for part in (name, ", ".join(precisions), variant) if part)
-            cases.setdefault((runs, *growths), []).append(case)
-        printed = [_columns("Grows like", "integrals", "error along", "across")]
-        for (runs, *said), motions in cases.items():
-            first, *rest = wrap(f"  {runs}: {', '.join(motions)}", 35, subsequent_indent="    ")
-            printed += [_columns(first, *said), *rest]
-        others = [row for row in rows if row.key.subject.name not in _OWN]
-        ours = {(row.key.case, row.precision): row for row in rows if row.key.subject.name == HEYOKA}
-        said = [_meaning(row) + _larger(row, ours.get((row.key.case, row.precision), row)) for row in others]
-        return printed + [line for sentence in said for line in wrapped(sentence)]
-
-
-def _growths(row: Row) -> tuple[str, ...]:
-    """The classes of the laws of the first integrals, along and across the flow; of what is exactly 0 none."""
-    laws: dict[str, dict[str, None]] = {}
-    for law in row.laws.values():
-        quantity = law.quantity or Quantity("")
-        what = "integrals" if quantity.name == DRIFT else quantity.component
-        if what in _SUMMED_UP and (law.growth, law.exponent) != ("bounded", None):
-            laws.setdefault(what, {})[law.growth] = None
-    return tuple(_either(laws.get(what, {})) for what in _SUMMED_UP)
-
-
-def _meaning(row: Row) -> str:
-    """What the law of an integrator of others says about it."""
-    name = Quantity(SOLUTION_ERROR, "along").text
-    law = row.laws.get(name)
-    growth = "unresolved" if law is None else law.growth
-    grows = {
-        "unresolved": f"follows no single law{_lately(row.series.get(name))}",
-        "bounded": "is bounded",
-        "exponential": "grows exponentially",
-    }.get(growth, f"grows like {growth}")
-    means = f": {_MEANS[growth]}" if growth in _MEANS else ""
-    return f"{row.key.case}: the error of {row.key.subject.name} along the flow {grows}{means}."
-
-
-def _larger(row: Row, ours: Row) -> str:
-    """What no law shows: an error that is far larger than heyoka's of the same motion; "" where it is not."""
-    error, known = (each.metric(SOLUTION_ERROR, "along", "final") for each in (row, ours))
-    if error is None or known is None or size(error) - size(known) < _FAR:
-        return ""
-    return f" At the end it is {short(error.value)}, heyoka's {short(known.value)}."
-
-
-def _lately(series: Series | None) -> str:
-    """By which power an error grew over the last decade of t; "" where that is not known."""
-    known = {} if series is None else dict(zip(*points(series), strict=True))
-    if not known or max(known) - min(known) < 1:
-        return ""
-    end = max(known)
-    begin = min(known, key=lambda time: abs(end - 1 - time))
-    return f", over the last decade of t like t^{(known[end] - known[begin]) / (end - begin):.1f}"
-
-
-def _either(growths: Iterable[str]) -> str:
-    """The laws of several quantities: by name where they are one or two."""
-    found = list(growths)
-    return " or ".join(found) or "-" if len(" or ".join(found)) <= _WIDE else f"{len(found)} laws"
-
-
-def _columns(name: str, integrals: str, along: str, across: str) -> str:
-    return f"{name:37}{integrals:{_WIDE + 1}}{along:13}{across}"
+        """The laws, a line for those of one kind."""
+        return law_lines(rows)
 
 
 def _biased(problem: Problem, bias: str | None) -> Problem:
