@@ -364,6 +364,17 @@ def test_whether_planted_faults_are_told_opens_the_page_of_growth(law: str, told
     assert laws_headline([healthy, mine]) == ("", f"Errors of mine:rk along the flow grow like {law}.")
 
 
+def test_regular_and_unstable_motions_stand_side_by_side_at_the_head_of_the_page_of_growth() -> None:
+    regular = row(measure="growth", starts=32)
+    unstable = row(measure="growth", starts=32, laws={"solution_error_along": Law("exponential", 32, 0.5, 0.4, 0.6)})
+    for rows, said in (
+        ([unstable, unstable, regular], "like t^1.5 (1 of 3 ensembles) or exponentially (2)."),
+        ([unstable, regular, regular, regular], "like t^1.5 (3 of 4 ensembles)."),
+    ):
+        (_, found) = laws_headline(rows)
+        assert found == f"Errors along the flow grow {said}"
+
+
 ALONE = {
     "claim_model": "The claimed Ω is off by 1 % of α from |t| = 0.002 on (ershkov-partial-6/forward, printed).",
     "claim_evaluation": "In double the printed form is off by up to 1.11e-7 in Ω, not finite from |t| = 7.4; the "

@@ -100,13 +100,17 @@ def laws_headline(rows: Sequence[Row]) -> tuple[str, str] | None:
 
 
 def _followed(rows: Sequence[Row], drifts: bool) -> str:
-    """``errors along the flow grow like t^1.5 (4 of 5 ensembles)``."""
+    """``errors along the flow grow like t^1.5 (4 of 5 ensembles)``, and what a third of them or more do besides."""
     laws = Counter(growth for row in rows for growth in {law.growth for law in _laws(row, drifts)})
     of = sum(bool(_laws(row, drifts)) for row in rows)
     if not laws:
         return ""
-    ((growth, count),) = laws.most_common(1)
+    most, *next_to_it = laws.most_common(2)
+    both = [most, *(each for each in next_to_it if 3 * each[1] >= of > 1)]
+    # regular motions before those that amplify every error
+    (growth, count), *others = sorted(both, key=lambda each: each[0] == "exponential")
     law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {of} ensembles)" if of > 1 else "")
+    law += "".join(f" or {_HOW.get(other, f'like {other}')} ({times})" for other, times in others)
     name = rows[0].key.subject.name
     whose = "" if name in (HEYOKA, WORDS) else f" of {clip(name, 40)}"
     return f"first integrals drift {law}" if drifts else f"errors{whose} along the flow grow {law}"
