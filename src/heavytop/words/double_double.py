@@ -20,17 +20,21 @@ from heavytop.words.lanes import turned
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
 from heavytop.words.pairs import add, covered, later, log2, polynomial, step_length, times
 from heavytop.words.recurrence import Layout, Recurrence
+from heavytop.words.split_orders import SplitOrders, first_split, judged, near, slope_of, splits
 from heavytop.words.stepping import Stepping
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, POINTER, Index, Pair, function
 
-TIME, TIME_LOW, TARGET, TARGET_LOW, BEGAN, BEGAN_LOW, SIGN, ROOM, REACH, CLOCK = range(10)
+TIME, TIME_LOW, TARGET, TARGET_LOW, BEGAN, BEGAN_LOW, SIGN, ROOM, REACH, DEPTH, CLOCK = range(11)
 """Places of the clock, doubles: |time| and its target and the beginning of the last step, in two words each; the
-direction; log2 of the rounding allowed above n0, in units of 2^-53; log2 of h/ρ."""
-ORDER, LOW_ORDER, LEAST, MOST, STATUS, USED, COUNTS = range(7)
-"""Places of the counts: N, n0 of the next step, bounds of n0, how the last step ended, its n0."""
+direction; log2 of the rounding allowed above n0, in units of 2^-53; log2 of h/ρ; how many bits below the state
+the products of split coefficients must be."""
+ORDER, LOW_ORDER, LEAST, MOST, STATUS, USED, TRIES, SLOPE, USED_TRIES, USED_SLOPE, COUNTS = range(11)
+"""Places of the counts: N, n0 of the next step, bounds of n0, how the last step ended, its n0; how often the next step was tried in split coefficients, and the slope of their units; the same of the
+last step."""
 FINE, NON_FINITE, TOO_SMALL = range(3)
 _HYSTERESIS = 3.0
 _TOLERATED = 1.0
+_MOST_TRIES = 3
 
 
 def build(system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, Layout]:
@@ -92,12 +96,29 @@ class _Step(Stepping):
         order, low_order = self.count(ORDER), self.count(LOW_ORDER)
         first = [series.pair(self.state, 16 * v) for v in vectors]
         series.put(0, first)
-        words = series.orders_in_pairs(first, low_order)
-        series.plain_orders(low_order, order, [words[2 * v] for v in vectors])
+        b, code = self.code.builder, self.code
         start = log2(self.code, self._norm(0))
+        slope = self.count(SLOPE)
+        units = [self.code.load(self.state, self.layout.units + 8 * v) for v in vectors]
+        trying = b.and_(splits(code, units, slope), b.icmp_signed("<", self.count(TRIES), code.integer(_MOST_TRIES)))
+        wanted = first_split(code, units, slope, self.time(REACH), b.fadd(start, self.time(DEPTH)))
+        split = b.and_(trying, b.icmp_signed("<", wanted, low_order))
+        pair_order = b.select(split, wanted, low_order)
+        words = series.orders_in_pairs(first, pair_order)
+        parts = SplitOrders(series, units, slope, b.add(order, code.integer(1)))
+        largest = parts.begin(b.select(split, pair_order, code.integer(-1)))
+        words, largest = parts.orders(pair_order, low_order, words, largest)
+        series.plain_orders(low_order, order, [words[2 * v] for v in vectors])
         length = self._length(order, start)
         result = self._sum(order, low_order, self.code.builder.fmul(length, self.time(SIGN)))
-        good = self._judge(length, low_order, start, result)
+        asked = slope_of(code, self.time(REACH), length)
+        fits, following = judged(code, units, largest)
+        fits = b.or_(b.and_(fits, near(code, slope, asked)), b.not_(split))
+        good = b.and_(self._judge(length, low_order, start, result), fits)
+        self._follow(good, fits, units, slope)
+        self.set_count(asked, SLOPE)
+        for v in vectors:
+            code.store(following[v], self.state, self.layout.units + 8 * v)
         self._accept(good, length, low_order, result)
         return good
 
@@ -174,6 +195,18 @@ class _Step(Stepping):
         self.set_count(following, LOW_ORDER)
         again = b.and_(b.fcmp_ordered(">", above, b.fadd(room, ir.Constant(DOUBLE, _TOLERATED))), can_rise)
         return b.and_(b.not_(again), b.icmp_signed("==", status, code.integer(FINE)))
+
+    def _follow(self, good: Any, fits: Any, units: list[Any], slope: Any) -> None:
+        """What the step was done with, if it stands, and how often the next was tried."""
+        code, b = self.code, self.code.builder
+        tries = self.count(TRIES)
+        with b.if_then(good):
+            self.set_count(tries, USED_TRIES)
+            self.set_count(slope, USED_SLOPE)
+            for v, unit in enumerate(units):
+                code.store(unit, self.state, self.layout.units + 8 * (len(units) + v))
+        again = b.select(fits, tries, b.add(tries, code.integer(1)))
+        self.set_count(b.select(good, code.integer(0), again), TRIES)
 
     def _rounding(self, n: Any, length: Any, start: Any) -> Any:
         """log2 of |y_n| h^n / |y_0|."""

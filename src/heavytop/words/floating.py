@@ -14,6 +14,7 @@ from heavytop.words.pairs import split
 from heavytop.words.recurrence import LEAST_LOW_ORDER, Layout
 from heavytop.words.run import Run, Status
 from heavytop.words.scaled import Scaled
+from heavytop.words.split_orders import FIRST_UNITS
 
 BITS = 106
 FALL_ALONE, FALL_IN_LANES = 1.45, 2.0
@@ -22,6 +23,7 @@ _DEEPEST = 84.0
 _DOUBLE_BITS = 53
 _ROUNDING_BITS = 4
 _LEAST_ROOM = -66.0
+_SPLIT_BITS = 32
 LARGEST_TIME = Fraction(2) ** 1000
 
 
@@ -36,6 +38,7 @@ class Ladder:
     order: int
     reach: float
     room: float
+    depth: float = -1000.0
 
     @classmethod
     def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> Ladder:
@@ -51,7 +54,8 @@ class Ladder:
         depth = _DEEPEST if finest else _MARGIN - log_tolerance
         order = math.ceil(depth / fall)
         reach = -(depth / order + 0.7 / (order - 1)) / math.log(2)
-        return cls(order, reach, max(_DOUBLE_BITS - depth / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM))
+        room = max(_DOUBLE_BITS - depth / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM)
+        return cls(order, reach, room, room - _DOUBLE_BITS + _SPLIT_BITS)
 
 
 machine = once(dd.build)
@@ -75,7 +79,7 @@ class Floating(Run):
         self.machine, self.layout = machine(problem.system, len(problem.state) == 9, processor)
         self.problem, self.forwards = problem, forwards
         self.steps = 0
-        self.words = _state_words(problem.state)
+        self.words = _state_words(problem.state, self.layout)
         self.clock, self.counts = doubles(dd.CLOCK), numpy.zeros(dd.COUNTS, numpy.int64)
         self.clock[dd.SIGN] = 1.0 if forwards else -1.0
         self.clock[dd.ROOM] = ladder.room
@@ -83,6 +87,7 @@ class Floating(Run):
         most = ladder.order - 1
         self.counts[[dd.ORDER, dd.LOW_ORDER]] = ladder.order, low_order or most
         self.counts[[dd.LEAST, dd.MOST]] = LEAST_LOW_ORDER, most
+        self.clock[dd.DEPTH] = ladder.depth
         self.table = _table(problem, ladder.order, self.layout)
         self.scratch = doubles((ladder.order + 5) * self.layout.row)
 
@@ -128,18 +133,21 @@ class Floating(Run):
 
     def place(self) -> tuple[str, ...]:
         clock = self.clock[[dd.BEGAN, dd.BEGAN_LOW]]
-        return (str(self.counts[dd.USED]), *(float(word).hex() for word in (*clock, *self._row(0))))
+        counts = self.counts[[dd.USED, dd.USED_TRIES, dd.USED_SLOPE]]
+        units = self.words[self.layout.units + 8 * self.layout.vectors :]
+        return (*map(str, counts), *(float(word).hex() for word in (*clock, *self._row(0), *units)))
 
     def restore(self, place: tuple[str, ...], steps: int) -> None:
-        self.counts[dd.LOW_ORDER] = int(place[0])
-        words = [float.fromhex(text) for text in place[1:]]
+        self.counts[[dd.LOW_ORDER, dd.TRIES, dd.SLOPE]] = [int(text) for text in place[:3]]
+        words = [float.fromhex(text) for text in place[3:]]
         self.clock[[dd.TIME, dd.TIME_LOW]] = words[:2]
-        self.words[:] = words[2:]
+        self.words[: len(words) - 2] = words[2:]
         self.steps = steps
 
 
-def _state_words(state: tuple[Fraction, ...]) -> Doubles:
-    words = doubles(16 * (1 if len(state) == 6 else 2))
+def _state_words(state: tuple[Fraction, ...], layout: Layout) -> Doubles:
+    words = doubles(layout.state)
+    words[layout.units :] = FIRST_UNITS
     for index, value in enumerate(state):
         place = index if index < 6 else 16 + index - 3
         words[place], words[place + 8] = split(value)

@@ -32,8 +32,10 @@ class Layout:
 
     @property
     def row(self) -> int:
-        """Doubles of one order: the two words of R, then of L and of y for each vector."""
-        return 8 * (2 + 4 * self.vectors)
+        """Doubles of one order: two words of R and its two parts, then the same of L, and two words of y, for each
+        vector.
+        """
+        return 8 * (4 + 6 * self.vectors)
 
     @property
     def constants(self) -> int:
@@ -45,13 +47,23 @@ class Layout:
         """Doubles of one order of the table: n + 1 and its inverse in two words, then A/(n + 1) and each B/(n + 1)."""
         return 8 * (1 + self.constants)
 
+    @property
+    def state(self) -> int:
+        """Doubles of a state: two words of each vector, units of the next step, and of the last."""
+        return 32 * self.vectors
+
+    @property
+    def units(self) -> int:
+        """Where the units of split coefficients are in a state."""
+        return 16 * self.vectors
+
     def left(self, vector: int) -> int:
         """Where L of a vector is in a row; its low word is 8 behind, as all low words are."""
-        return 16 + 32 * vector
+        return 32 + 48 * vector
 
     def value(self, vector: int) -> int:
         """Where y of a vector is in a row."""
-        return 32 + 32 * vector
+        return 64 + 48 * vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +99,8 @@ class Recurrence:
         second = [self.code.multiply(self.code.shuffle(word, self.code.zero, which.second), signs) for word in y]
         return add(self.code, (first[0], first[1]), (second[0], second[1]))
 
-    def _side(self, y: Any, which: Sum) -> Any:
+    def side(self, y: Any, which: Sum) -> Any:
+        """L or R of a plain double, or of a part that is exact."""
         first, second = (self.code.shuffle(y, self.code.zero, lanes) for lanes in (which.first, which.second))
         return self.code.fma(second, self.code.constant(which.sign), first)
 
@@ -101,13 +114,16 @@ class Recurrence:
             for word in range(2):
                 self.code.store(pair[word], row, place + 8 * word)
 
-    def _put_plain(self, n: Index, y: list[Any]) -> None:
+    def _put_plain(self, n: Index, y: list[Any]) -> list[Any]:
+        """Store a row; gives R, each L and each y."""
         row = self.row(n)
-        self.code.store(self._side(y[0], RIGHT), row, 0)
+        right, left = self.side(y[0], RIGHT), [self.side(value, LEFT) for value in y]
+        self.code.store(right, row, 0)
         for vector in self.vectors:
-            self.code.store(self._side(y[vector], LEFT), row, self.layout.left(vector))
+            self.code.store(left[vector], row, self.layout.left(vector))
             self.code.store(y[vector], row, self.layout.value(vector))
             self.code.store(self.code.zero, row, self.layout.value(vector) + 8)
+        return [right, *left, *y]
 
     def _accumulate_pairs(self, m: Index, other: Index, sums: list[Any]) -> list[Any]:
         """Σ L_m R_other in words (s, c), c unordered."""
@@ -134,9 +150,20 @@ class Recurrence:
         signs = [sign for _, sign in GATHERED[part]]
         return value if min(signs) >= 0 else self.code.multiply(value, self.code.constant([*signs, 0, 0]))
 
-    def _constant(self, vector: int, row: int) -> Pair:
+    def constant(self, vector: int, row: int) -> Pair:
         """A, or B of a row from 1 on."""
         return self.pair(self.table, 16 * ((1 + self.layout.linear) * vector + row))
+
+    def gathered(self, total: Any) -> Any:
+        """The sums of products that the field needs."""
+        parts = [self._signed(self._gather(total, k), k) for k in range(4)]
+        return self.code.add(self.code.add(parts[0], parts[1]), self.code.add(parts[2], parts[3]))
+
+    def divisor(self, n: Index) -> Pair:
+        """n + 1 and its inverse, doubles."""
+        base = self._table_row(n)
+        found = [self.code.spread(self.code.builder.load(self.code.address(base, k))) for k in range(2)]
+        return found[0], found[1]
 
     def _table_row(self, n: Index) -> Any:
         code = self.code
@@ -155,11 +182,11 @@ class Recurrence:
             high, low = (self._signed(self._gather(word, k), k) for word in total)
             parts.append((high, low))
         result = add(code, add(code, parts[0], parts[1]), add(code, parts[2], parts[3]))
-        result = multiply(code, self._constant(vector, 0), result)
+        result = multiply(code, self.constant(vector, 0), result)
         linear: Pair | None = None
         for k, lanes in enumerate(turned(self.system), 1):
             moved = tuple(code.shuffle(word, code.zero, lanes) for word in y)
-            term = multiply(code, self._constant(vector, k), (moved[0], moved[1]))
+            term = multiply(code, self.constant(vector, k), (moved[0], moved[1]))
             linear = term if linear is None else add(code, linear, term)
         if linear is not None:
             result = add(code, result, linear)
@@ -200,7 +227,8 @@ class Recurrence:
 
     def plain_orders(self, low_order: Any, order: Any, last: list[Any]) -> None:
         """y_(n0+1) to y_N in plain doubles; each order has its own code, entered at n0 and left at N."""
-        b = self.code.builder
+        b, row = self.code.builder, self.row(low_order)
+        sides = [self.code.load(row, place) for place in (0, *map(self.layout.left, self.vectors))]
         after = b.append_basic_block("summed")
         switch, before = b.switch(low_order, after), b.block
         entry, incoming = before, None
@@ -208,29 +236,33 @@ class Recurrence:
         for n, block in blocks.items():
             switch.add_case(self.code.integer(n), block)
             b.position_at_end(block)
-            y = [b.phi(value.type) for value in last]
-            for phi, value in zip(y, last, strict=True):
+            known = [b.phi(value.type) for value in (*sides, *last)]
+            for phi, value in zip(known, (*sides, *last), strict=True):
                 phi.add_incoming(value, entry)
             if incoming is not None:
-                for phi, value in zip(y, incoming, strict=True):
+                for phi, value in zip(known, incoming, strict=True):
                     phi.add_incoming(value, before)
-            incoming, before = self._plain_order(n, y), block
+            incoming, before = self._plain_order(n, known), block
             following = blocks.get(n + 1, after)
             b.cbranch(b.icmp_signed("==", order, self.code.integer(n + 1)), after, following)
         b.position_at_end(after)
 
-    def _plain_order(self, n: int, y: list[Any]) -> list[Any]:
-        """y_(n+1), with four sums side by side; the products of y_n come last."""
+    def _plain_order(self, n: int, known: list[Any]) -> list[Any]:
+        """R, each L and each y of order n + 1 from those of n, with four sums side by side.
+
+        The products of y_n come last, and do not wait until it is stored.
+        """
         code, width = self.code, len(self.vectors)
+        right, left, y = known[0], known[1 : 1 + width], known[1 + width :]
         sums = [code.zero] * (4 * width)
         for m in range(1, n):
             at = width * (m % 4)
             sums[at : at + width] = self._accumulate(m, n - m, sums[at : at + width])
+        first = self.row(0)
         totals = [
             code.add(code.add(sums[v], sums[width + v]), code.add(sums[2 * width + v], sums[3 * width + v]))
             for v in self.vectors
         ]
-        totals = self._accumulate(n, 0, self._accumulate(0, n, totals))
-        following = [self._next(n, v, totals[v], y[v]) for v in self.vectors]
-        self._put_plain(n + 1, following)
-        return following
+        totals = [code.fma(code.load(first, self.layout.left(v)), right, totals[v]) for v in self.vectors]
+        totals = [code.fma(left[v], code.load(first, 0), totals[v]) for v in self.vectors]
+        return self._put_plain(n + 1, [self._next(n, v, totals[v], y[v]) for v in self.vectors])

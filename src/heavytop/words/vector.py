@@ -84,7 +84,11 @@ class Code:
     def finite(self, a: Any) -> Any:
         """Whether every lane is a finite number, a bit."""
         below = self.builder.fcmp_ordered("<", self.absolute(a), self.constant(_INFINITY))
-        mask = self.builder.bitcast(below, ir.IntType(LANES))
+        return self.all_of(below)
+
+    def all_of(self, bits: Any) -> Any:
+        """Whether eight bits are set, a bit."""
+        mask = self.builder.bitcast(bits, ir.IntType(LANES))
         return self.builder.icmp_unsigned("==", mask, ir.Constant(ir.IntType(LANES), (1 << LANES) - 1))
 
     def any_bit(self, a: Any) -> Any:

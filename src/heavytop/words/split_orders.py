@@ -1,0 +1,254 @@
+"""Taylor orders between those in double-double and those in plain doubles: coefficients split in two.
+
+y_m = a + b, where a is a multiple of a unit 2^e_m and |y_m| < 2^20 units, and b a double of half a unit at most.  e_m is
+linear in m but for its rounding, so that the products of series that make S_n have a common unit: products and sums of a
+are exact in plain doubles, up to 60 orders and the four summands of the field.  With L = a + b and R likewise,
+
+    S_n = Σ a_m a_(n−m) + Σ (a_m b_(n−m) + b_m R_(n−m)),
+
+three operations a product instead of the ten of double-double, and an error of 2^-72 of the largest products: enough
+where y_n h^n lies as far below the state as that is above what is asked.
+
+The units follow the motion from step to step.  A step whose coefficients exceed them, or use a few bits of them only,
+is done again with others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from llvmlite import ir
+
+from heavytop.words.lanes import LEFT, RIGHT, turned
+from heavytop.words.pairs import log2
+from heavytop.words.recurrence import Recurrence
+from heavytop.words.vector import DOUBLE, INT, INT_VECTOR, LANES, Code, Index, Pair
+
+UNIT_BITS = 20
+"""|y_m| is below 2^20 units: L and R below 2^21, 61 products of them in units of which rounding e_m may lose one bit,
+and four sums of those, 2^52 at most."""
+SLOPE_BITS = 16
+"""e_m = e_0 + m slope, the slope in units of 2^-16."""
+_MOST_UNIT_BITS, _STEEPEST = 400, 8
+"""|e_0| and |slope| at most."""
+_SPARSE, _ROOM = 2.0**-6, 8.0
+_SLACK, _TOLERATED = 0.25, 0.375
+_FRACTION_BITS, _BIAS = 52, 1023
+_EXPONENT = ((1 << 11) - 1) << _FRACTION_BITS
+# the bits of 1.5 · 2^52 units and of the inverse of 2^20 units add to this
+_SCALES = (2 * _BIAS + _FRACTION_BITS - UNIT_BITS << _FRACTION_BITS) + (1 << (_FRACTION_BITS - 1))
+FIRST_UNITS = 1.5 * 2.0 ** (_FRACTION_BITS - UNIT_BITS + 1)
+# Ω, γ
+_ROUND = ([1, 2, 0, 4, 5, 3, 6, 7], [2, 0, 1, 5, 3, 4, 6, 7])
+
+
+def splits(code: Code, units: list[Any], slope: Any) -> Any:
+    """Whether there are such units, a bit; units: 1.5 · 2^52 of them, lane by lane."""
+    b = code.builder
+    steepest = _STEEPEST << SLOPE_BITS
+    found = b.icmp_unsigned("<", b.add(slope, code.integer(steepest)), code.integer(2 * steepest))
+    for unit in units:
+        low, high = (code.constant(2.0 ** (_FRACTION_BITS + sign * _MOST_UNIT_BITS)) for sign in (-1, 1))
+        found = b.and_(found, code.all_of(b.fcmp_ordered(">", unit, low)))
+        found = b.and_(found, code.all_of(b.fcmp_ordered("<", unit, high)))
+    return found
+
+
+def first_split(code: Code, units: list[Any], slope: Any, reach: Any, depth: Any) -> Any:
+    """The order from which split coefficients are exact enough, an integer.
+
+    depth: log2 of the state and how many bits below it the products of the units of Ω and the largest may be.
+    """
+    b = code.builder
+    lanes = [(units[0], 0), *((unit, 3) for unit in units)]
+    found = [b.bitcast(b.extract_element(unit, ir.Constant(ir.IntType(32), lane)), INT) for unit, lane in lanes]
+    largest = found[0]
+    for bits in found[1:]:
+        largest = b.select(b.icmp_signed(">", bits, largest), bits, largest)
+    both = b.add(b.lshr(found[0], code.integer(_FRACTION_BITS)), b.lshr(largest, code.integer(_FRACTION_BITS)))
+    units_bits = b.fsub(b.sitofp(both, DOUBLE), ir.Constant(DOUBLE, 2.0 * (_BIAS + _FRACTION_BITS)))
+    length = b.fsub(reach, b.fmul(b.sitofp(slope, DOUBLE), ir.Constant(DOUBLE, 2.0**-SLOPE_BITS)))
+    fall = b.fsub(ir.Constant(DOUBLE, -_SLACK), reach)
+    orders = b.fdiv(b.fsub(b.fadd(units_bits, length), depth), fall)
+    least = ir.Constant(DOUBLE, 1.0)
+    bounded = b.select(b.fcmp_ordered(">", orders, least), orders, least)
+    most = ir.Constant(DOUBLE, 1000.0)
+    return b.fptosi(b.select(b.fcmp_ordered("<", bounded, most), bounded, most), INT)
+
+
+def judged(code: Code, units: list[Any], largest: list[Any]) -> tuple[Any, list[Any]]:
+    """Whether the units of a step were good, a bit, and those of the next.
+
+    largest: |y_m| 2^(e_0 - e_m), lane by lane.
+    """
+    b = code.builder
+    good, following = ir.Constant(ir.IntType(1), 1), []
+    for unit, lanewise in zip(units, largest, strict=True):
+        peak = lanewise
+        for lanes in _ROUND:
+            peak = code.larger(peak, code.shuffle(lanewise, code.zero, lanes))
+        # 2^20 units of y_0, and its inverse
+        inverse = b.sub(_all(_SCALES), b.bitcast(unit, INT_VECTOR))
+        peak = code.multiply(peak, b.bitcast(inverse, peak.type))
+        nothing = b.fcmp_ordered("==", peak, code.zero)
+        fits = b.and_(
+            b.fcmp_ordered("<=", peak, code.constant(1.0)), b.fcmp_ordered(">=", peak, code.constant(_SPARSE))
+        )
+        good = b.and_(good, code.all_of(b.or_(nothing, fits)))
+        power = b.bitcast(b.and_(b.bitcast(peak, INT_VECTOR), _all(_EXPONENT)), peak.type)
+        factor = b.select(nothing, code.constant(1.0), code.multiply(power, code.constant(_ROOM)))
+        following.append(code.multiply(unit, factor))
+    return good, following
+
+
+def near(code: Code, slope: Any, asked: Any) -> Any:
+    """Whether units that rise with ``slope`` are fine enough where ``asked`` is wanted, a bit."""
+    b = code.builder
+    return b.icmp_signed("<", b.sub(slope, asked), code.integer(int(_TOLERATED * 2**SLOPE_BITS)))
+
+
+def slope_of(code: Code, reach: Any, length: Any) -> Any:
+    """The slope that goes with a step of this length: log2 of the inverse radius of convergence, and a little more."""
+    b = code.builder
+    value = b.fadd(b.fsub(reach, log2(code, length)), ir.Constant(DOUBLE, _SLACK + 2.0 * _BIAS))
+    scaled = b.fptosi(b.fmul(value, ir.Constant(DOUBLE, 2.0**SLOPE_BITS)), INT)
+    return b.sub(scaled, code.integer(2 * _BIAS << SLOPE_BITS))
+
+
+@dataclass(frozen=True, slots=True)
+class SplitOrders:
+    """Writes the orders in split coefficients.
+
+    units: 1.5 · 2^52 units of y_0, lane by lane, for each vector.  zero_row: a row of zeros.
+    """
+
+    series: Recurrence
+    units: list[Any]
+    slope: Any
+    zero_row: Any
+
+    def begin(self, last: Any) -> list[Any]:
+        """Split y_0 to y_last; gives the largest |y_m| 2^(e_0 - e_m), lane by lane."""
+        series = self.series
+
+        def one(m: Any, largest: list[Any]) -> list[Any]:
+            row = series.row(m)
+            y = [series.pair(row, series.layout.value(v)) for v in series.vectors]
+            return self._put(m, y, largest)[-len(largest) :]
+
+        stop = series.code.builder.add(last, series.code.integer(1))
+        return series.code.loop(0, stop, one, [series.code.zero for _ in series.vectors])
+
+    def orders(self, start: Any, stop: Any, last: list[Any], largest: list[Any]) -> tuple[list[Any], list[Any]]:
+        """y_(start+1) to y_stop; gives the words of the last, and the largest |y_m| as :meth:`begin` does."""
+        code, series, width = self.series.code, self.series, len(self.series.vectors)
+
+        def order(n: Any, values: list[Any]) -> list[Any]:
+            words, sides = values[: 2 * width], values[2 * width : -width]
+            products = self._products(n, sides)
+            following = [self._next(n, v, sums, (words[2 * v], words[2 * v + 1])) for v, sums in enumerate(products)]
+            after = code.builder.add(n, code.integer(1))
+            row = series.row(after)
+            for v, pair in enumerate(following):
+                for word in range(2):
+                    code.store(pair[word], row, series.layout.value(v) + 8 * word)
+            return [*(word for pair in following for word in pair), *self._put(after, following, values[-width:])]
+
+        row = series.row(start)
+        sides = [code.load(row, place) for place in self._places]
+        values = code.loop(start, stop, order, [*last, *sides, *largest])
+        return values[: 2 * width], values[-width:]
+
+    @property
+    def _places(self) -> list[int]:
+        """Where R and its parts are in a row, and the parts of each L."""
+        lefts = (self.series.layout.left(v) for v in self.series.vectors)
+        return [0, 16, 24, *(place + k for place in lefts for k in (16, 24))]
+
+    def _rise(self, m: Any) -> Pair:
+        """2^(e_m - e_0) and its inverse."""
+        code, b = self.series.code, self.series.code.builder
+        half = code.integer(1 << (SLOPE_BITS - 1))
+        rise = b.ashr(b.add(b.mul(m, self.slope), half), code.integer(SLOPE_BITS))
+        shifts = [b.shl(b.add(code.integer(_BIAS), part), code.integer(_FRACTION_BITS)) for part in (rise, b.neg(rise))]
+        up, down = (code.spread(b.bitcast(shift, DOUBLE)) for shift in shifts)
+        return up, down
+
+    def _put(self, m: Any, y: list[Pair], largest: list[Any]) -> list[Any]:
+        """Split both sides of order m and store them; gives R and its parts, the parts of each L, and the largest |y|
+        2^(e_0 - e_m), this one with it.
+        """
+        code, series = self.series.code, self.series
+        row, sides, peaks = series.row(m), list[Any](), []
+        up, down = self._rise(m)
+        for v in series.vectors:
+            big = code.multiply(self.units[v], up)
+            peaks.append(code.larger(code.absolute(code.multiply(y[v][0], down)), largest[v]))
+            coarse = code.subtract(code.add(y[v][0], big), big)
+            parts = coarse, code.add(code.subtract(y[v][0], coarse), y[v][1])
+            right = [series.side(part, RIGHT) for part in parts] if v == 0 else []
+            left = [series.side(part, LEFT) for part in parts]
+            for part, place in ((right, 0), (left, series.layout.left(v))):
+                if part:
+                    sides += [code.add(*part), *part][place > 0 :]
+                    code.store(code.add(*part), row, place)
+                    for k, word in enumerate(part):
+                        code.store(word, row, place + 16 + 8 * k)
+        return sides + peaks
+
+    def _products(self, n: Any, sides: list[Any]) -> list[Pair]:
+        """Σ L_m R_(n−m) of each vector: the exact sums of the coarse parts, and the rest."""
+        code, b, width = self.series.code, self.series.code.builder, len(self.series.vectors)
+        one = code.integer(1)
+
+        def row(m: Index) -> list[Any]:
+            at = self.series.row(m)
+            return [code.load(at, place) for place in self._places]
+
+        def both(m: Any, sums: list[Any]) -> list[Any]:
+            one, other = row(m), row(b.sub(n, m))
+            return self._added(one, other, sums[: 3 * width]) + self._added(other, one, sums[3 * width :])
+
+        sums = code.loop(1, b.lshr(b.add(n, one), one), both, [code.zero] * (6 * width))
+        odd = b.icmp_unsigned("!=", b.and_(n, one), code.integer(0))
+        middle, start = row(b.select(odd, self.zero_row, b.lshr(n, one))), row(0)
+        first, second = self._added(middle, middle, sums[: 3 * width]), sums[3 * width :]
+        first, second = self._added(start, sides, first), self._added(sides, start, second)
+        total = [code.add(x, y) for x, y in zip(first, second, strict=True)]
+        return [(total[3 * v], code.add(total[3 * v + 1], total[3 * v + 2])) for v in self.series.vectors]
+
+    def _added(self, one: list[Any], other: list[Any], sums: list[Any]) -> list[Any]:
+        """Three sums of each vector, with the products of L of one order and R of another."""
+        whole, coarse, fine = other[:3]
+        found = []
+        for v in self.series.vectors:
+            a, rest = one[3 + 2 * v : 5 + 2 * v]
+            for left, right, total in zip((a, a, rest), (coarse, fine, whole), sums[3 * v : 3 * v + 3], strict=True):
+                found.append(self.series.code.fma(left, right, total))
+        return found
+
+    def _next(self, n: Any, vector: int, sums: Pair, y: Pair) -> Pair:
+        """y_(n+1) = (A ∘ gathered S_n + Σ B ∘ permuted y_n)/(n + 1)."""
+        code, series = self.series.code, self.series
+        factors = [(series.constant(vector, 0), (series.gathered(sums[0]), series.gathered(sums[1])))]
+        for k, lanes in enumerate(turned(series.system), 1):
+            moved = [code.shuffle(word, code.zero, lanes) for word in y]
+            factors.append((series.constant(vector, k), (moved[0], moved[1])))
+        high, low = code.zero, code.zero
+        for index, (constant, factor) in enumerate(factors):
+            product, error = code.two_product(constant[0], factor[0])
+            rest = code.fma(constant[0], factor[1], code.fma(constant[1], factor[0], error))
+            if index == 0:
+                high, low = product, rest
+            else:
+                high, lost = code.two_sum(high, product)
+                low = code.add(low, code.add(rest, lost))
+        after, inverse = series.divisor(n)
+        quotient = code.multiply(high, inverse)
+        rest = code.add(code.fma(code.negative(quotient), after, high), low)
+        return code.quick_two_sum(quotient, code.multiply(rest, inverse))
+
+
+def _all(value: int) -> Any:
+    return ir.Constant(INT_VECTOR, [ir.Constant(INT, value)] * LANES)
