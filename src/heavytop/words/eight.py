@@ -14,6 +14,7 @@ from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
 from heavytop.words.pairs import split
 from heavytop.words.run import Status, Steps
 from heavytop.words.scaled import Scaled
+from heavytop.words.split_orders import FIRST_UNITS
 from heavytop.words.vector import LANES
 
 _NO_LIMIT = 2.0**53
@@ -32,6 +33,7 @@ class Eight:
     def __init__(self, system: System, ladder: Ladder, low_order: int, processor: Processor | None = None) -> None:
         self.functions = machine(system, processor).functions
         self.ladder, self.low_order = ladder, min(low_order, ladder.order - 1)
+        self.pair_order = min(self.low_order, ladder.pair_order(self.low_order))
         self.terms = steps.terms(system)
         self.words, self.clock = doubles(12 * LANES), doubles(steps.CLOCK * LANES)
         self.flags = numpy.zeros(LANES, numpy.int64)
@@ -42,6 +44,7 @@ class Eight:
         self.signs = [1] * LANES
         self._set(steps.ROOM, [ladder.room] * LANES)
         self._set(steps.REACH, [ladder.reach] * LANES)
+        self._set(steps.DEPTH, [ladder.depth] * LANES)
 
     def _set(self, vector: int, values: Any) -> None:
         self.clock[LANES * vector : LANES * (vector + 1)] = values
@@ -57,6 +60,7 @@ class Eight:
         self.flags[lane] = steps.FINE
         self.signs[lane] = 1 if forwards else -1
         values = {steps.TIME: 0.0, steps.TIME + 1: 0.0, steps.SIGN: float(self.signs[lane])}
+        values |= {steps.UNITS: FIRST_UNITS, steps.UNITS + 1: FIRST_UNITS, steps.SLOPE: 0.0, steps.TRIES: 0.0}
         for vector, word in (values | {steps.LEFT: _NO_LIMIT if most is None else float(most)}).items():
             self.clock[LANES * vector + lane] = word
 
@@ -68,6 +72,7 @@ class Eight:
         """A motion that was taken out of another eight."""
         self.put(lane, problem, forwards, None)
         self.words[lane::LANES], self.clock[lane::LANES] = moved
+        self.clock[LANES * steps.TRIES + lane] = 0.0
 
     def empty(self, lane: int) -> None:
         """Nothing in this lane: it takes no steps."""
@@ -83,7 +88,8 @@ class Eight:
         """Steps of all lanes that can go, at most so many; gives the rounds after which none could."""
         arrays = [pointer(array) for array in (self.words, self.clock, self.flags)]
         tables = [pointer(array) for array in (self.constants, self.quotients, self.scratch)]
-        taken: int = self.functions["advance"](*arrays, self.ladder.order, self.low_order, *tables, rounds)
+        orders = self.ladder.order, self.low_order, self.pair_order
+        taken: int = self.functions["advance"](*arrays, *orders, *tables, rounds)
         return taken
 
     def time(self, lane: int) -> Fraction:

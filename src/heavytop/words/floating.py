@@ -11,19 +11,20 @@ import numpy
 from heavytop.words import double_double as dd
 from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
 from heavytop.words.pairs import split
-from heavytop.words.recurrence import LEAST_LOW_ORDER, Layout
+from heavytop.words.recurrence import LEAST_LOW_ORDER, MOST_ORDER, Layout
 from heavytop.words.run import Run, Status
 from heavytop.words.scaled import Scaled
-from heavytop.words.split_orders import FIRST_UNITS
+from heavytop.words.split_orders import FIRST_UNITS, SLACK
 
 BITS = 106
-FALL_ALONE, FALL_IN_LANES = 1.45, 2.0
+FALL_ALONE, FALL_IN_LANES = 1.3, 1.6
 _MARGIN = 7.0
 _DEEPEST = 84.0
 _DOUBLE_BITS = 53
 _ROUNDING_BITS = 4
-_LEAST_ROOM = -66.0
+_LEAST_ROOM, _LEAST_DEPTH = -66.0, -112.0
 _SPLIT_BITS = 32
+_USUAL = -34.0
 LARGEST_TIME = Fraction(2) ** 1000
 
 
@@ -52,10 +53,21 @@ class Ladder:
         # what is left out errs in the same way at every step: it shall not show beside roundings after 10^7 steps
         finest = tolerance <= Fraction(1, 2 ** (BITS - 1))
         depth = _DEEPEST if finest else _MARGIN - log_tolerance
-        order = math.ceil(depth / fall)
+        order = min(math.ceil(depth / fall), MOST_ORDER - 2)
         reach = -(depth / order + 0.7 / (order - 1)) / math.log(2)
         room = max(_DOUBLE_BITS - depth / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM)
-        return cls(order, reach, room, room - _DOUBLE_BITS + _SPLIT_BITS)
+        return cls(order, reach, room, max(room - _DOUBLE_BITS, _LEAST_DEPTH) + _SPLIT_BITS)
+
+    def pair_order(self, low_order: int) -> int:
+        """The first order in split coefficients of eight motions, whose n0 is the same.
+
+        Where coefficients fall as those of a motion near a singularity, and larger where n0 is.
+        """
+        if low_order >= self.order - 1:
+            return low_order
+        first = math.ceil(self.room / self.reach)
+        usual = math.ceil((_USUAL - self.depth) / -(self.reach + SLACK))
+        return max(1, usual + (low_order - first) // 2)
 
 
 machine = once(dd.build)

@@ -30,15 +30,28 @@ from heavytop.words.pairs import (
     step_length,
     times,
 )
+from heavytop.words.split_orders import (
+    LOG2_OF_A_UNIT,
+    SLACK,
+    STEEPEST,
+    TOLERATED_SLOPE,
+    in_range,
+    next_unit,
+    parts,
+    quotient,
+    rises,
+)
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER, Pair, function
 
 FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
 """Flags of a lane."""
-TIME, TARGET, SIGN, LEFT, ROOM, REACH, CLOCK = 0, 2, 4, 5, 6, 7, 8
-"""Vectors of the clock: |time| and its target, two words each; direction, steps left, room and reach."""
+TIME, TARGET, SIGN, LEFT, ROOM, REACH, DEPTH, UNITS, SLOPE, TRIES, CLOCK = 0, 2, 4, 5, 6, 7, 8, 9, 11, 12, 13
+"""Vectors of the clock: |time| and its target, two words each; direction, steps left, room, reach and depth; units of
+split coefficients, of Ω and of γ, their slope, and how often the next step was tried."""
 _TOLERATED = 1.0
-ROW = 96
-"""Doubles of one order: two words of six components."""
+_MOST_TRIES = 3.0
+ROW = 192
+"""Doubles of one order: two words of six components, then their two parts."""
 
 # (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
 _PRODUCTS = (
@@ -60,7 +73,7 @@ def terms(system: System) -> list[tuple[int, int, int]]:
 def build(system: System, processor: Processor | None = None) -> Machine:
     """``advance`` and ``sample`` of eight motions.
 
-    advance(state, clock, flags, order, low_order, coefficients, quotients, scratch, steps): as many rounds of steps at
+    advance(state, clock, flags, order, low_order, pair_order, coefficients, quotients, scratch, steps): as many rounds of steps at
     most, until no lane can go; gives the number of rounds.
     sample(scratch, order, times, result): each lane's polynomial at its own time, in two words, behind its beginning.
     """
@@ -69,7 +82,7 @@ def build(system: System, processor: Processor | None = None) -> Machine:
     _write_sample(module)
     integer = ctypes.c_int64
     signatures: dict[str, tuple[Any, Sequence[Any]]] = {
-        "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, integer, integer, DOUBLES, DOUBLES, DOUBLES, integer]),
+        "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, *[integer] * 3, DOUBLES, DOUBLES, DOUBLES, integer]),
         "sample": (None, [DOUBLES, integer, DOUBLES, DOUBLES]),
     }
     return compiled(module, signatures, processor)
@@ -94,10 +107,10 @@ class _Round:
     """Writes ``advance``."""
 
     def __init__(self, module: ir.Module, system: System) -> None:
-        arguments = [POINTER, POINTER, INT_POINTER, INT, INT, POINTER, POINTER, POINTER, INT]
+        arguments = [POINTER, POINTER, INT_POINTER, INT, INT, INT, POINTER, POINTER, POINTER, INT]
         made, self.code = function(module, "advance", INT, arguments)
-        self.state, self.clock, self.flags, self.order, self.low_order = made.args[:5]
-        self.coefficients, self.quotients, self.scratch, self.most = made.args[5:]
+        self.state, self.clock, self.flags, self.order, self.low_order, self.pair_order = made.args[:6]
+        self.coefficients, self.quotients, self.scratch, self.most = made.args[6:]
         self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
 
     def _row(self, n: Any) -> Any:
@@ -129,9 +142,13 @@ class _Round:
         first = self._row(0)
         for i in range(12):
             code.store(code.load(self.state, 8 * i), first, 8 * i)
-        code.loop(0, self.low_order, self._pair_order, [])
+        code.loop(0, self.pair_order, self._pair_order, [])
+        splitting = b.icmp_signed("<", self.pair_order, self.low_order)
+        stop = b.select(splitting, b.add(self.pair_order, code.integer(1)), code.integer(0))
+        peaks = code.loop(0, stop, self._split_row, [code.zero] * 2)
+        peaks = code.loop(self.pair_order, self.low_order, self._split_order, peaks)
         code.loop(self.low_order, self.order, self._plain_order, [])
-        some = self._finish()
+        some = self._finish(peaks, splitting)
         taken.add_incoming(b.add(taken, code.integer(1)), b.block)
         b.cbranch(some, head, out)
         b.position_at_end(out)
@@ -169,6 +186,61 @@ class _Round:
             at = 2 * (component % 3)
             total = (found[at], found[at + 1])
             found[at : at + 2] = accumulated(code, total, (a, a_low), (c, c_low))
+        return found
+
+    def _clock(self, place: int) -> Any:
+        return self.code.load(self.clock, 8 * place)
+
+    def _split_row(self, m: Any, peaks: list[Any]) -> list[Any]:
+        """Split y_m; the largest |y_m| 2^(e_0 - e_m) of Ω and of γ, this one with it."""
+        row = self._row(m)
+        return self._put_parts(m, [self._pair(row, i) for i in range(6)], peaks)
+
+    def _put_parts(self, m: Any, y: list[Pair], peaks: list[Any]) -> list[Any]:
+        code, row, found = self.code, self._row(m), list(peaks)
+        up, down = rises(code, m, self._clock(SLOPE))
+        for i, (high, low) in enumerate(y):
+            coarse, fine = parts(code, (high, low), code.multiply(self._clock(UNITS + i // 3), up))
+            found[i // 3] = code.larger(code.absolute(code.multiply(high, down)), found[i // 3])
+            code.store(coarse, row, 96 + 16 * i)
+            code.store(fine, row, 104 + 16 * i)
+        return found
+
+    def _split_order(self, n: Any, peaks: list[Any]) -> list[Any]:
+        """y_(n+1) from split coefficients."""
+        code, b = self.code, self.code.builder
+        sums: list[Pair] = []
+        for rows in ((0, 1, 2), (3, 4, 5)):
+            group = [product for product in _PRODUCTS if product[2] in rows]
+            words = code.loop(0, b.add(n, code.integer(1)), partial(self._split_products, n, group), [code.zero] * 9)
+            sums += [(words[3 * i], code.add(words[3 * i + 1], words[3 * i + 2])) for i in range(3)]
+        y, following = self._row(n), self._row(b.add(n, code.integer(1)))
+        divisor = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE)), self._quotient(n)[0]
+        found = []
+        for i in range(6):
+            factors = [(self._coefficient(i), sums[i])] if i < 3 else []
+            for k, component, source in self.terms:
+                if component == i:
+                    factors.append((self._coefficient(k), self._pair(y, source)))
+            first = None if i < 3 else sums[i]
+            pair = quotient(code, first, factors, divisor)
+            for word in range(2):
+                code.store(pair[word], following, 16 * i + 8 * word)
+            found.append(pair)
+        return self._put_parts(b.add(n, code.integer(1)), found, peaks)
+
+    def _split_products(self, n: Any, group: list[Any], m: Any, sums: list[Any]) -> list[Any]:
+        code, left, right = self.code, self._row(m), self._row(self.code.builder.sub(n, m))
+        found = list(sums)
+        for first, second, component, sign in group:
+            a, rest = (code.load(left, 96 + 16 * first + 8 * k) for k in range(2))
+            coarse, fine = (code.load(right, 96 + 16 * second + 8 * k) for k in range(2))
+            if sign < 0:
+                a, rest = code.negative(a), code.negative(rest)
+            at = 3 * (component % 3)
+            whole = code.load(right, 16 * second)
+            for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, whole))):
+                found[at + k] = code.fma(one, factor, found[at + k])
         return found
 
     def _plain_order(self, n: Any, _: list[Any]) -> None:
@@ -227,8 +299,8 @@ class _Round:
         words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, [total[0], code.zero])
         return code.quick_two_sum(words[0], words[1])
 
-    def _finish(self) -> Any:
-        """Move the lanes that can go; whether any did."""
+    def _finish(self, peaks: list[Any], splitting: Any) -> Any:
+        """Move the lanes that can go; whether any did, or has to try again."""
         code, b = self.code, self.code.builder
         start = self._norm(code.integer(0))
         length = self._length(start)
@@ -238,18 +310,55 @@ class _Round:
         total, rest = later(code, (time, low), length)
         target, target_low = (code.load(self.clock, 8 * (TARGET + k)) for k in range(2))
         behind = covered(code, (total, rest), (target, target_low))
-        flags = self._judged(start, length, results, b.fcmp_ordered(">", total, time))
+        fits, tried_out = self._fits(peaks, splitting, start, length)
+        flags = self._judged(start, length, results, b.fcmp_ordered(">", total, time), tried_out)
         fine = b.icmp_signed("==", flags, ir.Constant(INT_VECTOR, [0] * 8))
         left = code.load(self.clock, 8 * LEFT)
-        going = b.and_(b.and_(fine, b.not_(behind)), b.fcmp_ordered(">", left, code.zero))
+        alive = b.and_(fine, b.fcmp_ordered(">", left, code.zero))
+        going, again = b.and_(alive, b.and_(fits, b.not_(behind))), b.and_(alive, b.not_(fits))
         old = [(self.state, 16 * i + 8 * word, results[i][word]) for i in range(6) for word in range(2)]
         old += [(self.clock, 8 * TIME, total), (self.clock, 8 * (TIME + 1), rest)]
         old += [(self.clock, 8 * LEFT, b.fsub(left, code.constant(1.0)))]
         for base, place, value in old:
             code.store(b.select(going, value, code.load(base, place)), base, place)
-        return b.icmp_unsigned("!=", b.bitcast(going, ir.IntType(8)), ir.Constant(ir.IntType(8), 0))
+        self._follow(peaks, length, going, again)
+        moved = b.bitcast(b.or_(going, again), ir.IntType(8))
+        return b.icmp_unsigned("!=", moved, ir.Constant(ir.IntType(8), 0))
 
-    def _judged(self, start: Any, length: Any, results: list[Pair], moves: Any) -> Any:
+    def _fits(self, peaks: list[Any], splitting: Any, start: Any, length: Any) -> tuple[Any, Any]:
+        """Lanes whose split coefficients were exact enough, and those that were tried often enough."""
+        code, b = self.code, self.code.builder
+        units = [self._clock(UNITS + k) for k in range(2)]
+        slope = self._clock(SLOPE)
+        fits = b.fcmp_ordered("<", b.fsub(slope, self._slope(length)), code.constant(TOLERATED_SLOPE))
+        fits = b.and_(fits, b.fcmp_ordered("<=", code.absolute(slope), code.constant(STEEPEST)))
+        for unit, peak in zip(units, peaks, strict=True):
+            fits = b.and_(fits, b.and_(in_range(code, unit), next_unit(code, unit, peak)[0]))
+        both = b.fadd(log2(code, units[0]), log2(code, code.larger(*units)))
+        above = b.fadd(b.fsub(both, code.constant(2 * LOG2_OF_A_UNIT)), b.fsub(log2(code, length), start))
+        fall = b.fsub(code.constant(-SLACK), self._clock(REACH))
+        most = b.fmul(code.spread(b.sitofp(self.pair_order, DOUBLE)), fall)
+        fits = b.and_(fits, b.fcmp_ordered("<=", b.fsub(above, self._clock(DEPTH)), most))
+        none = ir.Constant(ir.VectorType(ir.IntType(1), 8), [0] * 8)
+        all_of_them = ir.Constant(ir.VectorType(ir.IntType(1), 8), [1] * 8)
+        fits = b.select(splitting, fits, all_of_them)
+        tried = b.fcmp_ordered(">=", self._clock(TRIES), code.constant(_MOST_TRIES))
+        return fits, b.select(splitting, b.and_(tried, b.not_(fits)), none)
+
+    def _slope(self, length: Any) -> Any:
+        b = self.code.builder
+        return b.fadd(b.fsub(self._clock(REACH), log2(self.code, length)), self.code.constant(SLACK))
+
+    def _follow(self, peaks: list[Any], length: Any, going: Any, again: Any) -> None:
+        """Units for the next step; a lane that waits keeps its own, so that its series stays what it is."""
+        code, b = self.code, self.code.builder
+        either = b.or_(going, again)
+        tries = b.select(again, b.fadd(self._clock(TRIES), code.constant(1.0)), code.zero)
+        values = [next_unit(code, self._clock(UNITS + k), peak)[1] for k, peak in enumerate(peaks)]
+        for place, value in zip((UNITS, UNITS + 1, SLOPE, TRIES), (*values, self._slope(length), tries), strict=True):
+            code.store(b.select(either, value, self._clock(place)), self.clock, 8 * place)
+
+    def _judged(self, start: Any, length: Any, results: list[Pair], moves: Any, tried: Any) -> Any:
         """The flags of all lanes, with those that this step sets; a lane without steps left gets none."""
         code, b = self.code, self.code.builder
         above = b.add(self.low_order, code.integer(1))
@@ -269,7 +378,7 @@ class _Round:
         known = b.load(place)
         known.align = 8
         found = b.or_(flag(b.not_(finite), NON_FINITE), flag(b.not_(moves), TOO_SMALL))
-        found = b.or_(found, flag(b.fcmp_ordered(">", rounding, limit), LARGER_N0))
+        found = b.or_(found, flag(b.or_(b.fcmp_ordered(">", rounding, limit), tried), LARGER_N0))
         alive = b.fcmp_ordered(">", code.load(self.clock, 8 * LEFT), code.zero)
         found = b.or_(known, b.select(alive, found, ir.Constant(INT_VECTOR, [0] * 8)))
         b.store(found, place).align = 8

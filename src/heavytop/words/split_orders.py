@@ -15,6 +15,7 @@ is done again with others.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,15 +31,16 @@ UNIT_BITS = 20
 and four sums of those, 2^52 at most."""
 SLOPE_BITS = 16
 """e_m = e_0 + m slope, the slope in units of 2^-16."""
-_MOST_UNIT_BITS, _STEEPEST = 400, 8
+_MOST_UNIT_BITS, STEEPEST = 400, 8
 """|e_0| and |slope| at most."""
 _SPARSE, _ROOM = 2.0**-6, 8.0
-_SLACK, _TOLERATED = 0.25, 0.375
+SLACK, TOLERATED_SLOPE = 0.25, 0.375
 _FRACTION_BITS, _BIAS = 52, 1023
 _EXPONENT = ((1 << 11) - 1) << _FRACTION_BITS
 # the bits of 1.5 · 2^52 units and of the inverse of 2^20 units add to this
 _SCALES = (2 * _BIAS + _FRACTION_BITS - UNIT_BITS << _FRACTION_BITS) + (1 << (_FRACTION_BITS - 1))
 FIRST_UNITS = 1.5 * 2.0 ** (_FRACTION_BITS - UNIT_BITS + 1)
+LOG2_OF_A_UNIT = math.log2(1.5) + _FRACTION_BITS
 # Ω, γ
 _ROUND = ([1, 2, 0, 4, 5, 3, 6, 7], [2, 0, 1, 5, 3, 4, 6, 7])
 
@@ -46,13 +48,68 @@ _ROUND = ([1, 2, 0, 4, 5, 3, 6, 7], [2, 0, 1, 5, 3, 4, 6, 7])
 def splits(code: Code, units: list[Any], slope: Any) -> Any:
     """Whether there are such units, a bit; units: 1.5 · 2^52 of them, lane by lane."""
     b = code.builder
-    steepest = _STEEPEST << SLOPE_BITS
+    steepest = STEEPEST << SLOPE_BITS
     found = b.icmp_unsigned("<", b.add(slope, code.integer(steepest)), code.integer(2 * steepest))
     for unit in units:
-        low, high = (code.constant(2.0 ** (_FRACTION_BITS + sign * _MOST_UNIT_BITS)) for sign in (-1, 1))
-        found = b.and_(found, code.all_of(b.fcmp_ordered(">", unit, low)))
-        found = b.and_(found, code.all_of(b.fcmp_ordered("<", unit, high)))
+        found = b.and_(found, code.all_of(in_range(code, unit)))
     return found
+
+
+def in_range(code: Code, unit: Any) -> Any:
+    """Whether 1.5 · 2^52 units are far from the ends of the exponents of doubles, lane by lane."""
+    low, high = (code.constant(2.0 ** (_FRACTION_BITS + sign * _MOST_UNIT_BITS)) for sign in (-1, 1))
+    return code.builder.and_(code.builder.fcmp_ordered(">", unit, low), code.builder.fcmp_ordered("<", unit, high))
+
+
+def next_unit(code: Code, unit: Any, peak: Any) -> tuple[Any, Any]:
+    """Whether the units of a step were good, and those of the next, lane by lane.
+
+    unit: 1.5 · 2^52 of them.  peak: the largest |y_m| 2^(e_0 - e_m).
+    """
+    b = code.builder
+    # the inverse of 2^20 units of y_0
+    inverse = b.sub(_all(_SCALES), b.bitcast(unit, INT_VECTOR))
+    used = code.multiply(peak, b.bitcast(inverse, peak.type))
+    nothing = b.fcmp_ordered("==", used, code.zero)
+    fits = b.and_(b.fcmp_ordered("<=", used, code.constant(1.0)), b.fcmp_ordered(">=", used, code.constant(_SPARSE)))
+    power = b.bitcast(b.and_(b.bitcast(used, INT_VECTOR), _all(_EXPONENT)), used.type)
+    factor = b.select(nothing, code.constant(1.0), code.multiply(power, code.constant(_ROOM)))
+    return b.or_(nothing, fits), code.multiply(unit, factor)
+
+
+def rises(code: Code, m: Any, slope: Any) -> Pair:
+    """2^(e_m - e_0) and its inverse, lane by lane, for slopes that are doubles."""
+    b = code.builder
+    rounded = code.fma(code.spread(b.sitofp(m, DOUBLE)), slope, code.constant(1.5 * 2.0**_FRACTION_BITS))
+    shift = b.shl(b.bitcast(rounded, INT_VECTOR), _all(_FRACTION_BITS))
+    one = _all(_BIAS << _FRACTION_BITS)
+    return b.bitcast(b.add(one, shift), slope.type), b.bitcast(b.sub(one, shift), slope.type)
+
+
+def parts(code: Code, y: Pair, big: Any) -> Pair:
+    """y as a multiple of a unit and the rest; big: 1.5 · 2^52 units."""
+    coarse = code.subtract(code.add(y[0], big), big)
+    return coarse, code.add(code.subtract(y[0], coarse), y[1])
+
+
+def quotient(code: Code, first: Pair | None, factors: list[tuple[Pair, Pair]], divisor: Pair) -> Pair:
+    """The sum of a pair and of products of a constant and a pair, over a whole number; in order.
+
+    divisor: the number and its inverse.
+    """
+    high, low = first or (None, None)
+    for constant, factor in factors:
+        product, error = code.two_product(constant[0], factor[0])
+        rest = code.fma(constant[0], factor[1], code.fma(constant[1], factor[0], error))
+        if high is None:
+            high, low = product, rest
+        else:
+            high, lost = code.two_sum(high, product)
+            low = code.add(low, code.add(rest, lost))
+    whole, inverse = divisor
+    found = code.multiply(high, inverse)
+    rest = code.add(code.fma(code.negative(found), whole, high), low)
+    return code.quick_two_sum(found, code.multiply(rest, inverse))
 
 
 def first_split(code: Code, units: list[Any], slope: Any, reach: Any, depth: Any) -> Any:
@@ -69,7 +126,7 @@ def first_split(code: Code, units: list[Any], slope: Any, reach: Any, depth: Any
     both = b.add(b.lshr(found[0], code.integer(_FRACTION_BITS)), b.lshr(largest, code.integer(_FRACTION_BITS)))
     units_bits = b.fsub(b.sitofp(both, DOUBLE), ir.Constant(DOUBLE, 2.0 * (_BIAS + _FRACTION_BITS)))
     length = b.fsub(reach, b.fmul(b.sitofp(slope, DOUBLE), ir.Constant(DOUBLE, 2.0**-SLOPE_BITS)))
-    fall = b.fsub(ir.Constant(DOUBLE, -_SLACK), reach)
+    fall = b.fsub(ir.Constant(DOUBLE, -SLACK), reach)
     orders = b.fdiv(b.fsub(b.fadd(units_bits, length), depth), fall)
     least = ir.Constant(DOUBLE, 1.0)
     bounded = b.select(b.fcmp_ordered(">", orders, least), orders, least)
@@ -88,30 +145,22 @@ def judged(code: Code, units: list[Any], largest: list[Any]) -> tuple[Any, list[
         peak = lanewise
         for lanes in _ROUND:
             peak = code.larger(peak, code.shuffle(lanewise, code.zero, lanes))
-        # 2^20 units of y_0, and its inverse
-        inverse = b.sub(_all(_SCALES), b.bitcast(unit, INT_VECTOR))
-        peak = code.multiply(peak, b.bitcast(inverse, peak.type))
-        nothing = b.fcmp_ordered("==", peak, code.zero)
-        fits = b.and_(
-            b.fcmp_ordered("<=", peak, code.constant(1.0)), b.fcmp_ordered(">=", peak, code.constant(_SPARSE))
-        )
-        good = b.and_(good, code.all_of(b.or_(nothing, fits)))
-        power = b.bitcast(b.and_(b.bitcast(peak, INT_VECTOR), _all(_EXPONENT)), peak.type)
-        factor = b.select(nothing, code.constant(1.0), code.multiply(power, code.constant(_ROOM)))
-        following.append(code.multiply(unit, factor))
+        fits, after = next_unit(code, unit, peak)
+        good = b.and_(good, code.all_of(fits))
+        following.append(after)
     return good, following
 
 
 def near(code: Code, slope: Any, asked: Any) -> Any:
     """Whether units that rise with ``slope`` are fine enough where ``asked`` is wanted, a bit."""
     b = code.builder
-    return b.icmp_signed("<", b.sub(slope, asked), code.integer(int(_TOLERATED * 2**SLOPE_BITS)))
+    return b.icmp_signed("<", b.sub(slope, asked), code.integer(int(TOLERATED_SLOPE * 2**SLOPE_BITS)))
 
 
 def slope_of(code: Code, reach: Any, length: Any) -> Any:
     """The slope that goes with a step of this length: log2 of the inverse radius of convergence, and a little more."""
     b = code.builder
-    value = b.fadd(b.fsub(reach, log2(code, length)), ir.Constant(DOUBLE, _SLACK + 2.0 * _BIAS))
+    value = b.fadd(b.fsub(reach, log2(code, length)), ir.Constant(DOUBLE, SLACK + 2.0 * _BIAS))
     scaled = b.fptosi(b.fmul(value, ir.Constant(DOUBLE, 2.0**SLOPE_BITS)), INT)
     return b.sub(scaled, code.integer(2 * _BIAS << SLOPE_BITS))
 
@@ -185,10 +234,9 @@ class SplitOrders:
         for v in series.vectors:
             big = code.multiply(self.units[v], up)
             peaks.append(code.larger(code.absolute(code.multiply(y[v][0], down)), largest[v]))
-            coarse = code.subtract(code.add(y[v][0], big), big)
-            parts = coarse, code.add(code.subtract(y[v][0], coarse), y[v][1])
-            right = [series.side(part, RIGHT) for part in parts] if v == 0 else []
-            left = [series.side(part, LEFT) for part in parts]
+            split = parts(code, y[v], big)
+            right = [series.side(part, RIGHT) for part in split] if v == 0 else []
+            left = [series.side(part, LEFT) for part in split]
             for part, place in ((right, 0), (left, series.layout.left(v))):
                 if part:
                     sides += [code.add(*part), *part][place > 0 :]
@@ -235,19 +283,7 @@ class SplitOrders:
         for k, lanes in enumerate(turned(series.system), 1):
             moved = [code.shuffle(word, code.zero, lanes) for word in y]
             factors.append((series.constant(vector, k), (moved[0], moved[1])))
-        high, low = code.zero, code.zero
-        for index, (constant, factor) in enumerate(factors):
-            product, error = code.two_product(constant[0], factor[0])
-            rest = code.fma(constant[0], factor[1], code.fma(constant[1], factor[0], error))
-            if index == 0:
-                high, low = product, rest
-            else:
-                high, lost = code.two_sum(high, product)
-                low = code.add(low, code.add(rest, lost))
-        after, inverse = series.divisor(n)
-        quotient = code.multiply(high, inverse)
-        rest = code.add(code.fma(code.negative(quotient), after, high), low)
-        return code.quick_two_sum(quotient, code.multiply(rest, inverse))
+        return quotient(code, None, factors, series.divisor(n))
 
 
 def _all(value: int) -> Any:
