@@ -23,7 +23,7 @@ from heavytop.words.scaled import Scaled
 from heavytop.words.whole import Whole
 
 LOOSEST = Fraction(1, 10**6)
-_SPARE_BITS, _SPARE_BITS_OF_DOUBLE = 5, 17
+_SPARE_BITS, _SPARE_BITS_OF_DOUBLE = 6, 17
 """Of the formats that double-double exceeds: a long run adds its local errors up, and the sum shall stay below half an
 eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
 _GUARD_BITS = 8

@@ -17,7 +17,7 @@ from heavytop.words.scaled import Scaled
 from heavytop.words.split_orders import FIRST_UNITS, SLACK
 
 BITS = 106
-FALL_ALONE, FALL_IN_LANES = 1.3, 1.6
+FALL_ALONE, FALL_IN_LANES = 1.45, 1.6
 _MARGIN = 7.0
 _DEEPEST = 84.0
 _DOUBLE_BITS = 53

@@ -18,6 +18,8 @@ MOST_ORDER = 60
 """n0 is at least the one, N at most the other."""
 _NONE = 8
 """A lane of the second operand of a shuffle, which is 0."""
+SIGNS = tuple((*(sign for _, sign in part), 0, 0) for part in GATHERED)
+"""Of the four summands of the products, lane by lane; 0 where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,17 +149,22 @@ class Recurrence:
         return self.code.shuffle(word, self.code.zero, [*lanes, _NONE, _NONE])
 
     def _signed(self, value: Any, part: int) -> Any:
-        signs = [sign for _, sign in GATHERED[part]]
-        return value if min(signs) >= 0 else self.code.multiply(value, self.code.constant([*signs, 0, 0]))
+        return value if min(SIGNS[part]) >= 0 else self.code.multiply(value, self.code.constant(SIGNS[part]))
+
+    def _anywhere(self, word: Any, part: int) -> Any:
+        """One of the four summands, and any number where there is none."""
+        return self.code.shuffle(word, word, [*(lane for lane, _ in GATHERED[part]), 0, 0])
 
     def constant(self, vector: int, row: int) -> Pair:
         """A, or B of a row from 1 on."""
         return self.pair(self.table, 16 * ((1 + self.layout.linear) * vector + row))
 
     def gathered(self, total: Any) -> Any:
-        """The sums of products that the field needs."""
-        parts = [self._signed(self._gather(total, k), k) for k in range(4)]
-        return self.code.add(self.code.add(parts[0], parts[1]), self.code.add(parts[2], parts[3]))
+        """The sums of products that the field needs, where they are exact."""
+        found = self.code.multiply(self._anywhere(total, 0), self.code.constant(SIGNS[0]))
+        for k in range(1, len(SIGNS)):
+            found = self.code.fma(self._anywhere(total, k), self.code.constant(SIGNS[k]), found)
+        return found
 
     def divisor(self, n: Index) -> Pair:
         """n + 1 and its inverse, doubles."""

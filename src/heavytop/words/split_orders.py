@@ -1,6 +1,6 @@
 """Taylor orders between those in double-double and those in plain doubles: coefficients split in two.
 
-y_m = a + b, where a is a multiple of a unit 2^e_m and |y_m| < 2^20 units, and b a double of half a unit at most.  e_m is
+y_m = a + b, where a is a multiple of a unit 2^e_m and |y_m| < 2^21 units, and b a double of half a unit at most.  e_m is
 linear in m but for its rounding, so that the products of series that make S_n have a common unit: products and sums of a
 are exact in plain doubles, up to 60 orders and the four summands of the field.  With L = a + b and R likewise,
 
@@ -26,9 +26,9 @@ from heavytop.words.pairs import log2
 from heavytop.words.recurrence import Recurrence
 from heavytop.words.vector import DOUBLE, INT, INT_VECTOR, LANES, Code, Index, Pair
 
-UNIT_BITS = 20
-"""|y_m| is below 2^20 units: L and R below 2^21, 61 products of them in units of which rounding e_m may lose one bit,
-and four sums of those, 2^52 at most."""
+UNIT_BITS = 21
+"""|y_m| is below 2^21 units, so that L and R are below 2^22; 61 products of them, whose unit rounding e_m may halve, and
+four sums of those are below 2^53 units."""
 SLOPE_BITS = 16
 """e_m = e_0 + m slope, the slope in units of 2^-16."""
 _MOST_UNIT_BITS, STEEPEST = 400, 8
@@ -37,7 +37,7 @@ _SPARSE, _ROOM = 2.0**-6, 8.0
 SLACK, TOLERATED_SLOPE = 0.25, 0.375
 _FRACTION_BITS, _BIAS = 52, 1023
 _EXPONENT = ((1 << 11) - 1) << _FRACTION_BITS
-# the bits of 1.5 · 2^52 units and of the inverse of 2^20 units add to this
+# the bits of 1.5 · 2^52 units and of the inverse of 2^21 units add to this
 _SCALES = (2 * _BIAS + _FRACTION_BITS - UNIT_BITS << _FRACTION_BITS) + (1 << (_FRACTION_BITS - 1))
 FIRST_UNITS = 1.5 * 2.0 ** (_FRACTION_BITS - UNIT_BITS + 1)
 LOG2_OF_A_UNIT = math.log2(1.5) + _FRACTION_BITS
@@ -67,7 +67,7 @@ def next_unit(code: Code, unit: Any, peak: Any) -> tuple[Any, Any]:
     unit: 1.5 · 2^52 of them.  peak: the largest |y_m| 2^(e_0 - e_m).
     """
     b = code.builder
-    # the inverse of 2^20 units of y_0
+    # the inverse of 2^21 units of y_0
     inverse = b.sub(_all(_SCALES), b.bitcast(unit, INT_VECTOR))
     used = code.multiply(peak, b.bitcast(inverse, peak.type))
     nothing = b.fcmp_ordered("==", used, code.zero)
