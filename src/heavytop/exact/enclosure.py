@@ -35,6 +35,7 @@ Measured on the generic top of the tests at 400 bits, bits lost by t = 8, 30, 10
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import exp, inf, isfinite
@@ -78,7 +79,7 @@ class Node:
     """The motion at ``time``: centre in ulps plus the set of errors; ``halvings``: the next step is 2^-halvings."""
 
     time: Fraction
-    centre: tuple[int, ...]
+    centre: Sequence[int]
     errors: Errors
     halvings: int
 

@@ -6,6 +6,7 @@ import dataclasses
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
+from typing import Any
 
 from heavytop.errors import Contradiction
 from heavytop.exact.quadratic import Quadratic, quadratic
@@ -49,13 +50,13 @@ class ScaledMotion:
         own = Parameters(p.inertia, [gamma * n / unit**2 for n in p.moment], Fraction(p.rotor) / unit)
         sign = 1 if forwards else -1
 
-        def given(state: tuple[Fraction, ...]) -> list[Fraction]:
+        def given(state: tuple[Any, ...]) -> list[Any]:
             found = [*system.field(own, state[:6])]
             if len(state) == 9:
                 found += system.attitude(own, state[:6], state[6:])
             return [sign * rate for rate in found]
 
-        def by_lanes(state: tuple[Fraction, ...]) -> list[Fraction]:
+        def by_lanes(state: tuple[Any, ...]) -> list[Any]:
             return [sign * rate for rate in rates(system, scaled.coefficients, state)]
 
         motion = quadratic(given, len(y))
