@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import log2
@@ -99,7 +100,17 @@ class Pilot:
 
         The pilot is given up after a hundred steps where eight times ``most_steps`` would not do.
         """
+        times, losses = self._ahead(span, most_steps)
+        if not times:
+            return float(self.run.precision), 64 * float(min(span, FAR))
+        index = min(bisect_left(times, span), len(times) - 1)
+        return 16 + _carried_on(times, losses, index, span), (index + 1) * _times_as_far(span, times[index])
+
+    def _ahead(self, span: Fraction, most_steps: float) -> tuple[Sequence[Fraction], Sequence[float]]:
+        """The times and the bits lost as far as ``span``, where the pilot comes so far."""
         node, known, bits = self.ahead
+        if known and known[-1] >= span:
+            return known, bits
         times, losses, run = list(known), list(bits), self.run
         while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
             if len(times) >= _TRIED and len(times) * _times_as_far(span, times[-1]) > _HOPELESS * most_steps:
@@ -113,13 +124,16 @@ class Pilot:
             losses.append(node.errors.exponent + log2(float(node.errors.sizes().max()) + 1))
         if len(times) > len(known):
             self.ahead = Ahead(node, tuple(times), tuple(losses))
-        if not times:
-            return float(run.precision), 64 * float(min(span, FAR))
-        index = min(bisect_left(times, span), len(times) - 1)
-        return 16 + _carried_on(times, losses, index, span), (index + 1) * _times_as_far(span, times[index])
+        return times, losses
+
+    def reaches(self, span: Fraction, bits: int) -> bool:
+        """Whether it has come as far and has as many bits left there."""
+        _, times, losses = self.ahead
+        index = bisect_left(times, span)
+        return index < len(times) and self.run.precision - losses[index] >= bits
 
 
-def _carried_on(times: list[Fraction], losses: list[float], index: int, span: Fraction) -> float:
+def _carried_on(times: Sequence[Fraction], losses: Sequence[float], index: int, span: Fraction) -> float:
     """The bits lost by ``span``: by the step ``index``, and from there as by the later half of the steps before it."""
     later = min(span, FAR * times[index]) - times[index]
     if later <= 0:

@@ -102,12 +102,7 @@ class Validated:
 
     def cost(self, time: Fraction, bits: int) -> float:
         """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock."""
-        if time == 0:
-            return 0.0
-        direction, start = (1 if time > 0 else -1), self.start.flat
-        motion = self._motion(direction, start)
-        loss, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits)
-        return steps * _seconds_a_step(*motion.precision(bits + loss + 8, steps))
+        return 0.0 if time == 0 else self._cost(time, bits, self.start.flat)
 
     def reached(self) -> Fraction:
         """The |t| up to which the latest enclosure has come, for those who wait; any thread may ask."""
@@ -169,23 +164,27 @@ class Validated:
         motion = self._motion(direction, start)
         span, sizes = abs(time) * motion.scaled.rate, motion.scaled.sizes
         loss, steps = self._forecast(direction, span, start, bits)
+        pilot = self._pilot(direction, start, bits)
+        run = pilot.run if pilot.reaches(span, bits) else None
         for _ in range(_ATTEMPTS):
-            precision, in_words = motion.precision(bits + loss + 8, steps)
-            self._require_reach(time, bits, loss, steps, motion)
-            run = self._run(direction, start, precision, in_words)
+            planned = motion.precision(bits + loss + 8, steps)
+            if steps * _seconds_a_step(*planned) > self.effort:
+                raise self._refusal(time, self._reachable(time, bits, loss, start))
+            run = run or self._run(direction, start, *planned)
             found = run.at(span)
             if found is not None:
-                values = _evaluated(*found, found[0].radii(found[1]), precision + 64, sizes)
+                values = _evaluated(*found, found[0].radii(found[1]), run.precision + 64, sizes)
                 reached = min(map(relative_bits, values))
                 if reached >= bits:
                     return values
-                loss = precision - reached + 16
+                loss = run.precision - reached + 16
             else:
-                loss = 1.25 * precision * float(min(span / run.lost_at, FAR)) if run.lost_at else 2.0 * precision
+                loss = run.precision * (1.25 * float(min(span / run.lost_at, FAR)) if run.lost_at else 2.0)
+            run = None
         raise self._refusal(time, 0)
 
-    def _forecast(self, direction: int, span: Fraction, start: tuple[Fraction, ...], bits: int) -> tuple[float, float]:
-        """(bits that will be lost, steps that will be taken) up to ``span``, where ``bits`` are to be left."""
+    def _pilot(self, direction: int, start: tuple[Fraction, ...], bits: int) -> Pilot:
+        """In as many bits as short motions take, where they are not many."""
         motion = self._motion(direction, start)
         precision, in_words = motion.precision(bits + _PILOT_ROOM, inf)
         if not in_words or precision > _MOST_PILOT_BITS:
@@ -194,17 +193,27 @@ class Validated:
         if key not in self._pilots:
             run = self._run(direction, start, precision, in_words)
             self._pilots[key] = Pilot(run, Ahead(run.nodes[0]))
-        return self._pilots[key].forecast(span, self.effort / _seconds_a_step(precision, in_words))
+        return self._pilots[key]
 
-    def _require_reach(self, time: Fraction, bits: int, loss: float, steps: float, motion: ScaledMotion) -> None:
-        def too_long(bits: int) -> bool:
-            return steps * _seconds_a_step(*motion.precision(bits + loss + 8, steps)) > self.effort
+    def _forecast(self, direction: int, span: Fraction, start: tuple[Fraction, ...], bits: int) -> tuple[float, float]:
+        """(bits that will be lost, steps that will be taken) up to ``span``, where ``bits`` are to be left."""
+        pilot = self._pilot(direction, start, bits)
+        a_step = _seconds_a_step(pilot.run.precision, pilot.run.carrier is not None)
+        return pilot.forecast(span, self.effort / a_step)
 
-        reachable = bits
-        while reachable > 0 and too_long(reachable):
+    def _cost(self, time: Fraction, bits: int, start: tuple[Fraction, ...], loss: float = 0.0) -> float:
+        """loss: bits that are lost at least."""
+        direction = 1 if time > 0 else -1
+        motion = self._motion(direction, start)
+        forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits)
+        return steps * _seconds_a_step(*motion.precision(bits + max(loss, forecast) + 8, steps))
+
+    def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:
+        """Fewer bits than ``bits``, within the effort."""
+        reachable = bits * 15 // 16
+        while reachable > 0 and self._cost(time, reachable, start, loss) > self.effort:
             reachable = reachable * 15 // 16
-        if reachable < bits:
-            raise self._refusal(time, reachable)
+        return reachable
 
     def _refusal(self, time: Fraction, reachable: int) -> OutOfReach:
         at, digits = decimal_text(time, 6), int((reachable - 5) * log10(2))  # rounded up they take up to 5 bits more

@@ -76,11 +76,11 @@ class Total(Sequence[int]):
 
     @cached_property
     def _values(self) -> list[int]:
-        grid = self._carrier.grid
-        return [_whole(self.words[lane : lane + 8 * grid.words : 8].tolist(), grid) for lane in self._carrier.lanes]
+        grid, places = self._carrier.grid, self._carrier.places
+        return list(_whole(self.words[places], grid))
 
     def __len__(self) -> int:
-        return len(self._carrier.lanes)
+        return len(self._carrier.places)
 
     def __getitem__(self, index: Any) -> Any:
         return self._values[index]
@@ -144,9 +144,9 @@ class Carrier:
         self._of_constants = self._error_of_constants()
         self._exponents = grid.bits * numpy.arange(1, grid.words + 1)[:, None]
         self._threads = local()
-        second = 8 * grid.words
-        self.lanes = [*range(6), *(second + lane for lane in range(3, 6))][: 3 + 3 * self.vectors]
         self._columns = [*range(6), *range(11, 14)][: 3 + 3 * self.vectors]
+        first = numpy.array([lane % 8 + 8 * grid.words * (lane // 8) for lane in self._columns])
+        self.places = first[:, None] + 8 * numpy.arange(grid.words)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (Carrier, self._own)
@@ -175,11 +175,11 @@ class Carrier:
         for left in (table[:, 1 + vector] for vector in range(self.vectors)):
             middle = left[:, :, 5] / 2
             found += [left[:, :, 4] - middle, middle, left[:, :, 3] - middle]
-        return [[_whole(words, grid) for words in component.tolist()] for component in found]
+        return [_whole(component, grid).tolist() for component in found]
 
     def _computed(self, centre: Sequence[int], halvings: int) -> int:
         """N, with the coefficients in the rows of this thread's scratch; negative where there are none."""
-        words, exponent = self.grid.words, self.excess - halvings
+        exponent = self.excess - halvings
         if not -self.grid.bits <= exponent < 64:
             return UNSETTLED
         factor, raises = raises_of(exponent)
@@ -187,8 +187,7 @@ class Carrier:
         if isinstance(centre, Total):
             scratch.state[:] = centre.words
         else:
-            for lane, value in zip(self.lanes, centre, strict=True):
-                scratch.state[lane : lane + 8 * words : 8] = _words(value, self.grid)
+            scratch.state[self.places] = [_words(value, self.grid) for value in centre]
         found = self.machine.functions["series"](*scratch.pointers, self.sign * factor, raises, scratch.found)
         return int(found)
 
@@ -286,9 +285,10 @@ def _words(value: int, grid: Grid) -> list[float]:
     return [*found, ldexp(float(value), -grid.total)]
 
 
-def _whole(words: Sequence[float], grid: Grid) -> int:
-    """What words add to, in ulps."""
-    total = 0
-    for k, word in enumerate(words):
-        total = (total << grid.bits) + int(ldexp(word, grid.bits * (k + 1)))
+def _whole(words: Doubles, grid: Grid) -> Any:
+    """What words add to along the last axis, in ulps: an array of integers."""
+    digits = numpy.ldexp(words, grid.bits * numpy.arange(1, grid.words + 1)).astype(numpy.int64).astype(object)
+    total = digits[..., 0]
+    for k in range(1, grid.words):
+        total = (total << grid.bits) + digits[..., k]
     return total
