@@ -167,7 +167,7 @@ class Validated:
         pilot = self._pilot(direction, start, bits)
         run = pilot.run if pilot.reaches(span, bits) else None
         for _ in range(_ATTEMPTS):
-            planned = motion.precision(bits + loss + 8, steps)
+            planned = motion.precision(bits + loss, steps)
             if steps * _seconds_a_step(*planned) > self.effort:
                 raise self._refusal(time, self._reachable(time, bits, loss, start))
             run = run or self._run(direction, start, *planned)
@@ -206,7 +206,7 @@ class Validated:
         direction = 1 if time > 0 else -1
         motion = self._motion(direction, start)
         forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits)
-        return steps * _seconds_a_step(*motion.precision(bits + max(loss, forecast) + 8, steps))
+        return steps * _seconds_a_step(*motion.precision(bits + max(loss, forecast), steps))
 
     def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:
         """Fewer bits than ``bits``, within the effort."""
