@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import log2
+from threading import Lock
 from typing import NamedTuple
 
 from heavytop.exact.enclosure import Node, Step, step
@@ -19,6 +20,7 @@ _PILOT_STEPS = 1000
 _KEPT_NODES = 512
 _TRIED = 100
 _HOPELESS = 8
+_one_writer = Lock()
 
 
 @dataclass(slots=True)
@@ -88,8 +90,8 @@ class Ahead(NamedTuple):
 class Pilot:
     """The run in the fewest bits that may do: it tells how many bits the motion loses and how many steps it takes.
 
-    Where those bits do, its nodes are those of the enclosure.  Any thread may ask: ``ahead`` is replaced as a whole,
-    and does not depend on who came how far.
+    Where those bits do, its nodes are those of the enclosure.  Any thread may ask: ``ahead`` is replaced as a whole by
+    one that goes further, and does not depend on who came how far.
     """
 
     run: Run
@@ -122,8 +124,9 @@ class Pilot:
             run.keep(node)
             times.append(node.time)
             losses.append(node.errors.exponent + log2(float(node.errors.sizes().max()) + 1))
-        if len(times) > len(known):
-            self.ahead = Ahead(node, tuple(times), tuple(losses))
+        with _one_writer:
+            if len(times) > len(self.ahead.times):
+                self.ahead = Ahead(node, tuple(times), tuple(losses))
         return times, losses
 
     def reaches(self, span: Fraction, bits: int) -> bool:

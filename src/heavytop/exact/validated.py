@@ -154,7 +154,7 @@ class Validated:
             motion = self._motion(direction, start)
             carrier = motion.carrier(precision) if in_words else None
             node = start_node(motion.field, motion.scaled.state, precision)
-            self._runs[key] = Run(motion.field, precision, (node,), carrier)
+            self._runs.setdefault(key, Run(motion.field, precision, (node,), carrier))
         return self._runs[key]
 
     def _enclosure(self, time: Fraction, bits: int, start: tuple[Fraction, ...]) -> list[arb]:
@@ -192,7 +192,8 @@ class Validated:
         key = (direction, precision, in_words, len(start))
         if key not in self._pilots:
             run = self._run(direction, start, precision, in_words)
-            self._pilots[key] = Pilot(run, Ahead(run.nodes[0]))
+            # threads that come at once take the same one
+            self._pilots.setdefault(key, Pilot(run, Ahead(run.nodes[0])))
         return self._pilots[key]
 
     def _forecast(self, direction: int, span: Fraction, start: tuple[Fraction, ...], bits: int) -> tuple[float, float]:
