@@ -19,7 +19,7 @@ from heavytop.words.lanes import rates
 from heavytop.words.proven import Carrier
 from heavytop.words.scaled import Scaled
 
-_GRIDS = tuple(grid_of(words, whole=True) for words in (3, 4, 6, 8, 12, 16, 24))
+_GRIDS = tuple(grid_of(words, whole=True) for words in (3, 4, 6, 7, 8, 10, 12, 16, 24))
 """Few of those that there are: each is compiled at its first use."""
 _STEPS_A_WORD = 2
 """Fewer steps than that are not worth the machine code."""

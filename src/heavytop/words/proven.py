@@ -162,7 +162,7 @@ class Carrier:
         if rounding is None:
             return None
         size = 8 * self.vectors
-        sizes = scratch.sizes[: length * size].reshape(length, size).max(axis=1) * _UP
+        sizes = numpy.maximum.reduce(scratch.sizes[: length * size].reshape(length, size), 1) * _UP
         nearest = scratch.values[: length * size].reshape(length, size)[:, self._columns]
         return Series(self, centre, halvings, Total(scratch.result.copy(), self), rounding, sizes, nearest)
 
@@ -205,11 +205,11 @@ class Carrier:
         """
         grid = self.grid
         wide = numpy.ldexp(widest, self._exponents)
-        left, right = wide[1:].max(axis=0), wide[0]
+        left, right = numpy.maximum.reduce(wide[1:]), wide[0]
         one, products = _levels(grid, right, left)
         sums = products[: grid.words - 1] + 3 * one[: grid.words - 1]
         # γ1 and γ3 are differences of L's
-        state = (1.5 * left.max(axis=1)).tolist()
+        state = (1.5 * numpy.maximum.reduce(left, 1)).tolist()
         term, once = _error(grid, products, orders)
         limits = (
             (float(sums.max()), 2.0**52 * _ROOM),
@@ -254,9 +254,9 @@ class _Scratch:
 
 def _levels(grid: Grid, left: Doubles, right: Doubles) -> tuple[Doubles, Doubles]:
     """The largest product of level k and the sum of all, over g_k, for k = 0 to 2K − 2; from words over their units."""
-    products = (left[:, None, :] * right[None, :, :]).max(axis=2).ravel() * 2.0**-grid.bits
+    products = numpy.maximum.reduce(left[:, None, :] * right, 2).ravel() * 2.0**-grid.bits
     table = _antidiagonals(grid.words)
-    return (table * products).max(axis=1), table @ products * _UP
+    return numpy.maximum.reduce(table * products, 1), table @ products * _UP
 
 
 @lru_cache(maxsize=32)
@@ -265,11 +265,17 @@ def _antidiagonals(words: int) -> NDArray[numpy.float64]:
     return numpy.asarray((i + j == numpy.arange(2 * words - 1)[:, None]).astype(float))
 
 
+@lru_cache(maxsize=32)
+def _ulps(grid: Grid) -> Doubles:
+    """g_K, …, g_(2K−2), which are below the last word, over g."""
+    return numpy.asarray(2.0 ** (-grid.bits * numpy.arange(1.0, grid.words)))
+
+
 def _error(grid: Grid, products: Doubles, terms: int) -> tuple[float, float]:
     """ε(T) as (a, c) with a T + c for T ≤ ``terms``, in ulps."""
     words = grid.words
     largest = 1.5 * 2.0**52 + terms * (float(products[words - 1]) + words * 2.0**grid.bits)
-    dropped = float(products[words:] @ 2.0 ** (-grid.bits * numpy.arange(1.0, words))) * _UP
+    dropped = float(products[words:] @ _ulps(grid)) * _UP
     rounding = 2.0**-53 * largest * _UP
     return (words + 1) * rounding + dropped, rounding
 
