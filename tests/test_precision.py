@@ -1,5 +1,6 @@
 """Rounding at the wall: exact in, exact out, and no false number."""
 
+from decimal import Decimal
 from fractions import Fraction
 from random import Random
 
@@ -60,6 +61,25 @@ def test_double_agrees_with_python_s_own_rounding() -> None:
     for _ in range(200):
         value = Fraction(random.getrandbits(200) + 1, random.getrandbits(200) + 1)
         assert float(number(value, DOUBLE)) == float(value)
+
+
+@pytest.mark.parametrize("text", ["0.1", "-7e-20", "1e4932", "-3.36e-4932", "6.5e-4966", "-6.5e-4966", "0", "-0", "1"])
+def test_a_quad_is_the_binary_number_that_its_digits_name(text: str) -> None:
+    heyoka = pytest.importorskip("heyoka")
+    value = heyoka.real128(text)
+    named = Fraction(Decimal(str(value)))
+    near = exact(value)
+    # 36 digits name it: no other quad is nearer to them, the smallest (subnormal) are 2^-16494 apart
+    assert abs(near - named) <= max(abs(named) / 2**114, Fraction(1, 2**16495))
+    assert near.denominator.bit_length() - 1 <= 16494
+    assert number(near, QUAD) == value
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "-inf"])
+def test_a_quad_that_is_not_finite_is_no_number(text: str) -> None:
+    heyoka = pytest.importorskip("heyoka")
+    with pytest.raises(InputError, match="not a finite number"):
+        exact(heyoka.real128(text))
 
 
 def test_extended_and_quad_agree_with_decimal_parsing_of_their_libraries() -> None:

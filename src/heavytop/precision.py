@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from dataclasses import dataclass
 from decimal import MAX_EMAX, MIN_EMIN, ROUND_HALF_EVEN, Context, Decimal, Overflow
 from fractions import Fraction
@@ -136,8 +137,7 @@ def exact(value: Any) -> Fraction:
         return _from_text(value)
     kind = type(value).__name__
     if kind in ("real", "real128"):
-        bits = QUAD.bits if kind == "real128" else int(value.prec)
-        return round_to(_from_text(str(value)), bits)
+        return _from_quad(value) if kind == "real128" else round_to(_from_text(str(value)), int(value.prec))
     if isinstance(value, Decimal) and value.is_finite() and abs(value.adjusted()) > _MAX_TEXT:
         raise _too_large(value)
     # numpy.bool and bool are integers to Python, and no numbers to anyone
@@ -159,6 +159,20 @@ def exact(value: Any) -> Fraction:
     raise InputError(f"A {kind} is not a number: {quoted(value)}.", _REMEDY)
 
 
+def _from_quad(value: Any) -> Fraction:
+    """The exact value of heyoka's real128, from its bits: sign, 15 of the exponent, 112 of the fraction (IEEE 754)."""
+    bits = int.from_bytes(value.tobytes(), sys.byteorder)
+    biased = bits >> 112 & 0x7FFF
+    if biased == 0x7FFF:
+        raise InputError(f"{quoted(value)} is not a finite number.", _REMEDY)
+    significand = bits & (1 << 112) - 1 | (biased > 0) << 112
+    return _binary(-significand if bits >> 127 else significand, max(biased, 1) - 16495)
+
+
+def _binary(significand: int, exponent: int) -> Fraction:
+    return Fraction(significand << exponent) if exponent >= 0 else Fraction(significand, 1 << -exponent)
+
+
 def _from_mantissa(value: Any) -> Fraction:
     """The exact value of mpmath's mpf."""
     sign, mantissa, exponent, _ = value._mpf_
@@ -166,7 +180,7 @@ def _from_mantissa(value: Any) -> Fraction:
         raise InputError(f"{quoted(value)} is not a finite number.", _REMEDY)
     if abs(exponent) > 4 * _MAX_TEXT:
         raise _too_large(value)
-    return Fraction(-int(mantissa) if sign else int(mantissa)) * Fraction(2) ** int(exponent)
+    return _binary(-int(mantissa) if sign else int(mantissa), int(exponent))
 
 
 def _too_large(value: object) -> InputError:
@@ -229,8 +243,7 @@ def round_to(value: Fraction, bits: int) -> Fraction:
     """``value`` rounded to ``bits`` significant bits, to nearest, ties to even; no limit on the exponent."""
     if value == 0:
         return value
-    significand, exponent = _significand(value, bits)
-    return Fraction(significand << exponent) if exponent >= 0 else Fraction(significand, 1 << -exponent)
+    return _binary(*_significand(value, bits))
 
 
 def _significand(value: Fraction, bits: int) -> tuple[int, int]:

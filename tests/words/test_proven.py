@@ -11,9 +11,11 @@ from words_helpers import LEVELS
 from heavytop.exact.scaled_motion import ScaledMotion
 from heavytop.exact.step_series import lacking
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
-from heavytop.words import proven
+from heavytop.words import extents, proven
 from heavytop.words.digits import grid_of
 from heavytop.words.kernels import Grid
+from heavytop.words.lanes import LEFT, RIGHT
+from heavytop.words.machine import doubles, pointer
 from heavytop.words.proven import Carrier
 
 
@@ -130,14 +132,14 @@ def test_the_bound_is_the_theorem_in_exact_numbers(words: int) -> None:
         assert each * terms + once >= terms * ((words + 1) * rounding + dropped) + rounding
     motion = some_motion(Random(2))
     carrier = Carrier(motion.scaled, grid, True)
-    table, components = numpy.zeros((orders + 1, 2, words, 8)), numpy.zeros((6, orders + 1, words))
+    widest, added = numpy.zeros((2, words, 8)), numpy.zeros((1, words, 8))
     each, once = proven._error(grid, numpy.zeros(2 * words - 1), orders)
     for scale in (0.0, 2.0**20):
         sums = [
             Fraction(scale) * (2 * Fraction(each * n + once) + Fraction(carrier._of_constants)) for n in range(1, 41)
         ]
         total = sum((part + Fraction(1, 2)) / n + Fraction(3, 4) for n, part in enumerate(sums, 1))
-        assert total <= Fraction(carrier._rounding(table, components, scale)) <= 2 * total
+        assert total <= Fraction(carrier._rounding(widest, added, orders, scale)) <= 2 * total
 
 
 def test_sums_have_room_for_the_largest_products_between_two_looks() -> None:
@@ -145,17 +147,43 @@ def test_sums_have_room_for_the_largest_products_between_two_looks() -> None:
     grid = grid_of(3, whole=True)
     carrier = Carrier(some_motion(Random(2)).scaled, grid, True)
     for share, fine in ((1 - 2.0**-10, True), (1.0, False)):
-        table, components = numpy.zeros((3, 2, 3, 8)), numpy.zeros((6, 3, 3))
-        table[0, 0, 0], table[0, 1, 0] = (
-            2.0 ** (48 - grid.bits) * part for part in (1.0, 2.0 ** (grid.bits - 46) * share)
-        )
-        assert (carrier._rounding(table, components, 1.0) is not None) is fine
+        widest, added = numpy.zeros((2, 3, 8)), numpy.zeros((1, 3, 8))
+        widest[0, 0], widest[1, 0] = (2.0 ** (48 - grid.bits) * part for part in (1.0, 2.0 ** (grid.bits - 46) * share))
+        assert (carrier._rounding(widest, added, 2, 1.0) is not None) is fine
     # and the sum of all coefficients stays exact
     for share, fine in ((0.5, True), (2.0, False)):
-        components = numpy.full((6, 3, 3), share * 2.0**52 / 3)
-        components[:, :, 0] *= 2.0**-grid.bits
-        components[:, :, 1:] = 0
-        assert (carrier._rounding(numpy.zeros((3, 2, 3, 8)), components, 1.0) is not None) is fine
+        added = numpy.zeros((1, 3, 8))
+        added[0, 0, 5] = share * 2.0 ** (52 - grid.bits)
+        assert (carrier._rounding(numpy.zeros((2, 3, 8)), added, 2, 1.0) is not None) is fine
+
+
+@pytest.mark.parametrize(("words", "vectors"), [(3, 1), (4, 2), (24, 1)])
+def test_how_large_words_are_is_measured_on_the_words_themselves(words: int, vectors: int) -> None:
+    """y as the lanes give it, from random words of y; against sums and maxima of exact fractions."""
+    random, grid, orders = numpy.random.default_rng(words), grid_of(words, whole=True), 5
+    units = 2.0 ** (-grid.bits * numpy.arange(1.0, words + 1))[:, None]
+    y = numpy.rint(random.normal(0, 2.0 ** (grid.bits - 2), (orders + 1, vectors, words, 8))) * units
+    y[..., 6:] = 0
+    right, *left = (
+        y[:, v][..., list(which.first)] + which.sign * y[:, v][..., list(which.second)]
+        for v, which in [(0, RIGHT), *((v, LEFT) for v in range(vectors))]
+    )
+    rows = doubles((orders + 1) * (1 + vectors) * words * 8)
+    table = rows.reshape(orders + 1, 1 + vectors, words, 8)
+    table[:] = numpy.stack([right, *left], axis=1)
+    found = [doubles(8 * count) for count in (*[vectors * (orders + 1)] * 2, (1 + vectors) * words, vectors * words)]
+    extents.machine(words, vectors).functions["extents"](pointer(rows), orders, *map(pointer, found))
+    values, sizes, widest, added = (array.reshape(-1, 8) for array in found)
+    assert (widest.reshape(table.shape[1:]) == numpy.abs(table).max(axis=0)).all()
+    for n, block in enumerate(y.reshape(-1, words, 8)):
+        for lane in range(8):
+            exactly = [Fraction(float(word)) for word in block[:, lane]]
+            size = sum(map(abs, exactly))
+            assert abs(Fraction(float(values[n, lane])) - sum(exactly)) <= size / 2**50
+            assert abs(Fraction(float(sizes[n, lane])) - size) <= size / 2**48
+    for index, each in enumerate(y.transpose(1, 2, 3, 0).reshape(-1, orders + 1)):
+        total = sum(abs(Fraction(float(word))) for word in each)
+        assert abs(Fraction(float(added.ravel()[index])) - total) <= total / 2**48
 
 
 def test_words_that_are_too_wide_are_refused_or_within_the_bound() -> None:

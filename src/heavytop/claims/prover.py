@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 import sympy
 
@@ -48,7 +49,7 @@ class Prover:
             parts = [part for _, part in self._setting.parts.get(statement.branch, ())]
             self._fields[key] = self._make(alike, sign, strict, parts)
         if self._fields[key] is None:
-            alone: Key = (*key, str(statement.residual))
+            alone: Key = (*key, _text(statement.residual))
             if alone not in self._fields:
                 self._fields[alone] = self._make([statement], sign, strict, [])
             return self._fields[alone]
@@ -204,4 +205,10 @@ def shortest(formula: sympy.Expr, setting: Setting, domain: Domain) -> sympy.Exp
 
 
 def _sorted(needs: Iterable[Need]) -> list[Need]:
-    return sorted(needs, key=lambda need: (need.kind.value, str(need.expression)))
+    return sorted(needs, key=lambda need: (need.kind.value, _text(need.expression)))
+
+
+@lru_cache(maxsize=10_000)
+def _text(expression: sympy.Expr) -> str:
+    """As SymPy writes it, which takes it a millisecond."""
+    return str(expression)

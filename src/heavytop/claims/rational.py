@@ -122,14 +122,15 @@ class Tower:
 
     def reduce(self, p: Any) -> Any:
         """``p`` with every root to a power below 2."""
+        degrees = p.degrees()
         for index in sorted(self._radicands, reverse=True):
-            if p.degrees()[index] > 1:
+            if degrees[index] > 1:
                 parts = self.by_power(p, index)
                 q, root = self._radicands[index], self.gens[index]
                 total = self.context.constant(0)
                 for power, part in parts.items():
                     total += self.times(self.raised(q, power // 2), part * root ** (power % 2))
-                p = total
+                p, degrees = total, total.degrees()
         return p
 
     def raised(self, p: Any, exponent: int) -> Any:
@@ -157,14 +158,15 @@ class Tower:
     def quotient(self, numerator: Any, denominator: Any) -> Quotient:
         """Reduced, with no root left in the denominator; raises Unprovable where that is 0."""
         numerator, denominator = self.reduce(numerator), self.reduce(denominator)
+        degrees = denominator.degrees()
         for index in sorted(self._radicands, reverse=True):
-            if denominator.degrees()[index] == 1:
+            if degrees[index] == 1:
                 parts = self.by_power(denominator, index)
                 conjugate = parts.get(0, self.context.constant(0)) - parts[1] * self.gens[index]
                 rational = self.reduce(self.times(denominator, conjugate))
                 if rational:
                     numerator = self.reduce(self.times(numerator, conjugate))
-                    denominator = rational
+                    denominator, degrees = rational, rational.degrees()
         if not denominator:
             raise Unprovable("A denominator is identically 0.", "Check the formula, or the domain it is claimed on.")
         if len(denominator) > 1 and len(numerator) * len(denominator) > _MAX_QUOTIENT:

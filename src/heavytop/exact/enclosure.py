@@ -35,8 +35,10 @@ Measured on the generic top of the tests at 400 bits, bits lost by t = 8, 30, 10
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from math import exp, inf, isfinite
 
 import numpy as np
@@ -78,7 +80,7 @@ class Node:
     """The motion at ``time``: centre in ulps plus the set of errors; ``halvings``: the next step is 2^-halvings."""
 
     time: Fraction
-    centre: tuple[int, ...]
+    centre: Sequence[int]
     errors: Errors
     halvings: int
 
@@ -180,21 +182,26 @@ def _new_frame(variation: Matrix, variation_error: float, errors: Errors) -> tup
     """(Q', T, η): the next frame, T = Q'^T V̂ Q and a bound of |Q'^-1 V Q − T|; η also bounds |Q'^-1 − Q'^T|."""
     size = len(variation)
     carried = variation @ errors.frame
-    order = np.argsort(-np.linalg.norm(carried, axis=0) * errors.radii, kind="stable")
+    order = np.argsort(-np.sqrt((carried * carried).sum(axis=0)) * errors.radii, kind="stable")
     frame = np.linalg.qr(carried[:, order])[0]
     rounding = 2 * (size + 4) * _UNIT
     transposed, before = _norm(frame.T), _norm(errors.frame)
     product = (_norm(variation) + variation_error) * before
-    off = _norm(frame.T @ frame - np.eye(size)) + rounding * transposed * size
+    off = _norm(frame.T @ frame - _identity(size)) + rounding * transposed * size
     # (1 + F)^-1 differs from 1 by at most |F|/(1 − |F|)
     inverse = off / (1 - off) * transposed if off < 1 else inf
     slack = inverse * product + transposed * before * variation_error + 3 * rounding * transposed * product
     return frame, frame.T @ carried, max(slack, inverse) * _UP
 
 
+@lru_cache(maxsize=4)
+def _identity(size: int) -> Matrix:
+    return np.eye(size)
+
+
 def _norm(matrix: Matrix) -> float:
     """The largest row sum of absolute values."""
-    return float(max(np.abs(matrix).sum(axis=1).tolist()))
+    return float(max(np.add.reduce(np.abs(matrix), 1).tolist()))
 
 
 def coefficient_bound(field: Quadratic, size: Fraction) -> Fraction:
@@ -267,10 +274,15 @@ def _defect(series: StepSeries, precision: int, quadratic: float, linear: float)
     rate = precision // order
     scaled = series.scaled(rate)
     products = np.convolve(scaled, scaled)[order:]
-    n = np.arange(order, 2 * order + 1)
-    beyond = float(np.sum(products * np.ldexp(quadratic, -rate * (n - order)) / (n + 1)))
-    beyond += linear * float(scaled[-1]) / (order + 1)
+    # n ≥ N in the denominators
+    beyond = (quadratic * float(products @ _falling(rate, order)) + linear * float(scaled[-1])) / (order + 1)
     return (series.rounding + float(np.ldexp(beyond, precision - rate * order))) * _UP
+
+
+@lru_cache(maxsize=512)
+def _falling(rate: int, order: int) -> Matrix:
+    """2^(−rate n) for n = 0 to ``order``."""
+    return np.ldexp(1.0, np.maximum(-rate * np.arange(order + 1), -1000))
 
 
 def _variation(field: Quadratic, series: StepSeries, h: float, slopes: Matrix) -> tuple[Matrix, float, float]:
@@ -285,11 +297,11 @@ def _variation(field: Quadratic, series: StepSeries, h: float, slopes: Matrix) -
     jacobians[: len(values)] = (values @ field.jacobian.reshape(size * size, size).T).reshape(-1, size, size)
     jacobians[0] += field.slope
     variation = variation_of(h * jacobians)
-    norms = np.abs(variation).sum(axis=2).max(axis=1)
+    norms = np.maximum.reduce(np.add.reduce(np.abs(variation), 2), 1)
     rates = slopes.copy()
     rates[0] += h * float(field.l)
     terms = size * (top + 2) + 16
     rounding = (4 * terms * _UNIT * float(rates.sum()) + _TINY) * float(norms.sum())
-    products = np.convolve(rates, norms)[top:]
-    beyond = float(np.sum(products / np.arange(top + 1, top + 1 + products.size)))
+    # n ≥ top in the denominators
+    beyond = float(np.add.reduce(np.convolve(rates, norms)[top:])) / (top + 1)
     return variation, float(norms.sum()) * _UP, (rounding + beyond) * _UP

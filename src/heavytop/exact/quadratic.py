@@ -13,12 +13,13 @@ from math import inf, lcm
 from typing import Any
 
 import numpy as np
+from gmpy2 import mpq
 from numpy.typing import NDArray
 
 from heavytop.words.whole_series import Row
 
 Matrix = NDArray[np.float64]
-Field = Callable[[tuple[Fraction, ...]], Sequence[Any]]
+Field = Callable[[tuple[Any, ...]], Sequence[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,25 +47,30 @@ class Quadratic:
 
 def quadratic(field: Field, dimension: int) -> Quadratic:
     """``field`` taken apart; it must be of degree two without a constant part."""
-    unit = [tuple(Fraction(int(i == j)) for i in range(dimension)) for j in range(dimension)]
+    unit = [tuple(mpq(int(i == j)) for i in range(dimension)) for j in range(dimension)]
     plus = [field(e) for e in unit]
     minus = [field(tuple(-x for x in e)) for e in unit]
     table: list[dict[tuple[int, int], Fraction]] = [{} for _ in range(dimension)]
     lines: list[dict[int, Fraction]] = [{} for _ in range(dimension)]
     for j in range(dimension):
         for i in range(dimension):
-            table[i][j, j] = Fraction(plus[j][i] + minus[j][i]) / 2
-            lines[i][j] = Fraction(plus[j][i] - minus[j][i]) / 2
+            _keep(table[i], (j, j), (plus[j][i] + minus[j][i]) / 2)
+            _keep(lines[i], j, (plus[j][i] - minus[j][i]) / 2)
         for k in range(j + 1, dimension):
             both = field(tuple(x + y for x, y in zip(unit[j], unit[k], strict=True)))
             for i in range(dimension):
-                table[i][j, k] = Fraction(both[i] - plus[j][i] - plus[k][i])
+                _keep(table[i], (j, k), both[i] - plus[j][i] - plus[k][i])
     return _assemble(table, lines)
+
+
+def _keep(row: dict[Any, Fraction], key: Any, value: Any) -> None:
+    if value:
+        row[key] = Fraction(int(value.numerator), int(value.denominator))
 
 
 def _assemble(table: list[dict[tuple[int, int], Fraction]], lines: list[dict[int, Fraction]]) -> Quadratic:
     dimension = len(lines)
-    pairs = tuple(sorted({pair for row in table for pair, c in row.items() if c}))
+    pairs = tuple(sorted({pair for row in table for pair in row}))
     rows = []
     jacobian, slope = np.zeros((dimension,) * 3), np.zeros((dimension,) * 2)
     for i, (products, linear) in enumerate(zip(table, lines, strict=True)):
@@ -72,8 +78,8 @@ def _assemble(table: list[dict[tuple[int, int], Fraction]], lines: list[dict[int
         rows.append(
             Row(
                 common,
-                tuple((int(c * common), pairs.index(pair)) for pair, c in products.items() if c),
-                tuple((int(c * common), j) for j, c in linear.items() if c),
+                tuple((int(c * common), pairs.index(pair)) for pair, c in products.items()),
+                tuple((int(c * common), j) for j, c in linear.items()),
             )
         )
         for (j, k), c in products.items():

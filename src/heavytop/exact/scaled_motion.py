@@ -6,6 +6,7 @@ import dataclasses
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
+from typing import Any
 
 from heavytop.errors import Contradiction
 from heavytop.exact.quadratic import Quadratic, quadratic
@@ -18,7 +19,7 @@ from heavytop.words.lanes import rates
 from heavytop.words.proven import Carrier
 from heavytop.words.scaled import Scaled
 
-_GRIDS = tuple(grid_of(words, whole=True) for words in (3, 4, 6, 8, 12, 16, 24))
+_GRIDS = tuple(grid_of(words, whole=True) for words in (3, 4, 6, 7, 8, 10, 12, 16, 24))
 """Few of those that there are: each is compiled at its first use."""
 _STEPS_A_WORD = 2
 """Fewer steps than that are not worth the machine code."""
@@ -49,13 +50,13 @@ class ScaledMotion:
         own = Parameters(p.inertia, [gamma * n / unit**2 for n in p.moment], Fraction(p.rotor) / unit)
         sign = 1 if forwards else -1
 
-        def given(state: tuple[Fraction, ...]) -> list[Fraction]:
+        def given(state: tuple[Any, ...]) -> list[Any]:
             found = [*system.field(own, state[:6])]
             if len(state) == 9:
                 found += system.attitude(own, state[:6], state[6:])
             return [sign * rate for rate in found]
 
-        def by_lanes(state: tuple[Fraction, ...]) -> list[Fraction]:
+        def by_lanes(state: tuple[Any, ...]) -> list[Any]:
             return [sign * rate for rate in rates(system, scaled.coefficients, state)]
 
         motion = quadratic(given, len(y))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -41,8 +42,8 @@ class StepSeries(Protocol):
         """The coefficients of each component."""
 
     @property
-    def total(self) -> tuple[int, ...]:
-        """Σ b_n, exactly."""
+    def total(self) -> Sequence[int]:
+        """Σ b_n, exactly: what the next step begins at, as it stands."""
 
     @property
     def sizes(self) -> Matrix:

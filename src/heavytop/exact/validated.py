@@ -6,168 +6,48 @@ A motion is enclosed in its own units, powers of two, in which |ω| ≤ 4 at all
 The step and its theorem are in :mod:`heavytop.exact.enclosure`.  Its coefficients are computed in words
 (:mod:`heavytop.words.proven`), as far as there are words, or in exact integers where a few steps would not be worth the
 machine code.  Here the working precision is chosen so that the asked
-bits come out: the bits that the motion loses are measured on a short pilot run, and carried on linearly to the time
-asked for.  Precisions come from a ladder and steps depend on the node that they start from alone, so a ball does not
-depend on what was asked before; what was computed before is only found faster.
+bits come out: the bits that the motion loses are measured on a pilot run, and carried on linearly to the time asked
+for; where the pilot's bits do, it is the run asked for.  Precisions come from a ladder and steps depend on the node
+that they start from alone, so a ball does not depend on what was asked before; what was computed before is only found
+faster.
 
 Reach on the generic top of the tests (I = (3, 2, 1), P r = (1/2, 1/3, 1/5)), seconds of one core that was shared:
-60 digits at t = 8 in 0.04 s; 30 digits at t = 100 in 0.25 s, at t = 1000 in 3 s; about 0.17 bits are lost a unit of
+60 digits at t = 8 in 0.02 s; 30 digits at t = 100 in 0.1 s, at t = 1000 in 1.5 s; about 0.17 bits are lost a unit of
 time, so that t = 10,000 would need some 1,900 bits, more than there are words for, and is refused by default.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import inf, log2, log10
-from typing import NamedTuple
+from math import inf, log10
 
 from flint import arb, arb_series
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, relative_bits, working_precision
-from heavytop.exact.enclosure import Node, Step, coefficient_bound, start_node, step
+from heavytop.exact.enclosure import Step, coefficient_bound, start_node
 from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.quadratic import Matrix, Quadratic
+from heavytop.exact.quadratic import Matrix
+from heavytop.exact.runs import FAR, Ahead, Pilot, Run
 from heavytop.exact.scaled_motion import ScaledMotion
 from heavytop.exact.scales import exponent, require_handy, unit_of_time
 from heavytop.precision import decimal_text
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector
-from heavytop.words.proven import Carrier
 
 _PILOT_BITS = 128
-_PILOT_STEPS = 1000
-_KEPT_NODES = 512
+_PILOT_ROOM = 48
+"""Bits that the tests' generic top loses by t = 100: with so many more a pilot does for the enclosure itself."""
+_MOST_PILOT_BITS = 352
 _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
-_FAR = Fraction(10**12)
-_TRIED = 100
-_HOPELESS = 8
-
-
-@dataclass(slots=True)
-class Run:
-    """Nodes of one motion at one working precision, from time 0 on as far as they were asked for.
-
-    Any thread may ask: a node depends on its time alone, and what is remembered is replaced, never changed in place.
-    """
-
-    motion: Quadratic
-    precision: int
-    nodes: tuple[Node, ...]
-    carrier: Carrier | None = None
-    stride: int = 1
-    lost_at: Fraction | None = None
-    _last: Step | None = None
-    _skipped: int = 0
-
-    def at(self, time: Fraction) -> tuple[Step, Fraction] | None:
-        """The step that covers ``time`` ≥ 0, and τ in it; None if the errors grew too large before it."""
-        found, node = self._nearest(time)
-        while True:
-            if self.lost_at is not None and node.time >= self.lost_at:
-                return None
-            if found is None:
-                found = self._last = step(self.motion, node, self.precision, self.carrier)
-            if found is None:
-                self.lost_at = node.time
-                return None
-            if node.time + found.length >= time:
-                return found, (time - node.time) / found.length
-            node, found = found.end(), None
-            self._keep(node)
-
-    def _nearest(self, time: Fraction) -> tuple[Step | None, Node]:
-        """The last node known before ``time``, and the step from it where that is known too."""
-        last, nodes = self._last, self.nodes
-        node = nodes[bisect_right(nodes, time, key=lambda node: node.time) - 1]
-        if last is not None and node.time <= last.node.time <= time:
-            return last, last.node
-        return None, node
-
-    def _keep(self, node: Node) -> None:
-        """Remember every ``stride``-th node: constant memory at any horizon."""
-        nodes = self.nodes
-        if node.time <= nodes[-1].time:
-            return
-        self._skipped += 1
-        if self._skipped >= self.stride:
-            self._skipped = 0
-            nodes = (*nodes, node)
-        if len(nodes) > _KEPT_NODES:
-            nodes = nodes[::2]
-            self.stride *= 2
-        self.nodes = nodes
 
 
 def _seconds_a_step(precision: int, in_words: bool) -> float:
     """A model of the cost, not a measurement: what is refused must not depend on how busy the machine is."""
     return 4e-4 + 1.2e-11 * precision**3 if in_words else 1e-3 + 6e-8 * precision**2
-
-
-class _Ahead(NamedTuple):
-    """How far a pilot came: the node at its end, and the time and the bits lost after each of its steps."""
-
-    node: Node
-    times: tuple[Fraction, ...] = ()
-    losses: tuple[float, ...] = ()
-
-
-@dataclass(slots=True)
-class Pilot:
-    """A cheap run that tells how many bits the motion loses and how many steps it takes, by time.
-
-    Any thread may ask: ``ahead`` is replaced as a whole, and does not depend on who came how far.
-    """
-
-    motion: Quadratic
-    precision: int
-    carrier: Carrier | None
-    ahead: _Ahead
-
-    def forecast(self, span: Fraction, effort: float) -> tuple[float, float]:
-        """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go.
-
-        The pilot is given up after a hundred steps where eight times ``effort`` seconds of the model of the cost would
-        not do.
-        """
-        node, known, bits = self.ahead
-        times, losses = list(known), list(bits)
-        a_step = _seconds_a_step(self.precision, self.carrier is not None)
-        while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
-            forecast = len(times) * _times_as_far(span, times[-1]) * a_step if times else 0.0
-            if len(times) >= _TRIED and forecast > _HOPELESS * effort:
-                break
-            found = step(self.motion, node, self.precision, self.carrier)
-            if found is None:
-                break
-            node = found.end()
-            times.append(node.time)
-            losses.append(node.errors.exponent + log2(float(node.errors.sizes().max()) + 1))
-        if len(times) > len(known):
-            self.ahead = _Ahead(node, tuple(times), tuple(losses))
-        if not times:
-            return float(self.precision), 64 * float(min(span, _FAR))
-        index = min(bisect_left(times, span), len(times) - 1)
-        return 16 + _carried_on(times, losses, index, span), (index + 1) * _times_as_far(span, times[index])
-
-
-def _carried_on(times: list[Fraction], losses: list[float], index: int, span: Fraction) -> float:
-    """The bits lost by ``span``: by the step ``index``, and from there as by the later half of the steps before it."""
-    later = min(span, _FAR * times[index]) - times[index]
-    if later <= 0:
-        return losses[index]
-    middle = index // 2
-    slope = (losses[index] - losses[middle]) / float(times[index] - times[middle]) if index else 1.0
-    return losses[index] + max(0.0, slope) * float(later)
-
-
-def _times_as_far(span: Fraction, reached: Fraction) -> float:
-    """span/reached, at least 1 and at most 10^12."""
-    return max(1.0, float(min(span / reached, _FAR)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +70,9 @@ class Validated:
     method: str = "validated: Taylor enclosure"
     unit: int = field(default=0, init=False, repr=False, compare=False)
     _runs: dict[tuple[int, int, bool, int], Run] = field(default_factory=dict, init=False, repr=False, compare=False)
-    _pilots: dict[tuple[int, int], Pilot] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _pilots: dict[tuple[int, int, bool, int], Pilot] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
     _motions: dict[tuple[int, int], ScaledMotion] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -220,12 +102,7 @@ class Validated:
 
     def cost(self, time: Fraction, bits: int) -> float:
         """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock."""
-        if time == 0:
-            return 0.0
-        direction, start = (1 if time > 0 else -1), self.start.flat
-        motion = self._motion(direction, start)
-        loss, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start)
-        return steps * _seconds_a_step(*motion.precision(bits + loss + 8, steps))
+        return 0.0 if time == 0 else self._cost(time, bits, self.start.flat)
 
     def reached(self) -> Fraction:
         """The |t| up to which the latest enclosure has come, for those who wait; any thread may ask."""
@@ -277,7 +154,7 @@ class Validated:
             motion = self._motion(direction, start)
             carrier = motion.carrier(precision) if in_words else None
             node = start_node(motion.field, motion.scaled.state, precision)
-            self._runs[key] = Run(motion.field, precision, (node,), carrier)
+            self._runs.setdefault(key, Run(motion.field, precision, (node,), carrier))
         return self._runs[key]
 
     def _enclosure(self, time: Fraction, bits: int, start: tuple[Fraction, ...]) -> list[arb]:
@@ -286,42 +163,58 @@ class Validated:
         direction = 1 if time > 0 else -1
         motion = self._motion(direction, start)
         span, sizes = abs(time) * motion.scaled.rate, motion.scaled.sizes
-        loss, steps = self._forecast(direction, span, start)
+        loss, steps = self._forecast(direction, span, start, bits)
+        pilot = self._pilot(direction, start, bits)
+        run = pilot.run if pilot.reaches(span, bits) else None
         for _ in range(_ATTEMPTS):
-            precision, in_words = motion.precision(bits + loss + 8, steps)
-            self._require_reach(time, bits, loss, steps, motion)
-            run = self._run(direction, start, precision, in_words)
+            planned = motion.precision(bits + loss, steps)
+            if steps * _seconds_a_step(*planned) > self.effort:
+                raise self._refusal(time, self._reachable(time, bits, loss, start))
+            run = run or self._run(direction, start, *planned)
             found = run.at(span)
             if found is not None:
-                values = _evaluated(*found, found[0].radii(found[1]), precision + 64, sizes)
+                values = _evaluated(*found, found[0].radii(found[1]), run.precision + 64, sizes)
                 reached = min(map(relative_bits, values))
                 if reached >= bits:
                     return values
-                loss = precision - reached + 16
+                loss = run.precision - reached + 16
             else:
-                loss = 1.25 * precision * float(min(span / run.lost_at, _FAR)) if run.lost_at else 2.0 * precision
+                loss = run.precision * (1.25 * float(min(span / run.lost_at, FAR)) if run.lost_at else 2.0)
+            run = None
         raise self._refusal(time, 0)
 
-    def _forecast(self, direction: int, span: Fraction, start: tuple[Fraction, ...]) -> tuple[float, float]:
-        """(bits that will be lost, steps that will be taken) up to ``span``."""
-        key = (direction, len(start))
-        if key not in self._pilots:
-            motion = self._motion(direction, start)
+    def _pilot(self, direction: int, start: tuple[Fraction, ...], bits: int) -> Pilot:
+        """In as many bits as short motions take, where they are not many."""
+        motion = self._motion(direction, start)
+        precision, in_words = motion.precision(bits + _PILOT_ROOM, inf)
+        if not in_words or precision > _MOST_PILOT_BITS:
             precision, in_words = motion.precision(_PILOT_BITS, inf)
-            carrier = motion.carrier(precision) if in_words else None
-            ahead = _Ahead(start_node(motion.field, motion.scaled.state, precision))
-            self._pilots[key] = Pilot(motion.field, precision, carrier, ahead)
-        return self._pilots[key].forecast(span, self.effort)
+        key = (direction, precision, in_words, len(start))
+        if key not in self._pilots:
+            run = self._run(direction, start, precision, in_words)
+            # threads that come at once take the same one
+            self._pilots.setdefault(key, Pilot(run, Ahead(run.nodes[0])))
+        return self._pilots[key]
 
-    def _require_reach(self, time: Fraction, bits: int, loss: float, steps: float, motion: ScaledMotion) -> None:
-        def too_long(bits: int) -> bool:
-            return steps * _seconds_a_step(*motion.precision(bits + loss + 8, steps)) > self.effort
+    def _forecast(self, direction: int, span: Fraction, start: tuple[Fraction, ...], bits: int) -> tuple[float, float]:
+        """(bits that will be lost, steps that will be taken) up to ``span``, where ``bits`` are to be left."""
+        pilot = self._pilot(direction, start, bits)
+        a_step = _seconds_a_step(pilot.run.precision, pilot.run.carrier is not None)
+        return pilot.forecast(span, self.effort / a_step)
 
-        reachable = bits
-        while reachable > 0 and too_long(reachable):
+    def _cost(self, time: Fraction, bits: int, start: tuple[Fraction, ...], loss: float = 0.0) -> float:
+        """loss: bits that are lost at least."""
+        direction = 1 if time > 0 else -1
+        motion = self._motion(direction, start)
+        forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits)
+        return steps * _seconds_a_step(*motion.precision(bits + max(loss, forecast), steps))
+
+    def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:
+        """Fewer bits than ``bits``, within the effort."""
+        reachable = bits * 15 // 16
+        while reachable > 0 and self._cost(time, reachable, start, loss) > self.effort:
             reachable = reachable * 15 // 16
-        if reachable < bits:
-            raise self._refusal(time, reachable)
+        return reachable
 
     def _refusal(self, time: Fraction, reachable: int) -> OutOfReach:
         at, digits = decimal_text(time, 6), int((reachable - 5) * log10(2))  # rounded up they take up to 5 bits more

@@ -84,13 +84,20 @@ def certify(
         return Certificate(solution.method, "its own proven tail", agreed_digits(values, values), "proven")
     try:
         enclosure = enclosure or enclosure_of(solution)
-        other = enclosure.state(time, bits)
+        other = None if _refuses(enclosure, time, bits) else enclosure.state(time, bits)
     except OutOfReach:
         if enclosure is None:
             raise
+        other = None
+    if other is None:
         return _early_and_last(solution, enclosure, time, values, bits)
     _require_overlap(solution, time, values, other)
     return Certificate(solution.method, "validated integration", agreed_digits(values, other), "proven")
+
+
+def _refuses(source: ExactSolution, time: Fraction, bits: int) -> bool:
+    """Whether it would, by the model of its cost: a refusal takes longer, as it says which digits are in reach."""
+    return isinstance(source, Validated) and source.cost(time, bits) > source.effort
 
 
 def enclosure_of(solution: ExactSolution, start: State | None = None, effort: float = _EFFORT) -> Validated:

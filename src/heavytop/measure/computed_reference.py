@@ -127,9 +127,13 @@ def compute(
     finer = _finer(given, bits, first)
     second = [_Served.of(each, finer) for each in given]
     words = [(one.bits, two.bits) for one, two in zip(first, second, strict=True)]
+    balls: list[dict[Fraction, list[arb]]] = [{} for _ in given]
     for early in _stages(times, _STAGES if format_bits is not None else 0):
-        runs = _runs(first, early), _runs(second, early)
-        balls = [dict(zip(early, _around(*pair, bits), strict=True)) for pair in zip(*runs, strict=True)]
+        # no bit of a run depends on the samples taken: what a shorter stage had is not taken again
+        more = [time for time in early if time not in balls[0]]
+        for index, pair in enumerate(zip(_states(first, more), _states(second, more), strict=True)):
+            known = balls[index] | dict(zip(more, _around(*pair, bits), strict=True))
+            balls[index] = {time: known[time] for time in early}
         found = [ComputedReference(*each) for each in zip(words, balls, strict=True)]
         ends = None if format_bits is None else _last_digit(found, [each.accuracy - format_bits for each in first])
         if ends is not None and ends not in times:
@@ -187,12 +191,14 @@ def _last_digit(found: Sequence[ComputedReference], fewer: Sequence[int]) -> Fra
     return next((time for time in found[0].balls if any(time in each for each in lost)), None)
 
 
-def _runs(served: Sequence[_Served], times: Sequence[Fraction]) -> list[Trajectory]:
+def _states(served: Sequence[_Served], times: Sequence[Fraction]) -> list[Sequence[Any]]:
+    """The states of each motion at ``times``."""
     problems = [each.problem for each in served]
     words = max(each.bits for each in served)
     effort = EFFORT if len(problems) == 1 else EFFORT_OF_MANY / len(problems)
     limit = int(effort / seconds_a_step(words))
     runs = _followed(problems, times, min(limit, _PILOT_STEPS))
+    states: list[Sequence[Any]] = [run.states for run in runs]
     if limit > _PILOT_STEPS and any(run.outcome is Outcome.STEP_LIMIT for run in runs):
         reached = min(abs(run.time_reached) for run in runs if run.outcome is Outcome.STEP_LIMIT)
         if abs(times[-1]) * _PILOT_STEPS > limit * reached:
@@ -201,13 +207,15 @@ def _runs(served: Sequence[_Served], times: Sequence[Fraction]) -> list[Trajecto
                 f"first {_PILOT_STEPS} steps end at t = {decimal_text(reached, 3)}.",
                 "Ask for an earlier time.",
             )
-        runs = _followed(problems, times, limit)
+        done = min(map(len, states))
+        runs = _followed(problems, times[done:], limit)
+        states = [[*before[:done], *run.states] for before, run in zip(states, runs, strict=True)]
     for run in runs:
         if run.outcome is not Outcome.SUCCESS:
             raise OutOfReach(
                 f"A reference run in words of {words} bits {run.outcome.message}.", "Ask for an earlier time."
             )
-    return runs
+    return states
 
 
 def _followed(problems: Sequence[Problem], times: Sequence[Fraction], limit: int) -> list[Trajectory]:
@@ -219,10 +227,10 @@ def _followed(problems: Sequence[Problem], times: Sequence[Fraction], limit: int
 
 
 @whole_evaluation
-def _around(coarse: Trajectory, fine: Trajectory, bits: int) -> list[list[arb]]:
+def _around(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[list[arb]]:
     """The finer values; the radius of Ω, γ and ξ is the largest difference in it, and a rounding of the coarser."""
     with working_precision(bits + 128):
-        return [_group_balls(one, two, bits) for one, two in zip(coarse.states, fine.states, strict=True)]
+        return [_group_balls(one, two, bits) for one, two in zip(coarse, fine, strict=True)]
 
 
 def _group_balls(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[arb]:

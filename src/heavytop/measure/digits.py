@@ -19,8 +19,8 @@ samples."""
 
 def relative_error(deltas: Sequence[arb], truth: Sequence[arb]) -> arb:
     """The largest |δ|/max(1, |true value|) over the components of one state, at the working precision."""
-    one = arb(1)
-    return largest(delta / abs(value).max(one) for delta, value in zip(deltas, truth, strict=True))
+    sizes = map(abs, truth)
+    return largest(delta if size < 1 else delta / size.max(1) for delta, size in zip(deltas, sizes, strict=True))
 
 
 class Measured(Protocol):

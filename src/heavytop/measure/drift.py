@@ -102,9 +102,13 @@ class Drift:
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
         """Take in one native state."""
+        self.take(time, self.following(state))
+
+    def take(self, time: Fraction, sums: Sequence[Sums]) -> None:
+        """Take in one state by its :meth:`following`."""
         keep = time in self.keep
-        for running, sums in zip(self.running.values(), self._following(state), strict=True):
-            running.take(time, sums, keep)
+        for running, each in zip(self.running.values(), sums, strict=True):
+            running.take(time, each, keep)
 
     @whole_evaluation
     def _values(self, state: Sequence[Fraction]) -> dict[str, arb]:
@@ -113,7 +117,8 @@ class Drift:
             return {name: value(self.parameters, y) for name, value in self.functions.items()}
 
     @whole_evaluation
-    def _following(self, state: Sequence[Any]) -> list[Sums]:
+    def following(self, state: Sequence[Any]) -> list[Sums]:
+        """What the drifts add up to with this state, of native numbers or balls; nothing is taken in."""
         with working_precision(self.bits):
             y = [to_ball(value) for value in state]
             return [

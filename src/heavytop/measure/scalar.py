@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from fractions import Fraction
+from functools import reduce
 from typing import Any
 
 from flint import arb
@@ -22,23 +22,17 @@ _SURELY_RESOLVED = 8
 
 
 def to_ball(value: Any) -> arb:
-    """A native number as a ball of radius 0 (working precision permitting); NaN and infinities stay what they are."""
+    """A native number as a ball of radius 0 (working precision permitting); NaN and infinities, and balls, stay what
+    they are.
+    """
+    if isinstance(value, arb):
+        return value
     if isinstance(value, float):
         return arb(float(value))
     try:
         return ball(exact(value))
     except InputError:
         return arb("nan")
-
-
-def exactly(value: Any) -> Any:
-    """A native number as one that :func:`to_ball` takes at once: a float or a fraction, NaN for what is not finite."""
-    if isinstance(value, float):
-        return value
-    try:
-        return exact(value)
-    except InputError:
-        return math.nan
 
 
 def resolved(value: arb) -> bool:
@@ -73,7 +67,4 @@ def of_fraction(value: Fraction, kind: MetricKind = "error", words: str | None =
 
 def largest(values: Iterable[arb]) -> arb:
     """The ball around max |value|."""
-    result = arb(0)
-    for value in values:
-        result = result.max(abs(value))
-    return result
+    return reduce(arb.max, map(abs, values), arb(0))

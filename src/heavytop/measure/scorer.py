@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
+from heavytop.exact.balls import working_precision
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.drift import Drift, Running
-from heavytop.measure.scalar import exactly
-from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
+from heavytop.measure.drift import Drift, Running, Sums
+from heavytop.measure.scalar import GUARD_BITS, to_ball
+from heavytop.measure.solution_error import SOLUTION_ERROR, Errors, SolutionError
 from heavytop.measure.truth import Truth
 from heavytop.records import Against, Metric, Quantity, Series
 
@@ -44,10 +46,16 @@ class Scorer:
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
         """Take in one native state."""
-        state = [exactly(value) for value in state]  # once for both
-        self.drift(time, state)
+        drifts, errors = self._following(time, state)
+        self.drift.take(time, drifts)
         if self.error is not None:
-            self.error(time, state)
+            self.error.take(time, errors)
+
+    @whole_evaluation
+    def _following(self, time: Fraction, state: Sequence[Any]) -> tuple[list[Sums], Errors | None]:
+        with working_precision(self.drift.bits + GUARD_BITS):
+            balls = [to_ball(value) for value in state]  # once for both
+        return self.drift.following(balls), None if self.error is None else self.error.following(time, balls)
 
     def take(self, times: Iterable[Fraction], states: Iterable[Sequence[Any]]) -> None:
         """Take in an array of native states, one at each of the exact times."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from operator import mul
 from typing import Any
 
 from flint import arb
@@ -21,6 +22,9 @@ from heavytop.records import Metric, Quantity, Series, by_name
 SOLUTION_ERROR = "solution_error"
 COMPONENTS = ("omega", "gamma", "along", "across")
 _RELATIVE = "relative"
+
+Errors = tuple[list[Sums], bool]
+"""What :meth:`SolutionError.following` finds."""
 
 
 class SolutionError:
@@ -56,9 +60,13 @@ class SolutionError:
 
     def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
         """Take in one native state."""
-        if not self.truth.covers(time):
+        self.take(time, self.following(time, state))
+
+    def take(self, time: Fraction, errors: Errors | None) -> None:
+        """Take in one state by its :meth:`following`."""
+        if errors is None:
             return
-        sums, left = self._following(state, self.truth.state(time, self.bits))
+        sums, left = errors
         keep = time in self.keep
         counts = math.isinf(self.until) or float(abs(time)) <= self.until
         for running, part in zip(self.running.values(), sums, strict=True):
@@ -67,8 +75,13 @@ class SolutionError:
             self.escape = time
 
     @whole_evaluation
-    def _following(self, state: Sequence[Any], truth: Sequence[arb]) -> tuple[list[Sums], bool]:
-        """What the errors add up to with this state, and whether Ω is off by more than the threshold."""
+    def following(self, time: Fraction, state: Sequence[Any]) -> Errors | None:
+        """What the errors add up to with this state, of native numbers or balls, and whether Ω is off by more than the
+        threshold; None where there is no truth.  Nothing is taken in.
+        """
+        if not self.truth.covers(time):
+            return None
+        truth = self.truth.state(time, self.bits)
         with working_precision(self.bits + GUARD_BITS):
             delta = [to_ball(value) - true for value, true in zip(state[:6], truth, strict=True)]
             flow = self.system.field(self.parameters, truth)
@@ -112,13 +125,17 @@ class SolutionError:
 
 def split(delta: Sequence[arb], flow: Sequence[arb]) -> tuple[arb, arb]:
     """|δ| along the unit vector of the flow, and the Euclidean rest across it; the whole across at an equilibrium."""
-    total = sum((x * x for x in delta), arb(0))
-    speed = sum((x * x for x in flow), arb(0))
+    total = _product(delta, delta)
+    speed = _product(flow, flow)
     if not resolved(speed) or speed == 0:
         return arb(0), root(total)
-    projection = sum((x * f for x, f in zip(delta, flow, strict=True)), arb(0))
+    projection = _product(delta, flow)
     along = projection * projection / speed
     return root(along), root(total - along)
+
+
+def _product(a: Sequence[arb], b: Sequence[arb]) -> arb:
+    return sum(map(mul, a, b), arb(0))
 
 
 def root(value: arb) -> arb:

@@ -106,17 +106,14 @@ def _eight(row: Sequence[Any]) -> tuple[Fraction, ...]:
     return tuple(Fraction(c) for c in row) + (Fraction(0),) * (8 - len(row))
 
 
-def rates(system: System, given: Coefficients, y: Sequence[Fraction]) -> list[Fraction]:
-    """The derivative of (Ω, γ) or (Ω, γ, ξ) as the lanes compute it, exactly."""
-    zero = Fraction(0)
-    lanes = [[*y[:6], zero, zero], [zero, zero, zero, *y[6:], zero, zero]][: len(given.vectors)]
+def rates(system: System, given: Coefficients, y: Sequence[Any]) -> list[Any]:
+    """The derivative of (Ω, γ) or (Ω, γ, ξ) as the lanes compute it, exactly for exact numbers of any kind."""
+    lanes: list[list[Any]] = [[*y[:6], 0, 0], [0, 0, 0, *y[6:], 0, 0]][: len(given.vectors)]
     right = _side(lanes[0], RIGHT)
-    found: list[Fraction] = []
+    found: list[Any] = []
     for vector, (state, (first, *linear)) in enumerate(zip(lanes, given.vectors, strict=True)):
         products = [a * b for a, b in zip(_side(state, LEFT), right, strict=True)]
-        gathered = [
-            sum((sign * products[lane] for lane, sign in column), zero) for column in zip(*GATHERED, strict=True)
-        ]
+        gathered = [sum(sign * products[lane] for lane, sign in column) for column in zip(*GATHERED, strict=True)]
         derivative = [a * s for a, s in zip(first, gathered, strict=False)]
         for row, permutation in zip(linear, turned(system), strict=True):
             derivative = [d + b * state[lane] for d, b, lane in zip(derivative, row, permutation, strict=False)]
@@ -124,5 +121,5 @@ def rates(system: System, given: Coefficients, y: Sequence[Fraction]) -> list[Fr
     return found
 
 
-def _side(y: Sequence[Fraction], which: Sum) -> list[Fraction]:
+def _side(y: Sequence[Any], which: Sum) -> list[Any]:
     return [y[a] + sign * y[b] for a, b, sign in zip(which.first, which.second, which.sign, strict=True)]

@@ -56,9 +56,9 @@ from typing import Any, cast
 import numpy
 from numpy.typing import NDArray
 
-from heavytop.words import fixed
+from heavytop.words import extents, fixed
 from heavytop.words.grid import raises_of
-from heavytop.words.grid_series import most_orders
+from heavytop.words.grid_series import UNSETTLED, most_orders
 from heavytop.words.kernels import Grid
 from heavytop.words.lanes import turned
 from heavytop.words.machine import Doubles, Integers, Processor, doubles, pointer
@@ -68,18 +68,39 @@ _UP = 1 + 2.0**-40
 _ROOM = 1 - 2.0**-20
 
 
+class Total(Sequence[int]):
+    """Σ b_n of each component, whole ulps: kept as words, from which the next step begins."""
+
+    def __init__(self, words: Doubles, carrier: Carrier) -> None:
+        self.words, self._carrier = words, carrier
+
+    @cached_property
+    def _values(self) -> list[int]:
+        grid, places = self._carrier.grid, self._carrier.places
+        return list(_whole(self.words[places], grid))
+
+    def __len__(self) -> int:
+        return len(self._carrier.places)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._values[index]
+
+
 @dataclass(frozen=True)
 class Series:
-    """b_0, …, b_N of six or nine components, in words.
+    """b_0, …, b_N of six or nine components, in words: those of ``carrier`` from ``centre`` with h = 2^-halvings.
 
-    words: shape (components, N + 1, K).  total: Σ b_n, whole ulps.  rounding: Σ_(n < N) of (2) in ulps, which bounds
-    the integral of the defect of all orders below N.
+    total: Σ b_n.  rounding: Σ_(n < N) of (2) in ulps, which bounds the integral of the defect of all orders below N.
+    sizes: upper bounds of |b_n|, shape (N + 1,).  nearest: b_n within 2^-50 of ``sizes``, shape (N + 1, components).
     """
 
-    grid: Grid
-    words: Doubles
-    total: tuple[int, ...]
+    carrier: Carrier
+    centre: Sequence[int]
+    halvings: int
+    total: Total
     rounding: float
+    sizes: Doubles
+    nearest: Doubles
 
     @property
     def thrifty(self) -> tuple[float, float]:
@@ -89,25 +110,20 @@ class Series:
     @property
     def order(self) -> int:
         """N."""
-        return int(self.words.shape[1]) - 1
+        return len(self.sizes) - 1
 
     @cached_property
     def values(self) -> list[list[int]]:
-        """The coefficients of each component, whole ulps."""
-        return [[_whole(words, self.grid) for words in component] for component in self.words.tolist()]
-
-    @cached_property
-    def sizes(self) -> Doubles:
-        """Upper bounds of |b_n|, shape (N + 1,)."""
-        return numpy.asarray(numpy.abs(self.words).sum(axis=2).max(axis=0) * _UP)
+        """The coefficients of each component, whole ulps: computed once more, for few steps are asked for them."""
+        return self.carrier.coefficients(self.centre, self.halvings)
 
     def scaled(self, rate: int) -> Doubles:
         """Upper bounds of 2^(rate n) |b_n|, shape (N + 1,)."""
         return numpy.ldexp(self.sizes, rate * numpy.arange(len(self.sizes)))
 
     def rounded(self, orders: int) -> Doubles:
-        """b_0 to b_orders, as many as there are, within 2^-50 of their ``sizes``; shape (orders + 1, components)."""
-        return numpy.asarray(self.words[:, : orders + 1].sum(axis=2).T)
+        """b_0 to b_orders of ``nearest``, as many as there are."""
+        return self.nearest[: orders + 1]
 
 
 class Carrier:
@@ -119,39 +135,61 @@ class Carrier:
     def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:
         self.vectors = 1 if len(problem.state) == 6 else 2
         self.machine, self.row = fixed.machine(grid, problem.system, self.vectors == 2, processor)
+        self.extents = extents.machine(grid.words, self.vectors).functions["extents"]
         self.grid, self.sign = grid, 1.0 if forwards else -1.0
         self.excess = fixed.excess(problem)
         self.constants, self.inverses = fixed.constants(problem, grid, self.excess), fixed.inverses(grid)
         self._own = (problem, grid, forwards, processor)
         self._sources = 1 + len(turned(problem.system))
         self._of_constants = self._error_of_constants()
-        self._exponents = grid.bits * numpy.arange(1, grid.words + 1)
+        self._exponents = grid.bits * numpy.arange(1, grid.words + 1)[:, None]
         self._threads = local()
-        second = 8 * grid.words
-        self._lanes = [*range(6), *(second + lane for lane in range(3, 6))][: 3 + 3 * self.vectors]
+        self._columns = [*range(6), *range(11, 14)][: 3 + 3 * self.vectors]
+        first = numpy.array([lane % 8 + 8 * grid.words * (lane // 8) for lane in self._columns])
+        self.places = first[:, None] + 8 * numpy.arange(grid.words)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (Carrier, self._own)
 
     def series(self, centre: Sequence[int], halvings: int) -> Series | None:
         """From ``centre``, whole ulps 2^-(K b), with h = 2^-halvings; None where that is too long or words overflow."""
-        words, exponent = self.grid.words, self.excess - halvings
-        factor, raises = raises_of(exponent)
-        if not -self.grid.bits <= exponent < 64:
-            return None
-        scratch = self._scratch()
-        for lane, value in zip(self._lanes, centre, strict=True):
-            scratch.state[lane : lane + 8 * words : 8] = _words(value, self.grid)
-        orders = self.machine.functions["series"](*scratch.pointers, self.sign * factor, raises, scratch.found)
+        orders = self._computed(centre, halvings)
         if orders < 0:
             return None
-        table = scratch.rows[: self.row * (orders + 1)].reshape(orders + 1, 1 + self.vectors, words, 8)
-        components = self._components(table)
-        rounding = self._rounding(table, components, ldexp(1.0, exponent))
+        scratch, length = self._scratch(), orders + 1
+        self.extents(scratch.pointers[3], orders, *scratch.measures)
+        rounding = self._rounding(scratch.widest, scratch.added, orders, ldexp(1.0, self.excess - halvings))
         if rounding is None:
             return None
-        total = tuple(_whole(scratch.result[lane : lane + 8 * words : 8].tolist(), self.grid) for lane in self._lanes)
-        return Series(self.grid, components, total, rounding)
+        size = 8 * self.vectors
+        sizes = numpy.maximum.reduce(scratch.sizes[: length * size].reshape(length, size), 1) * _UP
+        nearest = scratch.values[: length * size].reshape(length, size)[:, self._columns]
+        return Series(self, centre, halvings, Total(scratch.result.copy(), self), rounding, sizes, nearest)
+
+    def coefficients(self, centre: Sequence[int], halvings: int) -> list[list[int]]:
+        """b_0 to b_N of each component, whole ulps, where :meth:`series` gives some."""
+        length, grid = self._computed(centre, halvings) + 1, self.grid
+        table = self._scratch().rows[: self.row * length].reshape(length, 1 + self.vectors, grid.words, 8)
+        # L holds Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2; what is taken out of it are the words of y, exactly
+        found = [table[:, 1, :, lane] for lane in (2, 0, 1)]
+        for left in (table[:, 1 + vector] for vector in range(self.vectors)):
+            middle = left[:, :, 5] / 2
+            found += [left[:, :, 4] - middle, middle, left[:, :, 3] - middle]
+        return [_whole(component, grid).tolist() for component in found]
+
+    def _computed(self, centre: Sequence[int], halvings: int) -> int:
+        """N, with the coefficients in the rows of this thread's scratch; negative where there are none."""
+        exponent = self.excess - halvings
+        if not -self.grid.bits <= exponent < 64:
+            return UNSETTLED
+        factor, raises = raises_of(exponent)
+        scratch = self._scratch()
+        if isinstance(centre, Total):
+            scratch.state[:] = centre.words
+        else:
+            scratch.state[self.places] = [_words(value, self.grid) for value in centre]
+        found = self.machine.functions["series"](*scratch.pointers, self.sign * factor, raises, scratch.found)
+        return int(found)
 
     def _scratch(self) -> _Scratch:
         """This thread's."""
@@ -159,32 +197,25 @@ class Carrier:
             self._threads.scratch = _Scratch(self)
         return cast("_Scratch", self._threads.scratch)
 
-    def _components(self, table: Doubles) -> Doubles:
-        """The words of y out of those of L, exactly: L holds Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2."""
-        found = numpy.empty((3 + 3 * self.vectors, len(table), self.grid.words))
-        for k, lane in enumerate((2, 0, 1)):
-            found[k] = table[:, 1, :, lane]
-        for vector in range(self.vectors):
-            left, first = table[:, 1 + vector], 3 + 3 * vector
-            middle = left[:, :, 5] / 2
-            found[first], found[first + 1], found[first + 2] = left[:, :, 4] - middle, middle, left[:, :, 3] - middle
-        return found
+    def _rounding(self, widest: Doubles, added: Doubles, orders: int, scale: float) -> float | None:
+        """The sum of (2) over n < N in ulps, with H = ``scale``; None where what is assumed does not hold.
 
-    def _rounding(self, table: Doubles, components: Doubles, scale: float) -> float | None:
-        """The sum of (2) over n < N in ulps, with H = ``scale``; None where what is assumed does not hold."""
-        grid, orders = self.grid, len(table) - 1
-        widest = numpy.ldexp(numpy.abs(table).max(axis=0), self._exponents[:, None])
-        one, products = _levels(grid, widest[0], widest[1:].max(axis=0))
+        widest: max_n |word k|, shape (1 + vectors, K, 8), of R and each L.  added: Σ_n |word k of y|, shape
+        (vectors, K, 8).
+        """
+        grid = self.grid
+        wide = numpy.ldexp(widest, self._exponents)
+        left, right = numpy.maximum.reduce(wide[1:]), wide[0]
+        one, products = _levels(grid, right, left)
         sums = products[: grid.words - 1] + 3 * one[: grid.words - 1]
-        added = numpy.ldexp(numpy.abs(components).sum(axis=1).max(axis=0), self._exponents)
         # γ1 and γ3 are differences of L's
-        state = 1.5 * widest[1:].max(axis=(0, 2))
+        state = (1.5 * numpy.maximum.reduce(left, 1)).tolist()
         term, once = _error(grid, products, orders)
         limits = (
             (float(sums.max()), 2.0**52 * _ROOM),
-            (float(added.max()), 2.0**52),
-            (float(state[0]), 2.0**51),
-            (float(state[1:].max()), 2.0 ** (grid.bits + 2)),
+            (float(numpy.ldexp(added, self._exponents).max()), 2.0**52),
+            (state[0], 2.0**51),
+            (max(state[1:]), 2.0 ** (grid.bits + 2)),
             (once, 2.0 ** (grid.bits + 16 - 53)),
         )
         if not all(found <= limit for found, limit in limits):
@@ -209,19 +240,23 @@ class _Scratch:
 
     def __init__(self, carrier: Carrier) -> None:
         words, vectors = carrier.grid.words, carrier.vectors
-        self.state, self.result = doubles(8 * words * vectors), doubles(8 * words * vectors)
-        self.rows = doubles(carrier.row * (most_orders(carrier.grid) + 2))
+        size, orders = 8 * words * vectors, most_orders(carrier.grid) + 2
+        self.state, self.result, self.rows = doubles(size), doubles(size), doubles(carrier.row * orders)
         kept = [self.state, carrier.constants, carrier.inverses, self.rows]
         places = numpy.zeros(words + 2, numpy.int64)
         self._kept: list[Doubles | Integers] = [*kept, doubles(8 * words), places, doubles(8)]
         self.pointers, self.found = [pointer(array) for array in self._kept], pointer(self.result)
+        self.values, self.sizes = doubles(8 * vectors * orders), doubles(8 * vectors * orders)
+        widest, added = doubles(8 * words * (1 + vectors)), doubles(size)
+        self.measures = [pointer(array) for array in (self.values, self.sizes, widest, added)]
+        self.widest, self.added = widest.reshape(-1, words, 8), added.reshape(-1, words, 8)
 
 
 def _levels(grid: Grid, left: Doubles, right: Doubles) -> tuple[Doubles, Doubles]:
     """The largest product of level k and the sum of all, over g_k, for k = 0 to 2K − 2; from words over their units."""
-    products = (left[:, None, :] * right[None, :, :]).max(axis=2).ravel() * 2.0**-grid.bits
+    products = numpy.maximum.reduce(left[:, None, :] * right, 2).ravel() * 2.0**-grid.bits
     table = _antidiagonals(grid.words)
-    return (table * products).max(axis=1), table @ products * _UP
+    return numpy.maximum.reduce(table * products, 1), table @ products * _UP
 
 
 @lru_cache(maxsize=32)
@@ -230,11 +265,17 @@ def _antidiagonals(words: int) -> NDArray[numpy.float64]:
     return numpy.asarray((i + j == numpy.arange(2 * words - 1)[:, None]).astype(float))
 
 
+@lru_cache(maxsize=32)
+def _ulps(grid: Grid) -> Doubles:
+    """g_K, …, g_(2K−2), which are below the last word, over g."""
+    return numpy.asarray(2.0 ** (-grid.bits * numpy.arange(1.0, grid.words)))
+
+
 def _error(grid: Grid, products: Doubles, terms: int) -> tuple[float, float]:
     """ε(T) as (a, c) with a T + c for T ≤ ``terms``, in ulps."""
     words = grid.words
     largest = 1.5 * 2.0**52 + terms * (float(products[words - 1]) + words * 2.0**grid.bits)
-    dropped = float(products[words:] @ 2.0 ** (-grid.bits * numpy.arange(1.0, words))) * _UP
+    dropped = float(products[words:] @ _ulps(grid)) * _UP
     rounding = 2.0**-53 * largest * _UP
     return (words + 1) * rounding + dropped, rounding
 
@@ -250,9 +291,10 @@ def _words(value: int, grid: Grid) -> list[float]:
     return [*found, ldexp(float(value), -grid.total)]
 
 
-def _whole(words: Sequence[float], grid: Grid) -> int:
-    """What words add to, in ulps."""
-    total = 0
-    for k, word in enumerate(words):
-        total = (total << grid.bits) + int(ldexp(word, grid.bits * (k + 1)))
+def _whole(words: Doubles, grid: Grid) -> Any:
+    """What words add to along the last axis, in ulps: an array of integers."""
+    digits = numpy.ldexp(words, grid.bits * numpy.arange(1, grid.words + 1)).astype(numpy.int64).astype(object)
+    total = digits[..., 0]
+    for k in range(1, grid.words):
+        total = (total << grid.bits) + digits[..., k]
     return total

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from threading import local
 from typing import Any
 
 import numpy
@@ -18,14 +19,34 @@ def variation(slopes: Doubles) -> Doubles:
     slopes: J_0, …, J_(T−1), shape (T, size, size).  The result has shape (T + 1, size, size).
     """
     orders, size, _ = slopes.shape
-    width = _width(size)
-    made = _machine(size)
-    given, found = doubles(slopes.size), doubles((orders + 1) * size * width)
-    given[:] = slopes.ravel()
-    table = found.reshape(orders + 1, size, width)
-    table[0, :, :size] = numpy.eye(size)
-    made.functions["variation"](pointer(given), pointer(found), orders)
-    return table[:, :, :size]
+    room = _rooms.of(orders, size)
+    room.given[:] = slopes.ravel()
+    _machine(size).functions["variation"](*room.pointers, orders)
+    return room.table[:, :, :size].copy()
+
+
+class _Room:
+    """What one thread computes with; V_0 stays."""
+
+    def __init__(self, orders: int, size: int) -> None:
+        width = _width(size)
+        self.given, found = doubles(orders * size * size), doubles((orders + 1) * size * width)
+        self.table = found.reshape(orders + 1, size, width)
+        self.table[0, :, :size] = numpy.eye(size)
+        self.pointers = pointer(self.given), pointer(found)
+
+
+class _Rooms(local):
+    def __init__(self) -> None:
+        self.made: dict[tuple[int, int], _Room] = {}
+
+    def of(self, orders: int, size: int) -> _Room:
+        if (orders, size) not in self.made:
+            self.made[orders, size] = _Room(orders, size)
+        return self.made[orders, size]
+
+
+_rooms = _Rooms()
 
 
 def _width(size: int) -> int:
