@@ -21,7 +21,7 @@ def problems(system) -> list[Scaled]:
     return [Scaled.of(system, p, (Fraction(k, 8), Fraction(1, 5), Fraction(k, 3) - 1, *rest)) for k in range(1, 9)]
 
 
-def in_lanes(system, lanes: list[Scaled | None], ladder=FINE, low_order=26, processor=None, forwards=True) -> Eight:
+def in_lanes(system, lanes: list[Scaled | None], ladder=FINE, low_order=33, processor=None, forwards=True) -> Eight:
     eight = Eight(system, ladder, low_order, processor)
     for lane, problem in enumerate(lanes):
         if problem is not None:
@@ -72,7 +72,7 @@ def test_a_lane_that_needs_a_larger_n0_says_so_and_stops() -> None:
 def test_the_bits_are_those_of_every_processor(processor) -> None:
     given, ladder = list(problems(HEAVY_TOP)), Ladder.of(Fraction(1, 10**20), FALL_IN_LANES)
     own, other = (
-        in_lanes(HEAVY_TOP, given, ladder, 12, each).samples(dict.fromkeys(range(8), SPAN))
+        in_lanes(HEAVY_TOP, given, ladder, 16, each).samples(dict.fromkeys(range(8), SPAN))
         for each in (None, processor)
     )
     assert own == other

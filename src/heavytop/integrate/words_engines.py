@@ -83,6 +83,7 @@ class DoubleDouble(Arithmetic):
     def make(self, system: System, attitude: bool) -> float:
         made, _ = floating.machine(system, attitude)
         check(system, attitude, lambda scaled: Floating(scaled, _FULL, True), floating.BITS)
+        check(system, attitude, lambda scaled: Floating(scaled, _SPLIT, True), _SPLIT_BITS)
         check(system, attitude, lambda scaled: Floating(scaled, _PLAIN, True, low_order=3), _PLAIN_BITS)
         return made.seconds
 
@@ -92,6 +93,9 @@ _REACH = -2.9
 _FULL = Ladder(38, _REACH, -1000.0)
 _PLAIN = Ladder(24, _REACH, 1000.0)
 _ALLOWED = Ladder(38, _REACH, 1000.0)
+# with most orders in split coefficients
+_SPLIT, _SPLIT_ALLOWED = Ladder(38, _REACH, -1000.0, -40.0), Ladder(38, _REACH, 1000.0, -40.0)
+_SPLIT_BITS = 80
 _PLAIN_BITS = 53
 _CHECKED_BITS = 128
 _STEP_OF_BITS = 64
@@ -207,6 +211,7 @@ def compiled_lanes(system: System) -> float:
         if key not in _made:
             seconds = eight.machine(system).seconds
             check(system, False, lambda scaled: eight.OneOfEight(scaled, _ALLOWED, _ALLOWED.order - 1), floating.BITS)
+            check(system, False, lambda scaled: eight.OneOfEight(scaled, _SPLIT_ALLOWED, 30), _SPLIT_BITS)
             check(system, False, lambda scaled: eight.OneOfEight(scaled, _PLAIN, 3), _PLAIN_BITS)
             _made[key] = seconds
         return _made[key]

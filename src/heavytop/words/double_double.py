@@ -1,7 +1,8 @@
-"""Taylor steps in double-double arithmetic (106 bits), with plain doubles above an order n0.
+"""Taylor steps in double-double arithmetic (106 bits), with fewer bits from some order on.
 
-The coefficients y_n of a motion fall with n, and the low words of all above some n0 < N are too small to matter: there
-the recurrence goes on in plain doubles.  n0 follows the motion: a step is done again with a larger one where
+The coefficients y_n of a motion fall with n.  From some order on split coefficients are exact enough
+(:mod:`heavytop.words.split_orders`), and the low words of all above some n0 < N are too small to matter: there the
+recurrence goes on in plain doubles.  n0 follows the motion: a step is done again with a larger one where
 2^-53 |y_(n0+1)| h^(n0+1) comes out above what is allowed, and n0 falls where a smaller one would do.
 
 The step is h = ρ exp(reach), with the radius ρ from the last two coefficients as Jorba and Zou have it (Exp. Math. 14
@@ -20,21 +21,20 @@ from heavytop.words.lanes import turned
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
 from heavytop.words.pairs import add, covered, later, log2, polynomial, step_length, times
 from heavytop.words.recurrence import Layout, Recurrence
-from heavytop.words.split_orders import SplitOrders, first_split, judged, near, slope_of, splits
+from heavytop.words.split_orders import MOST_TRIES, SplitOrders, first_split, judged, near, slope_of, splits
 from heavytop.words.stepping import Stepping
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, POINTER, Index, Pair, function
 
 TIME, TIME_LOW, TARGET, TARGET_LOW, BEGAN, BEGAN_LOW, SIGN, ROOM, REACH, DEPTH, CLOCK = range(11)
 """Places of the clock, doubles: |time| and its target and the beginning of the last step, in two words each; the
-direction; log2 of the rounding allowed above n0, in units of 2^-53; log2 of h/ρ; how many bits below the state
-the products of split coefficients must be."""
+direction; log2 of the rounding allowed above n0, in units of 2^-53; log2 of h/ρ; log2 of what the products of the units
+of split coefficients may be beside the state."""
 ORDER, LOW_ORDER, LEAST, MOST, STATUS, USED, TRIES, SLOPE, USED_TRIES, USED_SLOPE, COUNTS = range(11)
-"""Places of the counts: N, n0 of the next step, bounds of n0, how the last step ended, its n0; how often the next step was tried in split coefficients, and the slope of their units; the same of the
-last step."""
+"""Places of the counts: N, n0 of the next step, bounds of n0, how the last step ended, its n0; how often the next step
+was tried in split coefficients, and the slope of their units; the same of the last step."""
 FINE, NON_FINITE, TOO_SMALL = range(3)
 _HYSTERESIS = 3.0
 _TOLERATED = 1.0
-_MOST_TRIES = 3
 
 
 def build(system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, Layout]:
@@ -92,35 +92,46 @@ class _Step(Stepping):
 
     def write_step(self) -> Any:
         """One step; whether it stands."""
-        series, vectors = self.series, self.series.vectors
         order, low_order = self.count(ORDER), self.count(LOW_ORDER)
-        first = [series.pair(self.state, 16 * v) for v in vectors]
-        series.put(0, first)
-        b, code = self.code.builder, self.code
+        first = [self.series.pair(self.state, 16 * v) for v in self.series.vectors]
+        self.series.put(0, first)
         start = log2(self.code, self._norm(0))
+        units = [self.code.load(self.state, self.layout.units + 8 * v) for v in self.series.vectors]
         slope = self.count(SLOPE)
-        units = [self.code.load(self.state, self.layout.units + 8 * v) for v in vectors]
-        trying = b.and_(splits(code, units, slope), b.icmp_signed("<", self.count(TRIES), code.integer(_MOST_TRIES)))
+        split, largest = self._orders(first, start, units, slope)
+        length = self._length(order, start)
+        result = self._sum(order, low_order, self.code.builder.fmul(length, self.time(SIGN)))
+        fits = self._units_fit(split, units, slope, largest, length)
+        good = self.code.builder.and_(self._judge(length, low_order, start, result), fits)
+        self._follow(good, fits, units, slope)
+        self._accept(good, length, low_order, result)
+        return good
+
+    def _orders(self, first: list[Pair], start: Any, units: list[Any], slope: Any) -> tuple[Any, list[Any]]:
+        """y_1 to y_N; whether some are split, a bit, and the largest of their units."""
+        code, b, series = self.code, self.code.builder, self.series
+        order, low_order = self.count(ORDER), self.count(LOW_ORDER)
+        tried = b.icmp_signed(">=", self.count(TRIES), code.integer(MOST_TRIES))
         wanted = first_split(code, units, slope, self.time(REACH), b.fadd(start, self.time(DEPTH)))
-        split = b.and_(trying, b.icmp_signed("<", wanted, low_order))
+        split = b.and_(splits(code, units, slope), b.icmp_signed("<", wanted, low_order))
+        split = b.and_(split, b.not_(tried))
         pair_order = b.select(split, wanted, low_order)
         words = series.orders_in_pairs(first, pair_order)
         parts = SplitOrders(series, units, slope, b.add(order, code.integer(1)))
         largest = parts.begin(b.select(split, pair_order, code.integer(-1)))
         words, largest = parts.orders(pair_order, low_order, words, largest)
-        series.plain_orders(low_order, order, [words[2 * v] for v in vectors])
-        length = self._length(order, start)
-        result = self._sum(order, low_order, self.code.builder.fmul(length, self.time(SIGN)))
-        asked = slope_of(code, self.time(REACH), length)
+        series.plain_orders(low_order, order, [words[2 * v] for v in series.vectors])
+        return split, largest
+
+    def _units_fit(self, split: Any, units: list[Any], slope: Any, largest: list[Any], length: Any) -> Any:
+        """Whether the units of split coefficients were good, a bit; puts those of what comes next."""
+        code, b = self.code, self.code.builder
         fits, following = judged(code, units, largest)
-        fits = b.or_(b.and_(fits, near(code, slope, asked)), b.not_(split))
-        good = b.and_(self._judge(length, low_order, start, result), fits)
-        self._follow(good, fits, units, slope)
+        asked = slope_of(code, self.time(REACH), length)
         self.set_count(asked, SLOPE)
-        for v in vectors:
-            code.store(following[v], self.state, self.layout.units + 8 * v)
-        self._accept(good, length, low_order, result)
-        return good
+        for v, unit in enumerate(following):
+            code.store(unit, self.state, self.layout.units + 8 * v)
+        return b.or_(b.and_(fits, near(code, slope, asked)), b.not_(split))
 
     def _norm(self, n: Index) -> Any:
         row, found = self.series.row(n), self.code.zero
@@ -197,7 +208,7 @@ class _Step(Stepping):
         return b.and_(b.not_(again), b.icmp_signed("==", status, code.integer(FINE)))
 
     def _follow(self, good: Any, fits: Any, units: list[Any], slope: Any) -> None:
-        """What the step was done with, if it stands, and how often the next was tried."""
+        """What split coefficients the step was done with, if it stands, and how often the next was tried."""
         code, b = self.code, self.code.builder
         tries = self.count(TRIES)
         with b.if_then(good):

@@ -10,11 +10,12 @@ import numpy
 from heavytop.top.equations import System
 from heavytop.words import lane_steps as steps
 from heavytop.words.floating import LARGEST_TIME, Ladder
+from heavytop.words.lane_orders import ROW, terms
 from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
 from heavytop.words.pairs import split
 from heavytop.words.run import Status, Steps
 from heavytop.words.scaled import Scaled
-from heavytop.words.split_orders import FIRST_UNITS
+from heavytop.words.split_orders import FIRST_UNITS, MOST_TRIES
 from heavytop.words.vector import LANES
 
 _NO_LIMIT = 2.0**53
@@ -34,13 +35,13 @@ class Eight:
         self.functions = machine(system, processor).functions
         self.ladder, self.low_order = ladder, min(low_order, ladder.order - 1)
         self.pair_order = min(self.low_order, ladder.pair_order(self.low_order))
-        self.terms = steps.terms(system)
+        self.terms = terms(system)
         self.words, self.clock = doubles(12 * LANES), doubles(steps.CLOCK * LANES)
         self.flags = numpy.zeros(LANES, numpy.int64)
         self.constants = doubles(16 * (3 + len(self.terms)))
         self.quotients = doubles(2 * ladder.order)
         self.quotients[:] = [word for n in range(1, ladder.order + 1) for word in split(Fraction(1, n))]
-        self.scratch = doubles((ladder.order + 1) * steps.ROW)
+        self.scratch = doubles((ladder.order + 1) * ROW)
         self.signs = [1] * LANES
         self._set(steps.ROOM, [ladder.room] * LANES)
         self._set(steps.REACH, [ladder.reach] * LANES)
@@ -111,7 +112,7 @@ class Eight:
 
     def coefficients(self, lane: int, n: int) -> tuple[Fraction, ...]:
         """y_n of a lane's last series."""
-        return _exact_lane(self.scratch[steps.ROW * n : steps.ROW * (n + 1)], lane)
+        return _exact_lane(self.scratch[ROW * n : ROW * (n + 1)], lane)
 
     def state(self, lane: int) -> tuple[Fraction, ...]:
         """Where a lane's motion is."""
@@ -153,7 +154,11 @@ class OneOfEight(Steps):
         return self.eight.state(0)
 
     def advance(self, target: Fraction, steps: int) -> Status:
-        self.steps += self.eight.advance(1)
+        # one round at a time, since the scratch holds the series of the last; the first ones may fit units only
+        for _ in range(1 + MOST_TRIES):
+            if self.time == 0:
+                self.eight.advance(1)
+        self.steps += 1
         same = all(self.eight.state(lane) == self.state and self.eight.time(lane) == self.time for lane in range(LANES))
         return Status.FINE if same and self.time > 0 else Status.NON_FINITE
 

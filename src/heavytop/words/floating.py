@@ -17,14 +17,17 @@ from heavytop.words.scaled import Scaled
 from heavytop.words.split_orders import FIRST_UNITS, SLACK
 
 BITS = 106
-FALL_ALONE, FALL_IN_LANES = 1.45, 1.6
+FALL_ALONE, FALL_IN_LANES = 1.3, 1.6
 _MARGIN = 7.0
 _DEEPEST = 84.0
 _DOUBLE_BITS = 53
 _ROUNDING_BITS = 4
 _LEAST_ROOM, _LEAST_DEPTH = -66.0, -112.0
 _SPLIT_BITS = 32
-_USUAL = -34.0
+"""How far the rounding of S_n lies below the product of its two units (measured)."""
+_USUAL_UNITS = -34.0
+"""log2 of the product of two units where the state is about 1."""
+_NEVER = -1000.0
 LARGEST_TIME = Fraction(2) ** 1000
 
 
@@ -33,13 +36,14 @@ class Ladder:
     """How far the series goes, how long a step is, and what is kept in double-double.
 
     order: N.  reach: log2 of h/ρ.  room: log2 of the largest |y_n| h^n / |y_0| whose rounding to a double is allowed,
-    at n0 + 1.
+    at n0 + 1.  depth: log2 of what the products of two units h^n may be beside |y_0|, at the first n whose coefficients
+    are split; none are where it is very small.
     """
 
     order: int
     reach: float
     room: float
-    depth: float = -1000.0
+    depth: float = _NEVER
 
     @classmethod
     def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> Ladder:
@@ -56,17 +60,19 @@ class Ladder:
         order = min(math.ceil(depth / fall), MOST_ORDER - 2)
         reach = -(depth / order + 0.7 / (order - 1)) / math.log(2)
         room = max(_DOUBLE_BITS - depth / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM)
+        # roundings of split coefficients average out: the finest may show 2^6 times less than double-double's
         return cls(order, reach, room, max(room - _DOUBLE_BITS, _LEAST_DEPTH) + _SPLIT_BITS)
 
     def pair_order(self, low_order: int) -> int:
-        """The first order in split coefficients of eight motions, whose n0 is the same.
+        """The first order that is split in eight motions whose n0 is the same.
 
-        Where coefficients fall as those of a motion near a singularity, and larger where n0 is.
+        It is that of coefficients which fall as those of a motion near a singularity, and rises with n0; with the
+        largest n0 none are split.
         """
         if low_order >= self.order - 1:
             return low_order
         first = math.ceil(self.room / self.reach)
-        usual = math.ceil((_USUAL - self.depth) / -(self.reach + SLACK))
+        usual = math.ceil((_USUAL_UNITS - self.depth) / -(self.reach + SLACK))
         return max(1, usual + (low_order - first) // 2)
 
 

@@ -2,7 +2,7 @@
 
 Each lane has its own time, step and target, and its bits do not depend on the others: N and n0 are the same for all and
 do not change.  A lane whose next step would cover its target waits; the scratch then holds the polynomial of that step.
-A lane that would need a larger n0 stops and says so.
+A lane that would need a larger n0 stops and says so.  One whose units of split coefficients did not fit tries again.
 """
 
 from __future__ import annotations
@@ -10,36 +10,30 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 from llvmlite import ir
 
 from heavytop.top.equations import System
-from heavytop.words.lanes import ZERO, turned
+from heavytop.words.lane_orders import ROW, LaneOrders
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
 from heavytop.words.pairs import (
-    accumulated,
     add,
     covered,
-    divided,
     later,
     log2,
-    multiply,
     polynomial,
     step_length,
     times,
 )
 from heavytop.words.split_orders import (
     LOG2_OF_A_UNIT,
+    MOST_TRIES,
     SLACK,
     STEEPEST,
     TOLERATED_SLOPE,
     in_range,
     next_unit,
-    parts,
-    quotient,
-    rises,
 )
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER, Pair, function
 
@@ -49,32 +43,13 @@ TIME, TARGET, SIGN, LEFT, ROOM, REACH, DEPTH, UNITS, SLOPE, TRIES, CLOCK = 0, 2,
 """Vectors of the clock: |time| and its target, two words each; direction, steps left, room, reach and depth; units of
 split coefficients, of Ω and of γ, their slope, and how often the next step was tried."""
 _TOLERATED = 1.0
-_MOST_TRIES = 3.0
-ROW = 192
-"""Doubles of one order: two words of six components, then their two parts."""
-
-# (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
-_PRODUCTS = (
-    (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1),
-    (4, 2, 3, 1), (5, 1, 3, -1), (5, 0, 4, 1), (3, 2, 4, -1), (3, 1, 5, 1), (4, 0, 5, -1),
-)  # fmt: skip
-
-
-def terms(system: System) -> list[tuple[int, int, int]]:
-    """(row of the coefficients, component, component that it multiplies) of the linear part."""
-    return [
-        (row, lane, source)
-        for row, lanes in enumerate(turned(system), 1)
-        for lane, source in enumerate(lanes[:6])
-        if source != ZERO
-    ]
 
 
 def build(system: System, processor: Processor | None = None) -> Machine:
     """``advance`` and ``sample`` of eight motions.
 
-    advance(state, clock, flags, order, low_order, pair_order, coefficients, quotients, scratch, steps): as many rounds of steps at
-    most, until no lane can go; gives the number of rounds.
+    advance(state, clock, flags, order, low_order, pair_order, coefficients, quotients, scratch, steps): as many rounds
+    of steps at most, until no lane can go; gives the number of rounds.  Orders from pair_order to low_order are split.
     sample(scratch, order, times, result): each lane's polynomial at its own time, in two words, behind its beginning.
     """
     module = ir.Module("lanes")
@@ -110,23 +85,14 @@ class _Round:
         arguments = [POINTER, POINTER, INT_POINTER, INT, INT, INT, POINTER, POINTER, POINTER, INT]
         made, self.code = function(module, "advance", INT, arguments)
         self.state, self.clock, self.flags, self.order, self.low_order, self.pair_order = made.args[:6]
-        self.coefficients, self.quotients, self.scratch, self.most = made.args[6:]
-        self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
+        *arrays, self.most = made.args[6:]
+        self.series = LaneOrders(self.code, system, (arrays[0], arrays[1], arrays[2]), self._address(UNITS))
 
-    def _row(self, n: Any) -> Any:
-        return self.code.address(self.scratch, self.code.builder.mul(self.code.integer(n), self.code.integer(ROW)))
+    def _address(self, place: int) -> Any:
+        return self.code.address(self.clock, 8 * place)
 
-    def _pair(self, row: Any, i: int) -> Pair:
-        return self.code.load(row, 16 * i), self.code.load(row, 16 * i + 8)
-
-    def _coefficient(self, k: int) -> Pair:
-        return self._pair(self.coefficients, k)
-
-    def _quotient(self, n: Any) -> Pair:
-        """1/(n + 1) in every lane."""
-        place = self.code.address(self.quotients, self.code.builder.shl(n, self.code.integer(1)))
-        words = [self.code.builder.load(self.code.address(place, i)) for i in range(2)]
-        return self.code.spread(words[0]), self.code.spread(words[1])
+    def _clock(self, place: int) -> Any:
+        return self.code.load(self.clock, 8 * place)
 
     def write(self) -> None:
         """The loop of rounds."""
@@ -139,137 +105,18 @@ class _Round:
         taken.add_incoming(code.integer(0), entry)
         b.cbranch(b.icmp_signed("<", taken, self.most), body, out)
         b.position_at_end(body)
-        first = self._row(0)
+        first = self.series.row(0)
         for i in range(12):
             code.store(code.load(self.state, 8 * i), first, 8 * i)
-        code.loop(0, self.pair_order, self._pair_order, [])
-        splitting = b.icmp_signed("<", self.pair_order, self.low_order)
-        stop = b.select(splitting, b.add(self.pair_order, code.integer(1)), code.integer(0))
-        peaks = code.loop(0, stop, self._split_row, [code.zero] * 2)
-        peaks = code.loop(self.pair_order, self.low_order, self._split_order, peaks)
-        code.loop(self.low_order, self.order, self._plain_order, [])
+        splitting, peaks = self.series.write(self.pair_order, self.low_order, self.order)
         some = self._finish(peaks, splitting)
         taken.add_incoming(b.add(taken, code.integer(1)), b.block)
         b.cbranch(some, head, out)
         b.position_at_end(out)
         b.ret(taken)
 
-    def _pair_order(self, n: Any, _: list[Any]) -> None:
-        """y_(n+1) in double-double."""
-        code, b = self.code, self.code.builder
-        sums: list[Pair] = []
-        for rows in ((0, 1, 2), (3, 4, 5)):
-            group = [product for product in _PRODUCTS if product[2] in rows]
-            words = code.loop(0, b.add(n, code.integer(1)), partial(self._pair_products, n, group), [code.zero] * 6)
-            sums += [(words[2 * i], words[2 * i + 1]) for i in range(3)]
-        y, following, quotient = self._row(n), self._row(b.add(n, code.integer(1))), self._quotient(n)
-        after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
-        for i in range(6):
-            total = code.quick_two_sum(*sums[i])
-            if i < 3:
-                total = multiply(code, self._coefficient(i), total)
-            for k, component, source in self.terms:
-                if component == i:
-                    total = add(code, total, multiply(code, self._coefficient(k), self._pair(y, source)))
-            high, low = code.quick_two_sum(*divided(code, total, after, quotient))
-            code.store(high, following, 16 * i)
-            code.store(low, following, 16 * i + 8)
-
-    def _pair_products(self, n: Any, group: list[Any], m: Any, words: list[Any]) -> list[Any]:
-        code, b = self.code, self.code.builder
-        left, right = self._row(m), self._row(b.sub(n, m))
-        found = list(words)
-        for first, second, component, sign in group:
-            (a, a_low), (c, c_low) = self._pair(left, first), self._pair(right, second)
-            if sign < 0:
-                c, c_low = code.negative(c), code.negative(c_low)
-            at = 2 * (component % 3)
-            total = (found[at], found[at + 1])
-            found[at : at + 2] = accumulated(code, total, (a, a_low), (c, c_low))
-        return found
-
-    def _clock(self, place: int) -> Any:
-        return self.code.load(self.clock, 8 * place)
-
-    def _split_row(self, m: Any, peaks: list[Any]) -> list[Any]:
-        """Split y_m; the largest |y_m| 2^(e_0 - e_m) of Ω and of γ, this one with it."""
-        row = self._row(m)
-        return self._put_parts(m, [self._pair(row, i) for i in range(6)], peaks)
-
-    def _put_parts(self, m: Any, y: list[Pair], peaks: list[Any]) -> list[Any]:
-        code, row, found = self.code, self._row(m), list(peaks)
-        up, down = rises(code, m, self._clock(SLOPE))
-        for i, (high, low) in enumerate(y):
-            coarse, fine = parts(code, (high, low), code.multiply(self._clock(UNITS + i // 3), up))
-            found[i // 3] = code.larger(code.absolute(code.multiply(high, down)), found[i // 3])
-            code.store(coarse, row, 96 + 16 * i)
-            code.store(fine, row, 104 + 16 * i)
-        return found
-
-    def _split_order(self, n: Any, peaks: list[Any]) -> list[Any]:
-        """y_(n+1) from split coefficients."""
-        code, b = self.code, self.code.builder
-        sums: list[Pair] = []
-        for rows in ((0, 1, 2), (3, 4, 5)):
-            group = [product for product in _PRODUCTS if product[2] in rows]
-            words = code.loop(0, b.add(n, code.integer(1)), partial(self._split_products, n, group), [code.zero] * 9)
-            sums += [(words[3 * i], code.add(words[3 * i + 1], words[3 * i + 2])) for i in range(3)]
-        y, following = self._row(n), self._row(b.add(n, code.integer(1)))
-        divisor = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE)), self._quotient(n)[0]
-        found = []
-        for i in range(6):
-            factors = [(self._coefficient(i), sums[i])] if i < 3 else []
-            for k, component, source in self.terms:
-                if component == i:
-                    factors.append((self._coefficient(k), self._pair(y, source)))
-            first = None if i < 3 else sums[i]
-            pair = quotient(code, first, factors, divisor)
-            for word in range(2):
-                code.store(pair[word], following, 16 * i + 8 * word)
-            found.append(pair)
-        return self._put_parts(b.add(n, code.integer(1)), found, peaks)
-
-    def _split_products(self, n: Any, group: list[Any], m: Any, sums: list[Any]) -> list[Any]:
-        code, left, right = self.code, self._row(m), self._row(self.code.builder.sub(n, m))
-        found = list(sums)
-        for first, second, component, sign in group:
-            a, rest = (code.load(left, 96 + 16 * first + 8 * k) for k in range(2))
-            coarse, fine = (code.load(right, 96 + 16 * second + 8 * k) for k in range(2))
-            if sign < 0:
-                a, rest = code.negative(a), code.negative(rest)
-            at = 3 * (component % 3)
-            whole = code.load(right, 16 * second)
-            for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, whole))):
-                found[at + k] = code.fma(one, factor, found[at + k])
-        return found
-
-    def _plain_order(self, n: Any, _: list[Any]) -> None:
-        """y_(n+1) in plain doubles."""
-        code, b = self.code, self.code.builder
-
-        def products(m: Any, sums: list[Any]) -> list[Any]:
-            left, right = self._row(m), self._row(b.sub(n, m))
-            a = [code.load(left, 16 * i) for i in range(6)]
-            c = [code.load(right, 16 * i) for i in range(3)]
-            found = list(sums)
-            for first, second, component, sign in _PRODUCTS:
-                factor = a[first] if sign > 0 else code.negative(a[first])
-                found[component] = code.fma(factor, c[second], found[component])
-            return found
-
-        sums = code.loop(0, b.add(n, code.integer(1)), products, [code.zero] * 6)
-        y, following = self._row(n), self._row(b.add(n, code.integer(1)))
-        quotient = self._quotient(n)[0]
-        for i in range(6):
-            total = code.multiply(self._coefficient(i)[0], sums[i]) if i < 3 else sums[i]
-            for k, component, source in self.terms:
-                if component == i:
-                    total = code.fma(self._coefficient(k)[0], code.load(y, 16 * source), total)
-            code.store(code.multiply(total, quotient), following, 16 * i)
-            code.store(code.zero, following, 16 * i + 8)
-
     def _norm(self, n: Any) -> Any:
-        row, found = self._row(n), self.code.zero
+        row, found = self.series.row(n), self.code.zero
         for i in range(6):
             found = self.code.larger(self.code.absolute(self.code.load(row, 16 * i)), found)
         return log2(self.code, found)
@@ -282,18 +129,18 @@ class _Round:
             return b.fdiv(b.fsub(start, self._norm(n)), code.spread(b.sitofp(n, DOUBLE)))
 
         radii = radius(self.order), radius(b.sub(self.order, code.integer(1)))
-        return step_length(code, radii, code.load(self.clock, 8 * REACH))
+        return step_length(code, radii, self._clock(REACH))
 
     def _sum(self, i: int, h: Any) -> Pair:
         """Σ y_n h^n of one component, from the highest order."""
         code, b = self.code, self.code.builder
 
         def plain(k: Any, total: list[Any]) -> list[Any]:
-            return [code.fma(total[0], h, code.load(self._row(b.sub(self.order, k)), 16 * i))]
+            return [code.fma(total[0], h, code.load(self.series.row(b.sub(self.order, k)), 16 * i))]
 
         def pairs(k: Any, words: list[Any]) -> list[Any]:
             total = times(code, (words[0], words[1]), h)
-            return [*add(code, total, self._pair(self._row(b.sub(self.low_order, k)), i))]
+            return [*add(code, total, self.series.pair(self.series.row(b.sub(self.low_order, k)), i))]
 
         total = code.loop(0, b.sub(self.order, self.low_order), plain, [code.zero])
         words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, [total[0], code.zero])
@@ -304,7 +151,7 @@ class _Round:
         code, b = self.code, self.code.builder
         start = self._norm(code.integer(0))
         length = self._length(start)
-        step = b.fmul(length, code.load(self.clock, 8 * SIGN))
+        step = b.fmul(length, self._clock(SIGN))
         results = [self._sum(i, step) for i in range(6)]
         time, low = (code.load(self.clock, 8 * (TIME + k)) for k in range(2))
         total, rest = later(code, (time, low), length)
@@ -313,7 +160,7 @@ class _Round:
         fits, tried_out = self._fits(peaks, splitting, start, length)
         flags = self._judged(start, length, results, b.fcmp_ordered(">", total, time), tried_out)
         fine = b.icmp_signed("==", flags, ir.Constant(INT_VECTOR, [0] * 8))
-        left = code.load(self.clock, 8 * LEFT)
+        left = self._clock(LEFT)
         alive = b.and_(fine, b.fcmp_ordered(">", left, code.zero))
         going, again = b.and_(alive, b.and_(fits, b.not_(behind))), b.and_(alive, b.not_(fits))
         old = [(self.state, 16 * i + 8 * word, results[i][word]) for i in range(6) for word in range(2)]
@@ -342,7 +189,7 @@ class _Round:
         none = ir.Constant(ir.VectorType(ir.IntType(1), 8), [0] * 8)
         all_of_them = ir.Constant(ir.VectorType(ir.IntType(1), 8), [1] * 8)
         fits = b.select(splitting, fits, all_of_them)
-        tried = b.fcmp_ordered(">=", self._clock(TRIES), code.constant(_MOST_TRIES))
+        tried = b.fcmp_ordered(">=", self._clock(TRIES), code.constant(MOST_TRIES))
         return fits, b.select(splitting, b.and_(tried, b.not_(fits)), none)
 
     def _slope(self, length: Any) -> Any:
@@ -364,7 +211,7 @@ class _Round:
         above = b.add(self.low_order, code.integer(1))
         power = b.fmul(code.spread(b.sitofp(above, DOUBLE)), log2(code, length))
         rounding = b.fsub(b.fadd(self._norm(above), power), start)
-        limit = b.fadd(code.load(self.clock, 8 * ROOM), code.constant(_TOLERATED))
+        limit = b.fadd(self._clock(ROOM), code.constant(_TOLERATED))
         infinity, finite = code.constant(math.inf), None
         for word in (word for pair in results for word in pair):
             one = b.fcmp_ordered("<", code.absolute(word), infinity)
@@ -379,7 +226,7 @@ class _Round:
         known.align = 8
         found = b.or_(flag(b.not_(finite), NON_FINITE), flag(b.not_(moves), TOO_SMALL))
         found = b.or_(found, flag(b.or_(b.fcmp_ordered(">", rounding, limit), tried), LARGER_N0))
-        alive = b.fcmp_ordered(">", code.load(self.clock, 8 * LEFT), code.zero)
+        alive = b.fcmp_ordered(">", self._clock(LEFT), code.zero)
         found = b.or_(known, b.select(alive, found, ir.Constant(INT_VECTOR, [0] * 8)))
         b.store(found, place).align = 8
         return found

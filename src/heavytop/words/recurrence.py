@@ -18,8 +18,6 @@ MOST_ORDER = 60
 """n0 is at least the one, N at most the other."""
 _NONE = 8
 """A lane of the second operand of a shuffle, which is 0."""
-SIGNS = tuple((*(sign for _, sign in part), 0, 0) for part in GATHERED)
-"""Of the four summands of the products, lane by lane; 0 where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +147,7 @@ class Recurrence:
         return self.code.shuffle(word, self.code.zero, [*lanes, _NONE, _NONE])
 
     def _signed(self, value: Any, part: int) -> Any:
-        return value if min(SIGNS[part]) >= 0 else self.code.multiply(value, self.code.constant(SIGNS[part]))
+        return value if min(_signs(part)) >= 0 else self.code.multiply(value, self.code.constant(_signs(part)))
 
     def _anywhere(self, word: Any, part: int) -> Any:
         """One of the four summands, and any number where there is none."""
@@ -161,9 +159,9 @@ class Recurrence:
 
     def gathered(self, total: Any) -> Any:
         """The sums of products that the field needs, where they are exact."""
-        found = self.code.multiply(self._anywhere(total, 0), self.code.constant(SIGNS[0]))
-        for k in range(1, len(SIGNS)):
-            found = self.code.fma(self._anywhere(total, k), self.code.constant(SIGNS[k]), found)
+        found = self.code.multiply(self._anywhere(total, 0), self.code.constant(_signs(0)))
+        for k in range(1, len(GATHERED)):
+            found = self.code.fma(self._anywhere(total, k), self.code.constant(_signs(k)), found)
         return found
 
     def divisor(self, n: Index) -> Pair:
@@ -273,3 +271,8 @@ class Recurrence:
         totals = [code.fma(code.load(first, self.layout.left(v)), right, totals[v]) for v in self.vectors]
         totals = [code.fma(left[v], code.load(first, 0), totals[v]) for v in self.vectors]
         return self._put_plain(n + 1, [self._next(n, v, totals[v], y[v]) for v in self.vectors])
+
+
+def _signs(part: int) -> list[int]:
+    """Of one of the four summands of the products, lane by lane; 0 where there is none."""
+    return [*(sign for _, sign in GATHERED[part]), 0, 0]

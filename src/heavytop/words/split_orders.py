@@ -1,16 +1,16 @@
 """Taylor orders between those in double-double and those in plain doubles: coefficients split in two.
 
-y_m = a + b, where a is a multiple of a unit 2^e_m and |y_m| < 2^21 units, and b a double of half a unit at most.  e_m is
-linear in m but for its rounding, so that the products of series that make S_n have a common unit: products and sums of a
-are exact in plain doubles, up to 60 orders and the four summands of the field.  With L = a + b and R likewise,
+y_m = a + b, where a is a multiple of a unit 2^e_m and |y_m| <= 2^21 units, and b a double of half a unit at most.  But
+for its rounding e_m is linear in m, so that the products of series that make S_n have a common unit: products and sums
+of a are exact in plain doubles.  With L = a + b, and R likewise,
 
     S_n = Σ a_m a_(n−m) + Σ (a_m b_(n−m) + b_m R_(n−m)),
 
-three operations a product instead of the ten of double-double, and an error of 2^-72 of the largest products: enough
+three operations a product instead of the ten of double-double.  The error is some 2^-72 of the largest products: enough
 where y_n h^n lies as far below the state as that is above what is asked.
 
-The units follow the motion from step to step.  A step whose coefficients exceed them, or use a few bits of them only,
-is done again with others.
+The units follow the motion from step to step.  A step whose coefficients exceed them, or use few bits of them only, is
+done again with others.
 """
 
 from __future__ import annotations
@@ -27,14 +27,17 @@ from heavytop.words.recurrence import Recurrence
 from heavytop.words.vector import DOUBLE, INT, INT_VECTOR, LANES, Code, Index, Pair
 
 UNIT_BITS = 21
-"""|y_m| is below 2^21 units, so that L and R are below 2^22; 61 products of them, whose unit rounding e_m may halve, and
-four sums of those are below 2^53 units."""
+"""|y_m| is 2^21 units at most, so that L and R are 2^22 at most.  Rounding e_m may halve the common unit of 61
+products, and the field adds up to four of their sums: 2^44 · 2 · 61 · 4 < 2^53 units, which doubles hold exactly."""
 SLOPE_BITS = 16
 """e_m = e_0 + m slope, the slope in units of 2^-16."""
 _MOST_UNIT_BITS, STEEPEST = 400, 8
 """|e_0| and |slope| at most."""
 _SPARSE, _ROOM = 2.0**-6, 8.0
+"""The part of 2^21 units that a step uses at least; the next has between four and eight times what this one needed."""
 SLACK, TOLERATED_SLOPE = 0.25, 0.375
+"""What the slope exceeds log2 of the inverse radius by, and what it may have too much beside that."""
+MOST_TRIES = 3
 _FRACTION_BITS, _BIAS = 52, 1023
 _EXPONENT = ((1 << 11) - 1) << _FRACTION_BITS
 # the bits of 1.5 · 2^52 units and of the inverse of 2^21 units add to this

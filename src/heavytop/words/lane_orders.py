@@ -1,0 +1,183 @@
+"""The Taylor recurrence of eight motions side by side, a lane each: in double-double, split, and in plain doubles."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from heavytop.top.equations import System
+from heavytop.words.lanes import ZERO, turned
+from heavytop.words.pairs import accumulated, add, divided, multiply
+from heavytop.words.split_orders import parts, quotient, rises
+from heavytop.words.vector import DOUBLE, Code, Pair
+
+ROW = 192
+"""Doubles of one order: two words of six components, then their two parts."""
+
+# (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
+_PRODUCTS = (
+    (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1),
+    (4, 2, 3, 1), (5, 1, 3, -1), (5, 0, 4, 1), (3, 2, 4, -1), (3, 1, 5, 1), (4, 0, 5, -1),
+)  # fmt: skip
+
+
+def terms(system: System) -> list[tuple[int, int, int]]:
+    """(row of the coefficients, component, component that it multiplies) of the linear part."""
+    return [
+        (row, lane, source)
+        for row, lanes in enumerate(turned(system), 1)
+        for lane, source in enumerate(lanes[:6])
+        if source != ZERO
+    ]
+
+
+class LaneOrders:
+    """Writes the recurrence.
+
+    arrays: A and each B, 1/(n + 1), and a row for each order.  units: three vectors, 1.5 · 2^52 units of split
+    coefficients, of Ω and of γ, and their slope.
+    """
+
+    def __init__(self, code: Code, system: System, arrays: tuple[Any, Any, Any], units: Any) -> None:
+        self.code, self.units = code, units
+        self.coefficients, self.quotients, self.scratch = arrays
+        self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
+
+    def write(self, pair_order: Any, low_order: Any, order: Any) -> tuple[Any, list[Any]]:
+        """y_1 to y_N; whether any are split, a bit, and the largest |y_m| 2^(e_0 - e_m) of Ω and of γ."""
+        code, b = self.code, self.code.builder
+        code.loop(0, pair_order, self._pair_order, [])
+        splitting = b.icmp_signed("<", pair_order, low_order)
+        stop = b.select(splitting, b.add(pair_order, code.integer(1)), code.integer(0))
+        peaks = code.loop(0, stop, self._split_row, [code.zero] * 2)
+        peaks = code.loop(pair_order, low_order, self._split_order, peaks)
+        code.loop(low_order, order, self._plain_order, [])
+        return splitting, peaks
+
+    def row(self, n: Any) -> Any:
+        """Where the row of order n begins."""
+        return self.code.address(self.scratch, self.code.builder.mul(self.code.integer(n), self.code.integer(ROW)))
+
+    def pair(self, row: Any, i: int) -> Pair:
+        """Both words of a component of a row."""
+        return self.code.load(row, 16 * i), self.code.load(row, 16 * i + 8)
+
+    def _coefficient(self, k: int) -> Pair:
+        return self.pair(self.coefficients, k)
+
+    def _quotient(self, n: Any) -> Pair:
+        """1/(n + 1) in every lane."""
+        place = self.code.address(self.quotients, self.code.builder.shl(n, self.code.integer(1)))
+        words = [self.code.builder.load(self.code.address(place, i)) for i in range(2)]
+        return self.code.spread(words[0]), self.code.spread(words[1])
+
+    def _pair_order(self, n: Any, _: list[Any]) -> None:
+        """y_(n+1) in double-double."""
+        code, b = self.code, self.code.builder
+        sums: list[Pair] = []
+        for rows in ((0, 1, 2), (3, 4, 5)):
+            group = [product for product in _PRODUCTS if product[2] in rows]
+            words = code.loop(0, b.add(n, code.integer(1)), partial(self._pair_products, n, group), [code.zero] * 6)
+            sums += [(words[2 * i], words[2 * i + 1]) for i in range(3)]
+        y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)
+        after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
+        for i in range(6):
+            total = code.quick_two_sum(*sums[i])
+            if i < 3:
+                total = multiply(code, self._coefficient(i), total)
+            for k, component, source in self.terms:
+                if component == i:
+                    total = add(code, total, multiply(code, self._coefficient(k), self.pair(y, source)))
+            high, low = code.quick_two_sum(*divided(code, total, after, quotient))
+            code.store(high, following, 16 * i)
+            code.store(low, following, 16 * i + 8)
+
+    def _pair_products(self, n: Any, group: list[Any], m: Any, words: list[Any]) -> list[Any]:
+        code, b = self.code, self.code.builder
+        left, right = self.row(m), self.row(b.sub(n, m))
+        found = list(words)
+        for first, second, component, sign in group:
+            (a, a_low), (c, c_low) = self.pair(left, first), self.pair(right, second)
+            if sign < 0:
+                c, c_low = code.negative(c), code.negative(c_low)
+            at = 2 * (component % 3)
+            total = (found[at], found[at + 1])
+            found[at : at + 2] = accumulated(code, total, (a, a_low), (c, c_low))
+        return found
+
+    def _split_row(self, m: Any, peaks: list[Any]) -> list[Any]:
+        """Split y_m; the largest |y_m| 2^(e_0 - e_m) of Ω and of γ, this one with it."""
+        row = self.row(m)
+        return self._put_parts(m, [self.pair(row, i) for i in range(6)], peaks)
+
+    def _put_parts(self, m: Any, y: list[Pair], peaks: list[Any]) -> list[Any]:
+        code, row, found = self.code, self.row(m), list(peaks)
+        up, down = rises(code, m, code.load(self.units, 16))
+        for i, (high, low) in enumerate(y):
+            coarse, fine = parts(code, (high, low), code.multiply(code.load(self.units, 8 * (i // 3)), up))
+            found[i // 3] = code.larger(code.absolute(code.multiply(high, down)), found[i // 3])
+            code.store(coarse, row, 96 + 16 * i)
+            code.store(fine, row, 104 + 16 * i)
+        return found
+
+    def _split_order(self, n: Any, peaks: list[Any]) -> list[Any]:
+        """y_(n+1) from split coefficients."""
+        code, b = self.code, self.code.builder
+        sums: list[Pair] = []
+        for rows in ((0, 1, 2), (3, 4, 5)):
+            group = [product for product in _PRODUCTS if product[2] in rows]
+            words = code.loop(0, b.add(n, code.integer(1)), partial(self._split_products, n, group), [code.zero] * 9)
+            sums += [(words[3 * i], code.add(words[3 * i + 1], words[3 * i + 2])) for i in range(3)]
+        y, following = self.row(n), self.row(b.add(n, code.integer(1)))
+        divisor = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE)), self._quotient(n)[0]
+        found = []
+        for i in range(6):
+            factors = [(self._coefficient(i), sums[i])] if i < 3 else []
+            for k, component, source in self.terms:
+                if component == i:
+                    factors.append((self._coefficient(k), self.pair(y, source)))
+            first = None if i < 3 else sums[i]
+            pair = quotient(code, first, factors, divisor)
+            for word in range(2):
+                code.store(pair[word], following, 16 * i + 8 * word)
+            found.append(pair)
+        return self._put_parts(b.add(n, code.integer(1)), found, peaks)
+
+    def _split_products(self, n: Any, group: list[Any], m: Any, sums: list[Any]) -> list[Any]:
+        code, left, right = self.code, self.row(m), self.row(self.code.builder.sub(n, m))
+        found = list(sums)
+        for first, second, component, sign in group:
+            a, rest = (code.load(left, 96 + 16 * first + 8 * k) for k in range(2))
+            coarse, fine = (code.load(right, 96 + 16 * second + 8 * k) for k in range(2))
+            if sign < 0:
+                a, rest = code.negative(a), code.negative(rest)
+            at = 3 * (component % 3)
+            whole = code.load(right, 16 * second)
+            for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, whole))):
+                found[at + k] = code.fma(one, factor, found[at + k])
+        return found
+
+    def _plain_order(self, n: Any, _: list[Any]) -> None:
+        """y_(n+1) in plain doubles."""
+        code, b = self.code, self.code.builder
+
+        def products(m: Any, sums: list[Any]) -> list[Any]:
+            left, right = self.row(m), self.row(b.sub(n, m))
+            a = [code.load(left, 16 * i) for i in range(6)]
+            c = [code.load(right, 16 * i) for i in range(3)]
+            found = list(sums)
+            for first, second, component, sign in _PRODUCTS:
+                factor = a[first] if sign > 0 else code.negative(a[first])
+                found[component] = code.fma(factor, c[second], found[component])
+            return found
+
+        sums = code.loop(0, b.add(n, code.integer(1)), products, [code.zero] * 6)
+        y, following = self.row(n), self.row(b.add(n, code.integer(1)))
+        quotient = self._quotient(n)[0]
+        for i in range(6):
+            total = code.multiply(self._coefficient(i)[0], sums[i]) if i < 3 else sums[i]
+            for k, component, source in self.terms:
+                if component == i:
+                    total = code.fma(self._coefficient(k)[0], code.load(y, 16 * source), total)
+            code.store(code.multiply(total, quotient), following, 16 * i)
+            code.store(code.zero, following, 16 * i + 8)
