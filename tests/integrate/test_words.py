@@ -16,6 +16,7 @@ from heavytop.integrate import words_engines
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
 from heavytop.integrate.words import propagate_words
+from heavytop.integrate.words_ensemble import propagate_words_ensemble
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, exact, number, real
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
@@ -294,3 +295,23 @@ def test_wrong_machine_code_is_caught_by_the_step_that_is_known(monkeypatch: pyt
 def test_everything_that_changes_bits_is_in_the_flags() -> None:
     flags = propagate_words(TOP, START, [1], DOUBLE).flags
     assert {"arithmetic", "words", "bits", "order", "tolerance", "step_rule"} <= set(flags)
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE], ids=lambda p: p.name)
+@pytest.mark.parametrize(("about", "horizon"), [("1e-12", 20), ("1e-30", 60), ("1e-60", 110)])
+def test_what_an_unstable_axis_amplifies_is_computed_as_finely_as_it_needs(
+    precision: Precision, about: str, horizon: int
+) -> None:
+    """Spin about the middle axis with a weight on it; alone and with others beside it in lanes."""
+    top = HeavyTop((3, 2, 1), 1, (0, 1, 0))
+    problem = Problem.of(top, State((about, 1, 0), (0, 1, 0)), precision)
+    alone = propagate_words(top, problem.start, [horizon], precision)
+    true = propagate_words(top, problem.start, [horizon], real(400)).states[0]
+    allowed = exact(precision.eps) * (40 if precision is DOUBLE_DOUBLE else 1)
+    for value, expected in zip(map(exact, alone.states[0]), map(exact, true), strict=True):
+        assert abs(value - expected) <= allowed * max(1, abs(expected))
+    usual = [Problem.of(TOP, START, precision)] * 3
+    together = propagate_words_ensemble([*usual, problem, *usual], [horizon])
+    first = propagate_words_ensemble([problem, *usual], [horizon])
+    assert [*together[3].states[0]] == [*first[0].states[0]] == [*alone.states[0]]
+    assert [*together[0].states[0]] == [*first[1].states[0]]

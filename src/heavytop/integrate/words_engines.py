@@ -11,7 +11,7 @@ from threading import Lock
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Problem
 from heavytop.integrate.words_check import check
-from heavytop.precision import DOUBLE, decimal_text
+from heavytop.precision import DOUBLE, Precision, decimal_text
 from heavytop.top.equations import System
 from heavytop.words import eight, fixed, floating
 from heavytop.words.digits import grid_for
@@ -27,6 +27,7 @@ _SPARE_BITS, _SPARE_BITS_OF_DOUBLE = 6, 17
 """Of the formats that double-double exceeds: a long run adds its local errors up, and the sum shall stay below half an
 eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
 _GUARD_BITS = 8
+_TINY_BITS = 20
 
 
 class Arithmetic(ABC):
@@ -151,6 +152,35 @@ class WholeNumbers(Arithmetic):
         return 0.0
 
 
+def wanted_tolerance(precision: Precision, tolerance: Fraction | None) -> Fraction:
+    """The local error to aim at, relative to the state.
+
+    Raises InputError for a tolerance outside 1e-6 to the format's own.
+    """
+    most = _SPARE_BITS_OF_DOUBLE if precision.bits <= DOUBLE.bits else _SPARE_BITS
+    finest = precision.eps / 2 ** max(0, min(most, floating.BITS - precision.bits))
+    wanted = finest if tolerance is None else tolerance
+    if not finest <= wanted <= LOOSEST:
+        raise InputError(
+            f"The integrator words has no tolerance {decimal_text(wanted, 6)} in {precision.name}.",
+            f"Give one from {decimal_text(finest, 6)} to 1e-6, or none.",
+        )
+    return wanted
+
+
+def floats(wanted: Fraction, scaled: Scaled | None = None) -> DoubleDouble | None:
+    """Double-double for a tolerance and a start, or for usual starts; None where more bits are needed.
+
+    A start with very small components is computed as finely as those need it: fewer bits serve the coefficients that
+    are small beside the state, and an unstable axis would amplify what they lose.
+    """
+    tiny = 0 if scaled is None else fixed.spread(scaled)
+    inner = wanted / 2**tiny if tiny > _TINY_BITS else wanted
+    if inner < Fraction(1, 2 ** (floating.BITS - 1)):
+        return None
+    return DoubleDouble(wanted, Ladder.of(inner), Ladder.of(inner, FALL_IN_LANES))
+
+
 def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Scaled]:
     """The arithmetic for a format, or for the tolerance where one is given, and the problem in its units.
 
@@ -158,20 +188,11 @@ def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Sc
 
     Raises InputError for a tolerance outside 1e-6 to the format's own.
     """
-    precision = problem.precision
-    most = _SPARE_BITS_OF_DOUBLE if precision.bits <= DOUBLE.bits else _SPARE_BITS
-    spare = max(0, min(most, floating.BITS - precision.bits))
-    finest = precision.eps / 2**spare
-    wanted = finest if tolerance is None else tolerance
-    if not finest <= wanted <= LOOSEST:
-        raise InputError(
-            f"The integrator words has no tolerance {decimal_text(wanted, 6)} in {precision.name}.",
-            f"Give one from {decimal_text(finest, 6)} to 1e-6, or none.",
-        )
+    wanted = wanted_tolerance(problem.precision, tolerance)
     start = (*problem.start.flat, *(problem.xi or ()))
-    if wanted >= Fraction(1, 2 ** (floating.BITS - 1)):
-        scaled = Scaled.of(problem.system, problem.parameters, start)
-        return DoubleDouble(wanted, Ladder.of(wanted), Ladder.of(wanted, FALL_IN_LANES)), scaled
+    scaled = Scaled.of(problem.system, problem.parameters, start)
+    if (found := floats(wanted, scaled)) is not None:
+        return found, scaled
     scaled = Scaled.of(problem.system, problem.parameters, start, bounded=True)
     asked = wanted.denominator.bit_length() - wanted.numerator.bit_length()
     bits = asked + _GUARD_BITS + fixed.spread(scaled) + fixed.excess(scaled)

@@ -13,7 +13,7 @@ from heavytop.integrate.ensemble import Finished, Observer, in_threads, one_kind
 from heavytop.integrate.lanes import Work
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.integrate.words import follow
-from heavytop.integrate.words_engines import DoubleDouble, choose, compiled_lanes
+from heavytop.integrate.words_engines import DoubleDouble, compiled_lanes, floats, wanted_tolerance
 from heavytop.integrate.words_lanes import WordsLanes
 from heavytop.precision import exact, number, require
 from heavytop.top.times import check_times
@@ -46,27 +46,33 @@ def propagate_words_ensemble(
     threads = processors() if threads is None else threads
     if threads < 1:
         raise InputError(f"{threads} threads make no ensemble.", "Use 1 thread or more.")
-    arithmetic, _ = choose(first, tolerance)
+    arithmetic = floats(wanted_tolerance(first.precision, tolerance))
     work = Work(
         None, targets, [exact(t) for t in targets], step_limit, observer is not None, deque(enumerate(problems))
     )
     moves = targets[-1] != 0 and (step_limit is None or step_limit > 0)
-    if isinstance(arithmetic, DoubleDouble) and first.xi is None and moves:
+    if arithmetic is not None and first.xi is None and moves:
         seconds = compiled_lanes(first.system)
-        in_lanes = partial(_in_lanes, work, arithmetic, seconds)
+        in_lanes = partial(_in_lanes, work, arithmetic, tolerance, seconds)
         return in_threads(in_lanes, work, min(threads, -(-len(problems) // LANES)), observer, finished)
     one_by_one = partial(_one_by_one, work, tolerance)
     return in_threads(one_by_one, work, min(threads, len(problems)), observer, finished)
 
 
-def _in_lanes(work: Work, arithmetic: DoubleDouble, seconds: float) -> None:
-    """One thread of lanes."""
-    WordsLanes(work, arithmetic, seconds).run()
+def _in_lanes(work: Work, arithmetic: DoubleDouble, tolerance: Fraction | None, seconds: float) -> None:
+    """One thread of lanes, and afterwards those that need another arithmetic."""
+    others: deque[tuple[int, Problem]] = deque()
+    WordsLanes(work, arithmetic, tolerance, seconds, others).run()
+    while others:
+        _alone(work, tolerance, *others.popleft())
 
 
 def _one_by_one(work: Work, tolerance: Fraction | None) -> None:
     """One thread of single runs."""
     while taken := work.take():
-        index, problem = taken
-        observer = partial(work.observe, index) if work.observed else None
-        work.finish(index, follow(problem, work.targets, tolerance, work.step_limit, observer, work.check))
+        _alone(work, tolerance, *taken)
+
+
+def _alone(work: Work, tolerance: Fraction | None, index: int, problem: Problem) -> None:
+    observer = partial(work.observe, index) if work.observed else None
+    work.finish(index, follow(problem, work.targets, tolerance, work.step_limit, observer, work.check))

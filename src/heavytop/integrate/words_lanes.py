@@ -16,7 +16,7 @@ from typing import Any
 from heavytop.integrate.lanes import Work
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.integrate.words import CHUNK_SECONDS, OUTCOMES, native_state
-from heavytop.integrate.words_engines import DoubleDouble
+from heavytop.integrate.words_engines import DoubleDouble, choose
 from heavytop.words.eight import Eight
 from heavytop.words.machine import Doubles
 from heavytop.words.scaled import Scaled
@@ -47,11 +47,19 @@ def first_low_order(arithmetic: DoubleDouble) -> int:
 class WordsLanes:
     """One thread's eight lanes.
 
-    seconds: of compiling.
+    seconds: of compiling.  others: where problems go that need another arithmetic.
     """
 
-    def __init__(self, work: Work, arithmetic: DoubleDouble, seconds: float) -> None:
-        self.work, self.arithmetic, self.seconds = work, arithmetic, seconds
+    def __init__(
+        self,
+        work: Work,
+        arithmetic: DoubleDouble,
+        tolerance: Fraction | None,
+        seconds: float,
+        others: deque[tuple[int, Problem]],
+    ) -> None:
+        self.work, self.arithmetic, self.tolerance, self.seconds = work, arithmetic, tolerance, seconds
+        self.others = others
         self.forwards = bool(work.targets[-1] >= 0)
         self.lanes: dict[int, _Motion] = {}
         self.waiting: deque[_Motion] = deque()
@@ -94,7 +102,10 @@ class WordsLanes:
             return self.waiting.popleft()
         while (taken := self.work.take()) is not None:
             index, problem = taken
-            scaled = Scaled.of(problem.system, problem.parameters, problem.start.flat)
+            own, scaled = choose(problem, self.tolerance)
+            if own != self.arithmetic:
+                self.others.append(taken)
+                continue
             motion = _Motion(index, problem, scaled, perf_counter())
             if not scaled.rest:
                 return motion
