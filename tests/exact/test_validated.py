@@ -12,7 +12,7 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, OutOfReach
-from heavytop.exact import enclosure
+from heavytop.exact import enclosure, runs
 from heavytop.exact.balls import midpoint, radius, relative_bits, working_precision
 from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
@@ -292,3 +292,22 @@ def test_the_digits_that_a_refusal_offers_are_not_refused(effort):
         assert 0 < offered < asked
         assert generic.cost(Fraction(60), bits_of(offered)) <= effort
         asked = next(n for n in range(offered, asked + 1) if generic.cost(Fraction(60), bits_of(n)) > effort)
+
+
+@pytest.mark.parametrize("before", [(), ((Fraction(1), 40),), ((Fraction(20), 300), (Fraction(3), 120))])
+def test_where_the_bits_of_the_pilot_do_no_step_is_taken_twice(before, monkeypatch):
+    """And the ball is that of a fresh enclosure, whatever was asked before."""
+    vector = VECTORS[0]
+    solution, fresh, steps = motion(vector), motion(vector).state(Fraction(8), 203), []
+    for time, bits in before:
+        solution.state(time, bits)
+
+    def counted(field, node, *arguments):
+        steps.append(node.time)
+        return enclosure.step(field, node, *arguments)
+
+    monkeypatch.setattr(runs, "step", counted)
+    found = solution.state(Fraction(8), 203)
+    assert [(midpoint(b), radius(b)) for b in found] == [(midpoint(b), radius(b)) for b in fresh]
+    # the step that covers the time is known to the pilot by its end alone
+    assert len(steps) <= len(set(steps)) + 1
