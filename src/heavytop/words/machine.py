@@ -95,8 +95,8 @@ def compiled(
         target = binding.Target.from_default_triple().create_target_machine(
             cpu=which.name, features=which.features, opt=3
         )
-        # above 1, loads that several orders share are kept on the stack, which costs a quarter of the time
-        options = binding.create_pipeline_tuning_options(speed_level=1)
+        # the code is as it shall be; above 1, loads that several orders share are kept on the stack
+        options = binding.create_pipeline_tuning_options(speed_level=0)
         # the code is vectors already; reordering of sums is not allowed anyway
         options.loop_vectorization = False
         options.slp_vectorization = False
