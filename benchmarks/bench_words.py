@@ -3,7 +3,7 @@
 Bare integration on both sides: heyoka's ``propagate_until`` with par[i], and the machine code of words; compiling and
 the wall apart.  Ratios are medians over rounds; the error is against the proven motion or a run with 150 bits more.
 
-Run: python -m pytest benchmarks/bench_words.py --benchmark-enable
+Run: python -m pytest benchmarks/bench_words.py --benchmark-enable -s
 """
 
 from __future__ import annotations
@@ -82,6 +82,11 @@ def error(problem: Problem, tolerance: Fraction | None, span: Fraction) -> tuple
     return found[0], found[1]
 
 
+def said(title: str, found: dict[str, str]) -> None:
+    """A line of what was found."""
+    print(f"\n{title}: {'; '.join(f'{key} {value}' for key, value in found.items())}", flush=True)
+
+
 @pytest.mark.parametrize("name", MOTIONS)
 @pytest.mark.parametrize("setting", SETTINGS)
 def test_a_unit_of_time(benchmark, setting: str, name: str) -> None:
@@ -98,6 +103,7 @@ def test_a_unit_of_time(benchmark, setting: str, name: str) -> None:
     benchmark.extra_info["microseconds_by_heyoka"] = f"{median(b for _, b in turns) * 1e6:.4g}"
     benchmark.extra_info["times_faster"] = f"{median(b / a for a, b in turns):.3g}"
     benchmark.extra_info[f"error_at_{span}"] = f"{ours:.2g} by words, {theirs:.2g} by heyoka"
+    said(f"{setting}, {name}", benchmark.extra_info)
     benchmark.pedantic(by_words, (problem, tolerance, Fraction(1)), rounds=1)
 
 
@@ -123,4 +129,5 @@ def test_eight_motions_in_lanes(benchmark, precision: Precision) -> None:
         pairs = [(turn(propagate_words_ensemble, threads=1), turn(propagate_ensemble, threads=1)) for _ in range(5)]
         benchmark.extra_info["microseconds_by_heyoka"] = f"{median(b for _, b in pairs):.3g}"
         benchmark.extra_info["words_over_heyoka"] = f"{median(a / b for a, b in pairs):.3g}"
+    said(f"in lanes, {precision.name}", benchmark.extra_info)
     benchmark.pedantic(turn, (propagate_words_ensemble,), rounds=1)
