@@ -1,71 +1,76 @@
 """How the errors of three words grow, in the bits of the words themselves: no format's rounding hides them.
 
 No format is served by words without bits to spare (eight at least), so that rows of plans show no exponent there.
-Random starts of the Kovalevskaya top, integrals exactly from the words; along the flow against four words.
+Random starts of a case of the plans, integrals exactly from the words; along the flow against the closed form.
 
-Run: python benchmarks/words_grid_laws.py [--starts 32] [--horizon 1e4]
+Run: python benchmarks/words_grid_laws.py [--case kovalevskaya] [--starts 64] [--horizon 1e5] [--processes 2]
 """
 
 from __future__ import annotations
 
 import argparse
+from concurrent.futures import ProcessPoolExecutor
 from fractions import Fraction
-from random import Random
+from functools import partial
 
 import numpy
 
+from heavytop.exact.balls import midpoint
+from heavytop.integrate.trajectory import Problem
 from heavytop.measure.growth import Ensemble, law
-from heavytop.top.equations import HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.measure.truth import closed_form
+from heavytop.precision import real
+from heavytop.suite.cases import CASES
+from heavytop.suite.starts import ensemble_of
+from heavytop.top.heavy_top import HeavyTop
 from heavytop.words.digits import grid_of
 from heavytop.words.fixed import Fixed
 from heavytop.words.scaled import Scaled
 
-TOP = HeavyTop((2, 2, 1), 1, (0, 1, 0))
-SAMPLES = 16
+SAMPLES, START_BITS, TRUE_BITS = 16, 53, 200
 NAMES = ("energy", "area", "abs. square of γ", "along the flow")
 
 
-def integrals(y: tuple[Fraction, ...]) -> list[Fraction]:
+def integrals(top: HeavyTop, y: tuple[Fraction, ...]) -> list[Fraction]:
     """Energy, area, |γ|²."""
-    omega, gamma, inertia = y[:3], y[3:], TOP.inertia
+    omega, gamma, inertia = y[:3], y[3:], top.inertia
     energy = sum(i * w * w for i, w in zip(inertia, omega, strict=True)) / 2
-    energy += sum(n * g for n, g in zip(TOP.moment, gamma, strict=True))
+    energy += sum(n * g for n, g in zip(top.moment, gamma, strict=True))
     area = sum(i * w * g for i, w, g in zip(inertia, omega, gamma, strict=True))
     return [energy, area, sum(g * g for g in gamma)]
 
 
-def errors(random: Random, times: list[Fraction]) -> tuple[list[list[float]], int]:
+def errors(case: str, times: list[Fraction], index: int) -> tuple[list[list[float]], int]:
     """|error| of each name at the times, of one random start; and the steps taken."""
-    omega = tuple(Fraction(random.randint(-4096, 4096), 4096) for _ in range(3))
-    gamma = tuple(Fraction(random.randint(-4096, 4096), 4096) for _ in range(3))
-    start = State(omega, gamma)
-    scaled = Scaled.of(HEAVY_TOP, HEAVY_TOP.parameters(TOP, start), start.flat, bounded=True)
-    three, four = (Fixed(scaled, grid_of(words), True) for words in (3, 4))
-    first, found = integrals(start.flat), []
+    top, start = ensemble_of(CASES[case], index + 1, 1)[index]
+    problem = Problem.of(top, start, real(START_BITS), system=CASES[case].system)
+    scaled = Scaled.of(problem.system, problem.parameters, problem.start.flat, bounded=True)
+    run, truth = Fixed(scaled, grid_of(3), True), closed_form(problem)
+    assert truth is not None
+    first, found = integrals(top, problem.start.flat), []
     for time in times:
-        states = []
-        for run in (three, four):
-            run.advance(time * scaled.rate, 10**9)
-            sample = run.sample(time * scaled.rate)
-            assert sample is not None
-            states.append(scaled.back(sample))
-        velocity = HEAVY_TOP.field(HEAVY_TOP.parameters(TOP, start), states[1])
-        apart = sum((a - b) * v for a, b, v in zip(*states, velocity, strict=True))
-        along = apart / sum(v * v for v in velocity)
-        drifts = [a - b for a, b in zip(integrals(states[0]), first, strict=True)]
-        found.append([abs(float(value)) for value in (*drifts, along)])
-    return found, three.steps
+        run.advance(time * scaled.rate, 10**9)
+        sample = run.sample(time * scaled.rate)
+        assert sample is not None
+        state = scaled.back(sample)
+        true = tuple(midpoint(ball) for ball in truth.state(time, TRUE_BITS))
+        velocity = problem.system.field(problem.parameters, true)
+        apart = sum((a - b) * v for a, b, v in zip(state, true, velocity, strict=True))
+        drifts = [a - b for a, b in zip(integrals(top, state), first, strict=True)]
+        found.append([abs(float(value)) for value in (*drifts, apart / sum(v * v for v in velocity))])
+    return found, run.steps
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--starts", type=int, default=32)
-    parser.add_argument("--horizon", type=float, default=1e4)
+    parser.add_argument("--case", choices=("euler", "lagrange", "kovalevskaya"), default="kovalevskaya")
+    parser.add_argument("--starts", type=int, default=64)
+    parser.add_argument("--horizon", type=float, default=1e5)
+    parser.add_argument("--processes", type=int, default=2)
     given = parser.parse_args()
-    random = Random(138)
     times = [Fraction(int(16 * t), 16) for t in numpy.geomspace(given.horizon / 1e3, given.horizon, SAMPLES)]
-    found = [errors(random, times) for _ in range(given.starts)]
+    with ProcessPoolExecutor(given.processes) as pool:
+        found = list(pool.map(partial(errors, given.case, times), range(given.starts)))
     step = given.horizon / numpy.mean([steps for _, steps in found])
     values = numpy.array([rows for rows, _ in found])
     for k, name in enumerate(NAMES):
