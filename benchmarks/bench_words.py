@@ -38,9 +38,9 @@ SETTINGS = {
     "double at 1e-14": (DOUBLE, Fraction(1, 10**14), 1000, 1000, 15),
     "extended": (EXTENDED, None, 1000, 100, 9),
     "quad": (QUAD, None, 50, 2, 7),
-    "real:276": (real(276), None, 16, 1, 5),
-    "real:528": (real(528), None, 4, Fraction(1, 2), 3),
-    "real:1000": (real(1000), None, 1, Fraction(1, 4), 1),
+    "real:276": (real(276), None, 16, 1, 9),
+    "real:528": (real(528), None, 4, Fraction(1, 2), 5),
+    "real:1000": (real(1000), None, 1, Fraction(1, 4), 3),
 }
 
 
