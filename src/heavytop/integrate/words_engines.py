@@ -28,6 +28,7 @@ _SPARE_BITS, _SPARE_BITS_OF_DOUBLE = 6, 17
 eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
 _GUARD_BITS = 8
 _TINY_BITS = 20
+"""A component of the start that lies more bits below 1 asks for as many more; less is made up for by the spare ones."""
 
 
 class Arithmetic(ABC):
