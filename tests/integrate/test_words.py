@@ -297,6 +297,33 @@ def test_everything_that_changes_bits_is_in_the_flags() -> None:
     assert {"arithmetic", "words", "bits", "order", "tolerance", "step_rule"} <= set(flags)
 
 
+_TINY = Fraction(1, 2**90)
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD, real(237)], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    ("weight", "arm", "gamma"),
+    [
+        pytest.param(1, (0, 1, _TINY), (0, 1, 0), id="an arm beside the axis"),
+        pytest.param(1, (_TINY, "1/2", -_TINY), (0, -1, 0), id="two, hanging"),
+        pytest.param(1, (_TINY**2, "1/2", _TINY), (0, 1, 0), id="of two sizes"),
+        pytest.param(_TINY, ("1/2", "1/4", "1/8"), ("3/4", 0, "-1/2"), id="a weight"),
+    ],
+)
+def test_what_a_tiny_coefficient_makes_of_nothing_is_computed_as_finely_as_it_needs(
+    precision: Precision, weight: object, arm: tuple[object, ...], gamma: tuple[object, ...]
+) -> None:
+    """Spin about the middle axis, and nothing about the others at the start."""
+    for turned in range(3):
+        moments, arms, omega, gammas = ((*v[turned:], *v[:turned]) for v in ((3, 2, 1), arm, (0, 1, 0), gamma))
+        top, start = HeavyTop(moments, weight, arms), State(omega, gammas)
+        run = propagate_words(top, start, [80], precision)
+        true = propagate_words(top, start, [80], real(500)).states[0]
+        assert max(map(abs, map(exact, true[:3]))) > 0
+        for value, expected in zip(map(exact, run.states[0]), map(exact, true), strict=True):
+            assert abs(value - expected) <= exact(precision.eps) * max(1, abs(expected))
+
+
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE], ids=lambda p: p.name)
 @pytest.mark.parametrize(("about", "horizon"), [("1e-12", 20), ("1e-30", 60), ("1e-60", 110)])
 def test_what_an_unstable_axis_amplifies_is_computed_as_finely_as_it_needs(

@@ -195,6 +195,17 @@ def test_steps_grow_and_shrink_with_the_motion() -> None:
     assert all(length.numerator == 1 or length.denominator == 1 for length in lengths)
 
 
+def test_the_new_state_is_the_sum_of_the_coefficients_rounded_once() -> None:
+    """Terms below the last bit of the sum are not lost one by one, which would err in the same way at every step."""
+    run = Fixed(problem(), grid_of(3), True)
+    for _ in range(100):
+        assert run.advance(Fraction(10**6), 1) is Status.FINE
+        total = [sum(column) for column in zip(*map(run.coefficients, range(run.order + 1)), strict=True)]
+        last = Fraction(run.grid.unit(1)) / 2**50
+        for value, exact_sum in zip(run.state[:3], total[:3], strict=True):
+            assert abs(value - exact_sum) <= last
+
+
 def test_what_an_unstable_axis_amplifies_is_on_the_grid() -> None:
     """Rotation about the middle axis with 2^-140 of another: seen with the bits that the spread asks for."""
     p = Parameters((Fraction(3), Fraction(2), Fraction(1)), (Fraction(0),) * 3, Fraction(0))

@@ -27,8 +27,6 @@ _SPARE_BITS, _SPARE_BITS_OF_DOUBLE = 6, 17
 """Of the formats that double-double exceeds: a long run adds its local errors up, and the sum shall stay below half an
 eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
 _GUARD_BITS = 8
-_TINY_BITS = 20
-"""A component of the start that lies more bits below 1 asks for as many more; less is made up for by the spare ones."""
 
 
 class Arithmetic(ABC):
@@ -172,11 +170,11 @@ def wanted_tolerance(precision: Precision, tolerance: Fraction | None) -> Fracti
 def floats(wanted: Fraction, scaled: Scaled | None = None) -> DoubleDouble | None:
     """Double-double for a tolerance and a start, or for usual starts; None where more bits are needed.
 
-    A start with very small components is computed as finely as those need it: fewer bits serve the coefficients that
-    are small beside the state, and an unstable axis would amplify what they lose.
+    A motion with very small components is computed as finely as those need it: fewer bits serve the Taylor coefficients
+    that are small beside the state, and an unstable axis would amplify what they lose.
     """
     tiny = 0 if scaled is None else fixed.spread(scaled)
-    inner = wanted / 2**tiny if tiny > _TINY_BITS else wanted
+    inner = wanted / 2**tiny if tiny > fixed.TINY_BITS else wanted
     if inner < Fraction(1, 2 ** (floating.BITS - 1)):
         return None
     return DoubleDouble(wanted, Ladder.of(inner), Ladder.of(inner, FALL_IN_LANES))
@@ -185,7 +183,7 @@ def floats(wanted: Fraction, scaled: Scaled | None = None) -> DoubleDouble | Non
 def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Scaled]:
     """The arithmetic for a format, or for the tolerance where one is given, and the problem in its units.
 
-    A grid is as fine as the smallest component of the start needs it: what an unstable axis amplifies must be there.
+    A grid is as fine as the smallest component needs it: what an unstable axis amplifies must be there.
 
     Raises InputError for a tolerance outside 1e-6 to the format's own.
     """

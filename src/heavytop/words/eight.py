@@ -12,7 +12,7 @@ from heavytop.words import lane_steps as steps
 from heavytop.words.floating import LARGEST_TIME, Ladder
 from heavytop.words.lane_orders import ROW, terms
 from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
-from heavytop.words.pairs import split
+from heavytop.words.pairs import split, split_constant
 from heavytop.words.run import Status, Steps
 from heavytop.words.scaled import Scaled
 from heavytop.words.split_orders import FIRST_UNITS, MOST_TRIES
@@ -38,7 +38,7 @@ class Eight:
         self.terms = terms(system)
         self.words, self.clock = doubles(12 * LANES), doubles(steps.CLOCK * LANES)
         self.flags = numpy.zeros(LANES, numpy.int64)
-        self.constants = doubles(16 * (3 + len(self.terms)))
+        self.constants = doubles(24 * (3 + len(self.terms)))
         self.quotients = doubles(2 * ladder.order)
         self.quotients[:] = [word for n in range(1, ladder.order + 1) for word in split(Fraction(1, n))]
         self.scratch = doubles((ladder.order + 1) * ROW)
@@ -57,7 +57,7 @@ class Eight:
         rows = problem.coefficients.vectors[0]
         given = [rows[0][i] for i in range(3)] + [rows[row][component] for row, component, _ in self.terms]
         for k, value in enumerate(given):
-            self.constants[16 * k + lane], self.constants[16 * k + 8 + lane] = split(value)
+            self.constants[24 * k + lane : 24 * (k + 1) : LANES] = split_constant(value)
         self.flags[lane] = steps.FINE
         self.signs[lane] = 1 if forwards else -1
         values = {steps.TIME: 0.0, steps.TIME + 1: 0.0, steps.SIGN: float(self.signs[lane])}

@@ -11,6 +11,7 @@ from heavytop.words import grid as steps
 from heavytop.words.digits import digits, exact
 from heavytop.words.grid_series import most_orders
 from heavytop.words.kernels import Grid
+from heavytop.words.lanes import series_rates
 from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
 from heavytop.words.run import Run, Status
 from heavytop.words.scaled import Scaled
@@ -20,6 +21,10 @@ _FEWEST_HALVINGS = -4
 _MOST_HALVINGS = 40
 _HALVED_SAMPLES = 4
 _LARGEST_TIME = Fraction(2) ** 1000
+TINY_BITS = 20
+"""A component that lies more bits below 1 asks for as many more; less is made up for by the spare ones of a format."""
+_SMALL = Fraction(1, 2**TINY_BITS)
+_FIRST_ORDERS = 6
 
 
 machine = once(steps.build)
@@ -54,9 +59,30 @@ def inverses(grid: Grid) -> Doubles:
 
 
 def spread(problem: Scaled) -> int:
-    """How many bits the smallest component that is not 0 lies below 1."""
-    least = min((abs(value) for value in problem.state if value), default=Fraction(1))
-    return max(0, least.denominator.bit_length() - least.numerator.bit_length() + 1)
+    """How many bits the smallest component lies below 1: of those that are not 0 at the start, and of what tiny
+    coefficients make of the others, for an unstable axis would amplify that too.
+    """
+    small = max((_below(value) for value in problem.state if value), default=0)
+    coefficients = (c for vector in problem.coefficients.vectors for row in vector for c in row if c)
+    if all(problem.state[:6]) or max(small, *map(_below, coefficients)) <= TINY_BITS // 2:
+        return small
+    grown = max(map(_below, _from_nothing(problem)), default=0)
+    return max(small, grown if grown > TINY_BITS else 0)
+
+
+def _below(value: Fraction) -> int:
+    """How many bits ``value``, which is not 0, lies below 1; 0 where it is larger."""
+    return max(0, value.denominator.bit_length() - abs(value.numerator).bit_length() + 1)
+
+
+def _from_nothing(problem: Scaled) -> list[Fraction]:
+    """The largest of the first Taylor coefficients of each component of Ω and γ that is 0 at the start and then not."""
+    series, born = [problem.state], dict.fromkeys((k for k in range(6) if not problem.state[k]), Fraction(0))
+    while len(series) <= _FIRST_ORDERS and any(value < _SMALL for value in born.values()):
+        rates = series_rates(problem.system, problem.coefficients, series)
+        series.append(tuple(rate / len(series) for rate in rates))
+        born = {k: max(value, abs(series[-1][k])) for k, value in born.items()}
+    return [value for value in born.values() if value]
 
 
 class Fixed(Run):

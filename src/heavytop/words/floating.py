@@ -10,7 +10,7 @@ import numpy
 
 from heavytop.words import double_double as dd
 from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
-from heavytop.words.pairs import split
+from heavytop.words.pairs import split, split_constant
 from heavytop.words.recurrence import LEAST_LOW_ORDER, MOST_ORDER, Layout
 from heavytop.words.run import Run, Status
 from heavytop.words.scaled import Scaled
@@ -178,18 +178,18 @@ def _exact_state(words: Doubles, size: int) -> tuple[Fraction, ...]:
 
 
 def _table(problem: Scaled, order: int, layout: Layout) -> Doubles:
-    """A and each B in two words; then for n = 0, 1, ..., N - 1: n + 1 and 1/(n + 1) in two words, A/(n + 1) and each
+    """A and each B in three words; then for n = 0, 1, ..., N - 1: n + 1 and 1/(n + 1) in two words, A/(n + 1) and each
     B/(n + 1) in one.
     """
     flat = [row for vector in problem.coefficients.vectors for row in vector]
-    begin = 16 * layout.constants
+    begin = 24 * layout.constants
     table = doubles(begin + order * layout.table_row)
-    constants = table[:begin].reshape(layout.constants, 2, 8)
+    constants = table[:begin].reshape(layout.constants, 3, 8)
     rows = table[begin:].reshape(order, 1 + layout.constants, 8)
     after = numpy.arange(1, order + 1)
     rows[:, 0, :3] = [(n, *split(Fraction(1, int(n)))) for n in after]
     for index, row in enumerate(flat):
         for lane, c in enumerate(row):
-            constants[index, :, lane] = split(c)
+            constants[index, :, lane] = split_constant(c)
             rows[:, 1 + index, lane] = float(c) / after
     return table

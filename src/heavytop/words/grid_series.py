@@ -106,8 +106,10 @@ class Series:
         n, zeros, small = (b.phi(INT) for _ in range(3))
         wide = b.phi(VECTOR)
         y, total = ([b.phi(VECTOR) for _ in first] for _ in range(2))
-        carriers = [n, zeros, small, wide, *y, *total]
-        begin = [code.integer(0)] * 3 + [code.zero, *first, *first]
+        floating = range(self.grid.words - 1, len(first), self.grid.words) if not self.grid.whole else ()
+        rest = {k: b.phi(VECTOR) for k in floating}
+        carriers = [n, zeros, small, wide, *y, *total, *rest.values()]
+        begin = [code.integer(0)] * 3 + [code.zero, *first, *first, *(code.zero for _ in rest)]
         for phi, value in zip(carriers, begin, strict=True):
             phi.add_incoming(value, entry)
         more = b.icmp_signed("<", n, code.integer(most_orders(self.grid)))
@@ -121,11 +123,16 @@ class Series:
         counted = b.add(small, code.integer(1))
         small_after = b.select(b.fcmp_ordered("<=", size, limit), counted, code.integer(0))
         sums = [code.add(a, c) for a, c in zip(total, following, strict=True)]
-        for phi, value in zip(carriers, [after, zeros_after, small_after, wide_after, *following, *sums], strict=True):
+        lost = []
+        for k, before in rest.items():
+            sums[k], error = code.two_sum(total[k], following[k])
+            lost.append(code.add(before, error))
+        values = [after, zeros_after, small_after, wide_after, *following, *sums, *lost]
+        for phi, value in zip(carriers, values, strict=True):
             phi.add_incoming(value, b.block)
         b.branch(head)
         b.position_at_end(out)
-        return n, small, wide, total
+        return n, small, wide, [code.add(word, rest[k]) if k in rest else word for k, word in enumerate(total)]
 
     def _size(self, y: list[Any]) -> Any:
         """The largest sum of |words| of a component."""
@@ -234,7 +241,10 @@ class Series:
         result = Accumulator(code, grid, 0, centred(code, grid, words), watched.seen)
         for k, source in enumerate(sources):
             place = 8 * words * ((1 + len(linear)) * vector + k)
-            result.add_product([code.load(constants, place + 8 * i) for i in range(words)], source, each=True)
+            factors = [code.load(constants, place + 8 * i) for i in range(words)]
+            if not grid.whole:
+                result.add_below(factors, source)
+            result.add_product(factors, source, each=True)
         result.look_at_all()
         code.store(b.bitcast(result.seen, VECTOR), seen, 0)
         parts = zip(result.sums, centred(code, grid, words), strict=True)
@@ -291,6 +301,8 @@ class Series:
             quotient = code.subtract(code.fma(value, inverse, big), big)
             rest = code.fma(code.negative(quotient), divisor, value)
             found.append(quotient)
+        if not self.grid.whole:
+            found[-1] = code.fma(rest, inverse, found[-1])
         return found, wide
 
     def _watch(self, wide: Any, value: Any, k: int, bits: int = _WIDEST) -> Any:

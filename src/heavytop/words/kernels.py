@@ -93,6 +93,11 @@ class Accumulator:
                 self.sums[k + 1] = code.add(self.sums[k + 1], _total(code, lows))
                 self.look(k + 1)
 
+    def add_below(self, a: list[Any], b: list[Any]) -> None:
+        """Add the products one level below the last, with i + j = K, to the last level; they are rounded there."""
+        for i in range(1, len(a)):
+            self.sums[-1] = self.code.fma(a[i], b[len(a) - i], self.sums[-1])
+
     def look(self, k: int) -> None:
         """Gather the bits of a sum; those of the last level are of no account."""
         level = self.base + k

@@ -7,7 +7,7 @@ from typing import Any
 
 from heavytop.top.equations import System
 from heavytop.words.lanes import ZERO, turned
-from heavytop.words.pairs import accumulated, add, divided, multiply
+from heavytop.words.pairs import Constant, accumulated, add, by_constant, divided
 from heavytop.words.split_orders import parts, quotient, rises
 from heavytop.words.vector import DOUBLE, Code, Pair
 
@@ -62,8 +62,9 @@ class LaneOrders:
         """Both words of a component of a row."""
         return self.code.load(row, 16 * i), self.code.load(row, 16 * i + 8)
 
-    def _coefficient(self, k: int) -> Pair:
-        return self.pair(self.coefficients, k)
+    def _coefficient(self, k: int) -> Constant:
+        high, middle, low = (self.code.load(self.coefficients, 24 * k + 8 * word) for word in range(3))
+        return high, middle, low
 
     def _quotient(self, n: Any) -> Pair:
         """1/(n + 1) in every lane."""
@@ -84,10 +85,10 @@ class LaneOrders:
         for i in range(6):
             total = code.quick_two_sum(*sums[i])
             if i < 3:
-                total = multiply(code, self._coefficient(i), total)
+                total = by_constant(code, self._coefficient(i), total)
             for k, component, source in self.terms:
                 if component == i:
-                    total = add(code, total, multiply(code, self._coefficient(k), self.pair(y, source)))
+                    total = add(code, total, by_constant(code, self._coefficient(k), self.pair(y, source)))
             high, low = code.quick_two_sum(*divided(code, total, after, quotient))
             code.store(high, following, 16 * i)
             code.store(low, following, 16 * i + 8)

@@ -74,7 +74,7 @@ class Coefficients:
     def with_linear(self, factor: Fraction) -> Coefficients:
         """The same with every B multiplied."""
         return Coefficients(
-            tuple((rows[0], *(tuple(c * factor for c in row) for row in rows[1:])) for rows in self.vectors)
+            tuple((rows[0], *(tuple(c and c * factor for c in row) for row in rows[1:])) for rows in self.vectors)
         )
 
 
@@ -108,11 +108,17 @@ def _eight(row: Sequence[Any]) -> tuple[Fraction, ...]:
 
 def rates(system: System, given: Coefficients, y: Sequence[Any]) -> list[Any]:
     """The derivative of (Ω, γ) or (Ω, γ, ξ) as the lanes compute it, exactly for exact numbers of any kind."""
-    lanes: list[list[Any]] = [[*y[:6], 0, 0], [0, 0, 0, *y[6:], 0, 0]][: len(given.vectors)]
-    right = _side(lanes[0], RIGHT)
+    return series_rates(system, given, [y])
+
+
+def series_rates(system: System, given: Coefficients, series: Sequence[Sequence[Any]]) -> list[Any]:
+    """Coefficient n of the derivative of a motion whose Taylor coefficients from 0 to n these are."""
+    lanes = [[[*y[:6], 0, 0], [0, 0, 0, *y[6:], 0, 0]][: len(given.vectors)] for y in series]
+    right = [_side(y[0], RIGHT) for y in reversed(lanes)]
     found: list[Any] = []
-    for vector, (state, (first, *linear)) in enumerate(zip(lanes, given.vectors, strict=True)):
-        products = [a * b for a, b in zip(_side(state, LEFT), right, strict=True)]
+    for vector, (first, *linear) in enumerate(given.vectors):
+        left, state = [_side(y[vector], LEFT) for y in lanes], lanes[-1][vector]
+        products = [sum(a[k] * b[k] for a, b in zip(left, right, strict=True)) for k in range(8)]
         gathered = [sum(sign * products[lane] for lane, sign in column) for column in zip(*GATHERED, strict=True)]
         derivative = [a * s for a, s in zip(first, gathered, strict=False)]
         for row, permutation in zip(linear, turned(system), strict=True):

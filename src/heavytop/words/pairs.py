@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 from llvmlite import ir
@@ -22,6 +23,9 @@ _POWER = (-0.30407153, -0.07912522)
 _LEAST_EXPONENT = -900.0
 _STEP_BITS, _LARGEST_STEP = 10, 6
 
+Constant = tuple[Any, Any, Any]
+"""A number in three words: their vectors."""
+
 
 def add(code: Code, a: Pair, b: Pair) -> Pair:
     """a + b."""
@@ -33,6 +37,17 @@ def multiply(code: Code, a: Pair, b: Pair) -> Pair:
     """a b."""
     product, error = code.two_product(a[0], b[0])
     return product, code.fma(a[0], b[1], code.fma(a[1], b[0], error))
+
+
+def by_constant(code: Code, constant: Constant, a: Pair) -> Pair:
+    """A constant in three words times a.
+
+    What two words of a simple fraction such as 5/6 leave out, and how its few remainders round, does not average out:
+    over 10^6 steps it adds up.  So the second and third word are multiplied and rounded by themselves.
+    """
+    product, error = code.two_product(constant[0], a[0])
+    rest = code.fma(constant[1], a[0], code.multiply(constant[2], a[0]))
+    return product, code.add(code.fma(constant[0], a[1], error), rest)
 
 
 def times(code: Code, a: Pair, factor: Any) -> Pair:
@@ -97,8 +112,22 @@ def step_length(code: Code, radii: Sequence[Any], reach: Any) -> Any:
 
 def split(value: Fraction) -> tuple[float, float]:
     """The two doubles nearest to ``value``; exact for numbers of 106 bits."""
-    high = float(value)
-    return high, float(value - Fraction(high))
+    top, bottom = value.as_integer_ratio()
+    high = top / bottom
+    above, below = high.as_integer_ratio()
+    return high, (top * below - above * bottom) / (bottom * below)
+
+
+def split_constant(value: Fraction) -> tuple[float, float, float]:
+    """The three doubles nearest to ``value``, as :func:`by_constant` takes them."""
+    return _split_ratio(*value.as_integer_ratio())
+
+
+@lru_cache(maxsize=1024)
+def _split_ratio(top: int, bottom: int) -> tuple[float, float, float]:
+    # motions of one top share their constants
+    high, low = split(Fraction(top, bottom))
+    return high, low, float(Fraction(top, bottom) - Fraction(high) - Fraction(low))
 
 
 def log2(code: Code, value: Any) -> Any:

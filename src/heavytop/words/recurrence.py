@@ -10,7 +10,7 @@ from typing import Any
 
 from heavytop.top.equations import System
 from heavytop.words.lanes import GATHERED, LEFT, RIGHT, Sum, turned
-from heavytop.words.pairs import accumulated, add, divided, multiply
+from heavytop.words.pairs import Constant, accumulated, add, by_constant, divided
 from heavytop.words.vector import Code, Index, Pair
 
 LEAST_LOW_ORDER = 2
@@ -70,7 +70,7 @@ class Layout:
 class Recurrence:
     """Writes the recurrence y_(n+1) = (A ∘ gathered S_n + Σ B_l ∘ permuted y_n)/(n + 1).
 
-    table: A and B_l as pairs, then a row for each order.  scratch: a row of R, L and y for each order.
+    table: A and B_l in three words, then a row for each order.  scratch: a row of R, L and y for each order.
     """
 
     code: Code
@@ -153,9 +153,10 @@ class Recurrence:
         """One of the four summands, and any number where there is none."""
         return self.code.shuffle(word, word, [*(lane for lane, _ in GATHERED[part]), 0, 0])
 
-    def constant(self, vector: int, row: int) -> Pair:
+    def constant(self, vector: int, row: int) -> Constant:
         """A, or B of a row from 1 on."""
-        return self.pair(self.table, 16 * ((1 + self.layout.linear) * vector + row))
+        place = 24 * ((1 + self.layout.linear) * vector + row)
+        return (*self.pair(self.table, place), self.code.load(self.table, place + 16))
 
     def gathered(self, total: Any) -> Any:
         """The sums of products that the field needs, where they are exact."""
@@ -173,7 +174,7 @@ class Recurrence:
     def _table_row(self, n: Index) -> Any:
         code = self.code
         offset = code.builder.mul(code.integer(n), code.integer(self.layout.table_row))
-        return code.address(self.table, code.builder.add(offset, code.integer(16 * self.layout.constants)))
+        return code.address(self.table, code.builder.add(offset, code.integer(24 * self.layout.constants)))
 
     def _over(self, n: Index, vector: int, row: int) -> Any:
         """A constant over n + 1, a double."""
@@ -187,11 +188,11 @@ class Recurrence:
             high, low = (self._signed(self._gather(word, k), k) for word in total)
             parts.append((high, low))
         result = add(code, add(code, parts[0], parts[1]), add(code, parts[2], parts[3]))
-        result = multiply(code, self.constant(vector, 0), result)
+        result = by_constant(code, self.constant(vector, 0), result)
         linear: Pair | None = None
         for k, lanes in enumerate(turned(self.system), 1):
             moved = tuple(code.shuffle(word, code.zero, lanes) for word in y)
-            term = multiply(code, self.constant(vector, k), (moved[0], moved[1]))
+            term = by_constant(code, self.constant(vector, k), (moved[0], moved[1]))
             linear = term if linear is None else add(code, linear, term)
         if linear is not None:
             result = add(code, result, linear)

@@ -35,26 +35,29 @@ class Scaled:
 
         bounded: with |ω| <= 4 at all times, by the first integrals, in place of |ω| near 1 at the start.
         """
-        rates = list(system.field(p, y[:6]))
-        if len(y) == 9:
-            rates += system.attitude(p, y[:6], y[6:])
         given = coefficients(system, p, len(y) == 9)
         gamma = _power_above(max(map(abs, y[3:6])))
         rate = _bound(system, p, y) / 4 if bounded else _rate(system, given, p, y, gamma)
         sizes = [rate] * 3 + [gamma] * 3 + ([_power_above(max(map(abs, y[6:])))] * 3 if len(y) == 9 else [])
         scaled = given.with_linear(1 / rate if system is GYROSTAT else gamma / rate**2)
         state = tuple(value / size for value, size in zip(y, sizes, strict=True))
-        return cls(system, scaled, state, rate, tuple(sizes), not any(rates))
+        return cls(system, scaled, state, rate, tuple(sizes), _rests(system, p, y))
 
     def back(self, state: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
         """A state in the units of the problem."""
         return tuple(value * size for value, size in zip(state, self.sizes, strict=True))
 
 
+def _rests(system: System, p: Parameters, y: tuple[Fraction, ...]) -> bool:
+    """Whether the derivative is exactly 0; most motions turn γ, which takes six products to see."""
+    turning = any(system.attitude(p, y[:6], y[3:6])) or (len(y) == 9 and any(system.attitude(p, y[:6], y[6:])))
+    return not turning and not any(system.field(p, y[:6]))
+
+
 def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction) -> Fraction:
     """A power of two near the rate of the motion: the larger of |Ω| and √(torque per moment), or |λ|."""
     speed = max(map(abs, y[:3]))
-    linear = max((abs(c) for row in given.vectors[0][1:] for c in row), default=Fraction(0))
+    linear = max((abs(c) for row in given.vectors[0][1:] for c in row if c), default=Fraction(0))
     if system is GYROSTAT:
         return _power_above(max(speed, abs(p.rotor), linear))
     return max((_power_above(speed) if speed else Fraction(0), _root_above(linear * gamma))) or Fraction(1)

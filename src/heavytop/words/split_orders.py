@@ -22,7 +22,7 @@ from typing import Any
 from llvmlite import ir
 
 from heavytop.words.lanes import LEFT, RIGHT, turned
-from heavytop.words.pairs import log2
+from heavytop.words.pairs import Constant, log2
 from heavytop.words.recurrence import Recurrence
 from heavytop.words.vector import DOUBLE, INT, INT_VECTOR, LANES, Code, Index, Pair
 
@@ -95,7 +95,7 @@ def parts(code: Code, y: Pair, big: Any) -> Pair:
     return coarse, code.add(code.subtract(y[0], coarse), y[1])
 
 
-def quotient(code: Code, first: Pair | None, factors: list[tuple[Pair, Pair]], divisor: Pair) -> Pair:
+def quotient(code: Code, first: Pair | None, factors: list[tuple[Constant, Pair]], divisor: Pair) -> Pair:
     """The sum of a pair and of products of a constant and a pair, over a whole number; in order.
 
     divisor: the number and its inverse.
