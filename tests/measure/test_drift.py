@@ -13,7 +13,7 @@ from heavytop.measure.drift import Drift
 from heavytop.measure.scalar import metric, of_fraction, text, to_ball
 from heavytop.measure.solution_error import SolutionError, root, split
 from heavytop.measure.truth import Truth
-from heavytop.precision import DOUBLE, QUAD, exact, number, real
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.records import Against
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import holding
@@ -127,10 +127,12 @@ def test_what_the_reference_does_not_resolve_is_said_and_bounded() -> None:
     assert of_fraction(Fraction(1, 10**997)).log10 == -997
 
 
-@pytest.mark.parametrize("precision", [DOUBLE, QUAD, real(300)], ids=lambda p: p.name)
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD, real(300)], ids=lambda p: p.name)
 def test_native_numbers_become_exact_balls(precision) -> None:
-    native = number(Fraction(1, 7), precision)
+    """At the ends of the range of doubles too, and beyond."""
     with working_precision(400):
-        assert to_ball(native).is_exact()
-        assert to_ball(native) == ball(exact(native))
+        for exponent in (0, 100, 305, -100, -290, -305) + (() if precision is DOUBLE else (320, -320, -330, -4000)):
+            native = number(Fraction(-10, 7) * Fraction(10) ** exponent, precision)
+            assert to_ball(native).is_exact()
+            assert to_ball(native) == ball(exact(native))
         assert not to_ball(number(Fraction(1), precision) * float("inf")).is_finite()

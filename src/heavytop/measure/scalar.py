@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 from functools import reduce
+from math import isfinite
 from typing import Any
 
 from flint import arb
@@ -19,6 +20,7 @@ UNRESOLVED = "unresolved"
 GUARD_BITS = 64
 RESOLVED_RADII = 10
 _SURELY_RESOLVED = 8
+_WIDE = ("longdouble", "real128", "real")
 
 
 def to_ball(value: Any) -> arb:
@@ -29,10 +31,24 @@ def to_ball(value: Any) -> arb:
         return value
     if isinstance(value, float):
         return arb(float(value))
+    if (found := _by_doubles(value)) is not None:
+        return found
     try:
         return ball(exact(value))
     except InputError:
         return arb("nan")
+
+
+def _by_doubles(value: Any) -> arb | None:
+    """A wide native float as the sum of doubles, exactly; None for other numbers, and beyond the range of doubles."""
+    if type(value).__name__ not in _WIDE:
+        return None
+    total, left = arb(0), value
+    while part := float(left):
+        if not isfinite(part):
+            return None
+        total, left = total + arb(part), left - part
+    return total if left == 0 else None
 
 
 def resolved(value: arb) -> bool:
