@@ -22,7 +22,7 @@ from heavytop.measure.truth import closed_form
 from heavytop.precision import real
 from heavytop.suite.cases import CASES
 from heavytop.suite.starts import ensemble_of
-from heavytop.top.heavy_top import HeavyTop
+from heavytop.top.equations import Parameters
 from heavytop.words.digits import grid_of
 from heavytop.words.fixed import Fixed
 from heavytop.words.scaled import Scaled
@@ -31,11 +31,11 @@ SAMPLES, START_BITS, TRUE_BITS = 16, 53, 200
 NAMES = ("energy", "area", "abs. square of γ", "along the flow")
 
 
-def integrals(top: HeavyTop, y: tuple[Fraction, ...]) -> list[Fraction]:
+def integrals(p: Parameters, y: tuple[Fraction, ...]) -> list[Fraction]:
     """Energy, area, |γ|²."""
-    omega, gamma, inertia = y[:3], y[3:], top.inertia
+    omega, gamma, inertia = y[:3], y[3:], p.inertia
     energy = sum(i * w * w for i, w in zip(inertia, omega, strict=True)) / 2
-    energy += sum(n * g for n, g in zip(top.moment, gamma, strict=True))
+    energy += sum(n * g for n, g in zip(p.moment, gamma, strict=True))
     area = sum(i * w * g for i, w, g in zip(inertia, omega, gamma, strict=True))
     return [energy, area, sum(g * g for g in gamma)]
 
@@ -47,7 +47,7 @@ def errors(case: str, times: list[Fraction], index: int) -> tuple[list[list[floa
     scaled = Scaled.of(problem.system, problem.parameters, problem.start.flat, bounded=True)
     run, truth = Fixed(scaled, grid_of(3), True), closed_form(problem)
     assert truth is not None
-    first, found = integrals(top, problem.start.flat), []
+    first, found = integrals(problem.parameters, problem.start.flat), []
     for time in times:
         run.advance(time * scaled.rate, 10**9)
         sample = run.sample(time * scaled.rate)
@@ -56,7 +56,7 @@ def errors(case: str, times: list[Fraction], index: int) -> tuple[list[list[floa
         true = tuple(midpoint(ball) for ball in truth.state(time, TRUE_BITS))
         velocity = problem.system.field(problem.parameters, true)
         apart = sum((a - b) * v for a, b, v in zip(state, true, velocity, strict=True))
-        drifts = [a - b for a, b in zip(integrals(top, state), first, strict=True)]
+        drifts = [a - b for a, b in zip(integrals(problem.parameters, state), first, strict=True)]
         found.append([abs(float(value)) for value in (*drifts, apart / sum(v * v for v in velocity))])
     return found, run.steps
 
