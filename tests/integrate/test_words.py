@@ -313,15 +313,12 @@ _TINY = Fraction(1, 2**90)
 def test_what_a_tiny_coefficient_makes_of_nothing_is_computed_as_finely_as_it_needs(
     precision: Precision, weight: object, arm: tuple[object, ...], gamma: tuple[object, ...]
 ) -> None:
-    """Spin about the middle axis, and nothing about the others at the start."""
+    """Spin about the middle axis, and nothing about the others at the start; against the enclosure."""
     for turned in range(3):
         moments, arms, omega, gammas = ((*v[turned:], *v[:turned]) for v in ((3, 2, 1), arm, (0, 1, 0), gamma))
-        top, start = HeavyTop(moments, weight, arms), State(omega, gammas)
-        run = propagate_words(top, start, [80], precision)
-        true = propagate_words(top, start, [80], real(500)).states[0]
-        assert max(map(abs, map(exact, true[:3]))) > 0
-        for value, expected in zip(map(exact, run.states[0]), map(exact, true), strict=True):
-            assert abs(value - expected) <= exact(precision.eps) * max(1, abs(expected))
+        run = propagate_words(HeavyTop(moments, weight, arms), State(omega, gammas), [80], precision)
+        assert run.outcome is Outcome.SUCCESS
+        assert worst(run) <= 1
 
 
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE], ids=lambda p: p.name)
