@@ -19,6 +19,7 @@ _PRODUCTS = (
     (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1),
     (4, 2, 3, 1), (5, 1, 3, -1), (5, 0, 4, 1), (3, 2, 4, -1), (3, 1, 5, 1), (4, 0, 5, -1),
 )  # fmt: skip
+_GROUPS = (0, 1, 2), (3, 4, 5)
 
 
 def terms(system: System) -> list[tuple[int, int, int]]:
@@ -75,23 +76,21 @@ class LaneOrders:
     def _pair_order(self, n: Any, _: list[Any]) -> None:
         """y_(n+1) in double-double."""
         code, b = self.code, self.code.builder
-        sums: list[Pair] = []
-        for rows in ((0, 1, 2), (3, 4, 5)):
-            group = [product for product in _PRODUCTS if product[2] in rows]
-            words = code.loop(0, b.add(n, code.integer(1)), partial(self._pair_products, n, group), [code.zero] * 6)
-            sums += [(words[2 * i], words[2 * i + 1]) for i in range(3)]
         y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)
         after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
-        for i in range(6):
-            total = code.quick_two_sum(*sums[i])
-            if i < 3:
-                total = by_constant(code, self._coefficient(i), total)
-            for k, component, source in self.terms:
-                if component == i:
-                    total = add(code, total, by_constant(code, self._coefficient(k), self.pair(y, source)))
-            high, low = code.quick_two_sum(*divided(code, total, after, quotient))
-            code.store(high, following, 16 * i)
-            code.store(low, following, 16 * i + 8)
+        for rows in _GROUPS:
+            group = [product for product in _PRODUCTS if product[2] in rows]
+            words = code.loop(0, b.add(n, code.integer(1)), partial(self._pair_products, n, group), [code.zero] * 6)
+            for i in rows:
+                total = code.quick_two_sum(*words[2 * (i % 3) : 2 * (i % 3) + 2])
+                if i < 3:
+                    total = by_constant(code, self._coefficient(i), total)
+                for k, component, source in self.terms:
+                    if component == i:
+                        total = add(code, total, by_constant(code, self._coefficient(k), self.pair(y, source)))
+                high, low = code.quick_two_sum(*divided(code, total, after, quotient))
+                code.store(high, following, 16 * i)
+                code.store(low, following, 16 * i + 8)
 
     def _pair_products(self, n: Any, group: list[Any], m: Any, words: list[Any]) -> list[Any]:
         code, b = self.code, self.code.builder
@@ -124,24 +123,23 @@ class LaneOrders:
     def _split_order(self, n: Any, peaks: list[Any]) -> list[Any]:
         """y_(n+1) from split coefficients."""
         code, b = self.code, self.code.builder
-        sums: list[Pair] = []
-        for rows in ((0, 1, 2), (3, 4, 5)):
-            group = [product for product in _PRODUCTS if product[2] in rows]
-            words = code.loop(0, b.add(n, code.integer(1)), partial(self._split_products, n, group), [code.zero] * 9)
-            sums += [(words[3 * i], code.add(words[3 * i + 1], words[3 * i + 2])) for i in range(3)]
         y, following = self.row(n), self.row(b.add(n, code.integer(1)))
         divisor = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE)), self._quotient(n)[0]
         found = []
-        for i in range(6):
-            factors = [(self._coefficient(i), sums[i])] if i < 3 else []
-            for k, component, source in self.terms:
-                if component == i:
-                    factors.append((self._coefficient(k), self.pair(y, source)))
-            first = None if i < 3 else sums[i]
-            pair = quotient(code, first, factors, divisor)
-            for word in range(2):
-                code.store(pair[word], following, 16 * i + 8 * word)
-            found.append(pair)
+        for rows in _GROUPS:
+            group = [product for product in _PRODUCTS if product[2] in rows]
+            words = code.loop(0, b.add(n, code.integer(1)), partial(self._split_products, n, group), [code.zero] * 9)
+            for i in rows:
+                at = 3 * (i % 3)
+                total = words[at], code.add(words[at + 1], words[at + 2])
+                factors = [(self._coefficient(i), total)] if i < 3 else []
+                for k, component, source in self.terms:
+                    if component == i:
+                        factors.append((self._coefficient(k), self.pair(y, source)))
+                pair = quotient(code, None if i < 3 else total, factors, divisor)
+                for word in range(2):
+                    code.store(pair[word], following, 16 * i + 8 * word)
+                found.append(pair)
         return self._put_parts(b.add(n, code.integer(1)), found, peaks)
 
     def _split_products(self, n: Any, group: list[Any], m: Any, sums: list[Any]) -> list[Any]:

@@ -131,20 +131,24 @@ class _Round:
         radii = radius(self.order), radius(b.sub(self.order, code.integer(1)))
         return step_length(code, radii, self._clock(REACH))
 
-    def _sum(self, i: int, h: Any) -> Pair:
-        """Σ y_n h^n of one component, from the highest order."""
+    def _sums(self, h: Any) -> list[Pair]:
+        """Σ y_n h^n of each component, from the highest order."""
         code, b = self.code, self.code.builder
 
-        def plain(k: Any, total: list[Any]) -> list[Any]:
-            return [code.fma(total[0], h, code.load(self.series.row(b.sub(self.order, k)), 16 * i))]
+        def plain(k: Any, totals: list[Any]) -> list[Any]:
+            row = self.series.row(b.sub(self.order, k))
+            return [code.fma(total, h, code.load(row, 16 * i)) for i, total in enumerate(totals)]
 
         def pairs(k: Any, words: list[Any]) -> list[Any]:
-            total = times(code, (words[0], words[1]), h)
-            return [*add(code, total, self.series.pair(self.series.row(b.sub(self.low_order, k)), i))]
+            row, found = self.series.row(b.sub(self.low_order, k)), list[Any]()
+            for i in range(6):
+                found += add(code, times(code, (words[2 * i], words[2 * i + 1]), h), self.series.pair(row, i))
+            return found
 
-        total = code.loop(0, b.sub(self.order, self.low_order), plain, [code.zero])
-        words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, [total[0], code.zero])
-        return code.quick_two_sum(words[0], words[1])
+        totals = code.loop(0, b.sub(self.order, self.low_order), plain, [code.zero] * 6)
+        begin = [word for total in totals for word in (total, code.zero)]
+        words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, begin)
+        return [code.quick_two_sum(words[2 * i], words[2 * i + 1]) for i in range(6)]
 
     def _finish(self, peaks: list[Any], splitting: Any) -> Any:
         """Move the lanes that can go; whether any did, or has to try again."""
@@ -152,7 +156,7 @@ class _Round:
         start = self._norm(code.integer(0))
         length = self._length(start)
         step = b.fmul(length, self._clock(SIGN))
-        results = [self._sum(i, step) for i in range(6)]
+        results = self._sums(step)
         time, low = (code.load(self.clock, 8 * (TIME + k)) for k in range(2))
         total, rest = later(code, (time, low), length)
         target, target_low = (code.load(self.clock, 8 * (TARGET + k)) for k in range(2))
