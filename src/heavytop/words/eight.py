@@ -10,7 +10,7 @@ import numpy
 from heavytop.top.equations import System
 from heavytop.words import lane_steps as steps
 from heavytop.words.floating import LARGEST_TIME, Ladder
-from heavytop.words.lane_orders import ROW, terms
+from heavytop.words.lane_orders import LOW, ROW, SCRATCH, terms
 from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
 from heavytop.words.pairs import split, split_constant
 from heavytop.words.run import Status, Steps
@@ -41,7 +41,7 @@ class Eight:
         self.constants = doubles(24 * (3 + len(self.terms)))
         self.quotients = doubles(2 * ladder.order)
         self.quotients[:] = [word for n in range(1, ladder.order + 1) for word in split(Fraction(1, n))]
-        self.scratch = doubles((ladder.order + 1) * ROW)
+        self.scratch = doubles(SCRATCH)
         self.signs = [1] * LANES
         self._set(steps.ROOM, [ladder.room] * LANES)
         self._set(steps.REACH, [ladder.reach] * LANES)
@@ -53,7 +53,7 @@ class Eight:
     def put(self, lane: int, problem: Scaled, forwards: bool, most: int | None) -> None:
         """A motion at its beginning; most: the steps that it may take."""
         for i, value in enumerate(problem.state):
-            self.words[16 * i + lane], self.words[16 * i + 8 + lane] = split(value)
+            self.words[LANES * i + lane], self.words[ROW + LANES * i + lane] = split(value)
         rows = problem.coefficients.vectors[0]
         given = [rows[0][i] for i in range(3)] + [rows[row][component] for row, component, _ in self.terms]
         for k, value in enumerate(given):
@@ -112,7 +112,8 @@ class Eight:
 
     def coefficients(self, lane: int, n: int) -> tuple[Fraction, ...]:
         """y_n of a lane's last series."""
-        return _exact_lane(self.scratch[ROW * n : ROW * (n + 1)], lane)
+        tables = (self.scratch[place + ROW * n : place + ROW * (n + 1)] for place in (0, LOW))
+        return _exact_lane(numpy.concatenate(list(tables)), lane)
 
     def state(self, lane: int) -> tuple[Fraction, ...]:
         """Where a lane's motion is."""
@@ -128,7 +129,7 @@ class Eight:
 
 
 def _exact_lane(words: Doubles, lane: int) -> tuple[Fraction, ...]:
-    return tuple(Fraction(float(words[16 * i + lane])) + Fraction(float(words[16 * i + 8 + lane])) for i in range(6))
+    return tuple(Fraction(float(words[8 * i + lane])) + Fraction(float(words[ROW + 8 * i + lane])) for i in range(6))
 
 
 class OneOfEight(Steps):

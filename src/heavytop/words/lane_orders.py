@@ -8,11 +8,15 @@ from typing import Any
 from heavytop.top.equations import System
 from heavytop.words.lanes import ZERO, turned
 from heavytop.words.pairs import Constant, accumulated, add, by_constant, divided
+from heavytop.words.recurrence import MOST_ORDER
 from heavytop.words.split_orders import parts, quotient, rises
-from heavytop.words.vector import DOUBLE, Code, Pair
+from heavytop.words.vector import DOUBLE, LANES, Code, Pair
 
-ROW = 192
-"""Doubles of one order: two words of six components, then their two parts."""
+ROW = 6 * LANES
+"""Doubles of one order in each of four tables."""
+LOW, COARSE, FINE, SCRATCH = (k * ROW * MOST_ORDER for k in range(1, 5))
+"""Where the tables of low words and of the two parts of split coefficients begin, behind that of high words; low words
+of orders above n0 are 0 from the beginning.  Apart from each other, what an order needs fits into the nearest cache."""
 
 # (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
 _PRODUCTS = (
@@ -61,7 +65,11 @@ class LaneOrders:
 
     def pair(self, row: Any, i: int) -> Pair:
         """Both words of a component of a row."""
-        return self.code.load(row, 16 * i), self.code.load(row, 16 * i + 8)
+        return self.code.load(row, LANES * i), self.code.load(row, LOW + LANES * i)
+
+    def _put(self, row: Any, i: int, y: Pair) -> None:
+        for word, table in zip(y, (0, LOW), strict=True):
+            self.code.store(word, row, table + LANES * i)
 
     def _coefficient(self, k: int) -> Constant:
         high, middle, low = (self.code.load(self.coefficients, 24 * k + 8 * word) for word in range(3))
@@ -89,8 +97,7 @@ class LaneOrders:
                     if component == i:
                         total = add(code, total, by_constant(code, self._coefficient(k), self.pair(y, source)))
                 high, low = code.quick_two_sum(*divided(code, total, after, quotient))
-                code.store(high, following, 16 * i)
-                code.store(low, following, 16 * i + 8)
+                self._put(following, i, (high, low))
 
     def _pair_products(self, n: Any, group: list[Any], m: Any, words: list[Any]) -> list[Any]:
         code, b = self.code, self.code.builder
@@ -116,8 +123,8 @@ class LaneOrders:
         for i, (high, low) in enumerate(y):
             coarse, fine = parts(code, (high, low), code.multiply(code.load(self.units, 8 * (i // 3)), up))
             found[i // 3] = code.larger(code.absolute(code.multiply(high, down)), found[i // 3])
-            code.store(coarse, row, 96 + 16 * i)
-            code.store(fine, row, 104 + 16 * i)
+            code.store(coarse, row, COARSE + LANES * i)
+            code.store(fine, row, FINE + LANES * i)
         return found
 
     def _split_order(self, n: Any, peaks: list[Any]) -> list[Any]:
@@ -137,8 +144,7 @@ class LaneOrders:
                     if component == i:
                         factors.append((self._coefficient(k), self.pair(y, source)))
                 pair = quotient(code, None if i < 3 else total, factors, divisor)
-                for word in range(2):
-                    code.store(pair[word], following, 16 * i + 8 * word)
+                self._put(following, i, pair)
                 found.append(pair)
         return self._put_parts(b.add(n, code.integer(1)), found, peaks)
 
@@ -146,12 +152,12 @@ class LaneOrders:
         code, left, right = self.code, self.row(m), self.row(self.code.builder.sub(n, m))
         found = list(sums)
         for first, second, component, sign in group:
-            a, rest = (code.load(left, 96 + 16 * first + 8 * k) for k in range(2))
-            coarse, fine = (code.load(right, 96 + 16 * second + 8 * k) for k in range(2))
+            a, rest = (code.load(left, part + LANES * first) for part in (COARSE, FINE))
+            coarse, fine = (code.load(right, part + LANES * second) for part in (COARSE, FINE))
             if sign < 0:
                 a, rest = code.negative(a), code.negative(rest)
             at = 3 * (component % 3)
-            whole = code.load(right, 16 * second)
+            whole = code.load(right, LANES * second)
             for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, whole))):
                 found[at + k] = code.fma(one, factor, found[at + k])
         return found
@@ -162,8 +168,8 @@ class LaneOrders:
 
         def products(m: Any, sums: list[Any]) -> list[Any]:
             left, right = self.row(m), self.row(b.sub(n, m))
-            a = [code.load(left, 16 * i) for i in range(6)]
-            c = [code.load(right, 16 * i) for i in range(3)]
+            a = [code.load(left, LANES * i) for i in range(6)]
+            c = [code.load(right, LANES * i) for i in range(3)]
             found = list(sums)
             for first, second, component, sign in _PRODUCTS:
                 factor = a[first] if sign > 0 else code.negative(a[first])
@@ -177,6 +183,5 @@ class LaneOrders:
             total = code.multiply(self._coefficient(i)[0], sums[i]) if i < 3 else sums[i]
             for k, component, source in self.terms:
                 if component == i:
-                    total = code.fma(self._coefficient(k)[0], code.load(y, 16 * source), total)
-            code.store(code.multiply(total, quotient), following, 16 * i)
-            code.store(code.zero, following, 16 * i + 8)
+                    total = code.fma(self._coefficient(k)[0], code.load(y, LANES * source), total)
+            code.store(code.multiply(total, quotient), following, LANES * i)

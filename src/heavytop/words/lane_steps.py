@@ -15,7 +15,7 @@ from typing import Any
 from llvmlite import ir
 
 from heavytop.top.equations import System
-from heavytop.words.lane_orders import ROW, LaneOrders
+from heavytop.words.lane_orders import LOW, ROW, LaneOrders
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
 from heavytop.words.pairs import (
     add,
@@ -35,7 +35,7 @@ from heavytop.words.split_orders import (
     in_range,
     next_unit,
 )
-from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER, Pair, function
+from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, LANES, POINTER, Pair, function
 
 FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
 """Flags of a lane."""
@@ -70,11 +70,11 @@ def _write_sample(module: ir.Module) -> None:
 
     def row(n: Any) -> list[Pair]:
         at = code.address(scratch, b.mul(n, code.integer(ROW)))
-        return [(code.load(at, 16 * i), code.load(at, 16 * i + 8)) for i in range(6)]
+        return [(code.load(at, LANES * i), code.load(at, LOW + LANES * i)) for i in range(6)]
 
     words = polynomial(code, order, (code.load(times_, 0), code.load(times_, 8)), 6, row)
     for index, word in enumerate(words):
-        code.store(word, result, 8 * index)
+        code.store(word, result, ROW * (index % 2) + LANES * (index // 2))
     b.ret_void()
 
 
@@ -106,8 +106,9 @@ class _Round:
         b.cbranch(b.icmp_signed("<", taken, self.most), body, out)
         b.position_at_end(body)
         first = self.series.row(0)
-        for i in range(12):
-            code.store(code.load(self.state, 8 * i), first, 8 * i)
+        for place, table in ((0, 0), (ROW, LOW)):
+            for at in range(0, ROW, LANES):
+                code.store(code.load(self.state, place + at), first, table + at)
         splitting, peaks = self.series.write(self.pair_order, self.low_order, self.order)
         some = self._finish(peaks, splitting)
         taken.add_incoming(b.add(taken, code.integer(1)), b.block)
@@ -118,7 +119,7 @@ class _Round:
     def _norm(self, n: Any) -> Any:
         row, found = self.series.row(n), self.code.zero
         for i in range(6):
-            found = self.code.larger(self.code.absolute(self.code.load(row, 16 * i)), found)
+            found = self.code.larger(self.code.absolute(self.code.load(row, LANES * i)), found)
         return log2(self.code, found)
 
     def _length(self, start: Any) -> Any:
@@ -137,7 +138,7 @@ class _Round:
 
         def plain(k: Any, totals: list[Any]) -> list[Any]:
             row = self.series.row(b.sub(self.order, k))
-            return [code.fma(total, h, code.load(row, 16 * i)) for i, total in enumerate(totals)]
+            return [code.fma(total, h, code.load(row, LANES * i)) for i, total in enumerate(totals)]
 
         def pairs(k: Any, words: list[Any]) -> list[Any]:
             row, found = self.series.row(b.sub(self.low_order, k)), list[Any]()
@@ -167,7 +168,7 @@ class _Round:
         left = self._clock(LEFT)
         alive = b.and_(fine, b.fcmp_ordered(">", left, code.zero))
         going, again = b.and_(alive, b.and_(fits, b.not_(behind))), b.and_(alive, b.not_(fits))
-        old = [(self.state, 16 * i + 8 * word, results[i][word]) for i in range(6) for word in range(2)]
+        old = [(self.state, ROW * word + 8 * i, results[i][word]) for i in range(6) for word in range(2)]
         old += [(self.clock, 8 * TIME, total), (self.clock, 8 * (TIME + 1), rest)]
         old += [(self.clock, 8 * LEFT, b.fsub(left, code.constant(1.0)))]
         for base, place, value in old:
