@@ -7,7 +7,7 @@ from typing import Any
 
 from heavytop.top.equations import System
 from heavytop.words.lanes import ZERO, turned
-from heavytop.words.pairs import Constant, accumulated, add, by_constant, divided
+from heavytop.words.pairs import Constant, accumulated, add, by_constant, divided, multiply
 from heavytop.words.recurrence import MOST_ORDER
 from heavytop.words.split_orders import parts, quotient, rises
 from heavytop.words.vector import DOUBLE, LANES, Code, Pair
@@ -88,7 +88,8 @@ class LaneOrders:
         after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
         for rows in _GROUPS:
             group = [product for product in _PRODUCTS if product[2] in rows]
-            words = code.loop(0, b.add(n, code.integer(1)), partial(self._pair_products, n, group), [code.zero] * 6)
+            products = partial(self._pair_products, n, group)
+            words = code.loop(1, b.add(n, code.integer(1)), products, products(code.integer(0), []))
             for i in rows:
                 total = code.quick_two_sum(*words[2 * (i % 3) : 2 * (i % 3) + 2])
                 if i < 3:
@@ -102,14 +103,15 @@ class LaneOrders:
     def _pair_products(self, n: Any, group: list[Any], m: Any, words: list[Any]) -> list[Any]:
         code, b = self.code, self.code.builder
         left, right = self.row(m), self.row(b.sub(n, m))
-        found = list(words)
+        found = list(words) or [None] * 6
         for first, second, component, sign in group:
             (a, a_low), (c, c_low) = self.pair(left, first), self.pair(right, second)
             if sign < 0:
                 c, c_low = code.negative(c), code.negative(c_low)
             at = 2 * (component % 3)
-            total = (found[at], found[at + 1])
-            found[at : at + 2] = accumulated(code, total, (a, a_low), (c, c_low))
+            x, y = (a, a_low), (c, c_low)
+            total = found[at], found[at + 1]
+            found[at : at + 2] = multiply(code, x, y) if total[0] is None else accumulated(code, total, x, y)
         return found
 
     def _split_row(self, m: Any, peaks: list[Any]) -> list[Any]:
