@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from fractions import Fraction
 from functools import partial
+from queue import SimpleQueue
 from typing import Any
 
 import numpy
@@ -73,30 +74,45 @@ def propagate_ensemble(
 def in_threads(
     run: Callable[[], None], work: Work, threads: int, observer: Observer | None, finished: Finished | None
 ) -> list[Trajectory]:
-    """The motions of ``work`` in the order of its problems, by so many threads that each do ``run``.
+    """The motions of ``work`` in the order of its problems, by so many threads that each do ``run``; this one if one.
 
     observer, finished: as in :func:`propagate_ensemble`; called by this thread.
     """
     done: dict[int, Trajectory] = {}
+
+    def receive(item: Any) -> None:
+        if isinstance(item[1], Trajectory):
+            done[item[0]] = item[1]
+            if finished is not None:
+                finished(*item)
+        elif observer is not None:
+            work.room.release()
+            observer(*item)
+
+    if threads == 1:
+        work.send = receive
+        run()
+    else:
+        _in_pool(run, work, threads, receive)
+    return [done[index] for index in sorted(done)]
+
+
+def _in_pool(run: Callable[[], None], work: Work, threads: int, receive: Callable[[Any], None]) -> None:
+    inbox: SimpleQueue[Any] = SimpleQueue()
+    work.send = inbox.put
     with ThreadPoolExecutor(threads) as pool:
         try:
             for _ in range(threads):
-                pool.submit(run).add_done_callback(work.inbox.put)
+                pool.submit(run).add_done_callback(inbox.put)
             while threads:
-                item = work.inbox.get()
+                item = inbox.get()
                 if isinstance(item, Future):
                     item.result()
                     threads -= 1
-                elif isinstance(item[1], Trajectory):
-                    done[item[0]] = item[1]
-                    if finished is not None:
-                        finished(*item)
-                elif observer is not None:
-                    work.room.release()
-                    observer(*item)
+                else:
+                    receive(item)
         finally:
             work.stop.set()
-    return [done[index] for index in sorted(done)]
 
 
 def processors() -> int:

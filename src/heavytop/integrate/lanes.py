@@ -8,9 +8,9 @@ So no bit depends on the samples, on how many steps are taken between two looks,
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from queue import SimpleQueue
 from threading import Event, Semaphore
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -42,8 +42,8 @@ class Work:
     """What the threads of an ensemble share.
 
     tool: of the integrator.  targets: native times in order; times: their exact values.  pending: problems that no
-    thread has taken yet.  inbox: samples on their way to the observer, at most as many as there is room for, motions
-    and threads that ended.
+    thread has taken yet.  send: hands a sample, of which as many may be on their way as there is room for, or a motion
+    that ended to the thread that observes.
     """
 
     tool: Any
@@ -53,7 +53,7 @@ class Work:
     observed: bool
     pending: deque[tuple[int, Problem]]
     stop: Event = field(default_factory=Event)
-    inbox: SimpleQueue[Any] = field(default_factory=SimpleQueue)
+    send: Callable[[Any], None] = field(init=False)
     room: Semaphore = field(default_factory=lambda: Semaphore(_ROOM))
 
     def take(self) -> tuple[int, Problem] | None:
@@ -67,11 +67,11 @@ class Work:
         """Send one sample to the observer; wait for it if it is far behind."""
         while not self.room.acquire(timeout=CHUNK_SECONDS):
             self.check()
-        self.inbox.put((index, time, state))
+        self.send((index, time, state))
 
     def finish(self, index: int, run: Trajectory) -> None:
         """Hand in a motion that ended, behind its samples."""
-        self.inbox.put((index, run))
+        self.send((index, run))
 
     def check(self) -> None:
         """Raise StoppedError if the ensemble was given up."""

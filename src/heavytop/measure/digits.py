@@ -16,11 +16,13 @@ RELATIVE = Quantity("solution_error", "relative", "max")
 """The metric behind the digits right: the largest |error|/max(1, |true value|) of a component of Ω or γ over the
 samples."""
 
+_ONE = arb(1)
 
-def relative_error(deltas: Sequence[arb], truth: Sequence[arb]) -> arb:
-    """The largest |δ|/max(1, |true value|) over the components of one state, at the working precision."""
+
+def relative_error(errors: Sequence[arb], truth: Sequence[arb]) -> arb:
+    """The largest |error|/max(1, |true value|) over the components of one state, at the working precision."""
     sizes = map(abs, truth)
-    return largest(delta if size < 1 else delta / size.max(1) for delta, size in zip(deltas, sizes, strict=True))
+    return largest(error if size < _ONE else error / size.max(_ONE) for error, size in zip(errors, sizes, strict=True))
 
 
 class Measured(Protocol):

@@ -11,7 +11,7 @@ from flint import arb
 from heavytop.exact.balls import ball, ball_from, ball_text, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.scalar import GUARD_BITS, metric, text, to_ball
+from heavytop.measure.scalar import GUARD_BITS, larger, metric, text, to_ball
 from heavytop.records import Metric, Quantity, Series, by_name
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import dot
@@ -41,7 +41,7 @@ class Running:
     def following(self, value: arb) -> Sums:
         """Maximum, sum of squares and last with |value| too; evaluated at the working precision, nothing taken in."""
         size = abs(value)
-        return self.maximum.max(size), self.squares + size * size, size
+        return larger(self.maximum, size), self.squares + size * size, size
 
     def take(self, time: Fraction, sums: Sums, keep: bool) -> None:
         """Take in a value at ``time`` by its :meth:`following`; remember it for the series if ``keep``."""
@@ -106,7 +106,7 @@ class Drift:
 
     def take(self, time: Fraction, sums: Sequence[Sums]) -> None:
         """Take in one state by its :meth:`following`."""
-        keep = time in self.keep
+        keep = bool(self.keep) and time in self.keep  # a Fraction's hash takes as long as an operation on balls
         for running, each in zip(self.running.values(), sums, strict=True):
             running.take(time, each, keep)
 
@@ -118,13 +118,16 @@ class Drift:
 
     @whole_evaluation
     def following(self, state: Sequence[Any]) -> list[Sums]:
-        """What the drifts add up to with this state, of native numbers or balls; nothing is taken in."""
+        """What the drifts add up to with this native state; nothing is taken in."""
         with working_precision(self.bits):
-            y = [to_ball(value) for value in state]
-            return [
-                self.running[name].following(value(self.parameters, y) - self.initial[name])
-                for name, value in self.functions.items()
-            ]
+            return self.sums([to_ball(value) for value in state])
+
+    def sums(self, y: Sequence[arb]) -> list[Sums]:
+        """The same with a state of balls, at a working precision of ``bits``."""
+        return [
+            self.running[name].following(value(self.parameters, y) - self.initial[name])
+            for name, value in self.functions.items()
+        ]
 
     @whole_evaluation
     def metrics(self) -> dict[str, Metric]:

@@ -11,7 +11,7 @@ from heavytop.exact.balls import working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.drift import Drift, Running, Sums
-from heavytop.measure.scalar import GUARD_BITS, to_ball
+from heavytop.measure.scalar import to_ball
 from heavytop.measure.solution_error import SOLUTION_ERROR, Errors, SolutionError
 from heavytop.measure.truth import Truth
 from heavytop.records import Against, Metric, Quantity, Series
@@ -53,9 +53,11 @@ class Scorer:
 
     @whole_evaluation
     def _following(self, time: Fraction, state: Sequence[Any]) -> tuple[list[Sums], Errors | None]:
-        with working_precision(self.drift.bits + GUARD_BITS):
-            balls = [to_ball(value) for value in state]  # once for both
-        return self.drift.following(balls), None if self.error is None else self.error.following(time, balls)
+        error = self.error
+        truth = None if error is None else error.known(time)
+        with working_precision(self.drift.bits):
+            y = [to_ball(value) for value in state]  # once for both
+            return self.drift.sums(y), None if error is None or truth is None else error.errors(y[:6], truth)
 
     def take(self, times: Iterable[Fraction], states: Iterable[Sequence[Any]]) -> None:
         """Take in an array of native states, one at each of the exact times."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from operator import mul
 from typing import Any
 
 from flint import arb
 
-from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.balls import rational, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.digits import relative_error
@@ -18,6 +17,7 @@ from heavytop.measure.drift import Running, Sums, parameter_balls
 from heavytop.measure.scalar import GUARD_BITS, largest, resolved, to_ball
 from heavytop.measure.truth import Truth
 from heavytop.records import Metric, Quantity, Series, by_name
+from heavytop.top.heavy_top import dot
 
 SOLUTION_ERROR = "solution_error"
 COMPONENTS = ("omega", "gamma", "along", "across")
@@ -67,8 +67,8 @@ class SolutionError:
         if errors is None:
             return
         sums, left = errors
-        keep = time in self.keep
-        counts = math.isinf(self.until) or float(abs(time)) <= self.until
+        keep = bool(self.keep) and time in self.keep
+        counts = math.isinf(self.until) or abs(float(time)) <= self.until
         for running, part in zip(self.running.values(), sums, strict=True):
             (running.take if counts else running.remember)(time, part, keep)
         if left and self.escape is None:
@@ -76,20 +76,27 @@ class SolutionError:
 
     @whole_evaluation
     def following(self, time: Fraction, state: Sequence[Any]) -> Errors | None:
-        """What the errors add up to with this state, of native numbers or balls, and whether Ω is off by more than the
-        threshold; None where there is no truth.  Nothing is taken in.
+        """What the errors add up to with this native state, and whether Ω is off by more than the threshold; None where
+        there is no truth.  Nothing is taken in.
         """
-        if not self.truth.covers(time):
+        truth = self.known(time)
+        if truth is None:
             return None
-        truth = self.truth.state(time, self.bits)
-        with working_precision(self.bits + GUARD_BITS):
-            delta = [to_ball(value) - true for value, true in zip(state[:6], truth, strict=True)]
-            flow = self.system.field(self.parameters, truth)
-            omega = largest(delta[:3])
-            relative = relative_error(delta, truth)
-            values = omega, largest(delta[3:]), *split(delta, flow), relative
-            sums = [running.following(value) for running, value in zip(self.running.values(), values, strict=True)]
-            return sums, self.threshold is not None and bool(omega > ball(self.threshold))
+        with working_precision(self.bits):
+            return self.errors([to_ball(value) for value in state[:6]], truth)
+
+    def known(self, time: Fraction) -> list[arb] | None:
+        """The true state; None where there is none."""
+        return self.truth.state(time, self.bits) if self.truth.covers(time) else None
+
+    def errors(self, y: Sequence[arb], truth: Sequence[arb]) -> Errors:
+        """:meth:`following` of a state of six balls, at a working precision of ``bits``."""
+        delta = [value - true for value, true in zip(y, truth, strict=True)]
+        flow = self.system.field(self.parameters, truth)
+        omega = largest(delta[:3])
+        values = omega, largest(delta[3:]), *split(delta, flow), relative_error(delta, truth)
+        sums = [running.following(value) for running, value in zip(self.running.values(), values, strict=True)]
+        return sums, self.threshold is not None and bool(omega > rational(self.threshold))
 
     @whole_evaluation
     def metrics(self) -> dict[str, Metric]:
@@ -134,8 +141,8 @@ def split(delta: Sequence[arb], flow: Sequence[arb]) -> tuple[arb, arb]:
     return root(along), root(total - along)
 
 
-def _product(a: Sequence[arb], b: Sequence[arb]) -> arb:
-    return sum(map(mul, a, b), arb(0))
+def _product(a: Sequence[arb], b: Sequence[arb]) -> Any:
+    return dot(a[:3], b[:3]) + dot(a[3:], b[3:])
 
 
 def root(value: arb) -> arb:
