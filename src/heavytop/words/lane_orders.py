@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -18,12 +19,11 @@ LOW, COARSE, FINE, SCRATCH = (k * ROW * MOST_ORDER for k in range(1, 5))
 """Where the tables of low words and of the two parts of split coefficients begin, behind that of high words; low words
 of orders above n0 are 0 from the beginning.  Apart from each other, what an order needs fits into the nearest cache."""
 
+Products = Sequence[tuple[int, int, int, int]]
 # (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
-_PRODUCTS = (
-    (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1),
-    (4, 2, 3, 1), (5, 1, 3, -1), (5, 0, 4, 1), (3, 2, 4, -1), (3, 1, 5, 1), (4, 0, 5, -1),
-)  # fmt: skip
-_GROUPS = (0, 1, 2), (3, 4, 5)
+_OMEGA = (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1)
+_GAMMA = (4, 2, 3, 1), (5, 1, 3, -1), (5, 0, 4, 1), (3, 2, 4, -1), (3, 1, 5, 1), (4, 0, 5, -1)
+_GROUPS = (range(3), _OMEGA), (range(3, 6), _GAMMA)
 
 
 def terms(system: System) -> list[tuple[int, int, int]]:
@@ -56,7 +56,7 @@ class LaneOrders:
         stop = b.select(splitting, b.add(pair_order, code.integer(1)), code.integer(0))
         peaks = code.loop(0, stop, self._split_row, [code.zero] * 2)
         peaks = code.loop(pair_order, low_order, self._split_order, peaks)
-        code.loop(low_order, order, self._plain_order, [])
+        self._plain_orders(low_order, order)
         return splitting, peaks
 
     def row(self, n: Any) -> Any:
@@ -86,8 +86,7 @@ class LaneOrders:
         code, b = self.code, self.code.builder
         y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)
         after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
-        for rows in _GROUPS:
-            group = [product for product in _PRODUCTS if product[2] in rows]
+        for rows, group in _GROUPS:
             products = partial(self._pair_products, n, group)
             words = code.loop(1, b.add(n, code.integer(1)), products, products(code.integer(0), []))
             for i in rows:
@@ -100,7 +99,7 @@ class LaneOrders:
                 high, low = code.quick_two_sum(*divided(code, total, after, quotient))
                 self._put(following, i, (high, low))
 
-    def _pair_products(self, n: Any, group: list[Any], m: Any, words: list[Any]) -> list[Any]:
+    def _pair_products(self, n: Any, group: Products, m: Any, words: list[Any]) -> list[Any]:
         code, b = self.code, self.code.builder
         left, right = self.row(m), self.row(b.sub(n, m))
         found = list(words) or [None] * 6
@@ -135,8 +134,7 @@ class LaneOrders:
         y, following = self.row(n), self.row(b.add(n, code.integer(1)))
         divisor = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE)), self._quotient(n)[0]
         found = []
-        for rows in _GROUPS:
-            group = [product for product in _PRODUCTS if product[2] in rows]
+        for rows, group in _GROUPS:
             words = code.loop(0, b.add(n, code.integer(1)), partial(self._split_products, n, group), [code.zero] * 9)
             for i in rows:
                 at = 3 * (i % 3)
@@ -150,7 +148,7 @@ class LaneOrders:
                 found.append(pair)
         return self._put_parts(b.add(n, code.integer(1)), found, peaks)
 
-    def _split_products(self, n: Any, group: list[Any], m: Any, sums: list[Any]) -> list[Any]:
+    def _split_products(self, n: Any, group: Products, m: Any, sums: list[Any]) -> list[Any]:
         code, left, right = self.code, self.row(m), self.row(self.code.builder.sub(n, m))
         found = list(sums)
         for first, second, component, sign in group:
@@ -164,25 +162,69 @@ class LaneOrders:
                 found[at + k] = code.fma(one, factor, found[at + k])
         return found
 
-    def _plain_order(self, n: Any, _: list[Any]) -> None:
-        """y_(n+1) in plain doubles."""
+    def _plain_orders(self, start: Any, stop: Any) -> None:
+        """y_(start+1) to y_stop in plain doubles."""
+        code, b, one = self.code, self.code.builder, self.code.integer(1)
+        count = b.sub(stop, start)
+        odd = b.and_(count, one)
+        code.loop(0, odd, lambda _, values: self._plain_order(start), [])
+        begin = b.add(start, odd)
+        code.loop(0, b.lshr(count, one), lambda k, _: self._two_plain_orders(b.add(begin, b.shl(k, one))), [])
+
+    def _plain_order(self, n: Any) -> None:
+        """y_(n+1)."""
         code, b = self.code, self.code.builder
 
         def products(m: Any, sums: list[Any]) -> list[Any]:
-            left, right = self.row(m), self.row(b.sub(n, m))
-            a = [code.load(left, LANES * i) for i in range(6)]
-            c = [code.load(right, LANES * i) for i in range(3)]
-            found = list(sums)
-            for first, second, component, sign in _PRODUCTS:
-                factor = a[first] if sign > 0 else code.negative(a[first])
-                found[component] = code.fma(factor, c[second], found[component])
-            return found
+            return self._both(self._highs(m), self._highs(b.sub(n, m)), sums)
 
         sums = code.loop(0, b.add(n, code.integer(1)), products, [code.zero] * 6)
-        y, following = self.row(n), self.row(b.add(n, code.integer(1)))
-        quotient = self._quotient(n)[0]
-        for i in range(6):
-            total = code.multiply(self._coefficient(i)[0], sums[i]) if i < 3 else sums[i]
+        self._plain_rates(n, range(6), sums)
+
+    def _two_plain_orders(self, n: Any) -> None:
+        """y_(n+1) and y_(n+2).
+
+        Sums of γ_(n+1) wait for each other, twice as long as those of Ω_(n+1); so those of y_(n+2), which begin with
+        Ω_(n+1), go beside them.
+        """
+        code, b = self.code, self.code.builder
+        after = b.add(n, code.integer(1))
+
+        def alone(m: Any, sums: list[Any]) -> list[Any]:
+            return self._plain(_OMEGA, self._highs(m), self._highs(b.sub(n, m)), sums)
+
+        def beside(m: Any, values: list[Any]) -> list[Any]:
+            y, omega, following = self._highs(m), self._highs(b.sub(n, m))[:3], values[9:]
+            gamma = self._plain(_GAMMA, y, omega, values[:3])
+            return [*gamma, *self._both(y, following, values[3:9]), *omega]
+
+        self._plain_rates(n, range(3), code.loop(0, after, alone, [code.zero] * 3))
+        values = code.loop(0, after, beside, [*[code.zero] * 9, *self._highs(after)[:3]])
+        self._plain_rates(n, range(3, 6), values[:3])
+        self._plain_rates(after, range(6), self._both(self._highs(after), self._highs(code.integer(0)), values[3:9]))
+
+    def _highs(self, n: Any) -> list[Any]:
+        """The high words of y_n."""
+        row = self.row(n)
+        return [self.code.load(row, LANES * i) for i in range(6)]
+
+    def _both(self, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
+        return [*self._plain(_OMEGA, y, omega, sums[:3]), *self._plain(_GAMMA, y, omega, sums[3:])]
+
+    def _plain(self, group: Products, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
+        """Three sums with the products of Ω and of the same part of y."""
+        code, found = self.code, list(sums)
+        for first, second, component, sign in group:
+            factor = y[first] if sign > 0 else code.negative(y[first])
+            found[component % 3] = code.fma(factor, omega[second], found[component % 3])
+        return found
+
+    def _plain_rates(self, n: Any, components: Sequence[int], sums: list[Any]) -> None:
+        """Components of y_(n+1) from their sums."""
+        code, b = self.code, self.code.builder
+        y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)[0]
+        for i, products in zip(components, sums, strict=True):
+            total = code.multiply(self._coefficient(i)[0], products) if i < 3 else products
             for k, component, source in self.terms:
                 if component == i:
                     total = code.fma(self._coefficient(k)[0], code.load(y, LANES * source), total)
