@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -47,6 +47,7 @@ class LaneOrders:
         self.code, self.units = code, units
         self.coefficients, self.quotients, self.scratch = arrays
         self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
+        self.absent = {k: self._is_zero(k) for k in (2, *(k for k, *_ in self.terms))}
 
     def write(self, pair_order: Any, low_order: Any, order: Any) -> tuple[Any, list[Any]]:
         """y_1 to y_N; whether any are split, a bit, and the largest |y_m| 2^(e_0 - e_m) of Ω and of γ."""
@@ -75,6 +76,21 @@ class LaneOrders:
         high, middle, low = (self.code.load(self.coefficients, 24 * k + 8 * word) for word in range(3))
         return high, middle, low
 
+    def _is_zero(self, k: int) -> Any:
+        """Whether a coefficient is 0 in every lane, a bit."""
+        return self.code.all_of(self.code.builder.fcmp_ordered("==", self._coefficient(k)[0], self.code.zero))
+
+    def _sums(self, group: Products, sums: Callable[[Products], list[Any]]) -> list[Any]:
+        """``sums`` of a group of products; those of Ω3 are zeros, not computed, where all tops have I1 = I2."""
+        if group is not _OMEGA:
+            return sums(group)
+
+        def two() -> list[Any]:
+            found = sums(group[:2])
+            return [*found, *[self.code.zero] * (len(found) // 2)]
+
+        return self.code.either(self.absent[2], two, lambda: sums(group))
+
     def _quotient(self, n: Any) -> Pair:
         """1/(n + 1) in every lane."""
         place = self.code.address(self.quotients, self.code.builder.shl(n, self.code.integer(1)))
@@ -87,22 +103,33 @@ class LaneOrders:
         y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)
         after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
         for rows, group in _GROUPS:
-            products = partial(self._pair_products, n, group)
-            words = code.loop(1, b.add(n, code.integer(1)), products, products(code.integer(0), []))
+            words = self._sums(group, partial(self._pair_sums, n))
             for i in rows:
                 total = code.quick_two_sum(*words[2 * (i % 3) : 2 * (i % 3) + 2])
                 if i < 3:
                     total = by_constant(code, self._coefficient(i), total)
                 for k, component, source in self.terms:
                     if component == i:
-                        total = add(code, total, by_constant(code, self._coefficient(k), self.pair(y, source)))
+                        total = self._with_term(k, total, self.pair(y, source))
                 high, low = code.quick_two_sum(*divided(code, total, after, quotient))
                 self._put(following, i, (high, low))
+
+    def _with_term(self, k: int, total: Pair, y: Pair) -> Pair:
+        def added() -> list[Any]:
+            return [*add(self.code, total, by_constant(self.code, self._coefficient(k), y))]
+
+        high, low = self.code.either(self.absent[k], lambda: [*total], added)
+        return high, low
+
+    def _pair_sums(self, n: Any, group: Products) -> list[Any]:
+        products = partial(self._pair_products, n, group)
+        stop = self.code.builder.add(n, self.code.integer(1))
+        return self.code.loop(1, stop, products, products(self.code.integer(0), []))
 
     def _pair_products(self, n: Any, group: Products, m: Any, words: list[Any]) -> list[Any]:
         code, b = self.code, self.code.builder
         left, right = self.row(m), self.row(b.sub(n, m))
-        found = list(words) or [None] * 6
+        found = list(words) or [None] * 2 * (1 + group[-1][2] % 3)
         for first, second, component, sign in group:
             (a, a_low), (c, c_low) = self.pair(left, first), self.pair(right, second)
             if sign < 0:
@@ -135,7 +162,7 @@ class LaneOrders:
         divisor = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE)), self._quotient(n)[0]
         found = []
         for rows, group in _GROUPS:
-            words = code.loop(0, b.add(n, code.integer(1)), partial(self._split_products, n, group), [code.zero] * 9)
+            words = self._sums(group, partial(self._split_sums, n))
             for i in rows:
                 at = 3 * (i % 3)
                 total = words[at], code.add(words[at + 1], words[at + 2])
@@ -147,6 +174,11 @@ class LaneOrders:
                 self._put(following, i, pair)
                 found.append(pair)
         return self._put_parts(b.add(n, code.integer(1)), found, peaks)
+
+    def _split_sums(self, n: Any, group: Products) -> list[Any]:
+        code = self.code
+        zeros = [code.zero] * 3 * (1 + group[-1][2] % 3)
+        return code.loop(0, code.builder.add(n, code.integer(1)), partial(self._split_products, n, group), zeros)
 
     def _split_products(self, n: Any, group: Products, m: Any, sums: list[Any]) -> list[Any]:
         code, left, right = self.code, self.row(m), self.row(self.code.builder.sub(n, m))
