@@ -6,7 +6,7 @@ import pytest
 from words_helpers import LEVELS
 
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
-from heavytop.words.eight import Eight
+from heavytop.words.eight import Eight, exact_state
 from heavytop.words.floating import FALL_IN_LANES, Floating, Ladder
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
@@ -31,11 +31,15 @@ def in_lanes(system, lanes: list[Scaled | None], ladder=FINE, low_order=33, proc
     return eight
 
 
+def samples(eight: Eight, lanes=range(8)) -> dict[int, tuple[Fraction, ...]]:
+    return {lane: exact_state(words) for lane, words in eight.samples(dict.fromkeys(lanes, SPAN)).items()}
+
+
 @pytest.mark.parametrize("forwards", [True, False], ids=["forwards", "backwards"])
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
 def test_each_lane_is_the_motion_of_a_run_by_itself(system, forwards: bool) -> None:
     given = problems(system)
-    found = in_lanes(system, given, forwards=forwards).samples(dict.fromkeys(range(8), SPAN))
+    found = samples(in_lanes(system, given, forwards=forwards))
     for lane, problem in enumerate(given):
         run = Floating(problem, Ladder.of(Fraction(1, 2**105)), forwards)
         assert run.advance(SPAN, 10**6) is Status.FINE
@@ -45,11 +49,11 @@ def test_each_lane_is_the_motion_of_a_run_by_itself(system, forwards: bool) -> N
 
 def test_no_bit_depends_on_the_neighbours_or_on_the_lane() -> None:
     given = problems(HEAVY_TOP)
-    together = in_lanes(HEAVY_TOP, list(given)).samples(dict.fromkeys(range(8), SPAN))
+    together = samples(in_lanes(HEAVY_TOP, list(given)))
     for lane in (0, 5):
         alone: list[Scaled | None] = [None] * 8
         alone[7 - lane] = given[lane]
-        assert in_lanes(HEAVY_TOP, alone).samples({7 - lane: SPAN})[7 - lane] == together[lane]
+        assert samples(in_lanes(HEAVY_TOP, alone), [7 - lane])[7 - lane] == together[lane]
 
 
 def test_a_lane_that_waits_for_the_others_keeps_its_polynomial() -> None:
@@ -71,8 +75,5 @@ def test_a_lane_that_needs_a_larger_n0_says_so_and_stops() -> None:
 @pytest.mark.parametrize("processor", LEVELS)
 def test_the_bits_are_those_of_every_processor(processor) -> None:
     given, ladder = list(problems(HEAVY_TOP)), Ladder.of(Fraction(1, 10**20), FALL_IN_LANES)
-    own, other = (
-        in_lanes(HEAVY_TOP, given, ladder, 16, each).samples(dict.fromkeys(range(8), SPAN))
-        for each in (None, processor)
-    )
+    own, other = (samples(in_lanes(HEAVY_TOP, given, ladder, 16, each)) for each in (None, processor))
     assert own == other

@@ -13,11 +13,14 @@ from math import ceil
 from time import perf_counter
 from typing import Any
 
+import numpy
+
 from heavytop.integrate.lanes import Work
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.integrate.words import CHUNK_SECONDS, OUTCOMES, native_state
 from heavytop.integrate.words_engines import DoubleDouble, choose
-from heavytop.words.eight import Eight
+from heavytop.precision import sums_of_two
+from heavytop.words.eight import Eight, exact_state
 from heavytop.words.machine import Doubles
 from heavytop.words.scaled import Scaled
 from heavytop.words.vector import LANES
@@ -28,15 +31,27 @@ _RISE = 2
 
 @dataclass(slots=True, eq=False)
 class _Motion:
-    """A problem on its way; moved: its words, between two eights."""
+    """A problem on its way; target: the next time |τ|; moved: its words, between two eights."""
 
     index: int
     problem: Problem
     scaled: Scaled
+    exponents: tuple[int, ...]
     began: float
+    target: Fraction = Fraction(0)
     moved: tuple[Doubles, Doubles] | None = None
     times: list[Fraction] = field(default_factory=list)
     states: list[Any] = field(default_factory=list)
+
+    def native(self, words: Doubles) -> Any:
+        """A state in words of its units, rounded to the format; None where a number is too large for it."""
+        each = zip(words[:6].tolist(), words[6:].tolist(), self.exponents, strict=True)
+        found = sums_of_two(each, self.problem.precision)
+        return self.exactly(exact_state(words)) if found is None else numpy.array(found)
+
+    def exactly(self, state: tuple[Fraction, ...]) -> Any:
+        """The same of an exact state."""
+        return native_state(self.scaled.back(state), self.problem.precision)
 
 
 def first_low_order(arithmetic: DoubleDouble) -> int:
@@ -61,6 +76,7 @@ class WordsLanes:
         self.work, self.arithmetic, self.tolerance, self.seconds = work, arithmetic, tolerance, seconds
         self.others = others
         self.forwards = bool(work.targets[-1] >= 0)
+        self.ahead = [abs(time) for time in work.times]
         self.lanes: dict[int, _Motion] = {}
         self.waiting: deque[_Motion] = deque()
         self.outgrown: deque[_Motion] = deque()
@@ -106,27 +122,25 @@ class WordsLanes:
             if own != self.arithmetic:
                 self.others.append(taken)
                 continue
-            motion = _Motion(index, problem, scaled, perf_counter())
+            motion = _Motion(index, problem, scaled, scaled.exponents, perf_counter())
             if not scaled.rest:
                 return motion
             for _ in self.work.times:
-                self._record(motion, scaled.state)
+                self._record(motion, motion.exactly(scaled.state))
             self._finish(motion, Outcome.SUCCESS, Fraction(0), 0)
         return None
 
     def _aim(self, eight: Eight, lane: int) -> None:
         """The next time of the motion in a lane; at 0 it is there already.  Without one left it is over."""
         motion = self.lanes[lane]
-        if len(motion.times) < len(self.work.times) and self.work.times[len(motion.times)] == 0:
-            self._record(motion, motion.scaled.state)
+        if not motion.times and not self.ahead[0]:
+            self._record(motion, motion.exactly(motion.scaled.state))
         if len(motion.times) == len(self.work.times):
             steps = eight.taken(lane, self.work.step_limit)
             self._leave(eight, lane, Outcome.SUCCESS, steps + 1)
             return
-        eight.aim(lane, self._target(motion))
-
-    def _target(self, motion: _Motion) -> Fraction:
-        return abs(self.work.times[len(motion.times)]) * motion.scaled.rate
+        motion.target = self.ahead[len(motion.times)] * motion.scaled.rate
+        eight.aim(lane, motion.target)
 
     def _round(self, eight: Eight) -> None:
         """A chunk of steps, and whatever the lanes came to."""
@@ -152,16 +166,16 @@ class WordsLanes:
 
     def _sample(self, eight: Eight) -> None:
         """The next time of every motion: each lane that is left waits for it."""
-        found = eight.samples({lane: self._target(motion) for lane, motion in self.lanes.items()})
-        for lane, state in found.items():
-            if self._record(self.lanes[lane], state):
+        found = eight.samples({lane: motion.target for lane, motion in self.lanes.items()})
+        for lane, words in found.items():
+            motion = self.lanes[lane]
+            if self._record(motion, motion.native(words)):
                 self._aim(eight, lane)
             else:
                 self._leave(eight, lane, Outcome.NON_FINITE, eight.taken(lane, self.work.step_limit))
 
-    def _record(self, motion: _Motion, state: tuple[Fraction, ...]) -> bool:
-        """Keep a sample, or send it to the observer; False where it is too large for the format."""
-        native = native_state(motion.scaled.back(state), motion.problem.precision)
+    def _record(self, motion: _Motion, native: Any) -> bool:
+        """Keep a sample, or send it to the observer; False where there is none, being too large for the format."""
         if native is None:
             return False
         time = self.work.times[len(motion.times)]

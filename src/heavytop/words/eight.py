@@ -10,9 +10,9 @@ import numpy
 from heavytop.top.equations import System
 from heavytop.words import lane_steps as steps
 from heavytop.words.floating import LARGEST_TIME, Ladder
-from heavytop.words.lane_orders import ROW, terms
+from heavytop.words.lane_orders import LOW, ROW, SCRATCH, terms
 from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
-from heavytop.words.pairs import split, split_constant
+from heavytop.words.pairs import split, split_constant, split_ratio
 from heavytop.words.run import Status, Steps
 from heavytop.words.scaled import Scaled
 from heavytop.words.split_orders import FIRST_UNITS, MOST_TRIES
@@ -41,7 +41,9 @@ class Eight:
         self.constants = doubles(24 * (3 + len(self.terms)))
         self.quotients = doubles(2 * ladder.order)
         self.quotients[:] = [word for n in range(1, ladder.order + 1) for word in split(Fraction(1, n))]
-        self.scratch = doubles((ladder.order + 1) * ROW)
+        self.scratch = doubles(SCRATCH)
+        self.moving = [pointer(array) for array in (self.words, self.clock, self.flags)]
+        self.tables = [pointer(array) for array in (self.constants, self.quotients, self.scratch)]
         self.signs = [1] * LANES
         self._set(steps.ROOM, [ladder.room] * LANES)
         self._set(steps.REACH, [ladder.reach] * LANES)
@@ -53,7 +55,7 @@ class Eight:
     def put(self, lane: int, problem: Scaled, forwards: bool, most: int | None) -> None:
         """A motion at its beginning; most: the steps that it may take."""
         for i, value in enumerate(problem.state):
-            self.words[16 * i + lane], self.words[16 * i + 8 + lane] = split(value)
+            self.words[LANES * i + lane], self.words[ROW + LANES * i + lane] = split(value)
         rows = problem.coefficients.vectors[0]
         given = [rows[0][i] for i in range(3)] + [rows[row][component] for row, component, _ in self.terms]
         for k, value in enumerate(given):
@@ -87,10 +89,8 @@ class Eight:
 
     def advance(self, rounds: int) -> int:
         """Steps of all lanes that can go, at most so many; gives the rounds after which none could."""
-        arrays = [pointer(array) for array in (self.words, self.clock, self.flags)]
-        tables = [pointer(array) for array in (self.constants, self.quotients, self.scratch)]
         orders = self.ladder.order, self.low_order, self.pair_order
-        taken: int = self.functions["advance"](*arrays, *orders, *tables, rounds)
+        taken: int = self.functions["advance"](*self.moving, *orders, *self.tables, rounds)
         return taken
 
     def time(self, lane: int) -> Fraction:
@@ -112,23 +112,33 @@ class Eight:
 
     def coefficients(self, lane: int, n: int) -> tuple[Fraction, ...]:
         """y_n of a lane's last series."""
-        return _exact_lane(self.scratch[ROW * n : ROW * (n + 1)], lane)
+        tables = [self.scratch[place + ROW * n : place + ROW * (n + 1)] for place in (0, LOW)]
+        return exact_state(numpy.concatenate(tables)[lane::LANES])
 
     def state(self, lane: int) -> tuple[Fraction, ...]:
         """Where a lane's motion is."""
-        return _exact_lane(self.words, lane)
+        return exact_state(self.words[lane::LANES])
 
-    def samples(self, times: dict[int, Fraction]) -> dict[int, tuple[Fraction, ...]]:
-        """The states of some lanes, each at a time |τ| inside its next step."""
+    def samples(self, times: dict[int, Fraction]) -> dict[int, Doubles]:
+        """The states of some lanes, each at a time |τ| inside its next step: high words, then low ones, shape (12,)."""
         behind, found = doubles(2 * LANES), doubles(12 * LANES)
         for lane, time in times.items():
-            behind[lane], behind[LANES + lane] = split(self.signs[lane] * (time - self.time(lane)))
-        self.functions["sample"](pointer(self.scratch), self.ladder.order, pointer(behind), pointer(found))
-        return {lane: _exact_lane(found, lane) for lane in times}
+            behind[lane], behind[LANES + lane] = self._behind(lane, time)
+        self.functions["sample"](self.tables[2], self.ladder.order, pointer(behind), pointer(found))
+        return {lane: found[lane::LANES] for lane in times}
+
+    def _behind(self, lane: int, time: Fraction) -> tuple[float, float]:
+        """τ of a time |τ| after the beginning of a lane's next step."""
+        (a, b), (c, d) = (float(self.clock[LANES * (steps.TIME + k) + lane]).as_integer_ratio() for k in range(2))
+        top, bottom = time.as_integer_ratio()
+        return split_ratio(self.signs[lane] * (top * b * d - bottom * (a * d + c * b)), bottom * b * d)
 
 
-def _exact_lane(words: Doubles, lane: int) -> tuple[Fraction, ...]:
-    return tuple(Fraction(float(words[16 * i + lane])) + Fraction(float(words[16 * i + 8 + lane])) for i in range(6))
+def exact_state(words: Doubles) -> tuple[Fraction, ...]:
+    """The sums of six high words and the six low ones behind them."""
+    return tuple(
+        Fraction(high) + Fraction(low) for high, low in zip(words[:6].tolist(), words[6:].tolist(), strict=True)
+    )
 
 
 class OneOfEight(Steps):
@@ -164,7 +174,7 @@ class OneOfEight(Steps):
 
     def sample(self, time: Fraction) -> tuple[Fraction, ...]:
         # the scratch holds the series at the beginning of the step, time 0
-        return self.eight.samples({0: self.time + time})[0]
+        return exact_state(self.eight.samples({0: self.time + time})[0])
 
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
         return tuple(value * self.time**n for value in self.eight.coefficients(0, n))

@@ -7,18 +7,23 @@ from typing import Any
 
 from heavytop.top.equations import System
 from heavytop.words.lanes import ZERO, turned
-from heavytop.words.pairs import Constant, accumulated, add, by_constant, divided
+from heavytop.words.pairs import Constant, accumulated, add, by_constant, divided, multiply
+from heavytop.words.recurrence import MOST_ORDER
 from heavytop.words.split_orders import parts, quotient, rises
-from heavytop.words.vector import DOUBLE, Code, Pair
+from heavytop.words.vector import DOUBLE, LANES, Code, Pair
 
-ROW = 192
-"""Doubles of one order: two words of six components, then their two parts."""
+ROW = 6 * LANES
+"""Doubles of one order in each of four tables."""
+LOW, COARSE, FINE, SCRATCH = (k * ROW * MOST_ORDER for k in range(1, 5))
+"""Where the tables of low words and of the two parts of split coefficients begin, behind that of high words; low words
+of orders above n0 are 0 from the beginning.  Apart from each other, what an order needs fits into the nearest cache."""
 
 # (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
 _PRODUCTS = (
     (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1),
     (4, 2, 3, 1), (5, 1, 3, -1), (5, 0, 4, 1), (3, 2, 4, -1), (3, 1, 5, 1), (4, 0, 5, -1),
 )  # fmt: skip
+_GROUPS = (0, 1, 2), (3, 4, 5)
 
 
 def terms(system: System) -> list[tuple[int, int, int]]:
@@ -60,7 +65,11 @@ class LaneOrders:
 
     def pair(self, row: Any, i: int) -> Pair:
         """Both words of a component of a row."""
-        return self.code.load(row, 16 * i), self.code.load(row, 16 * i + 8)
+        return self.code.load(row, LANES * i), self.code.load(row, LOW + LANES * i)
+
+    def _put(self, row: Any, i: int, y: Pair) -> None:
+        for word, table in zip(y, (0, LOW), strict=True):
+            self.code.store(word, row, table + LANES * i)
 
     def _coefficient(self, k: int) -> Constant:
         high, middle, low = (self.code.load(self.coefficients, 24 * k + 8 * word) for word in range(3))
@@ -75,35 +84,34 @@ class LaneOrders:
     def _pair_order(self, n: Any, _: list[Any]) -> None:
         """y_(n+1) in double-double."""
         code, b = self.code, self.code.builder
-        sums: list[Pair] = []
-        for rows in ((0, 1, 2), (3, 4, 5)):
-            group = [product for product in _PRODUCTS if product[2] in rows]
-            words = code.loop(0, b.add(n, code.integer(1)), partial(self._pair_products, n, group), [code.zero] * 6)
-            sums += [(words[2 * i], words[2 * i + 1]) for i in range(3)]
         y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)
         after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
-        for i in range(6):
-            total = code.quick_two_sum(*sums[i])
-            if i < 3:
-                total = by_constant(code, self._coefficient(i), total)
-            for k, component, source in self.terms:
-                if component == i:
-                    total = add(code, total, by_constant(code, self._coefficient(k), self.pair(y, source)))
-            high, low = code.quick_two_sum(*divided(code, total, after, quotient))
-            code.store(high, following, 16 * i)
-            code.store(low, following, 16 * i + 8)
+        for rows in _GROUPS:
+            group = [product for product in _PRODUCTS if product[2] in rows]
+            products = partial(self._pair_products, n, group)
+            words = code.loop(1, b.add(n, code.integer(1)), products, products(code.integer(0), []))
+            for i in rows:
+                total = code.quick_two_sum(*words[2 * (i % 3) : 2 * (i % 3) + 2])
+                if i < 3:
+                    total = by_constant(code, self._coefficient(i), total)
+                for k, component, source in self.terms:
+                    if component == i:
+                        total = add(code, total, by_constant(code, self._coefficient(k), self.pair(y, source)))
+                high, low = code.quick_two_sum(*divided(code, total, after, quotient))
+                self._put(following, i, (high, low))
 
     def _pair_products(self, n: Any, group: list[Any], m: Any, words: list[Any]) -> list[Any]:
         code, b = self.code, self.code.builder
         left, right = self.row(m), self.row(b.sub(n, m))
-        found = list(words)
+        found = list(words) or [None] * 6
         for first, second, component, sign in group:
             (a, a_low), (c, c_low) = self.pair(left, first), self.pair(right, second)
             if sign < 0:
                 c, c_low = code.negative(c), code.negative(c_low)
             at = 2 * (component % 3)
-            total = (found[at], found[at + 1])
-            found[at : at + 2] = accumulated(code, total, (a, a_low), (c, c_low))
+            x, y = (a, a_low), (c, c_low)
+            total = found[at], found[at + 1]
+            found[at : at + 2] = multiply(code, x, y) if total[0] is None else accumulated(code, total, x, y)
         return found
 
     def _split_row(self, m: Any, peaks: list[Any]) -> list[Any]:
@@ -117,43 +125,41 @@ class LaneOrders:
         for i, (high, low) in enumerate(y):
             coarse, fine = parts(code, (high, low), code.multiply(code.load(self.units, 8 * (i // 3)), up))
             found[i // 3] = code.larger(code.absolute(code.multiply(high, down)), found[i // 3])
-            code.store(coarse, row, 96 + 16 * i)
-            code.store(fine, row, 104 + 16 * i)
+            code.store(coarse, row, COARSE + LANES * i)
+            code.store(fine, row, FINE + LANES * i)
         return found
 
     def _split_order(self, n: Any, peaks: list[Any]) -> list[Any]:
         """y_(n+1) from split coefficients."""
         code, b = self.code, self.code.builder
-        sums: list[Pair] = []
-        for rows in ((0, 1, 2), (3, 4, 5)):
-            group = [product for product in _PRODUCTS if product[2] in rows]
-            words = code.loop(0, b.add(n, code.integer(1)), partial(self._split_products, n, group), [code.zero] * 9)
-            sums += [(words[3 * i], code.add(words[3 * i + 1], words[3 * i + 2])) for i in range(3)]
         y, following = self.row(n), self.row(b.add(n, code.integer(1)))
         divisor = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE)), self._quotient(n)[0]
         found = []
-        for i in range(6):
-            factors = [(self._coefficient(i), sums[i])] if i < 3 else []
-            for k, component, source in self.terms:
-                if component == i:
-                    factors.append((self._coefficient(k), self.pair(y, source)))
-            first = None if i < 3 else sums[i]
-            pair = quotient(code, first, factors, divisor)
-            for word in range(2):
-                code.store(pair[word], following, 16 * i + 8 * word)
-            found.append(pair)
+        for rows in _GROUPS:
+            group = [product for product in _PRODUCTS if product[2] in rows]
+            words = code.loop(0, b.add(n, code.integer(1)), partial(self._split_products, n, group), [code.zero] * 9)
+            for i in rows:
+                at = 3 * (i % 3)
+                total = words[at], code.add(words[at + 1], words[at + 2])
+                factors = [(self._coefficient(i), total)] if i < 3 else []
+                for k, component, source in self.terms:
+                    if component == i:
+                        factors.append((self._coefficient(k), self.pair(y, source)))
+                pair = quotient(code, None if i < 3 else total, factors, divisor)
+                self._put(following, i, pair)
+                found.append(pair)
         return self._put_parts(b.add(n, code.integer(1)), found, peaks)
 
     def _split_products(self, n: Any, group: list[Any], m: Any, sums: list[Any]) -> list[Any]:
         code, left, right = self.code, self.row(m), self.row(self.code.builder.sub(n, m))
         found = list(sums)
         for first, second, component, sign in group:
-            a, rest = (code.load(left, 96 + 16 * first + 8 * k) for k in range(2))
-            coarse, fine = (code.load(right, 96 + 16 * second + 8 * k) for k in range(2))
+            a, rest = (code.load(left, part + LANES * first) for part in (COARSE, FINE))
+            coarse, fine = (code.load(right, part + LANES * second) for part in (COARSE, FINE))
             if sign < 0:
                 a, rest = code.negative(a), code.negative(rest)
             at = 3 * (component % 3)
-            whole = code.load(right, 16 * second)
+            whole = code.load(right, LANES * second)
             for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, whole))):
                 found[at + k] = code.fma(one, factor, found[at + k])
         return found
@@ -164,8 +170,8 @@ class LaneOrders:
 
         def products(m: Any, sums: list[Any]) -> list[Any]:
             left, right = self.row(m), self.row(b.sub(n, m))
-            a = [code.load(left, 16 * i) for i in range(6)]
-            c = [code.load(right, 16 * i) for i in range(3)]
+            a = [code.load(left, LANES * i) for i in range(6)]
+            c = [code.load(right, LANES * i) for i in range(3)]
             found = list(sums)
             for first, second, component, sign in _PRODUCTS:
                 factor = a[first] if sign > 0 else code.negative(a[first])
@@ -179,6 +185,5 @@ class LaneOrders:
             total = code.multiply(self._coefficient(i)[0], sums[i]) if i < 3 else sums[i]
             for k, component, source in self.terms:
                 if component == i:
-                    total = code.fma(self._coefficient(k)[0], code.load(y, 16 * source), total)
-            code.store(code.multiply(total, quotient), following, 16 * i)
-            code.store(code.zero, following, 16 * i + 8)
+                    total = code.fma(self._coefficient(k)[0], code.load(y, LANES * source), total)
+            code.store(code.multiply(total, quotient), following, LANES * i)

@@ -15,7 +15,7 @@ from typing import Any
 from llvmlite import ir
 
 from heavytop.top.equations import System
-from heavytop.words.lane_orders import ROW, LaneOrders
+from heavytop.words.lane_orders import LOW, ROW, LaneOrders
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
 from heavytop.words.pairs import (
     add,
@@ -35,7 +35,7 @@ from heavytop.words.split_orders import (
     in_range,
     next_unit,
 )
-from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER, Pair, function
+from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, LANES, POINTER, Pair, function
 
 FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
 """Flags of a lane."""
@@ -70,11 +70,11 @@ def _write_sample(module: ir.Module) -> None:
 
     def row(n: Any) -> list[Pair]:
         at = code.address(scratch, b.mul(n, code.integer(ROW)))
-        return [(code.load(at, 16 * i), code.load(at, 16 * i + 8)) for i in range(6)]
+        return [(code.load(at, LANES * i), code.load(at, LOW + LANES * i)) for i in range(6)]
 
     words = polynomial(code, order, (code.load(times_, 0), code.load(times_, 8)), 6, row)
     for index, word in enumerate(words):
-        code.store(word, result, 8 * index)
+        code.store(word, result, ROW * (index % 2) + LANES * (index // 2))
     b.ret_void()
 
 
@@ -106,8 +106,9 @@ class _Round:
         b.cbranch(b.icmp_signed("<", taken, self.most), body, out)
         b.position_at_end(body)
         first = self.series.row(0)
-        for i in range(12):
-            code.store(code.load(self.state, 8 * i), first, 8 * i)
+        for place, table in ((0, 0), (ROW, LOW)):
+            for at in range(0, ROW, LANES):
+                code.store(code.load(self.state, place + at), first, table + at)
         splitting, peaks = self.series.write(self.pair_order, self.low_order, self.order)
         some = self._finish(peaks, splitting)
         taken.add_incoming(b.add(taken, code.integer(1)), b.block)
@@ -118,7 +119,7 @@ class _Round:
     def _norm(self, n: Any) -> Any:
         row, found = self.series.row(n), self.code.zero
         for i in range(6):
-            found = self.code.larger(self.code.absolute(self.code.load(row, 16 * i)), found)
+            found = self.code.larger(self.code.absolute(self.code.load(row, LANES * i)), found)
         return log2(self.code, found)
 
     def _length(self, start: Any) -> Any:
@@ -131,20 +132,24 @@ class _Round:
         radii = radius(self.order), radius(b.sub(self.order, code.integer(1)))
         return step_length(code, radii, self._clock(REACH))
 
-    def _sum(self, i: int, h: Any) -> Pair:
-        """Σ y_n h^n of one component, from the highest order."""
+    def _sums(self, h: Any) -> list[Pair]:
+        """Σ y_n h^n of each component, from the highest order."""
         code, b = self.code, self.code.builder
 
-        def plain(k: Any, total: list[Any]) -> list[Any]:
-            return [code.fma(total[0], h, code.load(self.series.row(b.sub(self.order, k)), 16 * i))]
+        def plain(k: Any, totals: list[Any]) -> list[Any]:
+            row = self.series.row(b.sub(self.order, k))
+            return [code.fma(total, h, code.load(row, LANES * i)) for i, total in enumerate(totals)]
 
         def pairs(k: Any, words: list[Any]) -> list[Any]:
-            total = times(code, (words[0], words[1]), h)
-            return [*add(code, total, self.series.pair(self.series.row(b.sub(self.low_order, k)), i))]
+            row, found = self.series.row(b.sub(self.low_order, k)), list[Any]()
+            for i in range(6):
+                found += add(code, times(code, (words[2 * i], words[2 * i + 1]), h), self.series.pair(row, i))
+            return found
 
-        total = code.loop(0, b.sub(self.order, self.low_order), plain, [code.zero])
-        words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, [total[0], code.zero])
-        return code.quick_two_sum(words[0], words[1])
+        totals = code.loop(0, b.sub(self.order, self.low_order), plain, [code.zero] * 6)
+        begin = [word for total in totals for word in (total, code.zero)]
+        words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, begin)
+        return [code.quick_two_sum(words[2 * i], words[2 * i + 1]) for i in range(6)]
 
     def _finish(self, peaks: list[Any], splitting: Any) -> Any:
         """Move the lanes that can go; whether any did, or has to try again."""
@@ -152,7 +157,7 @@ class _Round:
         start = self._norm(code.integer(0))
         length = self._length(start)
         step = b.fmul(length, self._clock(SIGN))
-        results = [self._sum(i, step) for i in range(6)]
+        results = self._sums(step)
         time, low = (code.load(self.clock, 8 * (TIME + k)) for k in range(2))
         total, rest = later(code, (time, low), length)
         target, target_low = (code.load(self.clock, 8 * (TARGET + k)) for k in range(2))
@@ -163,7 +168,7 @@ class _Round:
         left = self._clock(LEFT)
         alive = b.and_(fine, b.fcmp_ordered(">", left, code.zero))
         going, again = b.and_(alive, b.and_(fits, b.not_(behind))), b.and_(alive, b.not_(fits))
-        old = [(self.state, 16 * i + 8 * word, results[i][word]) for i in range(6) for word in range(2)]
+        old = [(self.state, ROW * word + 8 * i, results[i][word]) for i in range(6) for word in range(2)]
         old += [(self.clock, 8 * TIME, total), (self.clock, 8 * (TIME + 1), rest)]
         old += [(self.clock, 8 * LEFT, b.fsub(left, code.constant(1.0)))]
         for base, place, value in old:

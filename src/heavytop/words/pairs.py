@@ -112,7 +112,11 @@ def step_length(code: Code, radii: Sequence[Any], reach: Any) -> Any:
 
 def split(value: Fraction) -> tuple[float, float]:
     """The two doubles nearest to ``value``; exact for numbers of 106 bits."""
-    top, bottom = value.as_integer_ratio()
+    return split_ratio(*value.as_integer_ratio())
+
+
+def split_ratio(top: int, bottom: int) -> tuple[float, float]:
+    """The same of a quotient, which need not be in lowest terms."""
     high = top / bottom
     above, below = high.as_integer_ratio()
     return high, (top * below - above * bottom) / (bottom * below)

@@ -43,6 +43,11 @@ class Scaled:
         state = tuple(value / size for value, size in zip(y, sizes, strict=True))
         return cls(system, scaled, state, rate, tuple(sizes), _rests(system, p, y))
 
+    @property
+    def exponents(self) -> tuple[int, ...]:
+        """log2 of the sizes."""
+        return tuple(size.numerator.bit_length() - size.denominator.bit_length() for size in self.sizes)
+
     def back(self, state: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
         """A state in the units of the problem."""
         return tuple(value * size for value, size in zip(state, self.sizes, strict=True))
@@ -87,12 +92,10 @@ def _power_above(value: Fraction) -> Fraction:
     """The least power of two that is not less; 1 for 0."""
     if value == 0:
         return Fraction(1)
-    exponent = value.numerator.bit_length() - value.denominator.bit_length()
-    while Fraction(2) ** exponent < value:
-        exponent += 1
-    while Fraction(2) ** (exponent - 1) >= value:
-        exponent -= 1
-    return Fraction(2) ** exponent
+    top, bottom = value.as_integer_ratio()
+    exponent = top.bit_length() - bottom.bit_length()
+    larger = top << max(0, -exponent) > bottom << max(0, exponent)
+    return Fraction(2) ** (exponent + larger)
 
 
 def _root_above(value: Fraction) -> Fraction:
