@@ -19,7 +19,6 @@ FAR = Fraction(10**12)
 _PILOT_STEPS = 1000
 _KEPT_NODES = 512
 _TRIED = 100
-_HOPELESS = 8
 _one_writer = Lock()
 
 
@@ -100,7 +99,7 @@ class Pilot:
     def forecast(self, span: Fraction, most_steps: float) -> tuple[float, float]:
         """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go.
 
-        The pilot is given up after a hundred steps where eight times ``most_steps`` would not do.
+        The pilot is given up after a hundred steps where, steps as long as these, ``most_steps`` would not do.
         """
         times, losses = self._ahead(span, most_steps)
         if not times:
@@ -115,7 +114,7 @@ class Pilot:
             return known, bits
         times, losses, run = list(known), list(bits), self.run
         while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
-            if len(times) >= _TRIED and len(times) * _times_as_far(span, times[-1]) > _HOPELESS * most_steps:
+            if len(times) >= _TRIED and len(times) * _times_as_far(span, times[-1]) > most_steps:
                 break
             found = step(run.motion, node, run.precision, run.carrier)
             if found is None:

@@ -41,6 +41,8 @@ _PILOT_BITS = 128
 _PILOT_ROOM = 72
 """The forecast for a motion such as the generic top of the tests to t = 100: its pilot is the enclosure itself."""
 _MOST_PILOT_BITS = 352
+_HOPELESS, _SURELY = 8, 1.25
+"""Times the effort, and times what a cost may be, beyond which a pilot is given up after its first hundred steps."""
 _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
 
@@ -100,9 +102,12 @@ class Validated:
         """
         return self._enclosure(time, bits, self.start.flat)
 
-    def cost(self, time: Fraction, bits: int) -> float:
-        """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock."""
-        return 0.0 if time == 0 else self._cost(time, bits, self.start.flat)
+    def cost(self, time: Fraction, bits: int, most: float | None = None) -> float:
+        """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock.
+
+        most: where it is a quarter more than this, the first hundred steps may tell; None for eight times the effort.
+        """
+        return 0.0 if time == 0 else self._cost(time, bits, self.start.flat, most=most)
 
     def reached(self) -> Fraction:
         """The |t| up to which the latest enclosure has come, for those who wait; any thread may ask."""
@@ -196,17 +201,25 @@ class Validated:
             self._pilots.setdefault(key, Pilot(run, Ahead(run.nodes[0])))
         return self._pilots[key]
 
-    def _forecast(self, direction: int, span: Fraction, start: tuple[Fraction, ...], bits: int) -> tuple[float, float]:
+    def _forecast(
+        self, direction: int, span: Fraction, start: tuple[Fraction, ...], bits: int, most: float | None = None
+    ) -> tuple[float, float]:
         """(bits that will be lost, steps that will be taken) up to ``span``, where ``bits`` are to be left."""
         pilot = self._pilot(direction, start, bits)
-        a_step = _seconds_a_step(pilot.run.precision, pilot.run.carrier is not None)
-        return pilot.forecast(span, self.effort / a_step)
+        if most is None:
+            a_step = _seconds_a_step(pilot.run.precision, pilot.run.carrier is not None)
+            return pilot.forecast(span, _HOPELESS * self.effort / a_step)
+        # the enclosure may take fewer bits than its pilot
+        fewest = self._motion(direction, start).precision(bits, inf)
+        return pilot.forecast(span, _SURELY * most / _seconds_a_step(*fewest))
 
-    def _cost(self, time: Fraction, bits: int, start: tuple[Fraction, ...], loss: float = 0.0) -> float:
+    def _cost(
+        self, time: Fraction, bits: int, start: tuple[Fraction, ...], loss: float = 0.0, most: float | None = None
+    ) -> float:
         """loss: bits that are lost at least."""
         direction = 1 if time > 0 else -1
         motion = self._motion(direction, start)
-        forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits)
+        forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits, most)
         return steps * _seconds_a_step(*motion.precision(bits + max(loss, forecast), steps))
 
     def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:

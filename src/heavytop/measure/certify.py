@@ -97,7 +97,7 @@ def certify(
 
 def _refuses(source: ExactSolution, time: Fraction, bits: int) -> bool:
     """Whether it would, by the model of its cost: a refusal takes longer, as it says which digits are in reach."""
-    return isinstance(source, Validated) and source.cost(time, bits) > source.effort
+    return isinstance(source, Validated) and source.cost(time, bits, source.effort) > source.effort
 
 
 def enclosure_of(solution: ExactSolution, start: State | None = None, effort: float = _EFFORT) -> Validated:

@@ -25,7 +25,7 @@ _STEPS = 20_000
 """A longer run is rerun over about its first so many steps only."""
 _STEPS_SINGLY = 2000
 """The same for an integrator that takes one motion at a time."""
-_SAMPLES = 64
+_SAMPLES = 32
 _BITS = 32
 """Bits of a top whose multiples by 1 + j/2^20 are exact in double: all its reruns then have one reference."""
 _FLOOR = math.log10(float(DOUBLE.eps)) - 1

@@ -143,8 +143,9 @@ def certified(solution: ExactSolution, time: Fraction, bits: int) -> Known | Non
     return Known(solution, certificate, time, bits) if certificate.agreed_digits >= needed else None
 
 
+@lru_cache(maxsize=8)
 def closed_form(problem: Problem) -> ExactSolution | None:
-    """The closed form of a rounded problem, if it has one here."""
+    """The closed form of a rounded problem, if it has one here; the same for rows one after another of one problem."""
     if problem.system is GYROSTAT:
         # rounded, γ is no longer parallel to M: the rotor is that of the exact data
         return Gyrostat(problem.top, problem.start, problem.parameters.rotor)
@@ -163,7 +164,7 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
         found = closed_form(problem)
         if found is None:
             found = Validated(problem.top, problem.start, problem.system)
-            if abs(horizon) > _ALWAYS_ENCLOSED and found.cost(horizon, bits) > CHEAP:
+            if abs(horizon) > _ALWAYS_ENCLOSED and found.cost(horizon, bits, CHEAP) > CHEAP:
                 return f"no closed form, and an enclosure to |t| = {time_text(abs(horizon))} takes too long"
         known = certified(found, horizon, bits)
     except OutOfReach as error:
