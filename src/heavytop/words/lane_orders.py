@@ -22,7 +22,7 @@ of orders above n0 are 0 from the beginning.  Apart from each other, what an ord
 Products = Sequence[tuple[int, int, int, int]]
 # (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
 _OMEGA = (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1)
-_GAMMA = (4, 2, 3, 1), (5, 1, 3, -1), (5, 0, 4, 1), (3, 2, 4, -1), (3, 1, 5, 1), (4, 0, 5, -1)
+_GAMMA = (4, 2, 3, 1), (5, 0, 4, 1), (3, 1, 5, 1), (5, 1, 3, -1), (3, 2, 4, -1), (4, 0, 5, -1)
 _GROUPS = (range(3), _OMEGA), (range(3, 6), _GAMMA)
 
 
