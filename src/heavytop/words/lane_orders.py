@@ -146,13 +146,16 @@ class LaneOrders:
         return self._put_parts(m, [self.pair(row, i) for i in range(6)], peaks)
 
     def _put_parts(self, m: Any, y: list[Pair], peaks: list[Any]) -> list[Any]:
-        code, row, found = self.code, self.row(m), list(peaks)
+        code, row, found = self.code, self.row(m), []
         up, down = rises(code, m, code.load(self.units, 16))
-        for i, (high, low) in enumerate(y):
-            coarse, fine = parts(code, (high, low), code.multiply(code.load(self.units, 8 * (i // 3)), up))
-            found[i // 3] = code.larger(code.absolute(code.multiply(high, down)), found[i // 3])
-            code.store(coarse, row, COARSE + LANES * i)
-            code.store(fine, row, FINE + LANES * i)
+        for k, (rows, _) in enumerate(_GROUPS):
+            big, largest = code.multiply(code.load(self.units, 8 * k), up), code.zero
+            for i in rows:
+                coarse, fine = parts(code, y[i], big)
+                largest = code.larger(code.absolute(y[i][0]), largest)
+                code.store(coarse, row, COARSE + LANES * i)
+                code.store(fine, row, FINE + LANES * i)
+            found.append(code.larger(code.multiply(largest, down), peaks[k]))
         return found
 
     def _split_order(self, n: Any, peaks: list[Any]) -> list[Any]:

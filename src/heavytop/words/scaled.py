@@ -62,10 +62,9 @@ def _rests(system: System, p: Parameters, y: tuple[Fraction, ...]) -> bool:
 def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction) -> Fraction:
     """A power of two near the rate of the motion: the larger of |Ω| and √(torque per moment), or |λ|."""
     speed = max(map(abs, y[:3]))
-    linear = max((abs(c) for row in given.vectors[0][1:] for c in row if c), default=Fraction(0))
     if system is GYROSTAT:
-        return _power_above(max(speed, abs(p.rotor), linear))
-    return max((_power_above(speed) if speed else Fraction(0), _root_above(linear * gamma))) or Fraction(1)
+        return _power_above(max(speed, abs(p.rotor), given.linear))
+    return max((_power_above(speed) if speed else Fraction(0), _root_above(given.linear * gamma))) or Fraction(1)
 
 
 def _bound(system: System, p: Parameters, y: tuple[Fraction, ...]) -> Fraction:
