@@ -6,6 +6,7 @@ their form.  All of it is exact, and whatever the units of the data, the arithme
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
@@ -54,9 +55,13 @@ class Scaled:
 
 
 def _rests(system: System, p: Parameters, y: tuple[Fraction, ...]) -> bool:
-    """Whether the derivative is exactly 0; most motions turn γ, which takes six products to see."""
-    turning = any(system.attitude(p, y[:6], y[3:6])) or (len(y) == 9 and any(system.attitude(p, y[:6], y[6:])))
-    return not turning and not any(system.field(p, y[:6]))
+    """Whether the derivative is exactly 0; most motions turn γ, which two products show."""
+    omega = system.angular_velocity(p, y[:6])
+    return all(_parallel(vector, omega) for vector in (y[3:6], y[6:]) if vector) and not any(system.field(p, y[:6]))
+
+
+def _parallel(a: Sequence[Fraction], b: Sequence[Fraction]) -> bool:
+    return all(a[i] * b[j] == a[j] * b[i] for i, j in ((0, 1), (1, 2), (2, 0)))
 
 
 def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction) -> Fraction:
