@@ -56,6 +56,18 @@ def test_no_bit_depends_on_the_neighbours_or_on_the_lane() -> None:
         assert samples(in_lanes(HEAVY_TOP, alone), [7 - lane])[7 - lane] == together[lane]
 
 
+def test_what_a_symmetric_top_spares_changes_no_bit() -> None:
+    """Beside another top nothing is spared: neither products with I1 - I2 = 0 nor terms with arms that are 0."""
+    weights = (Fraction(0), Fraction(1, 3), Fraction(0))
+    p = Parameters((Fraction(2), Fraction(2), Fraction(1)), weights, Fraction(0))
+    alike = [Scaled.of(HEAVY_TOP, p, tuple(Fraction(n * k, 7) for n in (1, 2, -3, 4, 5, 3))) for k in range(1, 8)]
+    spared = samples(in_lanes(HEAVY_TOP, [None, *alike]), range(1, 8))
+    assert spared == samples(in_lanes(HEAVY_TOP, [problems(HEAVY_TOP)[0], *alike]), range(1, 8))
+    run = Floating(alike[0], Ladder.of(Fraction(1, 2**105)), True)
+    assert run.advance(SPAN, 10**6) is Status.FINE
+    assert max(abs(a - b) for a, b in zip(spared[1], run.sample(SPAN), strict=True)) < Fraction(1, 2**94)
+
+
 def test_a_lane_that_waits_for_the_others_keeps_its_polynomial() -> None:
     given = problems(HEAVY_TOP)
     eight = in_lanes(HEAVY_TOP, list(given))

@@ -27,6 +27,8 @@ _SPARE_BITS, _SPARE_BITS_OF_DOUBLE = 6, 17
 """Of the formats that double-double exceeds: a long run adds its local errors up, and the sum shall stay below half an
 eps, to T = 1000 in extended and to T = 10,000 in double (measured)."""
 _GUARD_BITS = 8
+_FINEST = Fraction(1, 2 ** (floating.BITS - 1))
+"""The tolerance of double-double."""
 
 
 class Arithmetic(ABC):
@@ -175,7 +177,7 @@ def floats(wanted: Fraction, scaled: Scaled | None = None) -> DoubleDouble | Non
     """
     tiny = 0 if scaled is None else fixed.spread(scaled)
     inner = wanted / 2**tiny if tiny > fixed.TINY_BITS else wanted
-    if inner < Fraction(1, 2 ** (floating.BITS - 1)):
+    if inner < _FINEST:
         return None
     return DoubleDouble(wanted, Ladder.of(inner), Ladder.of(inner, FALL_IN_LANES))
 

@@ -31,17 +31,22 @@ _RISE = 2
 
 @dataclass(slots=True, eq=False)
 class _Motion:
-    """A problem on its way; target: the next time |τ|; moved: its words, between two eights."""
+    """A problem on its way; targets: its times |τ|; moved: its words, between two eights."""
 
     index: int
     problem: Problem
     scaled: Scaled
     exponents: tuple[int, ...]
+    targets: list[Fraction]
     began: float
-    target: Fraction = Fraction(0)
     moved: tuple[Doubles, Doubles] | None = None
     times: list[Fraction] = field(default_factory=list)
     states: list[Any] = field(default_factory=list)
+
+    @property
+    def target(self) -> Fraction:
+        """The next of its times."""
+        return self.targets[len(self.times)]
 
     def native(self, words: Doubles) -> Any:
         """A state in words of its units, rounded to the format; None where a number is too large for it."""
@@ -76,7 +81,7 @@ class WordsLanes:
         self.work, self.arithmetic, self.tolerance, self.seconds = work, arithmetic, tolerance, seconds
         self.others = others
         self.forwards = bool(work.targets[-1] >= 0)
-        self.ahead = [abs(time) for time in work.times]
+        self.targets: dict[Fraction, list[Fraction]] = {}
         self.lanes: dict[int, _Motion] = {}
         self.waiting: deque[_Motion] = deque()
         self.outgrown: deque[_Motion] = deque()
@@ -122,7 +127,9 @@ class WordsLanes:
             if own != self.arithmetic:
                 self.others.append(taken)
                 continue
-            motion = _Motion(index, problem, scaled, scaled.exponents, perf_counter())
+            if scaled.rate not in self.targets:
+                self.targets[scaled.rate] = [abs(time) * scaled.rate for time in self.work.times]
+            motion = _Motion(index, problem, scaled, scaled.exponents, self.targets[scaled.rate], perf_counter())
             if not scaled.rest:
                 return motion
             for _ in self.work.times:
@@ -133,13 +140,12 @@ class WordsLanes:
     def _aim(self, eight: Eight, lane: int) -> None:
         """The next time of the motion in a lane; at 0 it is there already.  Without one left it is over."""
         motion = self.lanes[lane]
-        if not motion.times and not self.ahead[0]:
+        if not motion.times and not motion.target:
             self._record(motion, motion.exactly(motion.scaled.state))
         if len(motion.times) == len(self.work.times):
             steps = eight.taken(lane, self.work.step_limit)
             self._leave(eight, lane, Outcome.SUCCESS, steps + 1)
             return
-        motion.target = self.ahead[len(motion.times)] * motion.scaled.rate
         eight.aim(lane, motion.target)
 
     def _round(self, eight: Eight) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy
 
@@ -46,6 +47,7 @@ class Ladder:
     depth: float = _NEVER
 
     @classmethod
+    @lru_cache(maxsize=256)
     def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> Ladder:
         """For a local error of ``tolerance`` relative to the state.
 

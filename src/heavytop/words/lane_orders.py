@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -18,12 +19,11 @@ LOW, COARSE, FINE, SCRATCH = (k * ROW * MOST_ORDER for k in range(1, 5))
 """Where the tables of low words and of the two parts of split coefficients begin, behind that of high words; low words
 of orders above n0 are 0 from the beginning.  Apart from each other, what an order needs fits into the nearest cache."""
 
+Products = Sequence[tuple[int, int, int, int]]
 # (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
-_PRODUCTS = (
-    (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1),
-    (4, 2, 3, 1), (5, 1, 3, -1), (5, 0, 4, 1), (3, 2, 4, -1), (3, 1, 5, 1), (4, 0, 5, -1),
-)  # fmt: skip
-_GROUPS = (0, 1, 2), (3, 4, 5)
+_OMEGA = (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1)
+_GAMMA = (4, 2, 3, 1), (5, 0, 4, 1), (3, 1, 5, 1), (5, 1, 3, -1), (3, 2, 4, -1), (4, 0, 5, -1)
+_GROUPS = (range(3), _OMEGA), (range(3, 6), _GAMMA)
 
 
 def terms(system: System) -> list[tuple[int, int, int]]:
@@ -47,6 +47,7 @@ class LaneOrders:
         self.code, self.units = code, units
         self.coefficients, self.quotients, self.scratch = arrays
         self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
+        self.absent = {k: self._is_zero(k) for k in (2, *(k for k, *_ in self.terms))}
 
     def write(self, pair_order: Any, low_order: Any, order: Any) -> tuple[Any, list[Any]]:
         """y_1 to y_N; whether any are split, a bit, and the largest |y_m| 2^(e_0 - e_m) of Ω and of γ."""
@@ -56,7 +57,8 @@ class LaneOrders:
         stop = b.select(splitting, b.add(pair_order, code.integer(1)), code.integer(0))
         peaks = code.loop(0, stop, self._split_row, [code.zero] * 2)
         peaks = code.loop(pair_order, low_order, self._split_order, peaks)
-        code.loop(low_order, order, self._plain_order, [])
+        plain = partial(self._plain_orders, low_order, order)
+        code.either(self.absent[2], lambda: plain(_OMEGA[:2]), lambda: plain(_OMEGA))
         return splitting, peaks
 
     def row(self, n: Any) -> Any:
@@ -75,6 +77,21 @@ class LaneOrders:
         high, middle, low = (self.code.load(self.coefficients, 24 * k + 8 * word) for word in range(3))
         return high, middle, low
 
+    def _is_zero(self, k: int) -> Any:
+        """Whether a coefficient is 0 in every lane, a bit."""
+        return self.code.all_of(self.code.builder.fcmp_ordered("==", self._coefficient(k)[0], self.code.zero))
+
+    def _sums(self, group: Products, sums: Callable[[Products], list[Any]]) -> list[Any]:
+        """``sums`` of a group of products; those of Ω3 are zeros, not computed, where all tops have I1 = I2."""
+        if group is not _OMEGA:
+            return sums(group)
+
+        def two() -> list[Any]:
+            found = sums(group[:2])
+            return [*found, *[self.code.zero] * (len(found) // 2)]
+
+        return self.code.either(self.absent[2], two, lambda: sums(group))
+
     def _quotient(self, n: Any) -> Pair:
         """1/(n + 1) in every lane."""
         place = self.code.address(self.quotients, self.code.builder.shl(n, self.code.integer(1)))
@@ -86,24 +103,34 @@ class LaneOrders:
         code, b = self.code, self.code.builder
         y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)
         after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
-        for rows in _GROUPS:
-            group = [product for product in _PRODUCTS if product[2] in rows]
-            products = partial(self._pair_products, n, group)
-            words = code.loop(1, b.add(n, code.integer(1)), products, products(code.integer(0), []))
+        for rows, group in _GROUPS:
+            words = self._sums(group, partial(self._pair_sums, n))
             for i in rows:
                 total = code.quick_two_sum(*words[2 * (i % 3) : 2 * (i % 3) + 2])
                 if i < 3:
                     total = by_constant(code, self._coefficient(i), total)
                 for k, component, source in self.terms:
                     if component == i:
-                        total = add(code, total, by_constant(code, self._coefficient(k), self.pair(y, source)))
+                        total = self._with_term(k, total, self.pair(y, source))
                 high, low = code.quick_two_sum(*divided(code, total, after, quotient))
                 self._put(following, i, (high, low))
 
-    def _pair_products(self, n: Any, group: list[Any], m: Any, words: list[Any]) -> list[Any]:
+    def _with_term(self, k: int, total: Pair, y: Pair) -> Pair:
+        def added() -> list[Any]:
+            return [*add(self.code, total, by_constant(self.code, self._coefficient(k), y))]
+
+        high, low = self.code.either(self.absent[k], lambda: [*total], added)
+        return high, low
+
+    def _pair_sums(self, n: Any, group: Products) -> list[Any]:
+        products = partial(self._pair_products, n, group)
+        stop = self.code.builder.add(n, self.code.integer(1))
+        return self.code.loop(1, stop, products, products(self.code.integer(0), []))
+
+    def _pair_products(self, n: Any, group: Products, m: Any, words: list[Any]) -> list[Any]:
         code, b = self.code, self.code.builder
         left, right = self.row(m), self.row(b.sub(n, m))
-        found = list(words) or [None] * 6
+        found = list(words) or [None] * 2 * (1 + group[-1][2] % 3)
         for first, second, component, sign in group:
             (a, a_low), (c, c_low) = self.pair(left, first), self.pair(right, second)
             if sign < 0:
@@ -120,13 +147,16 @@ class LaneOrders:
         return self._put_parts(m, [self.pair(row, i) for i in range(6)], peaks)
 
     def _put_parts(self, m: Any, y: list[Pair], peaks: list[Any]) -> list[Any]:
-        code, row, found = self.code, self.row(m), list(peaks)
+        code, row, found = self.code, self.row(m), []
         up, down = rises(code, m, code.load(self.units, 16))
-        for i, (high, low) in enumerate(y):
-            coarse, fine = parts(code, (high, low), code.multiply(code.load(self.units, 8 * (i // 3)), up))
-            found[i // 3] = code.larger(code.absolute(code.multiply(high, down)), found[i // 3])
-            code.store(coarse, row, COARSE + LANES * i)
-            code.store(fine, row, FINE + LANES * i)
+        for k, (rows, _) in enumerate(_GROUPS):
+            big, largest = code.multiply(code.load(self.units, 8 * k), up), code.zero
+            for i in rows:
+                coarse, fine = parts(code, y[i], big)
+                largest = code.larger(code.absolute(y[i][0]), largest)
+                code.store(coarse, row, COARSE + LANES * i)
+                code.store(fine, row, FINE + LANES * i)
+            found.append(code.larger(code.multiply(largest, down), peaks[k]))
         return found
 
     def _split_order(self, n: Any, peaks: list[Any]) -> list[Any]:
@@ -135,9 +165,8 @@ class LaneOrders:
         y, following = self.row(n), self.row(b.add(n, code.integer(1)))
         divisor = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE)), self._quotient(n)[0]
         found = []
-        for rows in _GROUPS:
-            group = [product for product in _PRODUCTS if product[2] in rows]
-            words = code.loop(0, b.add(n, code.integer(1)), partial(self._split_products, n, group), [code.zero] * 9)
+        for rows, group in _GROUPS:
+            words = self._sums(group, partial(self._split_sums, n))
             for i in rows:
                 at = 3 * (i % 3)
                 total = words[at], code.add(words[at + 1], words[at + 2])
@@ -150,7 +179,12 @@ class LaneOrders:
                 found.append(pair)
         return self._put_parts(b.add(n, code.integer(1)), found, peaks)
 
-    def _split_products(self, n: Any, group: list[Any], m: Any, sums: list[Any]) -> list[Any]:
+    def _split_sums(self, n: Any, group: Products) -> list[Any]:
+        code = self.code
+        zeros = [code.zero] * 3 * (1 + group[-1][2] % 3)
+        return code.loop(0, code.builder.add(n, code.integer(1)), partial(self._split_products, n, group), zeros)
+
+    def _split_products(self, n: Any, group: Products, m: Any, sums: list[Any]) -> list[Any]:
         code, left, right = self.code, self.row(m), self.row(self.code.builder.sub(n, m))
         found = list(sums)
         for first, second, component, sign in group:
@@ -164,25 +198,71 @@ class LaneOrders:
                 found[at + k] = code.fma(one, factor, found[at + k])
         return found
 
-    def _plain_order(self, n: Any, _: list[Any]) -> None:
-        """y_(n+1) in plain doubles."""
+    def _plain_orders(self, start: Any, stop: Any, omega: Products) -> list[Any]:
+        """y_(start+1) to y_stop in plain doubles; omega: those products of Ω that are needed."""
+        code, b, one = self.code, self.code.builder, self.code.integer(1)
+        count = b.sub(stop, start)
+        odd = b.and_(count, one)
+        code.loop(0, odd, lambda _, values: self._plain_order(omega, start), [])
+        begin = b.add(start, odd)
+        two = partial(self._two_plain_orders, omega)
+        return code.loop(0, b.lshr(count, one), lambda k, _: two(b.add(begin, b.shl(k, one))), [])
+
+    def _plain_order(self, group: Products, n: Any) -> None:
+        """y_(n+1)."""
         code, b = self.code, self.code.builder
 
         def products(m: Any, sums: list[Any]) -> list[Any]:
-            left, right = self.row(m), self.row(b.sub(n, m))
-            a = [code.load(left, LANES * i) for i in range(6)]
-            c = [code.load(right, LANES * i) for i in range(3)]
-            found = list(sums)
-            for first, second, component, sign in _PRODUCTS:
-                factor = a[first] if sign > 0 else code.negative(a[first])
-                found[component] = code.fma(factor, c[second], found[component])
-            return found
+            return self._both(group, self._highs(m), self._highs(b.sub(n, m)), sums)
 
         sums = code.loop(0, b.add(n, code.integer(1)), products, [code.zero] * 6)
-        y, following = self.row(n), self.row(b.add(n, code.integer(1)))
-        quotient = self._quotient(n)[0]
-        for i in range(6):
-            total = code.multiply(self._coefficient(i)[0], sums[i]) if i < 3 else sums[i]
+        self._plain_rates(n, range(6), sums)
+
+    def _two_plain_orders(self, group: Products, n: Any) -> None:
+        """y_(n+1) and y_(n+2).
+
+        Sums of γ_(n+1) wait for each other, twice as long as those of Ω_(n+1); so those of y_(n+2), which begin with
+        Ω_(n+1), go beside them.
+        """
+        code, b = self.code, self.code.builder
+        after = b.add(n, code.integer(1))
+
+        def alone(m: Any, sums: list[Any]) -> list[Any]:
+            return self._plain(group, self._highs(m), self._highs(b.sub(n, m)), sums)
+
+        def beside(m: Any, values: list[Any]) -> list[Any]:
+            y, omega, following = self._highs(m), self._highs(b.sub(n, m))[:3], values[9:]
+            gamma = self._plain(_GAMMA, y, omega, values[:3])
+            return [*gamma, *self._both(group, y, following, values[3:9]), *omega]
+
+        self._plain_rates(n, range(3), code.loop(0, after, alone, [code.zero] * 3))
+        values = code.loop(0, after, beside, [*[code.zero] * 9, *self._highs(after)[:3]])
+        self._plain_rates(n, range(3, 6), values[:3])
+        last = self._both(group, self._highs(after), self._highs(code.integer(0)), values[3:9])
+        self._plain_rates(after, range(6), last)
+
+    def _highs(self, n: Any) -> list[Any]:
+        """The high words of y_n."""
+        row = self.row(n)
+        return [self.code.load(row, LANES * i) for i in range(6)]
+
+    def _both(self, group: Products, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
+        return [*self._plain(group, y, omega, sums[:3]), *self._plain(_GAMMA, y, omega, sums[3:])]
+
+    def _plain(self, group: Products, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
+        """Three sums with the products of Ω and of the same part of y."""
+        code, found = self.code, list(sums)
+        for first, second, component, sign in group:
+            factor = y[first] if sign > 0 else code.negative(y[first])
+            found[component % 3] = code.fma(factor, omega[second], found[component % 3])
+        return found
+
+    def _plain_rates(self, n: Any, components: Sequence[int], sums: list[Any]) -> None:
+        """Components of y_(n+1) from their sums."""
+        code, b = self.code, self.code.builder
+        y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)[0]
+        for i, products in zip(components, sums, strict=True):
+            total = code.multiply(self._coefficient(i)[0], products) if i < 3 else products
             for k, component, source in self.terms:
                 if component == i:
                     total = code.fma(self._coefficient(k)[0], code.load(y, LANES * source), total)

@@ -62,9 +62,13 @@ def turned(system: System) -> tuple[tuple[int, ...], ...]:
 
 @dataclass(frozen=True, slots=True)
 class Coefficients:
-    """A and B_l of each state vector, eight exact numbers each: shape (vectors, 1 + number of permutations, 8)."""
+    """A and B_l of each state vector, eight exact numbers each: shape (vectors, 1 + number of permutations, 8).
+
+    linear: the largest |B_l| of the first.
+    """
 
     vectors: tuple[tuple[tuple[Fraction, ...], ...], ...]
+    linear: Fraction
 
     @property
     def largest(self) -> Fraction:
@@ -74,7 +78,8 @@ class Coefficients:
     def with_linear(self, factor: Fraction) -> Coefficients:
         """The same with every B multiplied."""
         return Coefficients(
-            tuple((rows[0], *(tuple(c and c * factor for c in row) for row in rows[1:])) for rows in self.vectors)
+            tuple((rows[0], *(tuple(c and c * factor for c in row) for row in rows[1:])) for rows in self.vectors),
+            self.linear * factor,
         )
 
 
@@ -95,11 +100,12 @@ def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
     linear = [[(a - b) / 2 for a, b in zip(*pair, strict=True)] for pair in zip(at, against, strict=True)]
     permuted = [[Fraction(0) if j == ZERO else linear[j][k] for k, j in enumerate(row[:6])] for row in turned(system)]
     rows = [_eight(row) for row in ([*products, half, half, half], *permuted)]
+    largest = max(abs(c) for row in rows[1:] for c in row)
     if not attitude:
-        return Coefficients((tuple(rows),))
+        return Coefficients((tuple(rows),), largest)
     # ξ' = ξ × ω turns as γ does
     third = [[Fraction(0)] * 3 + list(row[3:6]) for row in rows]
-    return Coefficients((tuple(rows), tuple(_eight(row) for row in third)))
+    return Coefficients((tuple(rows), tuple(_eight(row) for row in third)), largest)
 
 
 def _eight(row: Sequence[Any]) -> tuple[Fraction, ...]:

@@ -6,6 +6,7 @@ their form.  All of it is exact, and whatever the units of the data, the arithme
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
@@ -54,18 +55,21 @@ class Scaled:
 
 
 def _rests(system: System, p: Parameters, y: tuple[Fraction, ...]) -> bool:
-    """Whether the derivative is exactly 0; most motions turn γ, which takes six products to see."""
-    turning = any(system.attitude(p, y[:6], y[3:6])) or (len(y) == 9 and any(system.attitude(p, y[:6], y[6:])))
-    return not turning and not any(system.field(p, y[:6]))
+    """Whether the derivative is exactly 0; most motions turn γ, which two products show."""
+    omega = system.angular_velocity(p, y[:6])
+    return all(_parallel(vector, omega) for vector in (y[3:6], y[6:]) if vector) and not any(system.field(p, y[:6]))
+
+
+def _parallel(a: Sequence[Fraction], b: Sequence[Fraction]) -> bool:
+    return all(a[i] * b[j] == a[j] * b[i] for i, j in ((0, 1), (1, 2), (2, 0)))
 
 
 def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction) -> Fraction:
     """A power of two near the rate of the motion: the larger of |Ω| and √(torque per moment), or |λ|."""
     speed = max(map(abs, y[:3]))
-    linear = max((abs(c) for row in given.vectors[0][1:] for c in row if c), default=Fraction(0))
     if system is GYROSTAT:
-        return _power_above(max(speed, abs(p.rotor), linear))
-    return max((_power_above(speed) if speed else Fraction(0), _root_above(linear * gamma))) or Fraction(1)
+        return _power_above(max(speed, abs(p.rotor), given.linear))
+    return max((_power_above(speed) if speed else Fraction(0), _root_above(given.linear * gamma))) or Fraction(1)
 
 
 def _bound(system: System, p: Parameters, y: tuple[Fraction, ...]) -> Fraction:

@@ -158,6 +158,21 @@ class Code:
         b.position_at_end(after)
         return carried
 
+    def either(self, condition: Any, one: Callable[[], list[Any]], other: Callable[[], list[Any]]) -> list[Any]:
+        """The values of ``one`` where a bit is set, else those of ``other``; the other's code does not run."""
+        b = self.builder
+        with b.if_else(condition) as (then, otherwise):
+            with then:
+                first, after_first = one(), b.block
+            with otherwise:
+                second, after_second = other(), b.block
+        chosen = []
+        for values in zip(first, second, strict=True):
+            chosen.append(b.phi(values[0].type))
+            for value, block in zip(values, (after_first, after_second), strict=True):
+                chosen[-1].add_incoming(value, block)
+        return chosen
+
 
 def function(module: ir.Module, name: str, result: Any, arguments: Sequence[Any]) -> tuple[Any, Code]:
     """A new function of ``module`` whose pointers point to different places, and the writer of its body."""
