@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
 from math import ceil
 from threading import Lock
 
@@ -154,7 +153,6 @@ class WholeNumbers(Arithmetic):
         return 0.0
 
 
-@lru_cache(maxsize=256)
 def wanted_tolerance(precision: Precision, tolerance: Fraction | None) -> Fraction:
     """The local error to aim at, relative to the state.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
+from functools import lru_cache
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -17,13 +18,13 @@ from heavytop.kinds.claim_section import claim_error
 from heavytop.kinds.claim_tasks import INTEGRATION_ERROR
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.integrator import HEYOKA, require
-from heavytop.measure.reruns import Reruns, escape_band
+from heavytop.measure.reruns import Reruns, banded, escape_band
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.measure.truth import Truth, certified
 from heavytop.precision import DOUBLE, exact, parse, time_text
-from heavytop.records import Direction, Metric, Quantity, Row, RowKey, by_name
+from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.brief import named, wrapped
 from heavytop.report.section import clip
 from heavytop.report.text import NOISE, both, drifts, short, table, title, with_noise
@@ -122,7 +123,7 @@ class Homoclinic(Kind):
         truth = known.truth.remembered()
         scorer = _scorer(case, problem, truth, task.keep)
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer)
-        metrics = _with_bands(task, run, _metrics(scorer), truth)
+        metrics = _with_bands(task, run, _metrics(scorer))
         error = scorer.error
         assert error is not None
         series = error.series(time_text) | scorer.drift.series(time_text)
@@ -252,17 +253,31 @@ def _metrics(scorer: Scorer) -> dict[str, Metric]:
     return by_name({ESCAPE: escape}) | scorer.error.metrics() | scorer.drift.metrics()
 
 
-def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric], truth: Truth) -> dict[str, Metric]:
+def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric]) -> dict[str, Metric]:
     """``metrics`` of a row with their bands, that of the escape time from the times of the reruns."""
     case = task.case
     assert case is not None
     reruns = Reruns(Problem.of(case.top, case.start, DOUBLE, case.system), task.integrator, task.seed)
     if run.outcome is not Outcome.SUCCESS or not reruns.possible:
         return metrics
-    times = [time for time in task.times[3::4] if float(abs(time)) <= _end(case, DOUBLE.bits)]
-    banded, found = reruns.escape_bands(run, times, metrics, lambda given: _scorer(case, given, truth))
-    escapes = [abs(each) for each in found if each is not None]
-    own = banded[ESCAPE.text]
-    if own.log10 is not None and len(escapes) == len(found):
+    times = tuple(time for time in task.times[3::4] if float(abs(time)) <= _end(case, DOUBLE.bits))
+    # another package's integrator may not do the same again
+    again = _again if reruns.integrator.takes_many else _again.__wrapped__
+    found, escaped = again(case, reruns, times)
+    metrics = banded(run, metrics, found)
+    escapes = [abs(each) for each in escaped if each is not None]
+    own = metrics[ESCAPE.text]
+    if own.log10 is not None and len(escapes) == len(escaped):
         own.band = escape_band(exact(own.value), escapes, case.rate, task.precision.bits)
-    return banded
+    return metrics
+
+
+@lru_cache(maxsize=16)
+def _again(
+    case: Case, reruns: Reruns, times: tuple[Fraction, ...]
+) -> tuple[list[dict[str, Metric]], list[Fraction | None]]:
+    """Metrics and escape times of the reruns, the same for every format that the case is measured in."""
+    assert case.homoclinic is not None
+    truth = Truth(Against("proven", case.homoclinic.method), case.homoclinic.state).remembered()
+    scorers = reruns.of(times, lambda given: _scorer(case, given, truth))
+    return [each.metrics() for each in scorers], [each.error.escape for each in scorers if each.error is not None]

@@ -21,7 +21,7 @@ from heavytop.precision import DOUBLE, exact, number, round_to
 from heavytop.records import Metric
 from heavytop.top.equations import GYROSTAT
 
-_STEPS = 20_000
+_STEPS = 10_000
 """A longer run is rerun over about its first so many steps only."""
 _STEPS_SINGLY = 2000
 """The same for an integrator that takes one motion at a time."""
@@ -61,16 +61,11 @@ class Reruns:
         problem = _short(self.problem)
         truth: Truth | str = true if isinstance(true, str) else uncertified(problem, times)
         reruns = self._of(problem, times, lambda given: Scorer(given, truth))
-        return _banded(run, metrics, [scorer.metrics() for scorer in reruns])
+        return banded(run, metrics, [scorer.metrics() for scorer in reruns])
 
-    def escape_bands(
-        self, run: Trajectory, times: Sequence[Fraction], metrics: Metrics, scorer: Callable[[Problem], Scorer]
-    ) -> tuple[Metrics, list[Fraction | None]]:
-        """``metrics`` with their bands, and when each of the reruns escapes from the known motion."""
-        reruns = self._of(self.problem, times, scorer)
-        errors = [each.error for each in reruns]
-        escapes = [None if error is None else error.escape for error in errors]
-        return _banded(run, metrics, [each.metrics() for each in reruns]), escapes
+    def of(self, times: Sequence[Fraction], scorer: Callable[[Problem], Scorer]) -> list[Scorer]:
+        """The scorers of the reruns."""
+        return self._of(self.problem, times, scorer)
 
     def _of(self, problem: Problem, times: Sequence[Fraction], scorer: Callable[[Problem], Scorer]) -> list[Scorer]:
         """The scorers of the same motion with other roundings."""
@@ -100,7 +95,7 @@ def _short(problem: Problem) -> Problem:
     return replace(problem, parameters=p._replace(inertia=inertia, moment=moment))
 
 
-def _banded(run: Trajectory, metrics: Metrics, reruns: list[Metrics]) -> Metrics:
+def banded(run: Trajectory, metrics: Metrics, reruns: Sequence[Metrics]) -> Metrics:
     """The metrics with the bands of the reruns, the run itself beside them in units of its eps."""
     coarser = math.log10(2) * (run.problem.precision.bits - DOUBLE.bits)
     own = {

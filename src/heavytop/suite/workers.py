@@ -6,6 +6,7 @@ worker is a process, whatever the number of its threads.
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from collections import Counter, deque
@@ -97,7 +98,7 @@ def _in_processes(
 
     while queue:
         try:
-            with _pool(workers) as pool:
+            with _pool(workers, kinds) as pool:
                 for index, future in _windowed(queue, under_way, submit, at_once):
                     row = future.result()
                     deaths.pop(index, None)
@@ -211,9 +212,14 @@ def _measure_as(expected: Versions, kind: Kind, task: Task) -> Row:
         return _measure(kind, task, Saved())
 
 
-def _leave_interrupts_to_the_parent() -> None:
+def _begin(*_kinds: Kind) -> None:
+    """In a new process, which leaves interrupts to its parent.
+
+    With the kinds all that measures was imported.  None of it is garbage ever: it is not looked at again.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_the_parent, daemon=True).start()
+    gc.freeze()
 
 
 def _end_with_the_parent() -> None:
@@ -224,8 +230,10 @@ def _end_with_the_parent() -> None:
 
 
 @contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    with ProcessPoolExecutor(workers, mp_context=ChildContext(), initializer=_leave_interrupts_to_the_parent) as pool:
+def _pool(workers: int, kinds: Kinds) -> Iterator[ProcessPoolExecutor]:
+    with ProcessPoolExecutor(
+        workers, mp_context=ChildContext(), initializer=_begin, initargs=tuple(kinds.values())
+    ) as pool:
         try:
             yield pool
         except BrokenProcessPool:

@@ -57,7 +57,8 @@ class LaneOrders:
         stop = b.select(splitting, b.add(pair_order, code.integer(1)), code.integer(0))
         peaks = code.loop(0, stop, self._split_row, [code.zero] * 2)
         peaks = code.loop(pair_order, low_order, self._split_order, peaks)
-        self._plain_orders(low_order, order)
+        plain = partial(self._plain_orders, low_order, order)
+        code.either(self.absent[2], lambda: plain(_OMEGA[:2]), lambda: plain(_OMEGA))
         return splitting, peaks
 
     def row(self, n: Any) -> Any:
@@ -197,26 +198,27 @@ class LaneOrders:
                 found[at + k] = code.fma(one, factor, found[at + k])
         return found
 
-    def _plain_orders(self, start: Any, stop: Any) -> None:
-        """y_(start+1) to y_stop in plain doubles."""
+    def _plain_orders(self, start: Any, stop: Any, omega: Products) -> list[Any]:
+        """y_(start+1) to y_stop in plain doubles; omega: those products of Ω that are needed."""
         code, b, one = self.code, self.code.builder, self.code.integer(1)
         count = b.sub(stop, start)
         odd = b.and_(count, one)
-        code.loop(0, odd, lambda _, values: self._plain_order(start), [])
+        code.loop(0, odd, lambda _, values: self._plain_order(omega, start), [])
         begin = b.add(start, odd)
-        code.loop(0, b.lshr(count, one), lambda k, _: self._two_plain_orders(b.add(begin, b.shl(k, one))), [])
+        two = partial(self._two_plain_orders, omega)
+        return code.loop(0, b.lshr(count, one), lambda k, _: two(b.add(begin, b.shl(k, one))), [])
 
-    def _plain_order(self, n: Any) -> None:
+    def _plain_order(self, group: Products, n: Any) -> None:
         """y_(n+1)."""
         code, b = self.code, self.code.builder
 
         def products(m: Any, sums: list[Any]) -> list[Any]:
-            return self._both(self._highs(m), self._highs(b.sub(n, m)), sums)
+            return self._both(group, self._highs(m), self._highs(b.sub(n, m)), sums)
 
         sums = code.loop(0, b.add(n, code.integer(1)), products, [code.zero] * 6)
         self._plain_rates(n, range(6), sums)
 
-    def _two_plain_orders(self, n: Any) -> None:
+    def _two_plain_orders(self, group: Products, n: Any) -> None:
         """y_(n+1) and y_(n+2).
 
         Sums of γ_(n+1) wait for each other, twice as long as those of Ω_(n+1); so those of y_(n+2), which begin with
@@ -226,25 +228,26 @@ class LaneOrders:
         after = b.add(n, code.integer(1))
 
         def alone(m: Any, sums: list[Any]) -> list[Any]:
-            return self._plain(_OMEGA, self._highs(m), self._highs(b.sub(n, m)), sums)
+            return self._plain(group, self._highs(m), self._highs(b.sub(n, m)), sums)
 
         def beside(m: Any, values: list[Any]) -> list[Any]:
             y, omega, following = self._highs(m), self._highs(b.sub(n, m))[:3], values[9:]
             gamma = self._plain(_GAMMA, y, omega, values[:3])
-            return [*gamma, *self._both(y, following, values[3:9]), *omega]
+            return [*gamma, *self._both(group, y, following, values[3:9]), *omega]
 
         self._plain_rates(n, range(3), code.loop(0, after, alone, [code.zero] * 3))
         values = code.loop(0, after, beside, [*[code.zero] * 9, *self._highs(after)[:3]])
         self._plain_rates(n, range(3, 6), values[:3])
-        self._plain_rates(after, range(6), self._both(self._highs(after), self._highs(code.integer(0)), values[3:9]))
+        last = self._both(group, self._highs(after), self._highs(code.integer(0)), values[3:9])
+        self._plain_rates(after, range(6), last)
 
     def _highs(self, n: Any) -> list[Any]:
         """The high words of y_n."""
         row = self.row(n)
         return [self.code.load(row, LANES * i) for i in range(6)]
 
-    def _both(self, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
-        return [*self._plain(_OMEGA, y, omega, sums[:3]), *self._plain(_GAMMA, y, omega, sums[3:])]
+    def _both(self, group: Products, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
+        return [*self._plain(group, y, omega, sums[:3]), *self._plain(_GAMMA, y, omega, sums[3:])]
 
     def _plain(self, group: Products, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
         """Three sums with the products of Ω and of the same part of y."""
