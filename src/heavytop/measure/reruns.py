@@ -21,7 +21,7 @@ from heavytop.precision import DOUBLE, exact, number, round_to
 from heavytop.records import Metric
 from heavytop.top.equations import GYROSTAT
 
-_STEPS = 10_000
+_STEPS = 20_000
 """A longer run is rerun over about its first so many steps only."""
 _STEPS_SINGLY = 2000
 """The same for an integrator that takes one motion at a time."""
