@@ -16,16 +16,17 @@ from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.integrator import Integrator
 from heavytop.measure.rounding_noise import RERUNS, bands, duration_band, factor
 from heavytop.measure.scorer import Scorer
-from heavytop.measure.truth import Truth, uncertified
+from heavytop.measure.truth import Truth, closed_form, uncertified
 from heavytop.precision import DOUBLE, exact, number, round_to
 from heavytop.records import Metric
 from heavytop.top.equations import GYROSTAT
 
-_STEPS = 10_000
+_STEPS = 20_000
 """A longer run is rerun over about its first so many steps only."""
 _STEPS_SINGLY = 2000
 """The same for an integrator that takes one motion at a time."""
-_SAMPLES = 32
+_SAMPLES, _SAMPLES_OF_CHAOS = 32, 64
+"""The second without a closed form: of a chaotic motion the last samples with a digit left decide the largest error."""
 _BITS = 32
 """Bits of a top whose multiples by 1 + j/2^20 are exact in double: all its reruns then have one reference."""
 _FLOOR = math.log10(float(DOUBLE.eps)) - 1
@@ -57,8 +58,9 @@ class Reruns:
         end = horizon if run.steps <= most else horizon * most / run.steps
         if not isinstance(true, str) and not true.covers(end):
             end = true.ends or end
-        times = [exact(number(end * i / _SAMPLES, DOUBLE)) for i in range(1, _SAMPLES + 1)]
         problem = _short(self.problem)
+        samples = _SAMPLES if closed_form(problem) else _SAMPLES_OF_CHAOS
+        times = [exact(number(end * i / samples, DOUBLE)) for i in range(1, samples + 1)]
         truth: Truth | str = true if isinstance(true, str) else uncertified(problem, times)
         reruns = self._of(problem, times, lambda given: Scorer(given, truth))
         return banded(run, metrics, [scorer.metrics() for scorer in reruns])
