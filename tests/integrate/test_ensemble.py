@@ -235,33 +235,38 @@ def test_the_attitude_rides_along() -> None:
         assert numpy.einsum("ij,ij->i", states[:, 6:], states[:, 6:]) == pytest.approx(1, abs=1e-12)
 
 
-def test_the_caller_observes_all_samples_in_order_and_nothing_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("threads", [1, 3])
+def test_the_caller_observes_all_samples_in_order_and_nothing_is_kept(
+    monkeypatch: pytest.MonkeyPatch, threads: int
+) -> None:
     monkeypatch.setattr(lanes, "_ROOM", 2)
-    given, seen, caller = problems(19), defaultdict(list), get_ident()
+    given, seen, caller, errors = problems(19), defaultdict(list), get_ident(), numpy.geterr()
 
     def observer(index: int, time: Fraction, state) -> None:
-        assert get_ident() == caller
+        assert (get_ident(), numpy.geterr()) == (caller, errors)
         seen[index].append((time, list(state)))
 
-    runs = propagate_ensemble(given, [0, *TIMES], observer=observer, threads=3)
+    runs = propagate_ensemble(given, [0, *TIMES], observer=observer, threads=threads)
     kept = propagate_ensemble(given, [0, *TIMES])
     for index, (run, full) in enumerate(zip(runs, kept, strict=True)):
         assert (len(run.states), run.times) == (0, full.times)
         assert seen[index] == [(time, list(state)) for time, state in zip(full.times, full.states, strict=True)]
 
 
-def test_an_error_of_the_observer_ends_the_ensemble() -> None:
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_error_of_the_observer_ends_the_ensemble(threads: int) -> None:
     def observer(index: int, time: Fraction, state) -> None:
         raise LookupError(index)
 
     for precision in (DOUBLE, EXTENDED):
         with pytest.raises(LookupError):
-            propagate_ensemble(problems(30, precision), [1, 10**9], observer=observer, threads=2)
+            propagate_ensemble(problems(30, precision), [1, 10**9], observer=observer, threads=threads)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs timers that send signals")
+@pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED], ids=lambda p: p.name)
-def test_an_interrupt_ends_an_ensemble_that_would_take_years(precision) -> None:
+def test_an_interrupt_ends_an_ensemble_that_would_take_years(precision, threads: int) -> None:
     def interrupt(number, frame) -> None:
         raise KeyboardInterrupt
 
@@ -270,7 +275,7 @@ def test_an_interrupt_ends_an_ensemble_that_would_take_years(precision) -> None:
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.2)
         with pytest.raises(KeyboardInterrupt):
-            propagate_ensemble(problems(20, precision), [10**15])
+            propagate_ensemble(problems(20, precision), [10**15], threads=threads)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)

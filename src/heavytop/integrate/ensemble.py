@@ -79,6 +79,7 @@ def in_threads(
     observer, finished: as in :func:`propagate_ensemble`; called by this thread.
     """
     done: dict[int, Trajectory] = {}
+    given = numpy.geterr()
 
     def receive(item: Any) -> None:
         if isinstance(item[1], Trajectory):
@@ -89,8 +90,12 @@ def in_threads(
             work.room.release()
             observer(*item)
 
+    def receive_here(item: Any) -> None:
+        with numpy.errstate(**given):  # the caller's, whatever the lanes have set
+            receive(item)
+
     if threads == 1:
-        work.send = receive
+        work.send = receive_here
         run()
     else:
         _in_pool(run, work, threads, receive)
