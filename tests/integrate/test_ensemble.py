@@ -250,18 +250,22 @@ def test_the_caller_observes_all_samples_in_order_and_nothing_is_kept(monkeypatc
         assert seen[index] == [(time, list(state)) for time, state in zip(full.times, full.states, strict=True)]
 
 
-def test_an_error_of_the_observer_ends_the_ensemble() -> None:
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_error_of_the_observer_ends_the_ensemble(threads: int) -> None:
     def observer(index: int, time: Fraction, state) -> None:
         raise LookupError(index)
 
     for precision in (DOUBLE, EXTENDED):
+        full = propagate_ensemble(problems(3, precision), [1, 2], threads=threads)
         with pytest.raises(LookupError):
-            propagate_ensemble(problems(30, precision), [1, 10**9], observer=observer, threads=2)
+            propagate_ensemble(problems(30, precision), [1, 10**9], observer=observer, threads=threads)
+        assert all(map(same, propagate_ensemble(problems(3, precision), [1, 2], threads=threads), full))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs timers that send signals")
+@pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED], ids=lambda p: p.name)
-def test_an_interrupt_ends_an_ensemble_that_would_take_years(precision) -> None:
+def test_an_interrupt_ends_an_ensemble_that_would_take_years(precision, threads: int) -> None:
     def interrupt(number, frame) -> None:
         raise KeyboardInterrupt
 
@@ -270,7 +274,7 @@ def test_an_interrupt_ends_an_ensemble_that_would_take_years(precision) -> None:
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.2)
         with pytest.raises(KeyboardInterrupt):
-            propagate_ensemble(problems(20, precision), [10**15])
+            propagate_ensemble(problems(20, precision), [10**15], threads=threads)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
