@@ -206,6 +206,23 @@ def test_the_new_state_is_the_sum_of_the_coefficients_rounded_once() -> None:
             assert abs(value - exact_sum) <= last
 
 
+@pytest.mark.parametrize("words", [3, 4, 6])
+def test_products_of_second_words_count_where_a_leading_word_is_small(words: int) -> None:
+    """Else coefficients of one word would err alike at every step; two words more tell what is right."""
+    p = Parameters((Fraction(4), Fraction(2), Fraction(1)), tuple(Fraction(k, 4) for k in (2, 1, 4)), Fraction(0))
+    y = tuple(Fraction(k, 8) for k in (3, -10, 9, 4, 6, -1))
+    scaled = Scaled.of(HEAVY_TOP, p, y, bounded=True)
+    grids = Grid(words, 44), Grid(words + 2, 44)
+    short, wide = (Fixed(scaled, grid, True) for grid in grids)
+    for run in (short, wide):
+        assert run.advance(Fraction(1, 100), 1) is Status.FINE
+    unit = Fraction(short.grid.unit(words - 1))
+    pairs = [(short.coefficients(n), wide.coefficients(n)) for n in range(short.order)]
+    of_one_word = [(a, b) for a, b in pairs if max(map(abs, b)) < 2**44 * unit]
+    assert len(of_one_word) > 10
+    assert max(abs(x - z) for a, b in of_one_word for x, z in zip(a, b, strict=True)) < unit / 2**8
+
+
 def test_what_an_unstable_axis_amplifies_is_on_the_grid() -> None:
     """Rotation about the middle axis with 2^-140 of another: seen with the bits that the spread asks for."""
     p = Parameters((Fraction(3), Fraction(2), Fraction(1)), (Fraction(0),) * 3, Fraction(0))

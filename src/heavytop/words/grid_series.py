@@ -242,9 +242,7 @@ class Series:
         for k, source in enumerate(sources):
             place = 8 * words * ((1 + len(linear)) * vector + k)
             factors = [code.load(constants, place + 8 * i) for i in range(words)]
-            if not grid.whole:
-                result.add_below(factors, source)
-            result.add_product(factors, source, each=True)
+            result.add_product(factors, source, each=True, below=not grid.whole)
         result.look_at_all()
         code.store(b.bitcast(result.seen, VECTOR), seen, 0)
         parts = zip(result.sums, centred(code, grid, words), strict=True)

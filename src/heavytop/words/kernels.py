@@ -72,31 +72,36 @@ class Accumulator:
     sums: list[Any]
     seen: Any
 
-    def add_product(self, a: list[Any], b: list[Any], each: bool = False) -> None:
+    def add_product(self, a: list[Any], b: list[Any], each: bool = False, below: bool = False) -> None:
         """Add a b, of words numbered from 0 that count from level ``base`` on.
 
+        What goes to the last level is added up before it gets there: its sum is what the next product waits for.
+
         each: look at a sum after each of its products, not only where low parts are added to it.
+        below: with the products of the level below the last, rounded.
         """
-        code, count = self.code, len(self.sums)
-        for k in range(count):
+        code, last = self.code, len(self.sums) - 1
+        if last == 0:
+            self.sums[0] = code.fma(a[0], b[0], self.sums[0])
+            return
+        for k in range(last):
             lows = []
             for i in range(k + 1):
                 total = code.fma(a[i], b[k - i], self.sums[k])
-                if k < count - 1:
-                    part = code.subtract(total, self.sums[k])
-                    lows.append(code.fma(a[i], b[k - i], code.negative(part)))
+                part = code.subtract(total, self.sums[k])
+                lows.append(code.fma(a[i], b[k - i], code.negative(part)))
                 self.sums[k] = total
                 if k == 0 or each:
                     self.look(k)
-            if lows:
+            low = _total(code, lows)
+            if k + 1 < last:
                 self.look(k + 1)
-                self.sums[k + 1] = code.add(self.sums[k + 1], _total(code, lows))
+                self.sums[k + 1] = code.add(self.sums[k + 1], low)
                 self.look(k + 1)
-
-    def add_below(self, a: list[Any], b: list[Any]) -> None:
-        """Add the products one level below the last, with i + j = K, to the last level; they are rounded there."""
-        for i in range(1, len(a)):
-            self.sums[-1] = self.code.fma(a[i], b[len(a) - i], self.sums[-1])
+        pairs = [(i, last - i) for i in range(last + 1)] + [(i, last + 1 - i) for i in range(1, last + 1) if below]
+        for i, j in pairs:
+            low = code.fma(a[i], b[j], low)
+        self.sums[last] = code.add(self.sums[last], low)
 
     def look(self, k: int) -> None:
         """Gather the bits of a sum; those of the last level are of no account."""
@@ -143,7 +148,7 @@ def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Any:
         at = code.address(left, b.mul(m, code.integer(row)))
         against = code.address(right, b.mul(m, code.integer(-row)))
         a, c = ([code.load(place, 8 * i) for i in range(count)] for place in (at, against))
-        total.add_product(a, c)
+        total.add_product(a, c, below=count == 2 and not grid.whole)
         return [*total.sums, total.seen]
 
     begin = [code.load(sums, 8 * k) for k in range(count)] + [b.bitcast(code.load(seen, 0), INT_VECTOR)]

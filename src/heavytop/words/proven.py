@@ -21,7 +21,7 @@ the first of the next kernel.  It was in [2^52, 2^53) g_k when it was looked at,
 x/2 ≤ s ≤ 2 x and d is exact (Sterbenz).  a b is a multiple of g_i g_j = g_(k+1), and so is l, the rounding of x + a b,
 with |l| ≤ g_k = 2^b g_(k+1).  So l is exact, and so is the sum of K of them.  Lows are added between two looks: the sum
 is a multiple of g_(k+1) before and at most 2^53 g_(k+1) after, so it is exact.  Nothing is lost but in the last level,
-which no one looks at.  With T terms its sum stays below
+which no one looks at; what a product adds to it is summed first.  With T terms its sum stays below
 
     B = 1.5 2^52 g + T (Σ_(i+j=K−1) m_ij + K 2^b g);
 
