@@ -259,8 +259,10 @@ def test_an_error_of_the_observer_ends_the_ensemble(threads: int) -> None:
         raise LookupError(index)
 
     for precision in (DOUBLE, EXTENDED):
+        full = propagate_ensemble(problems(3, precision), [1, 2], threads=threads)
         with pytest.raises(LookupError):
             propagate_ensemble(problems(30, precision), [1, 10**9], observer=observer, threads=threads)
+        assert all(map(same, propagate_ensemble(problems(3, precision), [1, 2], threads=threads), full))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs timers that send signals")

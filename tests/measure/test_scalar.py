@@ -7,7 +7,7 @@ import pytest
 from flint import arb
 
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
-from heavytop.measure.scalar import UNRESOLVED, largest, metric, resolved, text, to_ball
+from heavytop.measure.scalar import UNRESOLVED, larger, largest, metric, resolved, text, to_ball
 from heavytop.measure.solution_error import root, split
 
 
@@ -57,6 +57,18 @@ def test_the_largest_ball_holds_the_largest_size() -> None:
     for size in (6, 5):
         assert found.contains(around(size, 0))
     assert midpoint(found) - radius(found) > Fraction(399, 100) / 2**80
+
+
+@pytest.mark.parametrize("apart", [Fraction(0), Fraction(1), Fraction(2), Fraction(3)])
+def test_the_larger_of_two_balls_holds_both_maxima(apart: Fraction) -> None:
+    one, other = arb(3, 1), arb(3 + int(apart), 1)
+    with working_precision(64):
+        for found in (larger(one, other), larger(other, one)):
+            assert found.contains(other)
+            # the smaller one does not widen it downwards
+            assert midpoint(found) - radius(found) > 2 + apart - Fraction(1, 2**20)
+        assert not larger(one, arb("nan")).is_finite()
+        assert not larger(arb("nan"), one).is_finite()
 
 
 def test_a_distance_is_split_into_orthogonal_parts() -> None:

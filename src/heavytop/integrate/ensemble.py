@@ -74,7 +74,7 @@ def propagate_ensemble(
 def in_threads(
     run: Callable[[], None], work: Work, threads: int, observer: Observer | None, finished: Finished | None
 ) -> list[Trajectory]:
-    """The motions of ``work`` in the order of its problems, by so many threads that each do ``run``; this one if one.
+    """The motions of ``work`` in the order of its problems, by so many threads that each do ``run``, or by this one.
 
     observer, finished: as in :func:`propagate_ensemble`; called by this thread.
     """
