@@ -34,7 +34,7 @@ DEAREST = 1.0
 """Seconds that an enclosure may take."""
 GRIDS = [(words, bits) for words in (3, 6) for bits in (None, 48, 49, 50, 51, 52)]
 FORMATS = [DOUBLE, EXTENDED, DOUBLE_DOUBLE, QUAD, real(276)]
-EPS = {"double": 1, "extended": 1, "double-double": 2000, "quad": 2, "real": 8}
+EPS = {"double": 1, "extended": 1, "double-double": 2000, "quad": 8, "real": 8}
 """Units of eps max(1, |value|) within which a result counts as right."""
 
 
