@@ -31,7 +31,9 @@ def grid_for(bits: int) -> Grid | None:
 
 def digits(value: Fraction, grid: Grid) -> list[float]:
     """``value`` rounded to a multiple of the last unit, as words."""
-    whole = round(value * 2**grid.total)
+    top, bottom = value.as_integer_ratio()
+    whole, rest = divmod(top << grid.total, bottom)
+    whole += 2 * rest > bottom or (2 * rest == bottom and whole & 1)  # to nearest, a tie to even
     found = []
     for k in range(grid.words):
         shift = grid.bits * (grid.words - 1 - k)
@@ -43,4 +45,6 @@ def digits(value: Fraction, grid: Grid) -> list[float]:
 
 def exact(words: Doubles) -> Fraction:
     """The number that words add to."""
-    return sum((Fraction(float(word)) for word in words), Fraction(0))
+    ratios = [word.as_integer_ratio() for word in words.tolist()]
+    bottom = max(below for _, below in ratios)  # all are powers of two
+    return Fraction(sum(above * (bottom // below) for above, below in ratios), bottom)

@@ -44,10 +44,12 @@ def constants(problem: Scaled, grid: Grid, over: int, factor: Fraction = Fractio
     flat = [row for vector in problem.coefficients.vectors for row in vector]
     found = doubles(8 * grid.words * len(flat))
     table = found.reshape(len(flat), grid.words, 8)
+    share = factor / 2**over
+    words = {c: digits(c * share, grid) for c in {c for row in flat for c in row}}
     for index, row in enumerate(flat):
         for lane, c in enumerate(row):
             if c:
-                table[index, :, lane] = digits(c * factor / 2**over, grid)
+                table[index, :, lane] = words[c]
     return found
 
 
