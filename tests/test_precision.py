@@ -1,6 +1,5 @@
 """Rounding at the wall: exact in, exact out, and no false number."""
 
-import math
 from decimal import Decimal
 from fractions import Fraction
 from random import Random
@@ -13,7 +12,6 @@ from hypothesis import strategies as st
 from heavytop.errors import InputError
 from heavytop.precision import (
     DOUBLE,
-    DOUBLE_DOUBLE,
     EXTENDED,
     QUAD,
     available,
@@ -26,7 +24,6 @@ from heavytop.precision import (
     real,
     round_to,
     rounded,
-    sums_of_two,
 )
 
 FORMATS = [DOUBLE, EXTENDED, QUAD, real(24), real(237), real(1024)]
@@ -44,27 +41,6 @@ def test_a_number_is_the_nearest_of_its_format_and_comes_back_exactly(precision)
         assert back == round_to(value, precision.bits)
         assert rounded(back, precision) == back
         assert rounded(exact(native_text(native, precision)), precision) == back
-
-
-@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE, real(53), real(90)], ids=lambda p: p.name)
-def test_a_sum_of_two_doubles_is_rounded_as_its_exact_value(precision) -> None:
-    random, words = Random(3), [(-0.0, -0.0, 3), (1.0, 2.0**-53, 0), (1 + 2.0**-52, 2.0**-53, -7), (1.0, -1.0, 5)]
-    for _ in range(300):
-        high = random.uniform(-2, 2) * 2.0 ** random.randint(-200, 200)
-        low = math.ulp(high) * random.choice([-0.5, 0.5, random.random(), 2.0**-53])
-        words.append((high, low, random.randint(-9, 9)))
-    for high, low, exponent in words:
-        value = (Fraction(high) + Fraction(low)) * Fraction(2) ** exponent
-        (found,), expected = sums_of_two([(high, low, exponent)], precision) or [None], number(value, precision)
-        assert type(found) is type(expected)
-        assert exact(found) == exact(expected)
-        assert str(found) == str(expected)  # a zero has no sign
-
-
-@pytest.mark.parametrize("words", [(1.0, 0.0, 501), (2.0**501, 0.0, 0), (2.0**-501, 0.0, 0), (math.inf, 0.0, 0)])
-def test_a_sum_that_may_leave_the_exponents_of_doubles_is_left_to_exact_numbers(words) -> None:
-    assert sums_of_two([(1.0, 0.0, 0), words], DOUBLE) is None
-    assert [sums_of_two([(1.0, 0.0, 0)], each) for each in (QUAD, real(52))] == [None, None]
 
 
 def test_twenty_thousand_bits_come_back_exactly() -> None:

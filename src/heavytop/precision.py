@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from decimal import MAX_EMAX, MIN_EMIN, ROUND_HALF_EVEN, Context, Decimal, Overflow
 from fractions import Fraction
@@ -23,8 +22,6 @@ REAL_BITS = range(24, 20001)
 _MAX_TEXT = 100_000
 LARGEST = Fraction(10) ** 150
 """Beyond this, physical data overflow in some float on the way; a change of units brings them back."""
-_LARGE_EXPONENT = 500
-_LARGE = 2.0**_LARGE_EXPONENT
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 _REMEDY = "Write an integer, a decimal such as 0.25 or 1e-3, or a fraction such as -2/5."
 
@@ -288,34 +285,6 @@ def number(value: Fraction, precision: Precision) -> Any:
             "Choose other units, or a format with a wider range such as real:237.",
         )
     return result
-
-
-def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision) -> list[Any] | None:
-    """(high + low) 2^exponent of each, rounded once as :func:`number` rounds, without exact numbers.
-
-    None where only those tell: near the ends of the exponents of doubles, in quad, and in fewer bits than double has.
-    """
-    if precision.bits < DOUBLE.bits or precision.family == "quad":
-        return None
-    widen, found = _widening(precision), []
-    for high, low, exponent in words:
-        total = high + low
-        if not (total == 0 or 1 / _LARGE < abs(total) < _LARGE) or abs(exponent) > _LARGE_EXPONENT:
-            return None
-        # a zero has no sign
-        found.append((widen(high + 0.0) + low) * math.ldexp(1.0, exponent))
-    return found
-
-
-def _widening(precision: Precision) -> Callable[[float], Any]:
-    """A double as a number of a format with as many bits or more."""
-    if precision.family in ("double-double", "real"):
-        import heyoka
-
-        return lambda value: heyoka.real(value, precision.bits)
-    import numpy
-
-    return numpy.longdouble if precision.family == "extended" else numpy.float64
 
 
 def _wide(significand: int, exponent: int, precision: Precision) -> Any:

@@ -1,6 +1,7 @@
 """The integrator words behind the same call as heyoka's: proven accuracy, the same bits however it is cut, outcomes."""
 
 import json
+import math
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from random import Random
@@ -15,7 +16,7 @@ from heavytop.integrate import words as words_module
 from heavytop.integrate import words_engines
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
-from heavytop.integrate.words import propagate_words
+from heavytop.integrate.words import propagate_words, sums_of_two
 from heavytop.integrate.words_ensemble import propagate_words_ensemble
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, exact, number, real
 from heavytop.top.angles import perpendicular
@@ -339,3 +340,24 @@ def test_what_an_unstable_axis_amplifies_is_computed_as_finely_as_it_needs(
     first = propagate_words_ensemble([problem, *usual], [horizon])
     assert [*together[3].states[0]] == [*first[0].states[0]] == [*alone.states[0]]
     assert [*together[0].states[0]] == [*first[1].states[0]]
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, DOUBLE_DOUBLE, real(53), real(90)], ids=lambda p: p.name)
+def test_a_sum_of_two_doubles_is_rounded_as_its_exact_value(precision) -> None:
+    random, words = Random(3), [(-0.0, -0.0, 3), (1.0, 2.0**-53, 0), (1 + 2.0**-52, 2.0**-53, -7), (1.0, -1.0, 5)]
+    for _ in range(300):
+        high = random.uniform(-2, 2) * 2.0 ** random.randint(-200, 200)
+        low = math.ulp(high) * random.choice([-0.5, 0.5, random.random(), 2.0**-53])
+        words.append((high, low, random.randint(-9, 9)))
+    for high, low, exponent in words:
+        value = (Fraction(high) + Fraction(low)) * Fraction(2) ** exponent
+        (found,), expected = sums_of_two([(high, low, exponent)], precision) or [None], number(value, precision)
+        assert type(found) is type(expected)
+        assert exact(found) == exact(expected)
+        assert str(found) == str(expected)  # a zero has no sign
+
+
+@pytest.mark.parametrize("words", [(1.0, 0.0, 501), (2.0**501, 0.0, 0), (2.0**-501, 0.0, 0), (math.inf, 0.0, 0)])
+def test_a_sum_that_may_leave_the_exponents_of_doubles_is_left_to_exact_numbers(words) -> None:
+    assert sums_of_two([(1.0, 0.0, 0), words], DOUBLE) is None
+    assert [sums_of_two([(1.0, 0.0, 0)], each) for each in (QUAD, real(52))] == [None, None]

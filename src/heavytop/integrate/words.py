@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from time import perf_counter
@@ -11,7 +12,7 @@ from typing import Any
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
 from heavytop.integrate.words_engines import choose, compiled
-from heavytop.precision import Precision, exact, number, require
+from heavytop.precision import DOUBLE, Precision, exact, number, require
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import check_times
@@ -22,6 +23,8 @@ Observer = Callable[[Fraction, Any], None]
 
 CHUNK_SECONDS = 0.25
 _FIRST_CHUNK = 16
+_LARGE_EXPONENT = 500
+_LARGE = 2.0**_LARGE_EXPONENT
 OUTCOMES = {
     Status.FINE: Outcome.SUCCESS,
     Status.NON_FINITE: Outcome.NON_FINITE,
@@ -146,6 +149,34 @@ def native_state(state: tuple[Fraction, ...], precision: Precision) -> Any:
                 return None
             values.append(number(Fraction(0), precision))
     return numpy.array(values)
+
+
+def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision) -> list[Any] | None:
+    """(high + low) 2^exponent of each, rounded once as :func:`heavytop.precision.number` rounds, without exact numbers.
+
+    None where only those tell: near the ends of the exponents of doubles, in quad, and in fewer bits than double has.
+    """
+    if precision.bits < DOUBLE.bits or precision.family == "quad":
+        return None
+    widen, found = _widening(precision), []
+    for high, low, exponent in words:
+        total = high + low
+        if not (total == 0 or 1 / _LARGE < abs(total) < _LARGE) or abs(exponent) > _LARGE_EXPONENT:
+            return None
+        # a zero has no sign
+        found.append((widen(high + 0.0) + low) * math.ldexp(1.0, exponent))
+    return found
+
+
+def _widening(precision: Precision) -> Callable[[float], Any]:
+    """A double as a number of a format with as many bits or more."""
+    if precision.family in ("double-double", "real"):
+        import heyoka
+
+        return lambda value: heyoka.real(value, precision.bits)
+    import numpy
+
+    return numpy.longdouble if precision.family == "extended" else numpy.float64
 
 
 @dataclass(slots=True)

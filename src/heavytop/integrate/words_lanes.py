@@ -17,9 +17,8 @@ import numpy
 
 from heavytop.integrate.lanes import Work
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.integrate.words import CHUNK_SECONDS, OUTCOMES, native_state
+from heavytop.integrate.words import CHUNK_SECONDS, OUTCOMES, native_state, sums_of_two
 from heavytop.integrate.words_engines import DoubleDouble, choose
-from heavytop.precision import sums_of_two
 from heavytop.words.eight import Eight, exact_state
 from heavytop.words.machine import Doubles
 from heavytop.words.scaled import Scaled

@@ -148,6 +148,7 @@ def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Any:
         at = code.address(left, b.mul(m, code.integer(row)))
         against = code.address(right, b.mul(m, code.integer(-row)))
         a, c = ([code.load(place, 8 * i) for i in range(count)] for place in (at, against))
+        # where a leading word is small in some lane, these would be left out alike at every step
         total.add_product(a, c, below=count == 2 and not grid.whole)
         return [*total.sums, total.seen]
 
