@@ -8,6 +8,7 @@ import sys
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
+from random import Random
 
 import numpy
 import pytest
@@ -18,11 +19,11 @@ from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.words import double_double as dd
 from heavytop.words.eight import Eight
 from heavytop.words.floating import Floating, Ladder
-from heavytop.words.machine import Processor, compiled
-from heavytop.words.pairs import log2, power_of_two, split
+from heavytop.words.machine import DOUBLES, Processor, compiled, doubles, pointer
+from heavytop.words.pairs import by_constant, log2, power_of_two, split, split_constant
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
-from heavytop.words.vector import DOUBLE, function
+from heavytop.words.vector import DOUBLE, POINTER, function
 
 HERE = str(Path(__file__).parent)
 FINEST, COARSE = Fraction(1, 2**105), Fraction(1, 10**16)
@@ -73,6 +74,33 @@ def test_simple_fractions_round_without_a_bias() -> None:
     mean, deviation = numpy.mean(errors, axis=0), numpy.std(errors, axis=0)
     assert (deviation > 0.1).all()
     assert (abs(mean) < 0.08).all()
+
+
+def test_a_constant_times_a_number_has_the_nearest_high_word() -> None:
+    """Not the nearest to the product with the constant's first word: its remainders are not symmetric about 0."""
+    module = ir.Module("products")
+    made, code = function(module, "product", ir.VoidType(), [POINTER, POINTER, POINTER])
+    given, factor, result = made.args
+    constant, number = ([code.load(base, 8 * k) for k in range(3)] for base in (given, factor))
+    words = by_constant(code, (constant[0], constant[1], constant[2]), (number[0], number[1]))
+    for k, word in enumerate(words):
+        code.store(word, result, 8 * k)
+    code.builder.ret_void()
+    machine = compiled(module, {"product": (None, [DOUBLES] * 3)})
+    random, unit = Random(1), 2.0**-53
+    for c in (Fraction(text) for text in ("2/5", "-3/20", "5/6", "1/3", "-3/7", "4/9", "17/21", "1/2")):
+        constants, found = doubles(24), doubles(16)
+        for k, word in enumerate(split_constant(c)):
+            constants[8 * k : 8 * k + 8] = word
+        for _ in range(200):
+            numbers = doubles(24)
+            numbers[:8] = [random.uniform(-1, 1) for _ in range(8)]
+            numbers[8:16] = [random.uniform(-unit, unit) * abs(high) / 2 for high in numbers[:8]]
+            machine.functions["product"](pointer(constants), pointer(numbers), pointer(found))
+            for a, low, high, rest in zip(numbers[:8], numbers[8:16], found[:8], found[8:], strict=True):
+                whole = c * (Fraction(a) + Fraction(low))
+                assert high == float(c * Fraction(a))
+                assert abs(Fraction(high) + Fraction(rest) - whole) <= abs(whole) / 2**105
 
 
 @pytest.mark.parametrize("processor", LEVELS[1:])
