@@ -120,7 +120,7 @@ def usable_tolerance(value: Any, precision: Precision) -> Fraction:
     if not precision.eps <= tolerance <= 1:
         raise InputError(
             f"The tolerance {shown(tolerance)} cannot be kept in {precision.name}.",
-            f"Give one from its eps, {decimal_text(precision.eps, 3)}, to 1; without one it is eps.",
+            f"Give one from its eps, {decimal_text(precision.eps, 3)}, to 1, or none.",
         )
     return tolerance
 

@@ -155,6 +155,18 @@ def a_run_that_stops_early_says_so(name: str) -> None:
     assert np.isfinite(np.asarray(run.states, float)).all()
 
 
+def whoever_watches_sees_every_state(name: str) -> None:
+    """Also of an integrator that hands over its states at the end."""
+    if name == "planted fault":
+        return
+    times, seen = [F(1, 4), F(1, 2)], list[Any]()
+    watched = registry.watched(name, {}, lambda time, state: seen.append((time, [float(x).hex() for x in state])))
+    run = watched(GENERIC.top, GENERIC.start, times, DOUBLE, system=HEAVY_TOP)
+    assert run.outcome is Outcome.SUCCESS
+    alone = registry.propagator(name, {})(GENERIC.top, GENERIC.start, times, DOUBLE, system=HEAVY_TOP)
+    assert seen == list(zip(times, bits(alone), strict=True))
+
+
 def bad_times_are_refused(name: str) -> None:
     for times in ([], [F(1), F(1)], [F(2), F(1)], [F(-1), F(1)]):
         with pytest.raises(InputError):
@@ -177,6 +189,7 @@ CONTRACT: tuple[Callable[[str], None], ...] = (
     the_gyrostat_is_another_system,
     what_is_not_finite_is_no_success,
     a_run_that_stops_early_says_so,
+    whoever_watches_sees_every_state,
     bad_times_are_refused,
     threads_do_not_mix,
 )

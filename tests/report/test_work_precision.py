@@ -272,13 +272,19 @@ def test_one_beside_heyoka_is_a_table_with_a_line_a_rung() -> None:
     mine += [row("mine:rk4 step=1/30", -13, 2.0, case="b/T=1"), row("heyoka tolerance=eps", -12, 0.5, case="b/T=1")]
     said = [
         "mine:rk4: largest error in its time (heyoka's time for that error)",
-        "                    top/T=9                        b/T=1",
-        "  step 1/10         1.0e-04 in 12 ms (1 s)         -",
-        "  step 1/30         2.0e-10 in 123 s (1.8 s)       1.0e-13 in 2 s (not reached)",
+        "             top/T=9                   b/T=1",
+        "  step 1/10  1.0e-04 in 12 ms (1 s)    -",
+        "  step 1/30  2.0e-10 in 123 s (1.8 s)  1.0e-13 in 2 s (not reached)",
     ]
     assert beside_ours(OURS + LANES + mine) == said
     # beside integrators of this program too: theirs are the plan's own ladders
     assert beside_ours(ALL + mine) == said
     assert beside_ours(ALL) == []
     assert beside_ours(mine[:2]) == []
-    assert all(len(line) <= 80 for line in said)
+    # what is too wide for a terminal side by side goes below each other, and nothing is cut
+    long = "extended tolerance=1e-18 of a peer"
+    wide = [row(f"mine:rk4 step={long}", -4, 0.0123, case=case) for case in ("top/T=9", "b/T=1")]
+    below = beside_ours(OURS + wide + [row("heyoka tolerance=eps", -12, 123.4, case="b/T=1")])
+    assert [line.split()[0] for line in below[1:]] == ["top/T=9", "step", "b/T=1", "step"]
+    assert below[-1].endswith("1.0e-04 in 12 ms (123 s)")
+    assert all(len(line) <= 80 for line in [*said, *below])

@@ -55,7 +55,7 @@ def figures(
 ) -> int:
     """Draw Figs 2-8 of the paper, and the true motion.
 
-    The true motion beside the claim, all as SVG and PNG.  Takes about 20 seconds.
+    The true motion beside the claim, all as SVG and PNG.  Takes about 10 seconds.
     """
     out = out.absolute()
     require_new(out)

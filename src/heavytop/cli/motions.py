@@ -20,7 +20,7 @@ Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly
 SystemName = Annotated[str, typer.Option(help="heavy_top or gyrostat.")]
 Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]
 
-_REFERENCE_SECONDS = 30.0
+_REFERENCE_SECONDS = 3.0
 """Expected of an enclosure, before anything is known of it."""
 _SLOW_BITS = 2000
 """From here on a single step takes seconds, and about 20 times as long with twice the bits."""
@@ -34,7 +34,9 @@ def propagate(
     omega: Omega,
     gamma: Gamma,
     times: Times,
-    precision: Annotated[str, typer.Option(help="double, extended, double-double, quad or real:BITS.")] = "double",
+    precision: Annotated[
+        str, typer.Option(help="double, extended, quad, real:BITS, or, of words, double-double.")
+    ] = "double",
     integrator: Annotated[str, typer.Option(help="Any that `heavytop list` shows.")] = "heyoka",
     system: SystemName = "heavy_top",
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
@@ -92,7 +94,7 @@ def reference(
 ) -> int:
     """Print proven states of one motion.
 
-    By a closed form where there is one, at once; else by a validated enclosure: seconds up to t = 100, half a minute up
+    By a closed form where there is one, at once; else by a validated enclosure: a second up to t = 100, a few seconds up
     to t = 1000.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
     """
     from heavytop.measure.reference import reference as proven

@@ -32,7 +32,7 @@ def run(
 ) -> int:
     """Run a plan of measurements and write its report.
 
-    It goes to DIR/report.json and DIR/report.html.  On two cores smoke takes about 20 seconds, default a minute,
+    It goes to DIR/report.json and DIR/report.html.  On two cores smoke takes about 10 seconds, default a minute,
     gate two minutes, peers seven, growth ten, long half an hour.
     """
     from heavytop.api.run_folder import PAGE, prepare

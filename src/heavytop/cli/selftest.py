@@ -19,7 +19,7 @@ def selftest(
 ) -> int:
     """Try the detectors on integrators broken on purpose.
 
-    Exit 1 if a fault they should see slips through.  Takes about a minute on two cores.
+    Exit 1 if a fault they should see slips through.  Takes two minutes on two cores.
     """
     from heavytop.api import selftest as detectors
     from heavytop.kinds import KINDS

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from fractions import Fraction
 from importlib.metadata import EntryPoint
 from typing import Any, NamedTuple
 
@@ -37,6 +38,21 @@ def propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:
         _with(peers.peer(name), name, options)
         return _with(peers.ready(name), name, options)
     return _with(_load(_find(name).propagate), name, options)
+
+
+def watched(name: str, options: dict[str, Any], observer: Callable[[Fraction, Any], None]) -> Callable[..., Any]:
+    """The same as :func:`propagator`, with every state given to ``observer``: by a peer at the end of its run."""
+    if name in INTEGRATORS:
+        return propagator(name, {**options, "observer": observer})
+    run = propagator(name, options)
+
+    def call(*arguments: Any, **more: Any) -> Any:
+        found = run(*arguments, **more)
+        for time, state in zip(found.times, found.states, strict=True):
+            observer(time, state)
+        return found
+
+    return call
 
 
 def ensemble_propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:

@@ -113,13 +113,13 @@ def compute(
     watcher = _Watcher(problem, holding(top, start, system), wanted)
     samples = times if watcher.angles is None else watcher.angles.samples(times)
     options = {name: value for name, value in (("xi", xi), ("step_limit", step_limit)) if value is not None}
-    propagate = registry.propagator(integrator, {**options, "observer": watcher})
+    propagate = registry.watched(integrator, options, watcher)
     run = propagate(top, start, samples, precision, system=system)
     run = replace(run, times=tuple(time for time, _ in watcher.kept), states=tuple(state for _, state in watcher.kept))
     texts = run.texts()
     attitudes = angles = None
     if watcher.angles is not None:
-        again = registry.propagator(integrator, {**options, "observer": watcher.angles.see})
+        again = registry.watched(integrator, options, watcher.angles.see)
         followed = watcher.angles.complete(lambda more: again(top, start, more, precision, system=system))
         attitudes = [line[6:] for line in texts]
         angles = [_angles(state, followed[time], precision) for time, state in watcher.kept]

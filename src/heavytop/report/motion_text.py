@@ -19,10 +19,9 @@ def motion_text(motion: Motion) -> RenderableType:
     """States, attitude where it was asked for, and the drift of the first integrals."""
     run = motion.trajectory
     precision = run.problem.precision
-    head = (
-        f"{run.problem.system.name} in {precision.name} ({precision.bits} bits): {run.outcome.message}, "
-        f"{run.steps} steps of order {run.order}"
-    )
+    head = f"{run.problem.system.name} in {precision.name} ({precision.bits} bits): {run.outcome.message}"
+    if run.order:  # some peers tell neither
+        head += f", {run.steps} steps of order {run.order}"
     parts: list[RenderableType] = [Text(head)]
     for index, time in enumerate(motion.to_json()["times"]):
         values = list(motion.states[index])

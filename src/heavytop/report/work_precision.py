@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from heavytop.integrate.peers import BUILT_IN
 from heavytop.precision import parse
 from heavytop.records import UNMEASURED, Quantity, Row
 
-_MOST_CASES, _CELL = 2, 31
+_MOST_CASES, _COLUMNS = 2, 80
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 """heyoka; with the numbers of the top compiled into its code; eight motions at once.  Others compare with these."""
 ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
@@ -173,14 +173,19 @@ def beside_ours(rows: Sequence[Row]) -> list[str]:
                     ours = [each for each in lines if each.integrator == OURS and each.precision == line.precision]
                     cells = {_rung(line, point): _cell(point, ours) for point in line.points}
                     cases[case] = cases.get(case, {}) | cells
-        rungs = dict.fromkeys(rung for cells in cases.values() for rung in cells)
-        if rungs:
-            said += [f"{name}: largest error in its time (heyoka's time for that error)"]
-            said += [
-                _line("", cases),
-                *(_line(rung, [cells.get(rung, "-") for cells in cases.values()]) for rung in rungs),
-            ]
+        if any(cases.values()):
+            said += [f"{name}: largest error in its time (heyoka's time for that error)", *_table(cases)]
     return said
+
+
+def _table(cases: dict[str, dict[str, str]]) -> list[str]:
+    """A column a case, a line a rung; each case by itself where they are wider than a terminal."""
+    rungs = dict.fromkeys(rung for cells in cases.values() for rung in cells)
+    rows = [["", *cases], *([rung, *(cells.get(rung, "-") for cells in cases.values())] for rung in rungs)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    if len(cases) > 1 and sum(widths) + 2 * len(widths) > _COLUMNS:
+        return [line for case, cells in cases.items() for line in _table({case: cells})]
+    return ["".join(f"  {cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
 def _rung(line: Line, point: Point) -> str:
@@ -192,10 +197,6 @@ def _cell(point: Point, ours: Sequence[Line]) -> str:
     seconds, _ = _quickest(ours, point.log10)
     theirs = "not reached" if seconds is None else seconds_text(seconds, 2)
     return f"{10**point.log10:.1e} in {seconds_text(point.seconds, 2)} ({theirs})"
-
-
-def _line(first: str, cells: Iterable[str]) -> str:
-    return f"  {first:18}" + "".join(f"{cell[: _CELL - 2]:{_CELL}}" for cell in cells).rstrip()
 
 
 def leads(rows: Sequence[Row]) -> list[Lead]:
