@@ -94,8 +94,8 @@ def reference(
 ) -> int:
     """Print proven states of one motion.
 
-    By a closed form where there is one, at once; else by a validated enclosure: a second up to t = 100, a few seconds up
-    to t = 1000.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
+    By a closed form where there is one, at once; else by a validated enclosure: a second up to t = 100, a few seconds
+    up to t = 1000.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
     """
     from heavytop.measure.reference import reference as proven
     from heavytop.top.equations import system as system_named
