@@ -52,6 +52,21 @@ def test_each_motion_is_that_of_a_run_by_itself(precision, sign: int) -> None:
         assert (run.steps == 0) == (alone.steps == 0)
 
 
+@pytest.mark.parametrize("exponent", range(6, 14))
+def test_every_tolerance_is_kept_in_lanes(exponent: int) -> None:
+    """Loose ones ask for fewer orders in double-double than there can be."""
+    tolerance = Fraction(1, 10**exponent)
+    for precision in (DOUBLE, DOUBLE_DOUBLE, QUAD):
+        given = problems(precision, 10)
+        runs = propagate_words_ensemble(given, TIMES, tolerance=tolerance)
+        for run, exact_run in zip(runs, propagate_words_ensemble(given, TIMES), strict=True):
+            assert run.outcome is Outcome.SUCCESS
+            pairs = zip(bits(run), bits(exact_run), strict=True)
+            off = max(abs(a - b) for p, q in pairs for a, b in zip(p, q, strict=True))
+            assert off <= 1000 * tolerance
+            assert (run.steps == 0) == (exact_run.steps == 0)
+
+
 def test_no_bit_depends_on_order_threads_chunks_or_company(monkeypatch: pytest.MonkeyPatch) -> None:
     given = problems()
     runs = propagate_words_ensemble(given, TIMES, threads=1)

@@ -10,8 +10,8 @@ from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.drift import Drift
-from heavytop.measure.scalar import metric, of_fraction, text, to_ball
-from heavytop.measure.solution_error import SolutionError, root, split
+from heavytop.measure.scalar import metric, of_fraction, root, text, to_ball
+from heavytop.measure.solution_error import SolutionError, split
 from heavytop.measure.truth import Truth
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.records import Against
@@ -64,6 +64,20 @@ def test_without_a_sample_the_metrics_are_missing() -> None:
     drift = Drift(Problem.of(TOP, START, DOUBLE), holding(TOP, START))
     assert {m.value for m in drift.metrics().values()} == {"missing"}
     assert {m.log10 for m in drift.metrics().values()} == {None}
+
+
+@pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(200)], ids=lambda p: p.name)
+@pytest.mark.parametrize("moment", ["3/20", "1/3", "2"])
+def test_a_state_that_does_not_move_has_no_drift_that_is_not_a_number(precision, moment: str) -> None:
+    """Where an integral is rounded its drift is a ball around 0: unresolved, with a bound, and never NaN."""
+    body, start = HeavyTop((moment,) * 3, 0, (0, 0, 0)), State(("1/3", "1/7", "23/10"), ("3/5", 0, "4/5"))
+    problem = Problem.of(body, start, precision)
+    drift = Drift(problem, holding(body, start))
+    for time in range(1, 4):
+        drift(Fraction(time), problem.start.flat)
+    for found in drift.metrics().values():
+        assert found.value in ("0", "unresolved")
+        assert found.value == "0" or exact(found.bound) < Fraction(1, 2**50) * precision.eps
 
 
 def test_a_nan_is_never_a_number() -> None:

@@ -7,8 +7,8 @@ import pytest
 from flint import arb
 
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
-from heavytop.measure.scalar import UNRESOLVED, larger, largest, metric, resolved, text, to_ball
-from heavytop.measure.solution_error import root, split
+from heavytop.measure.scalar import UNRESOLVED, larger, largest, metric, resolved, root, text, to_ball
+from heavytop.measure.solution_error import split
 
 
 def around(middle: int, wide: int) -> arb:

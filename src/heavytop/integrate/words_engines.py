@@ -164,7 +164,7 @@ def wanted_tolerance(precision: Precision, tolerance: Fraction | None) -> Fracti
     if not finest <= wanted <= LOOSEST:
         raise InputError(
             f"The integrator words has no tolerance {decimal_text(wanted, 6)} in {precision.name}.",
-            f"Give one from {decimal_text(finest, 6)} to 1e-6, or none.",
+            f"Give one from its eps, {decimal_text(precision.eps, 3)}, to 1e-6, or none.",
         )
     return wanted
 

@@ -21,6 +21,7 @@ from heavytop.integrate.words import CHUNK_SECONDS, OUTCOMES, native_state, sums
 from heavytop.integrate.words_engines import DoubleDouble, choose
 from heavytop.words.eight import Eight, exact_state
 from heavytop.words.machine import Doubles
+from heavytop.words.recurrence import LEAST_LOW_ORDER
 from heavytop.words.scaled import Scaled
 from heavytop.words.vector import LANES
 
@@ -60,7 +61,7 @@ class _Motion:
 
 def first_low_order(arithmetic: DoubleDouble) -> int:
     """n0 where coefficients fall by as much from order to order as those of a motion near a singularity do."""
-    return ceil(arithmetic.in_lanes.room / arithmetic.in_lanes.reach)
+    return max(LEAST_LOW_ORDER, ceil(arithmetic.in_lanes.room / arithmetic.in_lanes.reach))
 
 
 class WordsLanes:

@@ -11,7 +11,7 @@ from flint import arb
 from heavytop.exact.balls import ball, ball_from, ball_text, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.scalar import GUARD_BITS, larger, metric, text, to_ball
+from heavytop.measure.scalar import GUARD_BITS, larger, metric, root, text, to_ball
 from heavytop.records import Metric, Quantity, Series, by_name
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import dot
@@ -58,7 +58,7 @@ class Running:
         """Its ``max``, ``rms`` and ``final``; ``missing`` without a sample."""
         if not self.count:
             return {quantity.over(part): Metric("missing", None) for part in STATISTICS}
-        found = (self.maximum, (self.squares / self.count).sqrt(), self.final)
+        found = (self.maximum, root(self.squares / self.count), self.final)
         return {quantity.over(part): metric(value) for part, value in zip(STATISTICS, found, strict=True)}
 
     def series(self, quantity: Quantity, time_text: Callable[[Fraction], str]) -> Series:

@@ -89,6 +89,11 @@ def larger(one: arb, other: arb) -> arb:
     return other if other > one else one.max(other)
 
 
+def root(value: arb) -> arb:
+    """√value of a ball around a number that is not negative, though the ball may reach below 0."""
+    return value.sqrt() if value >= 0 else value.abs_upper().sqrt().union(arb(0))
+
+
 def largest(values: Iterable[arb]) -> arb:
     """The ball around max |value|."""
     return reduce(larger, map(abs, values), _ZERO)

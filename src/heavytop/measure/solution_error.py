@@ -14,7 +14,7 @@ from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.digits import relative_error
 from heavytop.measure.drift import Running, Sums, parameter_balls
-from heavytop.measure.scalar import GUARD_BITS, largest, resolved, to_ball
+from heavytop.measure.scalar import GUARD_BITS, largest, resolved, root, to_ball
 from heavytop.measure.truth import Truth
 from heavytop.records import Metric, Quantity, Series, by_name
 from heavytop.top.heavy_top import dot
@@ -143,8 +143,3 @@ def split(delta: Sequence[arb], flow: Sequence[arb]) -> tuple[arb, arb]:
 
 def _product(a: Sequence[arb], b: Sequence[arb]) -> Any:
     return dot(a[:3], b[:3]) + dot(a[3:], b[3:])
-
-
-def root(value: arb) -> arb:
-    """√value of a ball around a number that is not negative, though the ball may reach below 0."""
-    return value.sqrt() if value >= 0 else value.abs_upper().sqrt().union(arb(0))

@@ -13,6 +13,7 @@ from heavytop.words.floating import LARGEST_TIME, Ladder
 from heavytop.words.lane_orders import LOW, ROW, SCRATCH, terms
 from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
 from heavytop.words.pairs import split, split_constant, split_ratio
+from heavytop.words.recurrence import LEAST_LOW_ORDER
 from heavytop.words.run import Status, Steps
 from heavytop.words.scaled import Scaled
 from heavytop.words.split_orders import FIRST_UNITS, MOST_TRIES
@@ -28,12 +29,12 @@ machine = once(steps.build)
 class Eight:
     """Eight lanes of motions of one system, each idle or with a motion in it.
 
-    low_order: n0, the same for all; a motion that needs a larger one stops.
+    low_order: n0, the same for all, 2 at least; a motion that needs a larger one stops.
     """
 
     def __init__(self, system: System, ladder: Ladder, low_order: int, processor: Processor | None = None) -> None:
         self.functions = machine(system, processor).functions
-        self.ladder, self.low_order = ladder, min(low_order, ladder.order - 1)
+        self.ladder, self.low_order = ladder, max(LEAST_LOW_ORDER, min(low_order, ladder.order - 1))
         self.pair_order = min(self.low_order, ladder.pair_order(self.low_order))
         self.terms = terms(system)
         self.words, self.clock = doubles(12 * LANES), doubles(steps.CLOCK * LANES)
