@@ -124,7 +124,7 @@ class Words(Arithmetic):
         return Fixed(scaled, self.grid, forwards)
 
     def make(self, system: System, attitude: bool) -> float:
-        made, _ = fixed.machine(self.grid, system, attitude)
+        made = fixed.machine(self.grid, system, attitude)
         check(system, attitude, lambda scaled: Fixed(scaled, self.grid, True), self.grid.total, bounded=True)
         return made.seconds
 

@@ -9,7 +9,7 @@ import numpy
 
 from heavytop.words import grid as steps
 from heavytop.words.digits import digits, exact
-from heavytop.words.grid_series import most_orders
+from heavytop.words.grid_series import most_orders, rows_of, size_of
 from heavytop.words.kernels import Grid
 from heavytop.words.lanes import series_rates
 from heavytop.words.machine import Doubles, Processor, doubles, once, pointer
@@ -92,23 +92,22 @@ class Fixed(Run):
 
     def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:
         self.vectors = 1 if len(problem.state) == 6 else 2
-        self.machine, row = machine(grid, problem.system, self.vectors == 2, processor)
+        self.machine = machine(grid, problem.system, self.vectors == 2, processor)
         self.problem, self.grid, self.forwards = problem, grid, forwards
         self.steps = 0
-        size, orders = 8 * grid.words * self.vectors, most_orders(grid)
+        size, scratch = 8 * grid.words * self.vectors, size_of(grid, self.vectors)
         self.excess = excess(problem)
         self.words, self.result = doubles(size), doubles(2 * size)
         for place, value in zip(self._places, problem.state, strict=True):
             self.words[place : place + 8 * grid.words : 8] = digits(value, grid)
         self.inverses = inverses(grid)
-        self.rows, self.sums, self.seen = doubles(row * (orders + 2)), doubles(8 * grid.words), doubles(8)
-        self.places = numpy.zeros(grid.words + 2, numpy.int64)
+        self.rows, self.sums, self.seen = doubles(scratch.rows), doubles(scratch.sums), doubles(8)
+        self.places = numpy.zeros(scratch.places, numpy.int64)
         self.clock, self.counts = doubles(steps.CLOCK), numpy.zeros(steps.COUNTS, numpy.int64)
         self.clock[steps.SIGN] = 1.0 if forwards else -1.0
         self.counts[steps.EXCESS] = self.excess
         self.counts[[steps.HALVINGS, steps.FEWEST, steps.MOST]] = _FIRST_HALVINGS, _FEWEST_HALVINGS, _MOST_HALVINGS
         self.constants = constants(problem, grid, self.excess)
-        self._row = row
 
     @property
     def _places(self) -> list[int]:
@@ -173,9 +172,7 @@ class Fixed(Run):
         # L holds Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2
         found: list[Fraction] = []
         for vector in range(self.vectors):
-            start = n * self._row + 8 * self.grid.words * (1 + vector)
-            block = self.rows[start : start + 8 * self.grid.words]
-            left = [exact(block[lane::8]) for lane in range(8)]
+            left = rows_of(self.grid).left(self.rows, self.grid, self.vectors, n, vector)
             middle = left[5] / 2
             found += [*(left[2], left[0], left[1])[: 3 * (1 - vector)], left[4] - middle, middle, left[3] - middle]
         return tuple(found)

@@ -28,8 +28,8 @@ FINE, TOO_SMALL, CAPACITY = 0, 2, 3
 _MANY_ORDERS, _FEW_ORDERS = 0.53, 0.34
 
 
-def build(grid: Grid, system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, int]:
-    """``advance`` and ``series`` for this system, and the doubles of a row.
+def build(grid: Grid, system: System, attitude: bool, processor: Processor | None = None) -> Machine:
+    """``advance`` and ``series`` for this system.
 
     advance(state, constants, inverses, rows, sums, places, seen, result, clock, counts, steps): at most so many steps,
     until the time covers the target; gives their number.  Behind the result lies the state before the last step.
@@ -40,7 +40,7 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
     _Advance(module, grid, series.vectors, made).write()
     pointers = [DOUBLES] * 5 + [INTEGERS, DOUBLES]
     integer = ctypes.c_int64
-    machine = compiled(
+    return compiled(
         module,
         {
             "series": (integer, [*pointers, ctypes.c_double, integer, DOUBLES]),
@@ -48,7 +48,6 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
         },
         processor,
     )
-    return machine, series.row
 
 
 class _Advance(Stepping):

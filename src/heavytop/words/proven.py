@@ -58,7 +58,7 @@ from numpy.typing import NDArray
 
 from heavytop.words import extents, fixed
 from heavytop.words.grid import raises_of
-from heavytop.words.grid_series import UNSETTLED, most_orders
+from heavytop.words.grid_series import UNSETTLED, most_orders, size_of
 from heavytop.words.kernels import Grid
 from heavytop.words.lanes import turned
 from heavytop.words.machine import Doubles, Integers, Processor, doubles, pointer
@@ -134,7 +134,7 @@ class Carrier:
 
     def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:
         self.vectors = 1 if len(problem.state) == 6 else 2
-        self.machine, self.row = fixed.machine(grid, problem.system, self.vectors == 2, processor)
+        self.machine = fixed.machine(grid, problem.system, self.vectors == 2, processor)
         self.extents = extents.machine(grid.words, self.vectors).functions["extents"]
         self.grid, self.sign = grid, 1.0 if forwards else -1.0
         self.excess = fixed.excess(problem)
@@ -169,7 +169,7 @@ class Carrier:
     def coefficients(self, centre: Sequence[int], halvings: int) -> list[list[int]]:
         """b_0 to b_N of each component, whole ulps, where :meth:`series` gives some."""
         length, grid = self._computed(centre, halvings) + 1, self.grid
-        table = self._scratch().rows[: self.row * length].reshape(length, 1 + self.vectors, grid.words, 8)
+        table = self._scratch().rows[: size_of(grid, self.vectors).row * length].reshape(length, 1 + self.vectors, grid.words, 8)
         # L holds Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2; what is taken out of it are the words of y, exactly
         found = [table[:, 1, :, lane] for lane in (2, 0, 1)]
         for left in (table[:, 1 + vector] for vector in range(self.vectors)):
@@ -241,10 +241,11 @@ class _Scratch:
     def __init__(self, carrier: Carrier) -> None:
         words, vectors = carrier.grid.words, carrier.vectors
         size, orders = 8 * words * vectors, most_orders(carrier.grid) + 2
-        self.state, self.result, self.rows = doubles(size), doubles(size), doubles(carrier.row * orders)
+        room = size_of(carrier.grid, vectors)
+        self.state, self.result, self.rows = doubles(size), doubles(size), doubles(room.rows)
         kept = [self.state, carrier.constants, carrier.inverses, self.rows]
-        places = numpy.zeros(words + 2, numpy.int64)
-        self._kept: list[Doubles | Integers] = [*kept, doubles(8 * words), places, doubles(8)]
+        places = numpy.zeros(room.places, numpy.int64)
+        self._kept: list[Doubles | Integers] = [*kept, doubles(room.sums), places, doubles(8)]
         self.pointers, self.found = [pointer(array) for array in self._kept], pointer(self.result)
         self.values, self.sizes = doubles(8 * vectors * orders), doubles(8 * vectors * orders)
         widest, added = doubles(8 * words * (1 + vectors)), doubles(size)

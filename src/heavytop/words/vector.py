@@ -69,6 +69,10 @@ class Code:
         name = "llvm.fma.v8f64" if a.type == VECTOR else "llvm.fma.f64"
         return self._call(name, a.type, (a, b, c))
 
+    def multiply_add(self, a: Any, b: Any, c: Any) -> Any:
+        """a b + c where that is exact with and without a rounding of a b: the same bits, however it is computed."""
+        return self._call("llvm.fmuladd.v8f64", VECTOR, (a, b, c))
+
     def absolute(self, a: Any) -> Any:
         """|a|."""
         return self._call("llvm.fabs.v8f64", VECTOR, (a,))

@@ -1,0 +1,301 @@
+"""Coefficients in digits of 24 bits, and the sums of their products: every product and every sum is exact.
+
+L and R of an order are Σ_j d_j u_j with u_j = 2^(7 − 24 (j + 1)) and whole d_j, |d_j| ≤ 2^23 + 4.  A product of two
+digits is a whole number of at most 2^46 (1 + 2^-18), and 120 of them add up to less than 2^53: a double holds their sum,
+one operation a product, in any order and without a look at exponents.  Products with i + j < q are computed in tiles,
+eight digits of the left by eight of the right with a sum for each i + j, over 15 orders at a time; each sum is then
+split at 2^24, so that what adds up over all orders stays far below 2^53 too.
+
+From some order on the first z digits are 0: |y| ≤ u_(z−1)/8 is enough, for L and R are at most twice as large, and what
+lies behind digit z is at most 0.51 u_(z−1).  S_n begins at level s = min_m z(m) + z(n − m), and the pair (m, n − m) with
+digit z(m) on the left and digit s − z(m) on the right.  That is kept from lying more than two before the first digit,
+where zeros are.  What a left side has behind its last digit then meets these zeros.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import ceil
+from typing import Any
+
+from llvmlite import ir
+
+from heavytop.words.kernels import Grid
+from heavytop.words.machine import Doubles
+from heavytop.words.rows import Rows, Size
+from heavytop.words.vector import DOUBLE, INT, INT_POINTER, LANES, POINTER, Code, Index, function
+
+BITS = 24
+_HEAD = 7
+"""log2 of the unit before the first digit: L and R are at most half of it, and y a quarter."""
+_BEHIND = 6
+"""Digits go on for so many bits behind the unit of the last word."""
+_TILE, _ORDERS = 8, 15
+_BEFORE = 2
+_ROUND = 1.5 * 2.0**52
+_EXCESS = 2
+"""Words but the first are below 2^(b + 2) units, and a first piece of one below 2^25."""
+_SUM_BITS = 37
+"""Of a sum of all orders: at most 2^5 × 6 tiles of 2^29 and 2^23."""
+
+
+def digits_of(grid: Grid) -> int:
+    """J."""
+    return -(-(grid.total + _HEAD + _BEHIND) // BITS)
+
+
+class DigitRows(Rows):
+    """A row: two zeros, the digits of R, those of each L.  places: z(n) and, behind, where digit z(n) of the first L is
+    from the first digit of order 0 on.
+    """
+
+    @staticmethod
+    def size(grid: Grid, vectors: int, orders: int) -> Size:
+        row = LANES * (_BEFORE + digits_of(grid) * (1 + vectors))
+        return Size(row, row * orders, LANES * (digits_of(grid) + 1), 2 * orders)
+
+    @staticmethod
+    def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Any]:
+        return [_write_sums(module, grid, [_write_tile(module, d) for d in range(1, 2 * _TILE)])]
+
+    @staticmethod
+    def left(rows: Doubles, grid: Grid, vectors: int, n: int, vector: int) -> list[Fraction]:
+        count, row = digits_of(grid), DigitRows.size(grid, vectors, 1).row
+        start = n * row + LANES * (_BEFORE + count * (1 + vector))
+        block = rows[start : start + LANES * count].reshape(count, LANES)
+        unit = Fraction(2) ** (_HEAD - BITS * count)
+        return [
+            sum((int(d) << BITS * (count - 1 - j) for j, d in enumerate(block[:, lane])), 0) * unit
+            for lane in range(LANES)
+        ]
+
+    def begin(self, y: list[Any], wide: Any) -> Any:
+        return self.keep(0, y, self.code.integer(0), wide)[2]
+
+    def keep(self, n: Index, y: list[Any], zeros: Any, wide: Any) -> tuple[list[Any], Any, Any]:
+        code, b, grid = self.code, self.code.builder, self.grid
+        for place, word in enumerate(y):
+            k = place % grid.words
+            wide = self.watch(wide, word, k, grid.bits + (_EXCESS if k else _HEAD - 2))
+        count, start = digits_of(grid), b.mul(code.integer(n), code.integer(self.size(grid, self.vectors, 1).row))
+        at = code.address(self.rows, start)
+        for part, words in enumerate(self.sides(y)):
+            for j, digit in enumerate(self._digits(words)):
+                code.store(digit, at, LANES * (_BEFORE + part * count + j))
+        # |y| < 2^(e + 1), in bits of a double
+        size = b.bitcast(self.largest_sum(y), INT)
+        exponent = b.sub(b.lshr(size, code.integer(52)), code.integer(1023))
+        z = b.sdiv(self._larger(b.sub(code.integer(_HEAD - 4), exponent), code.integer(0)), code.integer(BITS))
+        z = self._smaller(z, code.integer(count - 1))
+        self._put_place(n, z)
+        return y, self._larger(z, zeros), wide
+
+    def _put_place(self, n: Index, z: Any) -> None:
+        code, b = self.code, self.code.builder
+        row = code.integer(self.size(self.grid, self.vectors, 1).row)
+        b.store(z, code.address(self.places, n))
+        place = b.add(b.mul(code.integer(n), row), b.mul(z, code.integer(LANES)))
+        b.store(place, code.address(self._where, n))
+
+    @property
+    def _where(self) -> Any:
+        return self.code.address(self.places, self.orders)
+
+    def products(self, n: Any, zeros: Any, vector: int) -> list[Any]:
+        code, b, count = self.code, self.code.builder, digits_of(self.grid)
+        level = self._level(n, zeros)
+        for k in range(count + 1):
+            code.store(code.zero, self.sums, LANES * k)
+        row = code.integer(self.size(self.grid, self.vectors, 1).row)
+        first = code.address(self.rows, LANES * (_BEFORE + count * (1 + vector)))
+        right = code.address(self.rows, b.add(b.mul(n, row), code.integer(LANES * _BEFORE)))
+        arguments = [
+            first,
+            code.address(right, b.mul(level, code.integer(LANES))),
+            self._where,
+            b.add(n, code.integer(1)),
+            b.sub(code.integer(count), level),
+            code.address(self.sums, b.mul(level, code.integer(LANES))),
+        ]
+        b.call(self.kernels[0], arguments)
+        return self._words([code.load(self.sums, LANES * k) for k in range(count + 1)])
+
+    def _level(self, n: Any, most: Any) -> Any:
+        """s; where some z(m) exceeds s + 2, it counts as s + 2, so that s is looked for again."""
+        code, b = self.code, self.code.builder
+        before, search = b.block, b.append_basic_block("level")
+        b.branch(search)
+        b.position_at_end(search)
+        largest = b.phi(INT)
+        largest.add_incoming(most, before)
+        half = b.add(b.ashr(n, code.integer(1)), code.integer(1))
+
+        def lower(m: Any, values: list[Any]) -> list[Any]:
+            pair = [b.load(code.address(self.places, k)) for k in (m, b.sub(n, m))]
+            return [self._smaller(values[0], b.add(*pair))]
+
+        level = code.loop(0, half, lower, [code.integer(2 * digits_of(self.grid))])[0]
+        limit = b.add(level, code.integer(_BEFORE))
+        again, found = b.append_basic_block("again"), b.append_basic_block("found")
+        b.cbranch(b.icmp_signed(">", largest, limit), again, found)
+        b.position_at_end(again)
+
+        def clip(m: Any, _: list[Any]) -> None:
+            self._put_place(m, self._smaller(b.load(code.address(self.places, m)), limit))
+
+        code.loop(0, b.add(n, code.integer(1)), clip, [])
+        largest.add_incoming(limit, b.block)
+        b.branch(search)
+        b.position_at_end(found)
+        return level
+
+    def _smaller(self, a: Any, c: Any) -> Any:
+        return self.code.builder.select(self.code.builder.icmp_signed("<", a, c), a, c)
+
+    def _larger(self, a: Any, c: Any) -> Any:
+        return self.code.builder.select(self.code.builder.icmp_signed(">", a, c), a, c)
+
+    def _digits(self, words: list[Any]) -> list[Any]:
+        """The digits of words, the last rounded."""
+        code, grid, count = self.code, self.grid, digits_of(self.grid)
+        found: list[Any] = [None] * count
+        for k, word in enumerate(words):
+            first = max(0, (_HEAD + grid.bits * k + BITS - 2) // BITS - 1)
+            rest = _times(code, word, BITS * (first + 1) - _HEAD)
+            for j in range(first, count):
+                exact = BITS * (j + 1) - _HEAD >= grid.bits * (k + 1) and (k + 1 < grid.words or grid.whole)
+                piece = rest if exact else _rounded(code, rest)
+                found[j] = piece if found[j] is None else code.add(found[j], piece)
+                if exact:
+                    break
+                rest = code.multiply(code.subtract(rest, piece), code.constant(2.0**BITS))
+        carries = [None, *(_rounded(code, code.multiply(d, code.constant(2.0**-BITS))) for d in found[1:]), None]
+        return [self._carried(*three) for three in zip(found, carries, carries[1:], strict=False)]
+
+    def _carried(self, digit: Any, out: Any, into: Any) -> Any:
+        code = self.code
+        value = digit if out is None else code.fma(out, code.constant(-(2.0**BITS)), digit)
+        return value if into is None else code.add(value, into)
+
+    def _words(self, sums: list[Any]) -> list[Any]:
+        """Σ_l of sums of level l − 1, whole multiples of its unit, as words."""
+        code, grid = self.code, self.grid
+        found: list[Any] = [None] * grid.words
+        for index in reversed(range(len(sums))):
+            unit = 2 * _HEAD - BITS * (index + 1)
+            k = min(grid.words - 1, max(0, (3 - unit - _SUM_BITS) // grid.bits))
+            rest = _times(code, sums[index], unit + grid.bits * (k + 1))
+            while True:
+                whole = k == grid.words - 1 or unit + grid.bits * (k + 1) >= 0
+                piece = rest if whole else _rounded(code, rest)
+                found[k] = piece if found[k] is None else code.add(found[k], piece)
+                if whole:
+                    break
+                rest = code.multiply(code.subtract(rest, piece), code.constant(2.0**grid.bits))
+                k += 1
+        return [_times(code, code.zero if word is None else word, -grid.bits * (k + 1)) for k, word in enumerate(found)]
+
+
+def _rounded(code: Code, value: Any) -> Any:
+    """To the nearest whole number, for |value| ≤ 2^51."""
+    big = code.constant(_ROUND)
+    return code.subtract(code.add(value, big), big)
+
+
+def _times(code: Code, value: Any, exponent: int) -> Any:
+    """value 2^exponent."""
+    while exponent:
+        part = max(-1000, min(1000, exponent))
+        value, exponent = code.multiply(value, code.constant(2.0**part)), exponent - part
+    return value
+
+
+def _write_tile(module: ir.Module, levels: int) -> Any:
+    """(left, right, where, orders, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels, i, j < 8.
+
+    Split at 2^24: what is whole multiples of that is added to the level before.
+    """
+    made, code = function(module, f"tile_{levels}", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, POINTER])
+    made.linkage = "internal"
+    made.attributes.add("noinline")
+    left, right, where, orders, sums = made.args
+    b, side = code.builder, min(levels, _TILE)
+    pairs = [[(i, level - i) for i in range(side) if 0 <= level - i < side] for level in range(min(levels, 2 * side - 1))]
+    total = sum(map(len, pairs))
+    # so many sums that none waits for itself longer than all products take: four cycles a product, two products a cycle
+    ways = [min(len(pair), ceil(9 * len(pair) / total)) for pair in pairs]
+    begins = [sum(ways[:level]) for level in range(len(ways) + 1)]
+
+    def order(m: Any, values: list[Any]) -> list[Any]:
+        at, found = b.load(code.address(where, m)), list(values)
+        one, other = code.address(left, at), code.address(right, b.neg(at))
+        a = [code.load(one, LANES * i) for i in range(side)]
+        for j in range(side):
+            c = code.load(other, LANES * j)
+            for i in range(side):
+                if i + j < levels:
+                    place = begins[i + j] + pairs[i + j].index((i, j)) % ways[i + j]
+                    found[place] = code.multiply_add(a[i], c, found[place])
+        return found
+
+    values = code.loop(0, orders, order, [code.zero] * begins[-1])
+    carries, rest = [], []
+    for level in range(len(pairs)):
+        first, *others = values[begins[level] : begins[level + 1]]
+        for value in others:
+            first = code.add(first, value)
+        carries.append(_rounded(code, code.multiply(first, code.constant(2.0**-BITS))))
+        rest.append(code.multiply_add(carries[-1], code.constant(-(2.0**BITS)), first))
+    for level, (value, carry) in enumerate(zip([code.zero, *rest], [*carries, code.zero], strict=True)):
+        place = LANES * level
+        code.store(code.add(code.load(sums, place), code.add(value, carry)), sums, place)
+    b.ret_void()
+    return made
+
+
+def _write_sums(module: ir.Module, grid: Grid, tiles: list[Any]) -> Any:
+    """(left, right, where, orders, levels, sums): the same for all digits."""
+    made, code = function(
+        module, "sum_products", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
+    )
+    made.linkage = "internal"
+    made.attributes.add("noinline")
+    left, right, where, orders, levels, sums = made.args
+    b, tile, most = code.builder, code.integer(LANES * _TILE), code.integer(_ORDERS)
+    parts = b.sdiv(b.add(levels, code.integer(_TILE - 1)), code.integer(_TILE))
+
+    def group(g: Any, _: list[Any]) -> None:
+        start = b.mul(g, most)
+        rest = b.sub(orders, start)
+        count = b.select(b.icmp_signed("<", rest, most), rest, most)
+
+        def one(i: Any, _: list[Any]) -> None:
+            def other(j: Any, _: list[Any]) -> None:
+                ahead = b.add(i, j)
+                here = b.sub(levels, b.mul(ahead, code.integer(_TILE)))
+                arguments = [
+                    code.address(left, b.mul(i, tile)),
+                    code.address(right, b.mul(j, tile)),
+                    code.address(where, start),
+                    count,
+                    code.address(sums, b.mul(ahead, tile)),
+                ]
+                full, end = b.append_basic_block("full"), b.append_basic_block("done")
+                switch = b.switch(here, full)
+                for d, function_of in enumerate(tiles, 1):
+                    block = full if d == len(tiles) else b.append_basic_block(f"levels_{d}")
+                    if d < len(tiles):
+                        switch.add_case(code.integer(d), block)
+                    b.position_at_end(block)
+                    b.call(function_of, arguments)
+                    b.branch(end)
+                b.position_at_end(end)
+
+            code.loop(0, b.sub(parts, i), other, [])
+
+        code.loop(0, parts, one, [])
+
+    groups = b.sdiv(b.add(orders, code.integer(_ORDERS - 1)), most)
+    code.loop(0, groups, group, [])
+    b.ret_void()
+    return made
