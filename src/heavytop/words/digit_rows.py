@@ -1,6 +1,6 @@
 """Coefficients in digits of 24 bits, and the sums of their products: every product and every sum is exact.
 
-L and R of an order are Σ_j d_j u_j with u_j = 2^(7 − 24 (j + 1)) and whole d_j, |d_j| ≤ 2^23 + 4.  A product of two
+L and R of an order are Σ_j d_j u_j with u_j = 2^(6 − 24 (j + 1)) and whole d_j, |d_j| ≤ 2^23 + 4.  A product of two
 digits is a whole number of at most 2^46 (1 + 2^-18), and 120 of them add up to less than 2^53: a double holds their sum,
 one operation a product, in any order and without a look at exponents.  Products with i + j < q are computed in tiles,
 eight digits of the left by eight of the right with a sum for each i + j, over 15 orders at a time; each sum is then
@@ -15,7 +15,6 @@ where zeros are.  What a left side has behind its last digit then meets these ze
 from __future__ import annotations
 
 from fractions import Fraction
-from math import ceil
 from typing import Any
 
 from llvmlite import ir
@@ -26,15 +25,14 @@ from heavytop.words.rows import Rows, Size
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, LANES, POINTER, Code, Index, function
 
 BITS = 24
-_HEAD = 7
+_HEAD = 6
 """log2 of the unit before the first digit: L and R are at most half of it, and y a quarter."""
 _BEHIND = 6
 """Digits go on for so many bits behind the unit of the last word."""
-_TILE, _ORDERS = 8, 15
+_TILE, _TRIANGLE, _PRODUCTS = 8, 13, 120
+_SUMS = 18
 _BEFORE = 2
 _ROUND = 1.5 * 2.0**52
-_EXCESS = 2
-"""Words but the first are below 2^(b + 2) units, and a first piece of one below 2^25."""
 _SUM_BITS = 37
 """Of a sum of all orders: at most 2^5 × 6 tiles of 2^29 and 2^23."""
 
@@ -56,7 +54,7 @@ class DigitRows(Rows):
 
     @staticmethod
     def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Any]:
-        return [_write_sums(module, grid, [_write_tile(module, d) for d in range(1, 2 * _TILE)])]
+        return [_write_sums(module)]
 
     @staticmethod
     def left(rows: Doubles, grid: Grid, vectors: int, n: int, vector: int) -> list[Fraction]:
@@ -75,8 +73,7 @@ class DigitRows(Rows):
     def keep(self, n: Index, y: list[Any], zeros: Any, wide: Any) -> tuple[list[Any], Any, Any]:
         code, b, grid = self.code, self.code.builder, self.grid
         for place, word in enumerate(y):
-            k = place % grid.words
-            wide = self.watch(wide, word, k, grid.bits + (_EXCESS if k else _HEAD - 2))
+            wide = self.watch(wide, word, place % grid.words, grid.most_bits(place % grid.words))
         count, start = digits_of(grid), b.mul(code.integer(n), code.integer(self.size(grid, self.vectors, 1).row))
         at = code.address(self.rows, start)
         for part, words in enumerate(self.sides(y)):
@@ -134,7 +131,7 @@ class DigitRows(Rows):
             pair = [b.load(code.address(self.places, k)) for k in (m, b.sub(n, m))]
             return [self._smaller(values[0], b.add(*pair))]
 
-        level = code.loop(0, half, lower, [code.integer(2 * digits_of(self.grid))])[0]
+        level = code.loop(0, half, lower, [code.integer(digits_of(self.grid))])[0]
         limit = b.add(level, code.integer(_BEFORE))
         again, found = b.append_basic_block("again"), b.append_basic_block("found")
         b.cbranch(b.icmp_signed(">", largest, limit), again, found)
@@ -160,22 +157,29 @@ class DigitRows(Rows):
         code, grid, count = self.code, self.grid, digits_of(self.grid)
         found: list[Any] = [None] * count
         for k, word in enumerate(words):
-            first = max(0, (_HEAD + grid.bits * k + BITS - 2) // BITS - 1)
-            rest = _times(code, word, BITS * (first + 1) - _HEAD)
-            for j in range(first, count):
-                exact = BITS * (j + 1) - _HEAD >= grid.bits * (k + 1) and (k + 1 < grid.words or grid.whole)
-                piece = rest if exact else _rounded(code, rest)
+            rest = _times(code, word, _raised(grid))
+            for j in range(self._first_digit(k), count):
+                exact = self._place(j) <= -grid.bits * (k + 1) and k + 1 < grid.words
+                piece = rest if exact else _rounded(code, rest, self._place(j) + _raised(grid))
                 found[j] = piece if found[j] is None else code.add(found[j], piece)
                 if exact:
                     break
-                rest = code.multiply(code.subtract(rest, piece), code.constant(2.0**BITS))
-        carries = [None, *(_rounded(code, code.multiply(d, code.constant(2.0**-BITS))) for d in found[1:]), None]
-        return [self._carried(*three) for three in zip(found, carries, carries[1:], strict=False)]
+                rest = code.subtract(rest, piece)
+        carries = [None, *(_rounded(code, d, self._place(j) + _raised(grid)) for j, d in enumerate(found[1:])), None]
+        carried = [self._carried(*three) for three in zip(found, carries, carries[1:], strict=False)]
+        return [_times(code, digit, -self._place(j) - _raised(grid)) for j, digit in enumerate(carried)]
 
     def _carried(self, digit: Any, out: Any, into: Any) -> Any:
-        code = self.code
-        value = digit if out is None else code.fma(out, code.constant(-(2.0**BITS)), digit)
-        return value if into is None else code.add(value, into)
+        value = digit if out is None else self.code.subtract(digit, out)
+        return value if into is None else self.code.add(value, into)
+
+    def _place(self, j: int) -> int:
+        """log2 u_j."""
+        return _HEAD - BITS * (j + 1)
+
+    def _first_digit(self, k: int) -> int:
+        """Where the digits of word k begin."""
+        return max(0, (_HEAD + self.grid.bits * k + BITS - 2) // BITS - 1)
 
     def _words(self, sums: list[Any]) -> list[Any]:
         """Σ_l of sums of level l − 1, whole multiples of its unit, as words."""
@@ -183,22 +187,25 @@ class DigitRows(Rows):
         found: list[Any] = [None] * grid.words
         for index in reversed(range(len(sums))):
             unit = 2 * _HEAD - BITS * (index + 1)
-            k = min(grid.words - 1, max(0, (3 - unit - _SUM_BITS) // grid.bits))
-            rest = _times(code, sums[index], unit + grid.bits * (k + 1))
-            while True:
-                whole = k == grid.words - 1 or unit + grid.bits * (k + 1) >= 0
-                piece = rest if whole else _rounded(code, rest)
+            rest = _times(code, sums[index], unit + _raised(grid))
+            for k in range(min(grid.words - 1, max(0, (3 - unit - _SUM_BITS) // grid.bits)), grid.words):
+                exact = k == grid.words - 1 or unit + grid.bits * (k + 1) >= 0
+                piece = rest if exact else _rounded(code, rest, _raised(grid) - grid.bits * (k + 1))
                 found[k] = piece if found[k] is None else code.add(found[k], piece)
-                if whole:
+                if exact:
                     break
-                rest = code.multiply(code.subtract(rest, piece), code.constant(2.0**grid.bits))
-                k += 1
-        return [_times(code, code.zero if word is None else word, -grid.bits * (k + 1)) for k, word in enumerate(found)]
+                rest = code.subtract(rest, piece)
+        return [code.zero if word is None else _times(code, word, -_raised(grid)) for word in found]
 
 
-def _rounded(code: Code, value: Any) -> Any:
-    """To the nearest whole number, for |value| ≤ 2^51."""
-    big = code.constant(_ROUND)
+def _raised(grid: Grid) -> int:
+    """Numbers are split times 2 to the power of this, where digits are small beside the range of doubles."""
+    return 500 if grid.total > 800 else 0
+
+
+def _rounded(code: Code, value: Any, place: int = 0) -> Any:
+    """To the nearest multiple of 2^place, for |value| ≤ 2^(51 + place)."""
+    big = code.constant(_ROUND * 2.0**place)
     return code.subtract(code.add(value, big), big)
 
 
@@ -210,20 +217,21 @@ def _times(code: Code, value: Any, exponent: int) -> Any:
     return value
 
 
-def _write_tile(module: ir.Module, levels: int) -> Any:
-    """(left, right, where, orders, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels, i, j < 8.
+def _write_tile(module: ir.Module, levels: int, side: int) -> Any:
+    """(left, right, where, orders, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels, i, j < side.
 
     Split at 2^24: what is whole multiples of that is added to the level before.
     """
-    made, code = function(module, f"tile_{levels}", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, POINTER])
+    made, code = function(module, f"tile_{levels}_{side}", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, POINTER])
     made.linkage = "internal"
     made.attributes.add("noinline")
     left, right, where, orders, sums = made.args
-    b, side = code.builder, min(levels, _TILE)
+    b = code.builder
     pairs = [[(i, level - i) for i in range(side) if 0 <= level - i < side] for level in range(min(levels, 2 * side - 1))]
-    total = sum(map(len, pairs))
-    # so many sums that none waits for itself longer than all products take: four cycles a product, two products a cycle
-    ways = [min(len(pair), ceil(9 * len(pair) / total)) for pair in pairs]
+    ways = [1] * len(pairs)
+    while sum(ways) < _SUMS and (rest := [k for k, pair in enumerate(pairs) if ways[k] < len(pair)]):
+        ways[max(rest, key=lambda k: len(pairs[k]) / ways[k])] += 1
+    most = _PRODUCTS // max(map(len, pairs))
     begins = [sum(ways[:level]) for level in range(len(ways) + 1)]
 
     def order(m: Any, values: list[Any]) -> list[Any]:
@@ -238,64 +246,83 @@ def _write_tile(module: ir.Module, levels: int) -> Any:
                     found[place] = code.multiply_add(a[i], c, found[place])
         return found
 
-    values = code.loop(0, orders, order, [code.zero] * begins[-1])
-    carries, rest = [], []
-    for level in range(len(pairs)):
-        first, *others = values[begins[level] : begins[level + 1]]
-        for value in others:
-            first = code.add(first, value)
-        carries.append(_rounded(code, code.multiply(first, code.constant(2.0**-BITS))))
-        rest.append(code.multiply_add(carries[-1], code.constant(-(2.0**BITS)), first))
-    for level, (value, carry) in enumerate(zip([code.zero, *rest], [*carries, code.zero], strict=True)):
-        place = LANES * level
-        code.store(code.add(code.load(sums, place), code.add(value, carry)), sums, place)
+    def group(g: Any, _: list[Any]) -> None:
+        start = b.mul(g, code.integer(most))
+        stop = b.add(start, code.integer(most))
+        stop = b.select(b.icmp_signed("<", stop, orders), stop, orders)
+        _add_levels(code, sums, begins, code.loop(start, stop, order, [code.zero] * begins[-1]))
+
+    code.loop(0, b.sdiv(b.add(orders, code.integer(most - 1)), code.integer(most)), group, [])
     b.ret_void()
     return made
 
 
-def _write_sums(module: ir.Module, grid: Grid, tiles: list[Any]) -> Any:
-    """(left, right, where, orders, levels, sums): the same for all digits."""
-    made, code = function(
-        module, "sum_products", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
-    )
+def _add_levels(code: Code, sums: Any, begins: list[int], values: list[Any]) -> None:
+    """sums += the values of each level, split at 2^24."""
+    carries, rest = [], []
+    for level in range(len(begins) - 1):
+        first, *others = values[begins[level] : begins[level + 1]]
+        for value in others:
+            first = code.add(first, value)
+        carries.append(_rounded(code, first, BITS))
+        rest.append(code.subtract(first, carries[-1]))
+    down = code.constant(2.0**-BITS)
+    for level, (value, carry) in enumerate(zip([code.zero, *rest], [*carries, code.zero], strict=True)):
+        place = LANES * level
+        total = code.add(code.load(sums, place), value)
+        code.store(code.multiply_add(carry, down, total), sums, place)
+
+
+def _write_sums(module: ir.Module) -> Any:
+    """(left, right, where, orders, levels, sums): the same for all digits.
+
+    Few levels are one tile.  Else a few orders at a time, which stay near, go through all tiles.
+    """
+    triangles = [_write_tile(module, d, d) for d in range(1, _TRIANGLE + 1)]
+    tiles = triangles[:_TILE] + [_write_tile(module, d, _TILE) for d in range(_TILE + 1, 2 * _TILE)]
+    arguments = [POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
+    made, code = function(module, "sum_products", ir.VoidType(), arguments)
     made.linkage = "internal"
     made.attributes.add("noinline")
     left, right, where, orders, levels, sums = made.args
-    b, tile, most = code.builder, code.integer(LANES * _TILE), code.integer(_ORDERS)
+    b, tile, group = code.builder, code.integer(LANES * _TILE), code.integer(_PRODUCTS // _TILE)
+    many = b.icmp_signed(">", levels, code.integer(len(triangles)))
+    with b.if_then(b.not_(many)):
+        _call(code, triangles, levels, [left, right, where, orders, sums])
+        b.ret_void()
     parts = b.sdiv(b.add(levels, code.integer(_TILE - 1)), code.integer(_TILE))
 
-    def group(g: Any, _: list[Any]) -> None:
-        start = b.mul(g, most)
+    def some(g: Any, _: list[Any]) -> None:
+        start = b.mul(g, group)
         rest = b.sub(orders, start)
-        count = b.select(b.icmp_signed("<", rest, most), rest, most)
+        count = b.select(b.icmp_signed("<", rest, group), rest, group)
 
         def one(i: Any, _: list[Any]) -> None:
             def other(j: Any, _: list[Any]) -> None:
                 ahead = b.add(i, j)
-                here = b.sub(levels, b.mul(ahead, code.integer(_TILE)))
-                arguments = [
-                    code.address(left, b.mul(i, tile)),
-                    code.address(right, b.mul(j, tile)),
-                    code.address(where, start),
-                    count,
-                    code.address(sums, b.mul(ahead, tile)),
-                ]
-                full, end = b.append_basic_block("full"), b.append_basic_block("done")
-                switch = b.switch(here, full)
-                for d, function_of in enumerate(tiles, 1):
-                    block = full if d == len(tiles) else b.append_basic_block(f"levels_{d}")
-                    if d < len(tiles):
-                        switch.add_case(code.integer(d), block)
-                    b.position_at_end(block)
-                    b.call(function_of, arguments)
-                    b.branch(end)
-                b.position_at_end(end)
+                sides = [code.address(side, b.mul(k, tile)) for side, k in ((left, i), (right, j))]
+                places = [code.address(where, start), count, code.address(sums, b.mul(ahead, tile))]
+                _call(code, tiles, b.sub(levels, b.mul(ahead, code.integer(_TILE))), [*sides, *places])
 
             code.loop(0, b.sub(parts, i), other, [])
 
         code.loop(0, parts, one, [])
 
-    groups = b.sdiv(b.add(orders, code.integer(_ORDERS - 1)), most)
-    code.loop(0, groups, group, [])
+    code.loop(0, b.sdiv(b.add(orders, b.sub(group, code.integer(1))), group), some, [])
     b.ret_void()
     return made
+
+
+def _call(code: Code, tiles: list[Any], levels: Any, arguments: list[Any]) -> None:
+    """The tile of so many levels, if there are any, or the last."""
+    b = code.builder
+    end = b.append_basic_block("end")
+    blocks = [b.append_basic_block(f"levels_{d}") for d in range(1, len(tiles) + 1)]
+    switch = b.switch(levels, blocks[-1])
+    switch.add_case(code.integer(0), end)
+    for d, (tile, block) in enumerate(zip(tiles, blocks, strict=True), 1):
+        switch.add_case(code.integer(d), block)
+        b.position_at_end(block)
+        b.call(tile, arguments)
+        b.branch(end)
+    b.position_at_end(end)

@@ -41,7 +41,8 @@ def excess(problem: Scaled) -> int:
 
 def constants(problem: Scaled, grid: Grid, over: int, factor: Fraction = Fraction(1)) -> Doubles:
     """The words of the coefficients times ``factor``, over 2^over."""
-    flat = [row for vector in problem.coefficients.vectors for row in vector]
+    given = problem.coefficients
+    flat = [row for vector in (given.beside if grid.bounded else given.vectors) for row in vector]
     found = doubles(8 * grid.words * len(flat))
     table = found.reshape(len(flat), grid.words, 8)
     share = factor / 2**over

@@ -14,25 +14,28 @@ from llvmlite import ir
 
 from heavytop.top.equations import System
 from heavytop.words.digit_rows import DigitRows
-from heavytop.words.kernels import EXPONENT_BITS, Accumulator, Grid, carried, centred
-from heavytop.words.lanes import GATHERED, turned
+from heavytop.words.kernels import EXPONENT_BITS, WIDEST, Accumulator, Grid, bounded_product, carried, centred
+from heavytop.words.lanes import GATHERED, beside, turned
 from heavytop.words.rows import Rows, Size
 from heavytop.words.vector import DOUBLE, INT, INT_POINTER, INT_VECTOR, POINTER, VECTOR, Code, function
 from heavytop.words.word_rows import WordRows
 
 FIRED, UNSETTLED = -1, -2
 """What ``series`` gives in place of its number of orders: a sum left its range; no convergence."""
-_WIDEST, _WIDEST_DIVIDEND = 51, 53
-"""Bits of a word whose sums and quotients are on the grid; of one that is divided, behind the first."""
+_WIDEST_DIVIDEND = 53
+"""Bits of a word that is divided, behind the first."""
 
 
-_FEWEST_WORDS = 5
+_NONE = 8
+"""A lane of the second operand of a shuffle, which is 0."""
+_HALVES = (0, 1, 2, *[_NONE] * 5), (3, 4, 5, *[_NONE] * 5)
+_FEWEST_WORDS = 8
 """With so many words, products are summed in digits."""
 
 
 def rows_of(grid: Grid) -> type[Rows]:
     """How products are summed on this grid."""
-    return WordRows if grid.whole or grid.words < _FEWEST_WORDS else DigitRows
+    return DigitRows if grid.bounded and grid.words >= _FEWEST_WORDS else WordRows
 
 
 def size_of(grid: Grid, vectors: int) -> Size:
@@ -142,32 +145,51 @@ class Series:
 
     def _rates(self, vector: int, sums: list[Any], y: list[Any], wide: Any) -> tuple[list[Any], Any]:
         """A ∘ gathered S + Σ B ∘ permuted y, and the largest word."""
-        code, b, grid = self.code, self.code.builder, self.grid
-        constants, seen = self.made.args[1], self.made.args[6]
-        words, linear = grid.words, turned(self.system)
-        sources = [self._gathered(carried(code, grid, sums))]
-        wide = self.rows.watch(wide, sources[0][0], 0)
-        sources += [[code.shuffle(word, code.zero, lanes) for word in y] for lanes in linear]
-        result = Accumulator(code, grid, 0, centred(code, grid, words), b.bitcast(code.load(seen, 0), INT_VECTOR))
+        grid, gathered = self.grid, self._gathered(carried(self.code, self.grid, sums))
+        wide = self.rows.watch(wide, gathered[0], 0, grid.most_bits(0))
+        total = self._bounded_rates(vector, gathered, y) if grid.bounded else self._watched_rates(vector, gathered, y)
+        return carried(self.code, grid, total), wide
+
+    def _constants(self, row: int) -> list[Any]:
+        """The words of a row of the constants."""
+        words = self.grid.words
+        return [self.code.load(self.made.args[1], 8 * (words * row + i)) for i in range(words)]
+
+    def _bounded_rates(self, vector: int, gathered: list[Any], y: list[Any]) -> list[Any]:
+        code, grid, (lanes, second) = self.code, self.grid, beside(self.system)
+        found = bounded_product(code, grid, self._constants(2 * vector), gathered)
+        if vector and second:
+            return found  # no weight turns an attitude
+        moved = [code.shuffle(word, code.zero, lanes) for word in y]
+        linear = bounded_product(code, grid, self._constants(2 * vector + 1), moved)
+        if second:
+            parts = [[code.shuffle(word, code.zero, lanes) for lanes in _HALVES] for word in linear]
+            linear = [code.add(one, other) for one, other in parts]
+        return [code.add(a, b) for a, b in zip(found, linear, strict=True)]
+
+    def _watched_rates(self, vector: int, gathered: list[Any], y: list[Any]) -> list[Any]:
+        code, b, grid, seen, linear = self.code, self.code.builder, self.grid, self.made.args[6], turned(self.system)
+        sources = [gathered, *([code.shuffle(word, code.zero, lanes) for word in y] for lanes in linear)]
+        gathered_bits = b.bitcast(code.load(seen, 0), INT_VECTOR)
+        result = Accumulator(code, grid, 0, centred(code, grid, grid.words), gathered_bits)
         for k, source in enumerate(sources):
-            place = 8 * words * ((1 + len(linear)) * vector + k)
-            factors = [code.load(constants, place + 8 * i) for i in range(words)]
+            factors = self._constants((1 + len(linear)) * vector + k)
             result.add_product(factors, source, each=True, below=not grid.whole)
         result.look_at_all()
         code.store(b.bitcast(result.seen, VECTOR), seen, 0)
-        parts = zip(result.sums, centred(code, grid, words), strict=True)
-        return carried(code, grid, [code.subtract(total, centre) for total, centre in parts]), wide
+        return [code.subtract(s, c) for s, c in zip(result.sums, centred(code, grid, grid.words), strict=True)]
 
     def _gathered(self, total: list[Any]) -> list[Any]:
-        code = self.code
+        code, zero = self.code, self.code.zero
         found = []
         for word in total:
-            parts = []
-            for column in GATHERED:
-                lanes, signs = ([pair[i] for pair in column] for i in range(2))
-                moved = code.shuffle(word, code.zero, [*lanes, 0, 0])
-                parts.append(code.multiply(moved, code.constant([*signs, 0, 0])))
-            found.append(code.add(code.add(parts[0], parts[1]), code.add(parts[2], parts[3])))
+            parts = [
+                code.shuffle(word, zero, [*(lane if sign else _NONE for lane, sign in column), _NONE, _NONE])
+                for column in GATHERED
+            ]
+            third, fourth = (code.constant([*(sign for _, sign in column), 0, 0]) for column in GATHERED[2:])
+            others = code.fma(parts[3], fourth, code.multiply(parts[2], third))
+            found.append(code.add(code.add(parts[0], parts[1]), others))
         return found
 
     def _raised(self, words: list[Any], wide: Any) -> tuple[list[Any], Any]:
@@ -204,7 +226,7 @@ class Series:
         found, rest = [], None
         for k, word in enumerate(words):
             value = word if rest is None else code.add(word, rest)
-            wide = self.rows.watch(wide, value, k, _WIDEST_DIVIDEND if k else _WIDEST)
+            wide = self.rows.watch(wide, value, k, _WIDEST_DIVIDEND if k else WIDEST)
             big = code.constant(self.grid.centre(k))
             quotient = code.subtract(code.fma(value, inverse, big), big)
             rest = code.fma(code.negative(quotient), divisor, value)

@@ -23,6 +23,10 @@ from llvmlite import ir
 from heavytop.words.vector import INT, INT_VECTOR, POINTER, VECTOR, Code, function
 
 EXPONENT_BITS = 0x7FF << 52
+WIDEST = 51
+"""Bits of a word whose sums and quotients are on the grid."""
+_FEWEST_BOUNDED, _WIDEST_BOUNDED = 5, 46
+_HEAD, _EXCESS = 4, 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,20 @@ class Grid:
     words: int
     bits: int
     whole: bool = False
+
+    @property
+    def bounded(self) -> bool:
+        """Whether words are kept so small that products with the coefficients of the field need not be watched.
+
+        With fewer words nothing is gained by it.
+        """
+        return not self.whole and self.words >= _FEWEST_BOUNDED and self.bits <= _WIDEST_BOUNDED
+
+    def most_bits(self, k: int) -> int:
+        """log2 of what word k of a coefficient stays below, in its units."""
+        if not self.bounded:
+            return WIDEST
+        return self.bits + (_EXCESS if k else _HEAD)
 
     @property
     def smallest(self) -> float:
@@ -93,7 +111,7 @@ class Accumulator:
                 self.sums[k] = total
                 if k == 0 or each:
                     self.look(k)
-            low = _total(code, lows)
+            low = in_pairs(code, lows)
             if k + 1 < last:
                 self.look(k + 1)
                 self.sums[k + 1] = code.add(self.sums[k + 1], low)
@@ -118,7 +136,7 @@ class Accumulator:
             self.look(k)
 
 
-def _total(code: Code, values: list[Any]) -> Any:
+def in_pairs(code: Code, values: list[Any]) -> Any:
     """Their sum, exact for multiples of one unit; in pairs."""
     while len(values) > 1:
         pairs = zip(values[::2], values[1::2], strict=False)
@@ -159,6 +177,30 @@ def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Any:
     code.store(b.bitcast(values[-1], VECTOR), seen, 0)
     b.ret_void()
     return made
+
+
+def bounded_product(code: Code, grid: Grid, a: list[Any], b: list[Any]) -> list[Any]:
+    """a b in K words, not carried, where no sum can leave its range; low parts are added at the end.
+
+    a: a coefficient of the field, |a_0| ≤ 2^b units and the others half as many at most.  b: words below
+    2^:meth:`Grid.most_bits` units.  Over 2^b units, the sum for level k stays below 2^4 for k = 0 and else below
+    2^2 + 2^3 + 2 (k − 1), which is less than 2^51 units for 24 words of 46 bits.
+    """
+    last = grid.words - 1
+    found, lows = [], [list[Any]() for _ in range(grid.words)]
+    for k in range(last):
+        centre = total = code.constant(grid.centre(k))
+        for i in range(k + 1):
+            after = code.fma(a[i], b[k - i], total)
+            lows[k + 1].append(code.fma(a[i], b[k - i], code.negative(code.subtract(after, total))))
+            total = after
+        found.append(code.subtract(total, centre))
+    total = code.zero
+    # those of the level below the last first: where a leading word is 0 they are what is left
+    for i, j in [(i, last + 1 - i) for i in range(1, last + 1)] + [(i, last - i) for i in range(last + 1)]:
+        total = code.fma(a[i], b[j], total)
+    found.append(total)
+    return [found[0], *(code.add(found[k], in_pairs(code, lows[k])) for k in range(1, last + 1))]
 
 
 def centred(code: Code, grid: Grid, count: int) -> list[Any]:

@@ -55,6 +55,17 @@ _TURNED: dict[str, tuple[tuple[int, ...], ...]] = {
 }
 
 
+_BESIDE: dict[str, tuple[int, ...]] = {
+    "heavy_top": (4, 5, 3, 5, 3, 4, ZERO, ZERO),
+    "gyrostat": _TURNED["gyrostat"][0],
+}
+
+
+def beside(system: System) -> tuple[tuple[int, ...], bool]:
+    """The permutations of y in the linear part as one, and whether its lanes 3 to 5 are the second, to be added to 0 to 2."""
+    return _BESIDE[system.name], len(_TURNED[system.name]) == 2
+
+
 def turned(system: System) -> tuple[tuple[int, ...], ...]:
     """The permutations of y in the linear part, one or two."""
     return _TURNED[system.name]
@@ -74,6 +85,13 @@ class Coefficients:
     def largest(self) -> Fraction:
         """The largest |coefficient|."""
         return max(abs(c) for vector in self.vectors for row in vector for c in row)
+
+    @property
+    def beside(self) -> tuple[tuple[tuple[Fraction, ...], ...], ...]:
+        """A and one B of each vector, for the permutation of :func:`beside`."""
+        return tuple(
+            (first, one if not other else (*one[:3], *other[0][:3], *one[6:])) for first, one, *other in self.vectors
+        )
 
     def with_linear(self, factor: Fraction) -> Coefficients:
         """The same with every B multiplied."""

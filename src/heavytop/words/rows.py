@@ -9,13 +9,10 @@ from typing import Any
 
 from llvmlite import ir
 
-from heavytop.words.kernels import Grid
+from heavytop.words.kernels import WIDEST, Grid
 from heavytop.words.lanes import LEFT, RIGHT, Sum
 from heavytop.words.machine import Doubles
 from heavytop.words.vector import Code, Index
-
-_WIDEST = 51
-"""Bits of a word whose sums and quotients are on the grid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +89,7 @@ class Rows(ABC):
             largest = code.larger(one, largest)
         return code.largest(largest)
 
-    def watch(self, wide: Any, value: Any, k: int, bits: int = _WIDEST) -> Any:
+    def watch(self, wide: Any, value: Any, k: int, bits: int = WIDEST) -> Any:
         """The largest word so far, over 2^bits of its unit."""
         share = self.code.multiply(self.code.absolute(value), self.code.constant(2.0**-bits / self.grid.unit(k)))
         return self.code.larger(share, wide)

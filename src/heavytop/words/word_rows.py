@@ -146,7 +146,7 @@ class WordRows(Rows):
         found, left = [], code.zero
         for k, word in enumerate(y):
             value = code.add(word, left)
-            wide = self.watch(wide, value, k)
+            wide = self.watch(wide, value, k, self.grid.most_bits(k))
             skipped = b.icmp_signed("<", code.integer(k), zeros)
             found.append(b.select(skipped, code.zero, value))
             left = b.select(skipped, value, code.zero)
