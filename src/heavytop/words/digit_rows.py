@@ -1,19 +1,20 @@
 """Coefficients in digits of 24 bits, and the sums of their products: every product and every sum is exact.
 
 L and R of an order are Σ_j d_j u_j with u_j = 2^(6 − 24 (j + 1)) and whole d_j, |d_j| ≤ 2^23 + 4.  A product of two
-digits is a whole number of at most 2^46 (1 + 2^-18), and 120 of them add up to less than 2^53: a double holds their sum,
-one operation a product, in any order and without a look at exponents.  Products with i + j < q are computed in tiles,
-eight digits of the left by eight of the right with a sum for each i + j, over 15 orders at a time; each sum is then
-split at 2^24, so that what adds up over all orders stays far below 2^53 too.
+digits is a whole number of at most 2^46 (1 + 2^-18), and 120 of them add up to less than 2^53: a double holds their
+sum, one operation a product, in any order and without a look at exponents.  Products with i + j < q are computed in
+tiles, some digits of the left by as many of the right with a sum for each i + j, over so many orders that no sum has
+more than 120 products; it is then split at 2^24, so that what adds up over all orders stays far below 2^53 too.
 
-From some order on the first z digits are 0: |y| ≤ u_(z−1)/8 is enough, for L and R are at most twice as large, and what
-lies behind digit z is at most 0.51 u_(z−1).  S_n begins at level s = min_m z(m) + z(n − m), and the pair (m, n − m) with
-digit z(m) on the left and digit s − z(m) on the right.  That is kept from lying more than two before the first digit,
-where zeros are.  What a left side has behind its last digit then meets these zeros.
+From some order on the first z digits are 0: |y| ≤ u_(z−1)/8 is enough, for L and R are at most twice as large, and
+what lies behind digit z is at most 0.51 u_(z−1).  S_n begins at level s = min_m z(m) + z(n − m), and the pair
+(m, n − m) with digit z(m) on the left and digit s − z(m) on the right.  That is kept from lying more than two before
+the first digit, where zeros are.  What a left side has behind its last digit then meets these zeros.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -22,19 +23,18 @@ from llvmlite import ir
 from heavytop.words.kernels import Grid
 from heavytop.words.machine import Doubles
 from heavytop.words.rows import Rows, Size
-from heavytop.words.vector import DOUBLE, INT, INT_POINTER, LANES, POINTER, Code, Index, function
+from heavytop.words.vector import INT, INT_POINTER, LANES, POINTER, Code, Index, function
 
 BITS = 24
 _HEAD = 6
 """log2 of the unit before the first digit: L and R are at most half of it, and y a quarter."""
 _BEHIND = 6
 """Digits go on for so many bits behind the unit of the last word."""
-_TILE, _TRIANGLE, _PRODUCTS = 8, 13, 120
-_SUMS = 18
+_PRODUCTS = 120
 _BEFORE = 2
 _ROUND = 1.5 * 2.0**52
-_SUM_BITS = 37
-"""Of a sum of all orders: at most 2^5 × 6 tiles of 2^29 and 2^23."""
+_SUM_BITS = 38
+"""Of the sum of a level over 700 orders: 50 groups of orders in 8 tiles, or fewer in more, of 2^29 and 2^23 each."""
 
 
 def digits_of(grid: Grid) -> int:
@@ -53,8 +53,8 @@ class DigitRows(Rows):
         return Size(row, row * orders, LANES * (digits_of(grid) + 1), 2 * orders)
 
     @staticmethod
-    def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Any]:
-        return [_write_sums(module)]
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Any]:
+        return [_write_sums(module, _WIDE if wide else _NARROW)]
 
     @staticmethod
     def left(rows: Doubles, grid: Grid, vectors: int, n: int, vector: int) -> list[Fraction]:
@@ -217,7 +217,21 @@ def _times(code: Code, value: Any, exponent: int) -> Any:
     return value
 
 
-def _write_tile(module: ir.Module, levels: int, side: int) -> Any:
+@dataclass(frozen=True, slots=True)
+class _Tiles:
+    """side: digits of the left and of the right in a tile.  triangle: levels up to which one tile has all.
+    sums: kept in registers.
+    """
+
+    side: int
+    triangle: int
+    sums: int
+
+
+_WIDE, _NARROW = _Tiles(8, 13, 18), _Tiles(4, 4, 7)
+
+
+def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> Any:
     """(left, right, where, orders, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels, i, j < side.
 
     Split at 2^24: what is whole multiples of that is added to the level before.
@@ -227,9 +241,11 @@ def _write_tile(module: ir.Module, levels: int, side: int) -> Any:
     made.attributes.add("noinline")
     left, right, where, orders, sums = made.args
     b = code.builder
-    pairs = [[(i, level - i) for i in range(side) if 0 <= level - i < side] for level in range(min(levels, 2 * side - 1))]
+    pairs = [
+        [(i, level - i) for i in range(side) if 0 <= level - i < side] for level in range(min(levels, 2 * side - 1))
+    ]
     ways = [1] * len(pairs)
-    while sum(ways) < _SUMS and (rest := [k for k, pair in enumerate(pairs) if ways[k] < len(pair)]):
+    while sum(ways) < most_sums and (rest := [k for k, pair in enumerate(pairs) if ways[k] < len(pair)]):
         ways[max(rest, key=lambda k: len(pairs[k]) / ways[k])] += 1
     most = _PRODUCTS // max(map(len, pairs))
     begins = [sum(ways[:level]) for level in range(len(ways) + 1)]
@@ -273,24 +289,25 @@ def _add_levels(code: Code, sums: Any, begins: list[int], values: list[Any]) -> 
         code.store(code.multiply_add(carry, down, total), sums, place)
 
 
-def _write_sums(module: ir.Module) -> Any:
+def _write_sums(module: ir.Module, sizes: _Tiles) -> Any:
     """(left, right, where, orders, levels, sums): the same for all digits.
 
     Few levels are one tile.  Else a few orders at a time, which stay near, go through all tiles.
     """
-    triangles = [_write_tile(module, d, d) for d in range(1, _TRIANGLE + 1)]
-    tiles = triangles[:_TILE] + [_write_tile(module, d, _TILE) for d in range(_TILE + 1, 2 * _TILE)]
+    side = sizes.side
+    triangles = [_write_tile(module, d, d, sizes.sums) for d in range(1, sizes.triangle + 1)]
+    tiles = triangles[:side] + [_write_tile(module, d, side, sizes.sums) for d in range(side + 1, 2 * side)]
     arguments = [POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
     made, code = function(module, "sum_products", ir.VoidType(), arguments)
     made.linkage = "internal"
     made.attributes.add("noinline")
     left, right, where, orders, levels, sums = made.args
-    b, tile, group = code.builder, code.integer(LANES * _TILE), code.integer(_PRODUCTS // _TILE)
+    b, tile, group = code.builder, code.integer(LANES * side), code.integer(_PRODUCTS // side)
     many = b.icmp_signed(">", levels, code.integer(len(triangles)))
     with b.if_then(b.not_(many)):
         _call(code, triangles, levels, [left, right, where, orders, sums])
         b.ret_void()
-    parts = b.sdiv(b.add(levels, code.integer(_TILE - 1)), code.integer(_TILE))
+    parts = b.sdiv(b.add(levels, code.integer(side - 1)), code.integer(side))
 
     def some(g: Any, _: list[Any]) -> None:
         start = b.mul(g, group)
@@ -300,9 +317,9 @@ def _write_sums(module: ir.Module) -> Any:
         def one(i: Any, _: list[Any]) -> None:
             def other(j: Any, _: list[Any]) -> None:
                 ahead = b.add(i, j)
-                sides = [code.address(side, b.mul(k, tile)) for side, k in ((left, i), (right, j))]
+                both = [code.address(base, b.mul(k, tile)) for base, k in ((left, i), (right, j))]
                 places = [code.address(where, start), count, code.address(sums, b.mul(ahead, tile))]
-                _call(code, tiles, b.sub(levels, b.mul(ahead, code.integer(_TILE))), [*sides, *places])
+                _call(code, tiles, b.sub(levels, b.mul(ahead, code.integer(side))), [*both, *places])
 
             code.loop(0, b.sub(parts, i), other, [])
 

@@ -35,7 +35,7 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
     until the time covers the target; gives their number.  Behind the result lies the state before the last step.
     """
     module = ir.Module("grid")
-    series = Series(module, grid, system, 2 if attitude else 1)
+    series = Series(module, grid, system, 2 if attitude else 1, (processor or Processor.here()).wide)
     made = series.write()
     _Advance(module, grid, series.vectors, made).write()
     pointers = [DOUBLES] * 5 + [INTEGERS, DOUBLES]

@@ -55,12 +55,14 @@ class Series:
     state, result: K words of each vector.  constants: K words of A and each B, for each vector.  inverses: 1/(n + 1).
     rows: R, then L of each vector, K words each, an order a row.  sums, seen, places: scratch.  factor, raises: from
     one order to the next coefficients are multiplied by factor 16^raises; factor is ± a power of two, at most 1.
+    wide: as :attr:`heavytop.words.machine.Processor.wide`; results are the same.
     """
 
     module: ir.Module
     grid: Grid
     system: System
     vectors: int
+    wide: bool
     made: Any = field(init=False)
     code: Code = field(init=False)
     rows: Rows = field(init=False)
@@ -69,7 +71,8 @@ class Series:
         """The function."""
         kind = rows_of(self.grid)
         room = most_orders(self.grid) + 2
-        kernels = kind.write_kernels(self.module, self.grid, kind.size(self.grid, self.vectors, 1).row)
+        row = kind.size(self.grid, self.vectors, 1).row
+        kernels = kind.write_kernels(self.module, self.grid, row, self.wide)
         arguments = [POINTER] * 5 + [INT_POINTER, POINTER, DOUBLE, INT, POINTER]
         self.made, self.code = function(self.module, "series", INT, arguments)
         state, _, _, rows, sums, places, seen, _, _, result = self.made.args
@@ -234,4 +237,3 @@ class Series:
         if not self.grid.whole:
             found[-1] = code.fma(rest, inverse, found[-1])
         return found, wide
-

@@ -25,7 +25,7 @@ from heavytop.words.vector import INT, INT_VECTOR, POINTER, VECTOR, Code, functi
 EXPONENT_BITS = 0x7FF << 52
 WIDEST = 51
 """Bits of a word whose sums and quotients are on the grid."""
-_FEWEST_BOUNDED, _WIDEST_BOUNDED = 5, 46
+_FEWEST_BOUNDED, _WIDEST_BOUNDED = 5, 45
 _HEAD, _EXCESS = 4, 2
 
 
@@ -51,7 +51,10 @@ class Grid:
         return not self.whole and self.words >= _FEWEST_BOUNDED and self.bits <= _WIDEST_BOUNDED
 
     def most_bits(self, k: int) -> int:
-        """log2 of what word k of a coefficient stays below, in its units."""
+        """log2 of what word k of a coefficient stays below, in its units.
+
+        At the start of a step |ω| ≤ 4, |γ| and |ξ| ≤ √3 and so 2 |γ × ω| < 16: short steps keep within.
+        """
         if not self.bounded:
             return WIDEST
         return self.bits + (_EXCESS if k else _HEAD)
@@ -182,9 +185,9 @@ def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Any:
 def bounded_product(code: Code, grid: Grid, a: list[Any], b: list[Any]) -> list[Any]:
     """a b in K words, not carried, where no sum can leave its range; low parts are added at the end.
 
-    a: a coefficient of the field, |a_0| ≤ 2^b units and the others half as many at most.  b: words below
-    2^:meth:`Grid.most_bits` units.  Over 2^b units, the sum for level k stays below 2^4 for k = 0 and else below
-    2^2 + 2^3 + 2 (k − 1), which is less than 2^51 units for 24 words of 46 bits.
+    a: a coefficient of the field, |a_0| ≤ 2^b units and the others half as many at most.  b: |b_0| ≤ 2^(b + 4) units,
+    the others at most 2^(b + 2).  Over 2^b units, the sum for level k is at most 2^4 for k = 0 and else
+    2^3 + 2^2 + 2 (k − 1): less than 2^51 units for 24 words of 45 bits.
     """
     last = grid.words - 1
     found, lows = [], [list[Any]() for _ in range(grid.words)]

@@ -62,7 +62,7 @@ _BESIDE: dict[str, tuple[int, ...]] = {
 
 
 def beside(system: System) -> tuple[tuple[int, ...], bool]:
-    """The permutations of y in the linear part as one, and whether its lanes 3 to 5 are the second, to be added to 0 to 2."""
+    """The permutations of y in the linear part as one; whether its lanes 3 to 5, the second, are added to 0 to 2."""
     return _BESIDE[system.name], len(_TURNED[system.name]) == 2
 
 

@@ -49,6 +49,11 @@ class Processor:
     name: str
     features: str = ""
 
+    @property
+    def wide(self) -> bool:
+        """Whether eight doubles are one register, of 32."""
+        return self.name == "x86-64-v4" or "+avx512f" in self.features.split(",")
+
     @classmethod
     def here(cls) -> Processor:
         """The one that this runs on."""

@@ -169,7 +169,11 @@ class Carrier:
     def coefficients(self, centre: Sequence[int], halvings: int) -> list[list[int]]:
         """b_0 to b_N of each component, whole ulps, where :meth:`series` gives some."""
         length, grid = self._computed(centre, halvings) + 1, self.grid
-        table = self._scratch().rows[: size_of(grid, self.vectors).row * length].reshape(length, 1 + self.vectors, grid.words, 8)
+        table = (
+            self._scratch()
+            .rows[: size_of(grid, self.vectors).row * length]
+            .reshape(length, 1 + self.vectors, grid.words, 8)
+        )
         # L holds Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2; what is taken out of it are the words of y, exactly
         found = [table[:, 1, :, lane] for lane in (2, 0, 1)]
         for left in (table[:, 1 + vector] for vector in range(self.vectors)):

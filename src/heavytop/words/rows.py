@@ -29,7 +29,7 @@ class Size:
 class Rows(ABC):
     """Writes what keeps the coefficients y_n of ``vectors`` state vectors, K words each, and sums their products.
 
-    orders: as many as there is room for.  rows, sums, places, seen: scratch, as large as :meth:`size` says; zeros at first.
+    orders: as many as there is room for.  rows, sums, places, seen: scratch as :meth:`size` says, zeros at first.
     """
 
     code: Code
@@ -49,8 +49,8 @@ class Rows(ABC):
 
     @staticmethod
     @abstractmethod
-    def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Any]:
-        """The functions that sum products."""
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Any]:
+        """The functions that sum products; which is best depends on how many registers there are, no result does."""
 
     @staticmethod
     @abstractmethod

@@ -28,7 +28,7 @@ class WordRows(Rows):
         return Size(row, row * orders, 8 * grid.words, grid.words + 2)
 
     @staticmethod
-    def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Any]:
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Any]:
         return write_kernels(module, grid, row)
 
     @staticmethod

@@ -1,0 +1,208 @@
+"""Digits: sums of products against integers, digits of words, and steps against whole numbers."""
+
+import ctypes
+from fractions import Fraction
+from random import Random
+
+import numpy
+import pytest
+from llvmlite import ir
+from words_helpers import LEVELS, problem
+
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
+from heavytop.words import digit_rows
+from heavytop.words.digit_rows import DigitRows, digits_of
+from heavytop.words.digits import exact, grid_of
+from heavytop.words.fixed import Fixed
+from heavytop.words.grid_series import rows_of, size_of
+from heavytop.words.kernels import Grid
+from heavytop.words.machine import DOUBLES, INTEGERS, Machine, compiled, doubles, pointer
+from heavytop.words.run import Status
+from heavytop.words.scaled import Scaled
+from heavytop.words.vector import INT, INT_POINTER, LANES, POINTER, function
+from heavytop.words.whole import Whole
+
+LARGEST = 2**23 + 4
+
+
+def sums_code(wide: bool) -> Machine:
+    """sums(left, right, where, orders, levels, sums), callable from here."""
+    module = ir.Module("sums")
+    (written,) = DigitRows.write_kernels(module, grid_of(8), 0, wide)
+    made, code = function(module, "sums", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, INT, POINTER])
+    code.builder.call(written, made.args)
+    code.builder.ret_void()
+    integer = ctypes.c_int64
+    return compiled(module, {"sums": (None, [DOUBLES, DOUBLES, INTEGERS, integer, integer, DOUBLES])})
+
+
+def known_sums(rows: numpy.ndarray, starts: tuple[list[int], list[int]], levels: int) -> list[int]:
+    """Σ d_i d'_j of each lane over i + j < levels, in units of the last level, whole."""
+    total = [0] * LANES
+    pairs = list(zip(*starts, strict=True))
+    for lane in range(LANES):
+        for i in range(levels):
+            for j in range(levels - i):
+                total[lane] += sum(int(rows[a + i, lane]) * int(rows[b + j, lane]) for a, b in pairs) << (
+                    digit_rows.BITS * (levels - 1 - i - j)
+                )
+    return total
+
+
+@pytest.mark.parametrize("wide", [True, False], ids=["8 by 8", "4 by 4"])
+@pytest.mark.parametrize("kind", ["random", "largest", "alternating"])
+def test_sums_of_products_are_exact(wide: bool, kind: str) -> None:
+    """As integers, for every number of levels up to two tiles and more, with digits as large as they may be."""
+    machine, random = sums_code(wide), Random(f"{wide} {kind}")
+    for levels in (1, 2, 3, 5, 8, 9, 13, 14, 17, 25):
+        orders = random.randint(1, 45)
+        row = levels + 1
+        table = doubles(LANES * row * orders).reshape(-1, LANES)
+        if kind == "random":
+            table[:] = [[random.randint(-LARGEST, LARGEST) for _ in range(LANES)] for _ in range(row * orders)]
+        else:
+            table[:] = LARGEST if kind == "largest" else -LARGEST * (-1) ** numpy.arange(row * orders)[:, None]
+        sums = doubles(LANES * (levels + 1))
+        where = LANES * row * numpy.arange(orders)
+        last = row * (orders - 1)
+        arrays = [table.ravel(), table[last:].ravel(), where.astype(numpy.int64)]
+        machine.functions["sums"](*map(pointer, arrays), orders, levels, pointer(sums))
+        starts = [row * n for n in range(orders)]
+        found = sums.reshape(-1, LANES)
+        assert numpy.abs(found).max() < 2.0**digit_rows._SUM_BITS
+        known = known_sums(table, (starts, starts[::-1]), levels)
+        for lane in range(LANES):
+            whole = sum(int(s) << digit_rows.BITS * (levels - k) for k, s in enumerate(found[:, lane]))
+            assert whole == known[lane]
+
+
+def test_with_more_products_in_a_sum_some_would_be_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The number of products is what keeps sums exact: with four times as many, large digits are added up wrongly."""
+    monkeypatch.setattr(digit_rows, "_PRODUCTS", 4 * digit_rows._PRODUCTS)
+    machine, levels, orders = sums_code(True), 8, 60
+    table = doubles(LANES * levels * orders).reshape(-1, LANES)
+    table[:] = LARGEST - numpy.random.default_rng(1).integers(0, 9, len(table))[:, None]
+    sums, where = doubles(LANES * (levels + 1)), LANES * levels * numpy.arange(orders)
+    arrays = [table.ravel(), table[levels * (orders - 1) :].ravel(), where.astype(numpy.int64)]
+    machine.functions["sums"](*map(pointer, arrays), orders, levels, pointer(sums))
+    starts = [levels * n for n in range(orders)]
+    whole = sum(int(s) << digit_rows.BITS * (levels - k) for k, s in enumerate(sums[::LANES]))
+    assert whole != known_sums(table, (starts, starts[::-1]), levels)[0]
+
+
+def conversion(grid: Grid) -> Machine:
+    """digits(words, found) and words(sums, found), callable from here."""
+    module = ir.Module("conversion")
+    count = digits_of(grid)
+    for name, length in (("digits", grid.words), ("words", count + 1)):
+        made, code = function(module, name, ir.VoidType(), [POINTER, POINTER])
+        given, to = made.args
+        rows = DigitRows(code, grid, 1, 0, None, None, None, None, [])
+        values = [code.load(given, LANES * k) for k in range(length)]
+        for k, value in enumerate(rows._digits(values) if name == "digits" else rows._words(values)):
+            code.store(value, to, LANES * k)
+        code.builder.ret_void()
+    return compiled(module, {name: (None, [DOUBLES, DOUBLES]) for name in ("digits", "words")})
+
+
+@pytest.mark.parametrize("words", [5, 8, 12, 13, 19, 24])
+def test_digits_are_those_of_the_words_and_sums_become_words(words: int) -> None:
+    grid, random = grid_of(words), Random(words)
+    count, machine = digits_of(grid), conversion(grid)
+    last = Fraction(2) ** (digit_rows._HEAD - digit_rows.BITS * count)
+    assert last <= Fraction(2) ** (-grid.total - digit_rows._BEHIND)
+    for _ in range(40):
+        given, found = doubles(LANES * grid.words), doubles(LANES * count)
+        for k in range(grid.words):
+            most = 2 ** (grid.bits + (3 if k else 5))
+            given[LANES * k : LANES * (k + 1)] = [
+                random.choice([-most, most, random.randint(-most, most), 1, 0]) * grid.unit(k) for _ in range(LANES)
+            ]
+        machine.functions["digits"](pointer(given), pointer(found))
+        assert numpy.abs(found).max() <= LARGEST
+        assert (found == numpy.round(found)).all()
+        for lane in range(LANES):
+            value = sum(int(d) * last * 2 ** (digit_rows.BITS * (count - 1 - j)) for j, d in enumerate(found[lane::8]))
+            assert abs(value - exact(given[lane::8])) <= last / 2
+    unit = Fraction(2) ** (2 * digit_rows._HEAD - digit_rows.BITS * (count + 1))
+    for _ in range(40):
+        given, found = doubles(LANES * (count + 1)), doubles(LANES * grid.words)
+        for k in range(1 + count):
+            most = 2**digit_rows._SUM_BITS if k > 3 else 2**10
+            given[LANES * k : LANES * (k + 1)] = [random.randint(-most, most) for _ in range(LANES)]
+        machine.functions["words"](pointer(given), pointer(found))
+        for lane in range(LANES):
+            value = sum(int(s) * unit * 2 ** (digit_rows.BITS * (count - k)) for k, s in enumerate(given[lane::8]))
+            assert abs(value - exact(found[lane::8])) * 2 ** (grid.total + 4) <= 1
+            for k in range(grid.words - 1):
+                assert (Fraction(found[LANES * k + lane]) * 2 ** (grid.bits * (k + 1))).denominator == 1
+                assert k == 0 or abs(found[LANES * k + lane]) <= 2.0 ** (grid.bits + 5) * grid.unit(k)
+
+
+def scaled(omega: str, gamma: str, moment: str = "1/2 1/3 1/5", system: System = HEAVY_TOP, xi: str = "") -> Scaled:
+    omegas, gammas, moments, xis = (tuple(map(Fraction, text.split())) for text in (omega, gamma, moment, xi))
+    rotor = Fraction(1, 3) if system is GYROSTAT else Fraction(0)
+    return Scaled.of(system, Parameters((Fraction(3), Fraction(2), Fraction(1)), moments, rotor),
+                     (*omegas, *gammas, *xis), bounded=True)  # fmt: skip
+
+
+MOTIONS = {
+    "generic": scaled("1/10 1/5 9/10", "3/5 0 4/5"),
+    "with an attitude": scaled("1/10 1/5 9/10", "3/5 0 4/5", xi="0 1 0"),
+    "gyrostat": scaled("1/10 1/5 9/10", "3/5 0 4/5", "0 0 0", GYROSTAT),
+    "gyrostat, attitude": scaled("1/10 1/5 9/10", "3/5 0 4/5", "0 0 0", GYROSTAT, "0 1 0"),
+    "from rest: every other order is 0": scaled("0 0 0", "3/5 0 4/5"),
+    "an entire function": scaled("0 0 1", "3/5 0 4/5", "0 0 0"),
+    "tiny beside a middle axis": scaled(f"1/{2**90} 1 0", "5/8 -3/8 11/16", "0 0 0"),
+    "a tiny weight": scaled("1/10 1/5 9/10", "3/5 0 4/5", f"1/{10**30} 0 1/{10**40}"),
+    "tiny and then not": scaled(f"1/{2**60} 0 0", f"1/{2**70} 0 1", f"1/{2**50} 0 1"),
+}
+
+
+@pytest.mark.parametrize("words", [8, 13])
+@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("forwards", [True, False])
+def test_steps_are_those_of_whole_numbers(words: int, name: str, forwards: bool) -> None:
+    given, grid, span = MOTIONS[name], grid_of(words), Fraction(2)
+    assert rows_of(grid) is DigitRows
+    run, known = Fixed(given, grid, forwards), Whole(given, 64 * (grid.total // 64 + 2), forwards)
+    for each in (run, known):
+        assert each.advance(span, 10**4) is Status.FINE
+    assert run.redone == 0 or name == "an entire function"  # which allows any step
+    found, truth = run.sample(span), known.sample(span)
+    assert found is not None
+    assert truth is not None
+    assert max(abs(a - b) for a, b in zip(found, truth, strict=True)) * 2**grid.total < 100
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_digits_that_count_as_zero_are(name: str) -> None:
+    given, grid = MOTIONS[name], grid_of(8)
+    run = Fixed(given, grid, True)
+    for _ in range(3):
+        assert run.advance(Fraction(10**6), 1) is Status.FINE
+        count, row = digits_of(grid), size_of(grid, run.vectors).row
+        for n in range(run.order + 1):
+            digits = run.rows[row * n : row * (n + 1)].reshape(-1, LANES)
+            assert not digits[: digit_rows._BEFORE].any()
+            for side in digits[digit_rows._BEFORE :].reshape(1 + run.vectors, count, LANES):
+                assert not side[: run.places[n]].any()
+        assert run.places[: run.order + 1].max() > 0
+
+
+@pytest.mark.parametrize("processor", LEVELS)
+def test_the_bits_are_those_of_every_processor(processor) -> None:
+    given = problem(1, attitude=True)
+    runs = [Fixed(given, grid_of(8), True, processor=each) for each in (None, processor)]
+    for run in runs:
+        assert run.advance(Fraction(2), 10**6) is Status.FINE
+    own, other = ((run.state, run.steps, run.place(), run.sample(Fraction(2))) for run in runs)
+    assert own == other
+
+
+def test_words_that_are_too_wide_for_the_bounds_are_watched() -> None:
+    """The products with the coefficients of the field of words of 46 bits are: see :attr:`Grid.bounded`."""
+    for grid in (Grid(8, 46), Grid(8, 44, whole=True), grid_of(4)):
+        assert not grid.bounded
+        assert rows_of(grid) is not DigitRows
+    assert all(grid_of(words).bounded for words in range(5, 25))
