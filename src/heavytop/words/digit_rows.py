@@ -1,10 +1,8 @@
-"""Coefficients in digits of 24 bits, and the sums of their products: every product and every sum is exact.
+"""Coefficients in digits of 24 bits, whose products are summed exactly.
 
-L and R of an order are Σ_j d_j u_j with u_j = 2^(6 − 24 (j + 1)) and whole d_j, |d_j| ≤ 2^23 + 4.  A product of two
-digits is a whole number of at most 2^46 (1 + 2^-18), and 120 of them add up to less than 2^53: a double holds their
-sum, one operation a product, in any order and without a look at exponents.  Products with i + j < q are computed in
-tiles, some digits of the left by as many of the right with a sum for each i + j, over so many orders that no sum has
-more than 120 products; it is then split at 2^24, so that what adds up over all orders stays far below 2^53 too.
+L and R of an order are Σ_j d_j u_j with u_j = 2^(6 − 24 (j + 1)) and digits d_j, j < J, as
+:mod:`heavytop.words.digit_sums` takes them.  What is left out of a sum of n products of numbers, products of digits
+with i + j ≥ J and what J digits lack, is at most n (J + 1)/4 units of the last word.
 
 From some order on the first z digits are 0: |y| ≤ u_(z−1)/8 is enough, for L and R are at most twice as large, and
 what lies behind digit z is at most 0.51 u_(z−1).  S_n begins at level s = min_m z(m) + z(n − m), and the pair
@@ -14,27 +12,22 @@ the first digit, where zeros are.  What a left side has behind its last digit th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from llvmlite import ir
 
+from heavytop.words.digit_sums import BITS, SUM_BITS, rounded, write_sums
 from heavytop.words.kernels import Grid
 from heavytop.words.machine import Doubles
 from heavytop.words.rows import Rows, Size
-from heavytop.words.vector import INT, INT_POINTER, LANES, POINTER, Code, Index, function
+from heavytop.words.vector import INT, LANES, Code, Index
 
-BITS = 24
 _HEAD = 6
 """log2 of the unit before the first digit: L and R are at most half of it, and y a quarter."""
 _BEHIND = 6
 """Digits go on for so many bits behind the unit of the last word."""
-_PRODUCTS = 120
 _BEFORE = 2
-_ROUND = 1.5 * 2.0**52
-_SUM_BITS = 38
-"""Of the sum of a level over 700 orders: 50 groups of orders in 8 tiles, or fewer in more, of 2^29 and 2^23 each."""
 
 
 def digits_of(grid: Grid) -> int:
@@ -54,7 +47,7 @@ class DigitRows(Rows):
 
     @staticmethod
     def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Any]:
-        return [_write_sums(module, _WIDE if wide else _NARROW)]
+        return [write_sums(module, wide)]
 
     @staticmethod
     def left(rows: Doubles, grid: Grid, vectors: int, n: int, vector: int) -> list[Fraction]:
@@ -160,12 +153,12 @@ class DigitRows(Rows):
             rest = _times(code, word, _raised(grid))
             for j in range(self._first_digit(k), count):
                 exact = self._place(j) <= -grid.bits * (k + 1) and k + 1 < grid.words
-                piece = rest if exact else _rounded(code, rest, self._place(j) + _raised(grid))
+                piece = rest if exact else rounded(code, rest, self._place(j) + _raised(grid))
                 found[j] = piece if found[j] is None else code.add(found[j], piece)
                 if exact:
                     break
                 rest = code.subtract(rest, piece)
-        carries = [None, *(_rounded(code, d, self._place(j) + _raised(grid)) for j, d in enumerate(found[1:])), None]
+        carries = [None, *(rounded(code, d, self._place(j) + _raised(grid)) for j, d in enumerate(found[1:])), None]
         carried = [self._carried(*three) for three in zip(found, carries, carries[1:], strict=False)]
         return [_times(code, digit, -self._place(j) - _raised(grid)) for j, digit in enumerate(carried)]
 
@@ -188,9 +181,9 @@ class DigitRows(Rows):
         for index in reversed(range(len(sums))):
             unit = 2 * _HEAD - BITS * (index + 1)
             rest = _times(code, sums[index], unit + _raised(grid))
-            for k in range(min(grid.words - 1, max(0, (3 - unit - _SUM_BITS) // grid.bits)), grid.words):
+            for k in range(min(grid.words - 1, max(0, (3 - unit - SUM_BITS) // grid.bits)), grid.words):
                 exact = k == grid.words - 1 or unit + grid.bits * (k + 1) >= 0
-                piece = rest if exact else _rounded(code, rest, _raised(grid) - grid.bits * (k + 1))
+                piece = rest if exact else rounded(code, rest, _raised(grid) - grid.bits * (k + 1))
                 found[k] = piece if found[k] is None else code.add(found[k], piece)
                 if exact:
                     break
@@ -203,143 +196,9 @@ def _raised(grid: Grid) -> int:
     return 500 if grid.total > 800 else 0
 
 
-def _rounded(code: Code, value: Any, place: int = 0) -> Any:
-    """To the nearest multiple of 2^place, for |value| ≤ 2^(51 + place)."""
-    big = code.constant(_ROUND * 2.0**place)
-    return code.subtract(code.add(value, big), big)
-
-
 def _times(code: Code, value: Any, exponent: int) -> Any:
     """value 2^exponent."""
     while exponent:
         part = max(-1000, min(1000, exponent))
         value, exponent = code.multiply(value, code.constant(2.0**part)), exponent - part
     return value
-
-
-@dataclass(frozen=True, slots=True)
-class _Tiles:
-    """side: digits of the left and of the right in a tile.  triangle: levels up to which one tile has all.
-    sums: kept in registers.
-    """
-
-    side: int
-    triangle: int
-    sums: int
-
-
-_WIDE, _NARROW = _Tiles(8, 13, 18), _Tiles(4, 4, 7)
-
-
-def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> Any:
-    """(left, right, where, orders, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels, i, j < side.
-
-    Split at 2^24: what is whole multiples of that is added to the level before.
-    """
-    made, code = function(module, f"tile_{levels}_{side}", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, POINTER])
-    made.linkage = "internal"
-    made.attributes.add("noinline")
-    left, right, where, orders, sums = made.args
-    b = code.builder
-    pairs = [
-        [(i, level - i) for i in range(side) if 0 <= level - i < side] for level in range(min(levels, 2 * side - 1))
-    ]
-    ways = [1] * len(pairs)
-    while sum(ways) < most_sums and (rest := [k for k, pair in enumerate(pairs) if ways[k] < len(pair)]):
-        ways[max(rest, key=lambda k: len(pairs[k]) / ways[k])] += 1
-    most = _PRODUCTS // max(map(len, pairs))
-    begins = [sum(ways[:level]) for level in range(len(ways) + 1)]
-
-    def order(m: Any, values: list[Any]) -> list[Any]:
-        at, found = b.load(code.address(where, m)), list(values)
-        one, other = code.address(left, at), code.address(right, b.neg(at))
-        a = [code.load(one, LANES * i) for i in range(side)]
-        for j in range(side):
-            c = code.load(other, LANES * j)
-            for i in range(side):
-                if i + j < levels:
-                    place = begins[i + j] + pairs[i + j].index((i, j)) % ways[i + j]
-                    found[place] = code.multiply_add(a[i], c, found[place])
-        return found
-
-    def group(g: Any, _: list[Any]) -> None:
-        start = b.mul(g, code.integer(most))
-        stop = b.add(start, code.integer(most))
-        stop = b.select(b.icmp_signed("<", stop, orders), stop, orders)
-        _add_levels(code, sums, begins, code.loop(start, stop, order, [code.zero] * begins[-1]))
-
-    code.loop(0, b.sdiv(b.add(orders, code.integer(most - 1)), code.integer(most)), group, [])
-    b.ret_void()
-    return made
-
-
-def _add_levels(code: Code, sums: Any, begins: list[int], values: list[Any]) -> None:
-    """sums += the values of each level, split at 2^24."""
-    carries, rest = [], []
-    for level in range(len(begins) - 1):
-        first, *others = values[begins[level] : begins[level + 1]]
-        for value in others:
-            first = code.add(first, value)
-        carries.append(_rounded(code, first, BITS))
-        rest.append(code.subtract(first, carries[-1]))
-    down = code.constant(2.0**-BITS)
-    for level, (value, carry) in enumerate(zip([code.zero, *rest], [*carries, code.zero], strict=True)):
-        place = LANES * level
-        total = code.add(code.load(sums, place), value)
-        code.store(code.multiply_add(carry, down, total), sums, place)
-
-
-def _write_sums(module: ir.Module, sizes: _Tiles) -> Any:
-    """(left, right, where, orders, levels, sums): the same for all digits.
-
-    Few levels are one tile.  Else a few orders at a time, which stay near, go through all tiles.
-    """
-    side = sizes.side
-    triangles = [_write_tile(module, d, d, sizes.sums) for d in range(1, sizes.triangle + 1)]
-    tiles = triangles[:side] + [_write_tile(module, d, side, sizes.sums) for d in range(side + 1, 2 * side)]
-    arguments = [POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
-    made, code = function(module, "sum_products", ir.VoidType(), arguments)
-    made.linkage = "internal"
-    made.attributes.add("noinline")
-    left, right, where, orders, levels, sums = made.args
-    b, tile, group = code.builder, code.integer(LANES * side), code.integer(_PRODUCTS // side)
-    many = b.icmp_signed(">", levels, code.integer(len(triangles)))
-    with b.if_then(b.not_(many)):
-        _call(code, triangles, levels, [left, right, where, orders, sums])
-        b.ret_void()
-    parts = b.sdiv(b.add(levels, code.integer(side - 1)), code.integer(side))
-
-    def some(g: Any, _: list[Any]) -> None:
-        start = b.mul(g, group)
-        rest = b.sub(orders, start)
-        count = b.select(b.icmp_signed("<", rest, group), rest, group)
-
-        def one(i: Any, _: list[Any]) -> None:
-            def other(j: Any, _: list[Any]) -> None:
-                ahead = b.add(i, j)
-                both = [code.address(base, b.mul(k, tile)) for base, k in ((left, i), (right, j))]
-                places = [code.address(where, start), count, code.address(sums, b.mul(ahead, tile))]
-                _call(code, tiles, b.sub(levels, b.mul(ahead, code.integer(side))), [*both, *places])
-
-            code.loop(0, b.sub(parts, i), other, [])
-
-        code.loop(0, parts, one, [])
-
-    code.loop(0, b.sdiv(b.add(orders, b.sub(group, code.integer(1))), group), some, [])
-    b.ret_void()
-    return made
-
-
-def _call(code: Code, tiles: list[Any], levels: Any, arguments: list[Any]) -> None:
-    """The tile of so many levels, if there are any, or the last."""
-    b = code.builder
-    end = b.append_basic_block("end")
-    blocks = [b.append_basic_block(f"levels_{d}") for d in range(1, len(tiles) + 1)]
-    switch = b.switch(levels, blocks[-1])
-    switch.add_case(code.integer(0), end)
-    for d, (tile, block) in enumerate(zip(tiles, blocks, strict=True), 1):
-        switch.add_case(code.integer(d), block)
-        b.position_at_end(block)
-        b.call(tile, arguments)
-        b.branch(end)
-    b.position_at_end(end)
