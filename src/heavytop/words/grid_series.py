@@ -1,8 +1,8 @@
 """One Taylor step on a grid of K words: the function ``series``.
 
-Coefficients carry h^n, so that the step is a sum.  Words that have become 0 in all lanes are skipped: from some order
-on the first u words of every coefficient are 0, which is most of the speed.  The series ends where two coefficients in
-a row are below :attr:`heavytop.words.kernels.Grid.smallest`.
+Coefficients carry h^n, so that the step is a sum.  What has become 0 in all lanes is skipped, which is most of the
+speed: :mod:`heavytop.words.word_rows` and :mod:`heavytop.words.digit_rows` keep coefficients and sum their products.
+The series ends where two coefficients in a row are below :attr:`heavytop.words.kernels.Grid.smallest`.
 """
 
 from __future__ import annotations
@@ -24,13 +24,11 @@ FIRED, UNSETTLED = -1, -2
 """What ``series`` gives in place of its number of orders: a sum left its range; no convergence."""
 _WIDEST_DIVIDEND = 53
 """Bits of a word that is divided, behind the first."""
-
-
 _NONE = 8
 """A lane of the second operand of a shuffle, which is 0."""
 _HALVES = (0, 1, 2, *[_NONE] * 5), (3, 4, 5, *[_NONE] * 5)
 _FEWEST_WORDS = 8
-"""With so many words, products are summed in digits."""
+"""With so many words, products are summed in digits: with seven and fewer that is slower (measured)."""
 
 
 def rows_of(grid: Grid) -> type[Rows]:
@@ -52,9 +50,10 @@ def most_orders(grid: Grid) -> int:
 class Series:
     """Writes ``series(state, constants, inverses, rows, sums, places, seen, factor, raises, result)``.
 
-    state, result: K words of each vector.  constants: K words of A and each B, for each vector.  inverses: 1/(n + 1).
-    rows: R, then L of each vector, K words each, an order a row.  sums, seen, places: scratch.  factor, raises: from
-    one order to the next coefficients are multiplied by factor 16^raises; factor is ± a power of two, at most 1.
+    state, result: K words of each vector.  constants: K words of A and each B (or of the one of
+    :attr:`heavytop.words.lanes.Coefficients.beside`, where the grid is bounded), for each vector.  inverses: 1/(n + 1).
+    rows, sums, places, seen: scratch, see :class:`heavytop.words.rows.Rows`.  factor, raises: from one order to the
+    next coefficients are multiplied by factor 16^raises; factor is ± a power of two, at most 1.
     wide: as :attr:`heavytop.words.machine.Processor.wide`; results are the same.
     """
 
