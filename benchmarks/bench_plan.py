@@ -97,7 +97,7 @@ def main() -> None:
         if only not in task.label:
             continue
         before = clock.spent.copy()
-        row = workers._measure(KINDS[task.key.kind], task, Saved())
+        row = workers.measure(KINDS[task.key.kind], task, Saved())
         clock.switch()
         spent = clock.spent - before
         kinds.setdefault(task.key.kind, Counter()).update(spent)

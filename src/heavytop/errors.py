@@ -49,3 +49,13 @@ class PeerFailed(HeavyTopError):
     """An integrator of others that raised or broke its contract; says which and how.  Its row says so, others go on."""
 
     exit_code = 3
+
+
+class Unsupported(InputError):
+    """What an integrator declares that it cannot do: a system, a format, a direction.  No failure."""
+
+
+class OutOfTime(HeavyTopError):
+    """A third-party integrator that was stopped at the time limit of its row."""
+
+    exit_code = 3

@@ -1,4 +1,4 @@
-"""Child processes that do not import the caller's script.
+"""Child processes that do not import the caller's script, and that end with this process.
 
 ``multiprocessing`` imports the main script again in every child that it spawns, so a script without a main guard would
 start over in each of them.  The children of this program need nothing of the script: what they run is imported by name.
@@ -6,6 +6,10 @@ start over in each of them.  The children of this program need nothing of the sc
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+from contextlib import suppress
 from multiprocessing import spawn
 from multiprocessing.context import SpawnContext, SpawnProcess
 from threading import Lock, get_ident
@@ -43,3 +47,36 @@ class ChildContext(SpawnContext):
     """
 
     Process = _Child
+
+
+class Guard:
+    """A small process that kills its process group once this process has ended, however that came about.
+
+    group: the process group that it joins; a new one where that is 0.
+    """
+
+    def __init__(self, group: int = 0) -> None:
+        reading, self._lifeline = os.pipe()
+        try:
+            # what it reads ends with this process, which alone holds the other end
+            self._shell = subprocess.Popen(
+                ["/bin/sh", "-c", "read -r _; kill -KILL 0"],
+                stdin=reading,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                process_group=group,
+            )
+        except BaseException:
+            os.close(self._lifeline)
+            raise
+        finally:
+            os.close(reading)
+        self.group = group or self._shell.pid
+
+    def end(self) -> None:
+        """Kills every process of the group, the guard too."""
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.group, signal.SIGKILL)
+        self._shell.wait()
+        with suppress(OSError):
+            os.close(self._lifeline)

@@ -13,10 +13,13 @@ import msgspec
 
 SCHEMA = "heavytop-report/2"
 
-UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED = "out_of_reach", "contradiction", "failed"
+OUT_OF_REACH, CONTRADICTION, FAILED = "out_of_reach", "contradiction", "failed"
+UNSUPPORTED, OUT_OF_TIME = "unsupported", "out_of_time"
+UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED, UNSUPPORTED, OUT_OF_TIME
 """Outcomes of a row that came to nothing: it has no metrics, and says why in the place of a reference.
 
-failed: an integrator of others raised an error, or gave back what is no motion."""
+failed: a third-party integrator raised an error, or gave back what is no trajectory.  unsupported: it declares that it
+cannot do what was asked, which is no failure.  out_of_time: it was stopped at the time limit of its row."""
 
 EXACT = "exact"
 """The precision of a row in which no format is involved."""

@@ -127,6 +127,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "seed": 0,
             "integrator": None,
             "parquet": False,
+            "row_timeout": None,
         },
     ),
     "read_report": (ht.read_report, {"path": "nowhere"}),

@@ -26,7 +26,7 @@ SURROUNDINGS = run_folder.environment()
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "os.rmdir", "fcntl.flock")
 
 
-def rows(tasks, kinds, workers, scheduler, done, saved) -> Iterator:
+def rows(tasks, kinds, workers, scheduler, done, saved, *_) -> Iterator:
     for index, task in enumerate(tasks):
         if index not in done:
             saved(index).save({"task": task.label})

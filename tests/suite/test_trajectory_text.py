@@ -12,7 +12,7 @@ from heavytop.integrate.taylor import propagate
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text
 from heavytop.suite.cases import CASES
 from heavytop.suite.trajectory_file import read
-from heavytop.suite.written_numbers import format_of, number
+from heavytop.written_numbers import format_of, number
 
 CASE = CASES["lagrange"]
 TIMES = [Fraction(k, 2) for k in range(5)]

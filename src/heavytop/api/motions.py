@@ -10,6 +10,7 @@ from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
 from heavytop.errors import InputError
 from heavytop.integrate import registry
+from heavytop.integrate.peers.source import named
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.measure.reference import Reference
 from heavytop.measure.reference import reference as proven
@@ -28,7 +29,7 @@ def propagate(
     times: Numbers,
     precision: Precision | str = DOUBLE,
     *,
-    integrator: str = "heyoka",
+    integrator: str | Callable[..., Any] = "heyoka",
     system: System | str = HEAVY_TOP,
     xi: Numbers | None = None,
     tolerance: Number | None = None,
@@ -44,7 +45,8 @@ def propagate(
         start: Ω in 1/time unit and γ at t = 0.
         times: shape (n,), exact numbers of one sign, strictly monotone away from 0; 0 itself may come first.
         precision: DOUBLE, EXTENDED, QUAD, real(BITS), or the name of one.
-        integrator: "heyoka" or another name that `heavytop list` shows.
+        integrator: "heyoka" or another name that `heavytop list` shows; a file, "mine.toml" of a program or
+            "./mine.py:solve"; or a callable, a peer or a solver (:func:`heavytop.integrate.peers.double.double_peer`).
         system: "heavy_top" or "gyrostat".
         xi: shape (3,), a unit vector ⟂ γ, the space axis x in body components at t = 0, to ride along.
         tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; words: from there to
@@ -69,7 +71,7 @@ def propagate(
     body, state = arguments.motion(top, start, form)
     options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
     options |= {} if xi is None else {"xi": arguments.attitude(xi, state, form)}
-    run = registry.propagator(integrator, options)
+    run = registry.propagator(named(integrator), options)
     about, instants = arguments.system(system), check_times(times)
     return cast(Trajectory, run(body, state, instants, form, system=about))
 
@@ -111,7 +113,7 @@ def ensemble(
     problems = _problems(bodies, states, form, about)
     options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
     options |= {} if threads is None else {"threads": arguments.count(threads, "threads")}
-    run = registry.ensemble_propagator(integrator, options)
+    run = registry.ensemble_propagator(named(integrator), options)
     return cast("list[Trajectory]", run(problems, check_times(times)))
 
 

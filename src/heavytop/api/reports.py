@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Callable
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
@@ -87,8 +88,9 @@ def run(
     workers: int | None = None,
     scheduler: str | None = None,
     seed: int = 0,
-    integrator: str | None = None,
+    integrator: str | Callable[..., Any] | None = None,
     parquet: bool = False,
+    row_timeout: Number | None = None,
 ) -> Report:
     """Run a plan of measurements, write its report and page, and return the report.
 
@@ -98,9 +100,13 @@ def run(
         resume: go on with the rows that ``out`` already holds.
         workers: local processes; None for as many as there are processors.  No main guard is needed.
         scheduler: the address of a Dask scheduler to run on instead.
-        integrator: the name of one that is measured beside heyoka, such as ``mine:name``.
+        integrator: one that is measured beside heyoka: a name such as ``mine:name``, a file (``mine.toml``,
+            ``./mine.py:solve``), or a callable as :func:`heavytop.integrate.peers.double.double_peer` makes or takes
+            it.  It runs in a process of its own.
         seed: measure the same motions with other roundings: 0 to 1000.
         parquet: write rows.parquet too.
+        row_timeout: seconds that a row of a third-party integrator may take; None for the plan's, or limits by its
+            other rows (docs/commands.md).
 
     Returns:
         A :class:`Report`.  A motion that failed is a row with its outcome, not an exception.
@@ -116,16 +122,23 @@ def run(
         workers=arguments.count(workers, "workers"),
         scheduler=None if scheduler is None else arguments.text(scheduler, "scheduler"),
         seed=whole(seed, "seed"),
-        integrator="" if integrator is None else arguments.text(integrator, "integrator"),
+        integrator=_integrator(integrator),
         with_parquet=bool(arguments.flag(parquet, "parquet")),
+        row_timeout=row_timeout,
     )
     for warning in asked.warnings:
         warnings.warn(warning, stacklevel=2)
     if asked.is_finished:
         asked.finished()
     else:
-        asked.measure(lambda task: None)
+        asked.measure()
     return read_report(asked.directory)
+
+
+def _integrator(given: str | Callable[..., Any] | None) -> str | Callable[..., Any]:
+    if given is None:
+        return ""
+    return given if callable(given) else arguments.text(given, "integrator")
 
 
 def read_report(path: PathLike) -> Report:

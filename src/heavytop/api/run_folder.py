@@ -9,10 +9,14 @@ from datetime import UTC, datetime
 from functools import partial
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from msgspec.structs import replace
 
 from heavytop.errors import InputError
+from heavytop.integrate.peers import name_of
+from heavytop.integrate.peers.command import Command, greeting
+from heavytop.integrate.peers.source import named, seconds_of
 from heavytop.kinds import KINDS
 from heavytop.precision import whole
 from heavytop.records import SCHEMA, Report, Row
@@ -22,7 +26,7 @@ from heavytop.report.environment import environment
 from heavytop.suite import checkpoint
 from heavytop.suite.checkpoint import Checkpoint, identity_of
 from heavytop.suite.plan import read, warnings
-from heavytop.suite.run import Progress
+from heavytop.suite.run import Progress, unheard
 from heavytop.suite.run import run as run_tasks
 from heavytop.suite.task import Task
 
@@ -45,6 +49,7 @@ class Run:
 
     identity: name, hash and seed of the plan.  warnings: what is odd about the plan's own tops.
     resume: go on with the rows that ``directory`` holds.  save_every: seconds between two places of a long row.
+    row_timeout: seconds of a row of a third-party integrator; None for limits by its other rows.
     """
 
     identity: dict[str, str]
@@ -56,6 +61,7 @@ class Run:
     scheduler: str | None
     save_every: float
     parquet: bool
+    row_timeout: float | None = None
 
     @property
     def is_finished(self) -> bool:
@@ -71,16 +77,19 @@ class Run:
             parquet.write(self.directory / parquet.FILE, report.rows, report.plan)
         return Ended(brief(report, report.rows, KINDS), overview.all_good(report.rows, KINDS))
 
-    def measure(self, progress: Progress) -> Ended:
-        """Measure what is not there yet, write the report and sum it up; ``progress`` hears of each finished task.
+    def measure(self, progress: Progress = unheard, begun: Progress = unheard) -> Ended:
+        """Measure what is not there yet, write the report and sum it up.
 
+        progress, begun: hear of each task that is finished, and that begins.
         Raises InputError where the folder is not fit or cannot be written; what is finished is kept for --resume.
         """
-        report = Report(SCHEMA, self.identity, environment(), [])
+        report = Report(SCHEMA, self.identity, environment() | _integrators(self.tasks), [])
         fit = partial(require_fit, self.directory, self.resume)
         try:
             with Checkpoint(self.directory, identity_of(report), fit, self.save_every) as rows:
-                laws = run_tasks(self.tasks, KINDS, rows, progress, self.workers, self.scheduler)
+                laws = run_tasks(
+                    self.tasks, KINDS, rows, progress, self.workers, self.scheduler, begun, self.row_timeout
+                )
                 return self._write(report, lambda: chain(rows.rows(range(len(self.tasks))), laws))
         except OSError as error:
             raise InputError(
@@ -108,7 +117,8 @@ def prepare(
     seed: int = 0,
     save_every: float = checkpoint.EVERY,
     with_parquet: bool = False,
-    integrator: str = "",
+    integrator: Any = "",
+    row_timeout: Any = None,
 ) -> Run:
     """The run of a plan into the folder ``out``, by default a new one under heavytop-results; nothing is written yet.
 
@@ -116,7 +126,9 @@ def prepare(
     """
     if with_parquet:
         parquet.require_pyarrow()
-    loaded, digest, tasks = read(plan, KINDS, seed, integrator)
+    which = named(integrator)
+    loaded, digest, tasks = read(plan, KINDS, seed, which)
+    timeout = loaded.row_timeout or None if row_timeout is None else row_timeout
     if workers is not None and whole(workers, "--workers") < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     if workers is not None and scheduler is not None:
@@ -124,7 +136,7 @@ def prepare(
     if resume and out is None:
         raise InputError("--resume needs to know what to resume.", "Give the folder with --out.")
     run = Run(
-        {"name": loaded.name, "sha256": digest, "seed": str(seed)} | ({"integrator": integrator} if integrator else {}),
+        {"name": loaded.name, "sha256": digest, "seed": str(seed)} | ({"integrator": name_of(which)} if which else {}),
         tasks,
         warnings(loaded),
         out or Path("heavytop-results") / f"{loaded.name}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}",
@@ -133,10 +145,18 @@ def prepare(
         scheduler,
         save_every,
         with_parquet,
+        None if timeout is None else seconds_of(timeout, "--row-timeout" if row_timeout is not None else "row_timeout"),
     )
     if not run.is_finished:
         require_fit(run.directory, resume)
     return run
+
+
+def _integrators(tasks: Sequence[Task]) -> dict[str, dict[str, str]]:
+    """The entry of the environment block for the programs that integrate: what each says of itself."""
+    sources = {task.source for task in tasks if task.source is not None} if len(tasks) <= MOST_ON_A_PAGE else set()
+    said = {each.name: greeting(each) for each in sources if isinstance(each, Command)}
+    return {"integrators": dict(sorted(said.items()))} if said else {}
 
 
 def require_fit(directory: Path, resume: bool) -> None:

@@ -37,7 +37,7 @@ def propagate(
     precision: Annotated[
         str, typer.Option(help="double, extended, quad, real:BITS, or, of words, double-double.")
     ] = "double",
-    integrator: Annotated[str, typer.Option(help="Any that `heavytop list` shows.")] = "heyoka",
+    integrator: Annotated[str, typer.Option(help="One of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
     system: SystemName = "heavy_top",
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     normalize: Normalize = False,
@@ -66,9 +66,10 @@ def propagate(
             file=sys.stderr,
         )
 
+    from heavytop.integrate.peers.source import named
     from heavytop.measure.motion import compute
 
-    motion = compute(top, start, instants, form, which, attitude, max_steps, integrator)
+    motion = compute(top, start, instants, form, which, attitude, max_steps, named(integrator))
     if json:
         print_json(motion.to_json())
     else:

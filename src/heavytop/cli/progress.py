@@ -116,10 +116,14 @@ class Progress(Bar):
         self.kinds = kinds
         super().__init__(Estimator(sum(map(self._cost, tasks)), 1 / max(workers, 1)), len(tasks))
 
+    def begin(self, task: Any) -> None:
+        """Names the task that is running."""
+        self.show(task.label)
+
     def __call__(self, task: Any) -> None:
         self.finished += 1
         self.estimator.advance(self._cost(task))
-        self.show(task.label)
+        self.show()
 
     def _cost(self, task: Any) -> float:
         cost: float = self.kinds[task.key.kind].cost(task)

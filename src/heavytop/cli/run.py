@@ -21,13 +21,16 @@ def run(
     plan: Annotated[
         str, typer.Option(help="smoke, default, growth, long, peers, gate, or a TOML file.", autocompletion=plans)
     ] = "default",
-    integrator: Annotated[str, typer.Option(help="Measure this one beside heyoka.")] = "",
+    integrator: Annotated[str, typer.Option(help="Measure it beside heyoka: a name, mine.toml, mine.py:solve.")] = "",
     out: Annotated[Path | None, typer.Option(help="New folder for the report.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the rows that --out already holds.")] = False,
     workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on instead.")] = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write DIR/rows.parquet too.")] = False,
     seed: Annotated[int, typer.Option(help="Measure the same motions with other roundings: 0 to 1000.")] = 0,
+    row_timeout: Annotated[
+        str | None, typer.Option(help="Seconds of a row of a third-party integrator, at most.", metavar="SECONDS")
+    ] = None,
     save_every: Annotated[float, typer.Option(help="Seconds after which a long row saves its place.", min=0)] = 10.0,
 ) -> int:
     """Run a plan of measurements and write its report.
@@ -51,6 +54,7 @@ def run(
         integrator=integrator,
         save_every=save_every,
         with_parquet=parquet,
+        row_timeout=row_timeout,
     )
     directory = asked.directory
     for warning in asked.warnings:
@@ -63,7 +67,7 @@ def run(
     began = perf_counter()
     try:
         with _stopped_by_signals(), Progress(asked.tasks, KINDS, asked.workers) as advance:
-            ended = asked.measure(advance)
+            ended = asked.measure(advance, advance.begin)
     except KeyboardInterrupt as stop:
         kept = f"finished rows are kept: --out {directory} --resume goes on"
         said = kept if (directory / ROWS).exists() else "no row was finished"

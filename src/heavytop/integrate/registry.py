@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, quoted
 from heavytop.integrate import peers
+from heavytop.integrate.peers.command import Command, CommandIntegrator
+from heavytop.integrate.peers.source import Source
 
 HERE = "heavytop.integrate"
 
@@ -32,19 +34,23 @@ INTEGRATORS = {
 }
 
 
-def propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:
-    """What propagates one motion with the integrator of that name; raises InputError for an unknown name or option."""
-    if isinstance(name, str) and name not in INTEGRATORS and name in peers.known():
-        _with(peers.peer(name), name, options)
-        return _with(peers.ready(name), name, options)
-    return _with(_load(_find(name).propagate), name, options)
+def propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
+    """What propagates one motion with that integrator; raises InputError for an unknown name or option."""
+    if isinstance(which, Command):
+        return _with(CommandIntegrator(which), which.name, options)
+    if not isinstance(which, str) or (which not in INTEGRATORS and which in peers.known()):
+        _with(peers.peer(which), peers.name_of(which), options)
+        return _with(peers.ready(which), peers.name_of(which), options)
+    return _with(_load(_find(which).propagate), which, options)
 
 
-def watched(name: str, options: dict[str, Any], observer: Callable[[Fraction, Any], None]) -> Callable[..., Any]:
+def watched(
+    which: str | Source, options: dict[str, Any], observer: Callable[[Fraction, Any], None]
+) -> Callable[..., Any]:
     """The same as :func:`propagator`, with every state given to ``observer``: by a peer at the end of its run."""
-    if name in INTEGRATORS:
-        return propagator(name, {**options, "observer": observer})
-    run = propagator(name, options)
+    if isinstance(which, str) and which in INTEGRATORS:
+        return propagator(which, {**options, "observer": observer})
+    run = propagator(which, options)
 
     def call(*arguments: Any, **more: Any) -> Any:
         found = run(*arguments, **more)
@@ -55,13 +61,15 @@ def watched(name: str, options: dict[str, Any], observer: Callable[[Fraction, An
     return call
 
 
-def ensemble_propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:
+def ensemble_propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
     """What propagates many motions; raises InputError also for an integrator that runs one at a time."""
-    one_at_a_time = isinstance(name, str) and name not in INTEGRATORS and name in peers.known()
-    place = "" if one_at_a_time else _find(name).ensemble
-    if not place:
+    if not isinstance(which, str) or (which not in INTEGRATORS and which in peers.known()):
+        name = peers.name_of(which)
         raise InputError(f"The integrator {name} runs one motion at a time.", "Call propagate for each.")
-    return _with(_load(place), name, options)
+    place = _find(which).ensemble
+    if not place:
+        raise InputError(f"The integrator {which} runs one motion at a time.", "Call propagate for each.")
+    return _with(_load(place), which, options)
 
 
 def _find(name: str) -> Integrator:

@@ -31,6 +31,7 @@ class Outcome(Enum):
     STEP_TOO_SMALL = "step_too_small"
     CAPACITY = "capacity"
     INCOMPLETE = "incomplete"
+    FAILED = "failed"
 
     @property
     def message(self) -> str:
@@ -41,6 +42,7 @@ class Outcome(Enum):
             Outcome.NON_FINITE: "stopped: the state was no longer finite",
             Outcome.STEP_TOO_SMALL: "stopped: the step no longer moves the time",
             Outcome.CAPACITY: "stopped: the numbers outgrew the words that were chosen for them",
+            Outcome.FAILED: "stopped: the integrator said that it failed",
             Outcome.INCOMPLETE: "said to have succeeded, but gave fewer times than were asked for",
         }[self]
 

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from heavytop.integrate.trajectory import Place, Problem
 from heavytop.kinds.base import Kind
-from heavytop.measure.integrator import HEYOKA, require
+from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.reruns import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
@@ -48,7 +48,6 @@ class DriftTable(Table, tag=NAME):
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
-        require(self.integrator)
         runs = []
         for run in self.runs:
             (horizon,) = positive([run.horizon], "horizon")

@@ -18,7 +18,7 @@ from heavytop.kinds.base import Kind
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.ensemble import Ended, complete, growing
 from heavytop.measure.ensemble_reference import Reference, reference
-from heavytop.measure.integrator import HEYOKA, require
+from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import Scorer
 from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
@@ -79,7 +79,6 @@ class GrowthTable(Table, tag=NAME):
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
-        require(self.integrator)
         return [_task(case, run, self.integrator) for case in map(find, self.cases) for run in self.runs]
 
 

@@ -17,7 +17,7 @@ from heavytop.kinds.break_away_law import ESCAPE, break_away_law, escape_times
 from heavytop.kinds.claim_section import claim_error
 from heavytop.kinds.claim_tasks import INTEGRATION_ERROR
 from heavytop.measure.drift import DRIFT
-from heavytop.measure.integrator import HEYOKA, require
+from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.reruns import Reruns, banded, escape_band
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.scorer import Scorer
@@ -59,7 +59,6 @@ class HomoclinicTable(Table, tag=NAME):
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
-        require(self.integrator)
         tasks = []
         for case in map(find, self.cases):
             spacing = Fraction(round(64 / (samples(self.samples) * case.rate)) or 1, 64)

@@ -13,7 +13,7 @@ from heavytop.errors import OutOfReach
 from heavytop.integrate.trajectory import Outcome, TaylorStep
 from heavytop.kinds.base import Kind
 from heavytop.measure import local_error
-from heavytop.measure.integrator import HEYOKA, require
+from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.single_calls import single_calls
 from heavytop.precision import parse, time_text
 from heavytop.records import Against, Row, RowKey
@@ -44,7 +44,6 @@ class LocalErrorTable(Table, tag=NAME):
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
-        require(self.integrator)
         times = tuple(positive([self.horizon], "horizon"))
         horizon, subject = time_text(times[-1]), computed(self.integrator)
         return [

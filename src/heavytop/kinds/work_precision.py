@@ -17,6 +17,7 @@ from rich.text import Text
 
 from heavytop.errors import InputError
 from heavytop.integrate import peers
+from heavytop.integrate.peers.source import Source
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind
 from heavytop.measure.drift import DRIFT
@@ -67,8 +68,7 @@ class Ladder(msgspec.Struct, forbid_unknown_fields=True):
     steps: list[str] = []
 
     def subjects(self) -> Iterator[Subject]:
-        """One a rung; raises InputError for an integrator that is unknown, or built in and not installed."""
-        peers.require(self.integrator)
+        """One a rung; raises InputError for an impossible value."""
         if not self.tolerances and not self.steps:
             raise InputError(f"The ladder of {self.integrator} is empty.", "Give it tolerances, or steps.")
         for text in self.steps:
@@ -108,10 +108,11 @@ class WorkPrecisionTable(Table, tag=NAME):
             for precision, subject in rungs
         ]
 
-    def beside(self, integrator: str) -> Table | None:
+    def beside(self, which: str | Source) -> Table | None:
         """Four rungs in double, and the finest in other formats, where heyoka has a ladder."""
+        integrator = peers.name_of(which)
         formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
-        knob = peers.knob_apart(integrator) if DOUBLE.name in formats else ""
+        knob = peers.knob_apart(which) if DOUBLE.name in formats else ""
         ladders = [
             Ladder(integrator, name, **{"steps" if knob == "step" else "tolerances": _RUNGS[knob]})
             if name == DOUBLE.name
@@ -150,7 +151,7 @@ class WorkPrecision(Kind):
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
         # found before the runs: looking through the installed packages empties the caches of the processor
-        peer = peers.ready(task.key.subject.name, _setting(task.key.subject))
+        peer = peers.ready(task.integrator.which, _setting(task.key.subject))
 
         def integrate(times: Any, start: State = case.start) -> Trajectory:
             top = case.top if start is case.start else problem.top

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from heavytop.errors import InputError, PeerFailed
+from heavytop.errors import InputError, PeerFailed, Unsupported
 from heavytop.integrate import peers, registry, taylor
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
+from heavytop.integrate.peers.source import Source
 from heavytop.integrate.taylor import Observer
 from heavytop.integrate.trajectory import Problem, TaylorStep, Trajectory
 from heavytop.precision import Precision
@@ -21,22 +22,29 @@ from heavytop.top.heavy_top import HeavyTop, State
 HEYOKA, WORDS = "heyoka", "words"
 
 
-def require(name: str) -> None:
+def require(which: str | Source) -> None:
     """Raises InputError for an integrator that is unknown, or built in and not installed."""
-    if name not in registry.INTEGRATORS:
-        peers.require(name)
+    if which not in registry.INTEGRATORS:
+        peers.require(which)
 
 
 @dataclass(frozen=True, slots=True)
 class Integrator:
     """The integrator of that name, or a planted fault of :mod:`heavytop.integrate.broken` in the place of heyoka.
 
-    setting: ("tolerance", 1e-9) or ("step", 1/50) of an integrator of others; None for what it does by itself.
+    setting: ("tolerance", 1e-9) or ("step", 1/50) of a third-party integrator; None for what it does by itself.
+    source: where the integrator is defined, if it is neither built in nor a package's.
     """
 
     name: str = HEYOKA
     fault: str = ""
     setting: tuple[str, Fraction] | None = None
+    source: Source | None = None
+
+    @property
+    def which(self) -> str | Source:
+        """What it is looked up by."""
+        return self.source or self.name
 
     @property
     def takes_many(self) -> bool:
@@ -71,7 +79,9 @@ class Integrator:
             run: Trajectory = call(top, start, times, precision, system=system, observer=observer, **going_on)
             return run
         try:
-            run = peers.ready(self.name, self.setting)(top, start, times, precision, system=system)
+            run = peers.ready(self.which, self.setting)(top, start, times, precision, system=system)
+        except Unsupported:
+            raise
         except InputError as error:  # what a peer of this program cannot be asked for is one row's failure too
             raise PeerFailed(error.cause.removesuffix(".")) from None
         if observer is not None:
@@ -98,6 +108,9 @@ class Integrator:
                 raise PeerFailed(error.cause.removesuffix(".")) from None
             runs: list[Trajectory] = many(problems, times, observer=observer, finished=finished, threads=threads)
             return runs
+        if options.keys() == {"tolerance"}:
+            given = replace(self, setting=("tolerance", options["tolerance"]))
+            return given.propagate_many(problems, times, observer, finished, threads)
         if options:
             raise PeerFailed(f"The integrator {self.name} has no {', '.join(options)}")
         runs = []

@@ -15,6 +15,7 @@ from heavytop.exact.balls import FUNCTIONS, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.scales import least_rate
 from heavytop.integrate import registry
+from heavytop.integrate.peers.source import Source
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
 from heavytop.measure.followed_angles import FollowedAngles
@@ -96,13 +97,13 @@ def compute(
     system: System,
     attitude: bool = False,
     step_limit: int | None = None,
-    integrator: str = "heyoka",
+    integrator: str | Source = "heyoka",
 ) -> Motion:
     """The motion at ``times`` (exact, checked), with the drift of every integral that holds.
 
     attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
-    integrator: a name that `heavytop list` shows.
+    integrator: a name that `heavytop list` shows, or a source.
 
     Raises InputError for another integrator, OutOfReach where the run would take more steps than anyone waits for.
     """

@@ -7,8 +7,9 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from heavytop.errors import PeerFailed
+from heavytop.errors import PeerFailed, Unsupported
 from heavytop.integrate import peers, registry
+from heavytop.integrate.peers.command import NOT_COUNTED
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.integrator import Integrator
 from heavytop.measure.local_error import Call
@@ -39,7 +40,7 @@ def single_calls(
     sampled = integrator.propagate(top, start, times, precision, system)
     begins = [whole.problem.native(whole.problem.start.flat), *sampled.states]
     problems = [_from(whole.problem, state) for state in begins]
-    fixed = integrator.name not in registry.INTEGRATORS and peers.knob(integrator.name) == "step"
+    fixed = integrator.name not in registry.INTEGRATORS and peers.knob(integrator.which) == "step"
     length = until / max(whole.steps, 1)
 
     def over(n: int) -> list[Trajectory]:
@@ -68,6 +69,8 @@ def _require_count(integrator: Integrator, runs: Sequence[Trajectory], most: int
     A mean step follows from the count of steps: one too many times too large would make every call look exact.
     """
     for run in runs:
+        if NOT_COUNTED.items() <= run.flags.items():
+            raise Unsupported(f"{integrator.name} does not say how many steps it takes.", "Say it: `done steps N`.")
         moved = any(tuple(map(exact, state)) != run.problem.start.flat for state in run.states)
         if moved and run.steps == 0:
             raise PeerFailed(f"{integrator.name} moved, and says that it took no step")

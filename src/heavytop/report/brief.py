@@ -14,7 +14,7 @@ from heavytop.records import UNMEASURED, Report, Row
 from heavytop.report.kind import Kinds
 from heavytop.report.printable import printable
 from heavytop.report.section import clip, logarithm
-from heavytop.report.text import failed, failure
+from heavytop.report.text import failed, failure, unsupported
 
 WIDTH = 80
 LINES = 21
@@ -49,6 +49,7 @@ def brief(report: Report, rows: Iterable[Row], kinds: Kinds) -> str:
         held = list(seen(first))
         measured = [row for row in held if row.outcome not in UNMEASURED]
         parts = [kind.brief([row for row in measured if row.key.kind == name]) for name, kind in kinds.items()]
+        parts += [wrapped(said)[:_MOST_OF_ONE] for said in [unsupported(held)] if said]
     else:
         parts = [_counted(seen(chain(first, stream)))]
     head = f"Plan {report.plan.get('name', '?')}: {number} measurements, "

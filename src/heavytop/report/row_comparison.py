@@ -9,7 +9,7 @@ import msgspec
 
 from heavytop.measure.rounding_noise import least
 from heavytop.precision import exact
-from heavytop.records import UNMEASURED, Identity, Metric, Quantity, Row
+from heavytop.records import UNMEASURED, UNSUPPORTED, Identity, Metric, Quantity, Row
 from heavytop.report.against import weaker
 from heavytop.report.consistency import contradictions
 from heavytop.report.kind import Kinds, kind_of
@@ -74,6 +74,8 @@ class RowComparison:
     def compare(self, old: Row, new: Row) -> list[Finding]:
         """All findings about a row that both reports have."""
         key = old.identity
+        if UNSUPPORTED in (old.outcome, new.outcome) and (verdict := _support(old, new)) is not None:
+            return [] if self.ignores(old) else self._supported(key, old, new, *verdict)
         if reason := self._incomparable(old, new):
             if self.ignores(old):
                 return []
@@ -89,6 +91,12 @@ class RowComparison:
         if self.timed:
             found += self._seconds(key, rules, old, new)
         return found
+
+    def _supported(self, key: Identity, old: Row, new: Row, verdict: Verdict, why: str) -> list[Finding]:
+        if verdict is Verdict.SAME and not self.list_same:
+            self.same += 1
+            return []
+        return [Finding(key, "", verdict, old.outcome, new.outcome, why)]
 
     def _metrics(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> list[Finding]:
         loss = self.lookup.metric((), "").loss
@@ -240,6 +248,15 @@ class RowComparison:
         bands = [metric for metric in _of_series(name, row, "final", "rms", "max") if metric.band]
         widest = max((allowed_loss(metric, metric) for metric in bands), default=0.0)
         return limits.noise * max(widest, kind_of(row, self.kinds).assumed_band(row.key.subject))
+
+
+def _support(old: Row, new: Row) -> tuple[Verdict, str] | None:
+    """The verdict where a row was or is not supported; None where the other was not measured either."""
+    if old.outcome == new.outcome:
+        return Verdict.SAME, ""
+    if new.outcome == UNSUPPORTED:
+        return (Verdict.WORSE, "no longer supported") if old.outcome == "success" else None
+    return (Verdict.BETTER, "now supported") if new.outcome == "success" else None
 
 
 def _samples(row: Row) -> int:

@@ -15,7 +15,7 @@ from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import decimal_text, exact
-from heavytop.records import FAILED, UNMEASURED, Metric, Report, Row
+from heavytop.records import FAILED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Report, Row
 from heavytop.report.kind import Kinds, kind_of
 from heavytop.report.names import computed_by
 from heavytop.report.printable import printable
@@ -71,6 +71,8 @@ def summary(report: Report, kinds: Kinds) -> RenderableType:
     for name, rows in measured.items():
         said = f"Measure {name or 'without a name'}: {len(rows)} rows, which the page lists (--html FILE)"
         parts += [Text(), Text(printable(said))]
+    if said := unsupported(report.rows):
+        parts += [Text(), Text(printable(said))]
     if failures := [row for row in report.rows if failed(row, kinds)]:
         parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
         parts += [Text(printable(failure(row))) for row in failures]
@@ -78,13 +80,26 @@ def summary(report: Report, kinds: Kinds) -> RenderableType:
 
 
 def failed(row: Row, kinds: Kinds) -> bool:
-    """Whether a run did not reach its horizon; that one gives up may be what its rows are there to show."""
+    """Whether a run did not reach its horizon; that one gives up may be what its rows are there to show.
+
+    What an integrator declares that it cannot do is no failure.
+    """
+    if row.outcome == UNSUPPORTED:
+        return False
     return row.outcome in UNMEASURED or (row.outcome != "success" and not kind_of(row, kinds).may_give_up)
+
+
+def unsupported(rows: Iterable[Row]) -> str:
+    """What integrators declare that they cannot do, in one line; empty where there is no such row."""
+    lacking = [row for row in rows if row.outcome == UNSUPPORTED]
+    why = dict.fromkeys((row.reference.reason or "").removesuffix(".") for row in lacking)
+    count = f"{len(lacking)} row{'s' if len(lacking) > 1 else ''}"
+    return f"Not supported, and not measured: {count}; {'; '.join(why)}." if lacking else ""
 
 
 def failure(row: Row) -> str:
     """A run that did not reach its horizon, and why."""
-    if row.outcome == FAILED:
+    if row.outcome in (FAILED, OUT_OF_TIME):
         return f"  {row.reference.reason} in {row.precision}"
     if row.outcome in UNMEASURED:
         return f"  {row.key.kind} of {row.case}, {row.integrator} in {row.precision}: {row.outcome}, {row.against}"

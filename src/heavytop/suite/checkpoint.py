@@ -184,6 +184,7 @@ def identity_of(report: Report) -> dict[str, str]:
     plan = {f"plan {key}": value for key, value in report.plan.items()}
     return plan | {
         **surroundings["packages"],
+        **{f"integrator {name}": said for name, said in surroundings.get("integrators", {}).items()},
         **{key: str(surroundings[key]) for key in ("commit", "processor", "simd_width_double")},
     }
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy
 
+from heavytop import written_numbers
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, number, round_to, shown
-from heavytop.suite import written_numbers
 from heavytop.top.equations import VARIABLES, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
 

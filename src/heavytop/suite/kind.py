@@ -7,6 +7,8 @@ from typing import Protocol
 
 import msgspec
 
+from heavytop.integrate.peers import name_of
+from heavytop.integrate.peers.source import Source
 from heavytop.measure.integrator import HEYOKA
 from heavytop.records import Row
 from heavytop.suite.cases import Case
@@ -24,11 +26,11 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
         """One a row; raises InputError for an impossible value."""
         raise NotImplementedError
 
-    def beside(self, integrator: str) -> Table | None:
+    def beside(self, which: str | Source) -> Table | None:
         """The same measurements with that integrator in heyoka's place; None where heyoka is not measured."""
         if getattr(self, "integrator", None) != HEYOKA:
             return None
-        return msgspec.structs.replace(self, integrator=integrator)
+        return msgspec.structs.replace(self, integrator=name_of(which))
 
 
 class Kind(Protocol):

@@ -6,7 +6,7 @@ import hashlib
 import re
 import tomllib
 from bisect import bisect_right
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import reduce
@@ -19,6 +19,8 @@ from typing import Any, cast, get_args
 import msgspec
 
 from heavytop.errors import InputError, quoted
+from heavytop.integrate.peers import known as known_integrators
+from heavytop.integrate.peers.source import Source, command_of, commands_in, named, seconds_of
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.integrator import require as require_integrator
@@ -51,25 +53,36 @@ class Top(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """A whole plan; of the tables in ``measure`` each is that of its kind."""
+    """A whole plan; of the tables in ``measure`` each is that of its kind.
+
+    integrator: tables of programs.  integrators: files beside that of the plan, ``mine.toml`` or ``mine.py:solve``.
+    row_timeout: seconds that a row of a third-party integrator may take.
+    """
 
     name: str
     measure: list[Table]
     top: list[Top] = []
     sweep: list[Sweep] = []
+    integrator: list[dict[str, Any]] = []
+    integrators: list[str] = []
+    row_timeout: str = ""
 
 
-def read(name: str, kinds: Kinds, seed: int = 0, integrator: str = "") -> tuple[Plan, str, Sequence[Task]]:
+def read(name: str, kinds: Kinds, seed: int = 0, integrator: str | Source = "") -> tuple[Plan, str, Sequence[Task]]:
     """The plan of that name or file, the hash of its text, and its measurements with the roundings of a seed.
 
-    integrator: measures whatever heyoka does too.
+    integrator: measures whatever heyoka does too.  Integrators of the plan's own are defined in it or beside its file.
     Raises InputError, which names the file, where :func:`load`, :func:`expand` or :func:`beside` does.
     """
     plan, digest = load(name, kinds)
     try:
+        defined = definitions(plan, Path() if name in BUILT_IN else Path(name).parent)
         if integrator:
+            integrator = defined.get(integrator, integrator) if isinstance(integrator, str) else integrator
             plan = beside(plan, integrator)
-        return plan, digest, expand(plan, seed)
+        if not isinstance(integrator, str):
+            defined = defined | {integrator.name: integrator}
+        return plan, digest, expand(plan, seed, defined)
     except InputError as error:
         if name in BUILT_IN:
             raise
@@ -102,7 +115,29 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
     return plan, hashlib.sha256(text.encode()).hexdigest()
 
 
-def beside(plan: Plan, integrator: str) -> Plan:
+def definitions(plan: Plan, folder: Path) -> dict[str, Source]:
+    """The integrators that a plan in that folder defines, by name; raises InputError for what is none, and for two of
+    one name.
+    """
+    found: list[Source] = [command_of(table, folder, f"The plan {plan.name}") for table in plan.integrator]
+    for text in plan.integrators:
+        if text.endswith(".toml"):
+            found += commands_in(folder / text)
+        elif isinstance(source := named(text, folder), str):
+            raise InputError(f"integrators = {quoted(text)} is no file.", "Give FILE.toml or FILE.py:FUNCTION.")
+        else:
+            found.append(source)
+    defined = {each.name: each for each in found}
+    for name in (name for name in defined if name in known_integrators()):
+        raise InputError(f"The plan {plan.name} defines the integrator {name}, which is there already.", _RENAME)
+    if len(defined) < len(found):
+        raise InputError(f"The plan {plan.name} gives one name to two integrators.", _RENAME)
+    if plan.row_timeout:
+        seconds_of(plan.row_timeout, "row_timeout")
+    return defined
+
+
+def beside(plan: Plan, integrator: str | Source) -> Plan:
     """The plan with the same measurements of another integrator after heyoka's.
 
     Raises InputError for an unknown integrator, for heyoka itself and for a plan that measures no integrator.
@@ -141,11 +176,12 @@ def _require_kinds(table: dict[str, Any], section: str, known: Collection[str]) 
             )
 
 
-def expand(plan: Plan, seed: int = 0) -> Sequence[Task]:
+def expand(plan: Plan, seed: int = 0, defined: Mapping[str, Source] | None = None) -> Sequence[Task]:
     """The plan's measurements in its order, with the roundings of a seed; those over a sweep are made when asked for.
 
-    Raises InputError for an unknown case or precision, an impossible value or seed, data that a format cannot hold, two
-    measurements of the same, and a top or sweep that nothing measures.
+    defined: integrators of the plan's own, by name.
+    Raises InputError for an unknown case, integrator or precision, an impossible value or seed, data that a format
+    cannot hold, two measurements of the same, and a top or sweep that nothing measures.
     """
     if not 0 <= seed <= MOST_SEEDS:
         raise InputError(f"There is no seed {seed}.", f"Give a number from 0 to {MOST_SEEDS}.")
@@ -162,9 +198,15 @@ def expand(plan: Plan, seed: int = 0) -> Sequence[Task]:
         for whole in plan.measure
         for table, cases in _parts(whole, swept)
     ]
+    sources: dict[str, Source | None] = {}
     seen: dict[RowKey, str] = {}
     for templates, _ in parts:
         for place, task in enumerate(templates):
+            subject = task.key.subject
+            if subject.what == "computed" and subject.name not in sources:
+                sources[subject.name] = (defined or {}).get(subject.name)
+                require_integrator(sources[subject.name] or subject.name)
+            task = templates[place] = replace(task, source=sources.get(subject.name))
             work = _exactly(task.key)
             if work in seen:
                 other = "" if seen[work] == task.label else f", also as {seen[work]}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from heavytop.errors import Contradiction, HeavyTopError, PeerFailed
+from heavytop.errors import Contradiction, HeavyTopError, OutOfTime, PeerFailed, Unsupported
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import decimal_text, time_text
@@ -12,6 +12,8 @@ from heavytop.records import (
     CONTRADICTION,
     FAILED,
     OUT_OF_REACH,
+    OUT_OF_TIME,
+    UNSUPPORTED,
     Against,
     Data,
     Metric,
@@ -109,6 +111,14 @@ def computed_row(
     )
 
 
+_OUTCOMES: dict[type[HeavyTopError], str] = {
+    Contradiction: CONTRADICTION,
+    PeerFailed: FAILED,
+    Unsupported: UNSUPPORTED,
+    OutOfTime: OUT_OF_TIME,
+}
+
+
 def unmeasured(task: Task, reason: HeavyTopError) -> Row:
     """The row of a task that came to nothing: an outcome of its own, no metric, and why in the place of a reference."""
     return Row(
@@ -117,7 +127,7 @@ def unmeasured(task: Task, reason: HeavyTopError) -> Row:
         integrator=task.subject,
         precision=task.key.precision,
         bits=task.precision.bits if task.has_precision else 0,
-        outcome={Contradiction: CONTRADICTION, PeerFailed: FAILED}.get(type(reason), OUT_OF_REACH),
+        outcome=_OUTCOMES.get(type(reason), OUT_OF_REACH),
         horizon=task.key.horizon,
         time_reached="0",
         steps=0,
@@ -131,10 +141,10 @@ def unmeasured(task: Task, reason: HeavyTopError) -> Row:
     )
 
 
-def failed(task: Task, cause: str) -> Row:
+def failed(task: Task, cause: str, kind: type[HeavyTopError] = PeerFailed) -> Row:
     """The row of a task whose integrator failed: ``cause``, and in which case at which setting."""
     setting = task.key.subject.setting
-    return unmeasured(task, PeerFailed(" ".join(part for part in (cause, "in", task.title, setting) if part)))
+    return unmeasured(task, kind(" ".join(part for part in (cause, "in", task.title, setting) if part)))
 
 
 def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:

@@ -13,6 +13,10 @@ from heavytop.suite.workers import rows
 Progress = Callable[[Task], None]
 
 
+def unheard(task: Task) -> None:
+    """Progress that nobody follows."""
+
+
 def run(
     tasks: Sequence[Task],
     kinds: Kinds,
@@ -20,14 +24,19 @@ def run(
     progress: Progress,
     workers: int = 1,
     scheduler: str | None = None,
+    begun: Progress = unheard,
+    row_timeout: float | None = None,
 ) -> list[Row]:
     """Every row of the tasks into the checkpoint; returns only the rows drawn from them.
 
-    Rows that the checkpoint holds are not measured again.  ``progress`` hears of each task as it is done.
+    Rows that the checkpoint holds are not measured again.  ``progress`` hears of each task as it is done, ``begun`` as
+    it begins.  row_timeout: seconds of each row of a third-party integrator; None for limits by its other rows.
     """
     for index in checkpoint.offsets:
         progress(tasks[index])
-    for index, row in rows(tasks, kinds, min(workers, len(tasks)), scheduler, checkpoint.offsets, checkpoint.saved):
+    at_once = min(workers, len(tasks))
+    done, saved = checkpoint.offsets, checkpoint.saved
+    for index, row in rows(tasks, kinds, at_once, scheduler, done, saved, begun, row_timeout):
         checkpoint.add(index, row)
         progress(tasks[index])
     concluded: list[Row] = []

@@ -8,6 +8,8 @@ from typing import Any
 
 import msgspec
 
+from heavytop.integrate.peers import is_third_party
+from heavytop.integrate.peers.source import Source
 from heavytop.measure.computed_reference import seconds_a_step as words_seconds
 from heavytop.measure.integrator import HEYOKA, WORDS, Integrator
 from heavytop.measure.rounding_noise import factor, scaled
@@ -29,6 +31,7 @@ class Task:
     options: what else the kind of measurement needs to know, and it alone.
     seed: which roundings; 0 for those of the data as given.
     fault: of :mod:`heavytop.integrate.broken`, which runs in the place of the integrator.
+    source: of an integrator that is neither built in nor a package's.
     """
 
     key: RowKey
@@ -40,6 +43,7 @@ class Task:
     options: Any = None
     seed: int = 0
     fault: str = ""
+    source: Source | None = None
 
     def of(self, case: Case) -> Task:
         """The same measurement of another case of the same system."""
@@ -59,7 +63,12 @@ class Task:
     @property
     def integrator(self) -> Integrator:
         """What computes the motion."""
-        return Integrator(self.key.subject.name, self.fault)
+        return Integrator(self.key.subject.name, self.fault, source=self.source)
+
+    @property
+    def is_third_party(self) -> bool:
+        """Whether code or a program of others computes the motion."""
+        return self.key.subject.what == "computed" and not self.fault and is_third_party(self.key.subject.name)
 
     @property
     def given(self) -> Case:

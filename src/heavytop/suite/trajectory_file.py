@@ -9,10 +9,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from heavytop import written_numbers
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, exact_text, parse, real, shown
-from heavytop.suite import written_numbers
 from heavytop.suite.cases import Case
 from heavytop.suite.files import read_whole, without_repeats
 from heavytop.suite.given import LONGEST_NAME, MOST, Given, named, require_states, rounded_state, too_many

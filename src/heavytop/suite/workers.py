@@ -21,7 +21,8 @@ from operator import itemgetter
 from threading import Lock, Thread
 from typing import Any
 
-from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, PeerFailed
+from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported
+from heavytop.integrate.peers.command import begin_row
 from heavytop.processes import ChildContext
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
@@ -56,26 +57,39 @@ def rows(
     scheduler: str | None,
     done: Container[int] = (),
     saved: Callable[[int], Saved] | None = None,
+    begun: Callable[[Task], None] = lambda task: None,
+    row_timeout: float | None = None,
 ) -> Iterator[tuple[int, Row]]:
     """(index of the task, its row) as they finish, long ones started first; without those in ``done``.
 
     saved: for the index of a task, where its row keeps its place; None where it keeps none, as on a cluster, which may
     have no disk in common with this machine.
 
-    A task whose worker died is run again, three times in all; an integrator of another package that it ran is then a
-    row that failed.
+    begun: called with a task that begins; on a cluster and with several workers, with one that is under way.
+    row_timeout: seconds of each row of a third-party integrator; None for limits by its other rows.
+
+    Where a task has a third-party integrator, all tasks run in processes of their own, also with one worker
+    (:mod:`heavytop.suite.limited`); on a cluster it runs in the cluster's.
+
+    A task whose worker died is run again, three times in all; a third-party integrator that it ran is then a row that
+    failed.
     Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
     InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
     """
     queue = _longest_first(tasks, kinds, done)
     saved = saved or (lambda index: Saved())
     if scheduler is not None:
-        yield from _on_cluster(tasks, kinds, queue, scheduler)
+        yield from _on_cluster(tasks, kinds, queue, scheduler, begun)
+    elif any(tasks[index].is_third_party for index in queue):
+        from heavytop.suite.limited import in_limited_processes
+
+        yield from in_limited_processes(tasks, kinds, queue, workers, saved, begun, row_timeout)
     elif workers > 1:
-        yield from _in_processes(tasks, kinds, queue, workers, saved)
+        yield from _in_processes(tasks, kinds, queue, workers, saved, begun)
     else:
         for index in queue:
-            yield index, _measure(kinds[tasks[index].key.kind], tasks[index], saved(index))
+            begun(tasks[index])
+            yield index, measure(kinds[tasks[index].key.kind], tasks[index], saved(index))
 
 
 def _longest_first(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> deque[int]:
@@ -84,13 +98,18 @@ def _longest_first(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) ->
 
 
 def _in_processes(
-    tasks: Sequence[Task], kinds: Kinds, queue: deque[int], workers: int, saved: Callable[[int], Saved]
+    tasks: Sequence[Task],
+    kinds: Kinds,
+    queue: deque[int],
+    workers: int,
+    saved: Callable[[int], Saved],
+    begun: Callable[[Task], None],
 ) -> Iterator[tuple[int, Row]]:
     deaths: Counter[int] = Counter()
     under_way: UnderWay = {}
 
     def submit(index: int) -> Future[Row]:
-        return pool.submit(_measure, kinds[tasks[index].key.kind], tasks[index], saved(index))
+        return pool.submit(measure, kinds[tasks[index].key.kind], tasks[index], saved(index))
 
     def at_once() -> int:
         # any task that was under way when a worker died may be to blame: fewer and fewer at once tell which
@@ -99,7 +118,7 @@ def _in_processes(
     while queue:
         try:
             with _pool(workers, kinds) as pool:
-                for index, future in _windowed(queue, under_way, submit, at_once):
+                for index, future in _windowed(queue, under_way, submit, at_once, lambda i: begun(tasks[i])):
                     row = future.result()
                     deaths.pop(index, None)
                     yield index, row
@@ -110,18 +129,19 @@ def _in_processes(
             queue.extendleft(reversed(lost))
             worst, times = max(deaths.items(), key=itemgetter(1), default=(0, 0))
             if times > 2:
-                if (ended := _ended_by_peer(tasks[worst], times)) is not None:
-                    queue.remove(worst)
-                    del deaths[worst]
-                    yield worst, ended
-                    continue
-                raise HeavyTopError(
-                    f"A worker process died {times} times during {tasks[worst].label}.",
-                    f"{_RESUME}, perhaps with fewer --workers.",
-                ) from None
+                raise died(tasks[worst], times) from None
 
 
-def _on_cluster(tasks: Sequence[Task], kinds: Kinds, queue: deque[int], scheduler: str) -> Iterator[tuple[int, Row]]:
+def died(task: Task, times: int) -> HeavyTopError:
+    """That a task of this program ended its process each time."""
+    return HeavyTopError(
+        f"A worker process died {times} times during {task.label}.", f"{_RESUME}, perhaps with fewer --workers."
+    )
+
+
+def _on_cluster(
+    tasks: Sequence[Task], kinds: Kinds, queue: deque[int], scheduler: str, begun: Callable[[Task], None]
+) -> Iterator[tuple[int, Row]]:
     with _client(scheduler) as client:
         from distributed import KilledWorker
 
@@ -136,12 +156,12 @@ def _on_cluster(tasks: Sequence[Task], kinds: Kinds, queue: deque[int], schedule
             return _AHEAD * len(client.nthreads())
 
         try:
-            for index, future in _windowed(queue, {}, submit, at_once):
+            for index, future in _windowed(queue, {}, submit, at_once, lambda i: begun(tasks[i])):
                 try:
                     row = future.result()
                 except KilledWorker as error:
-                    if (ended := _ended_by_peer(tasks[index], error.allowed_failures + 1)) is not None:
-                        yield index, ended
+                    if tasks[index].is_third_party:
+                        yield index, ended_its_process(tasks[index], error.allowed_failures + 1)
                         continue
                     raise HeavyTopError(
                         f"{error.allowed_failures + 1} workers died during {tasks[index].label}.", f"{_RESUME}."
@@ -156,14 +176,21 @@ def _on_cluster(tasks: Sequence[Task], kinds: Kinds, queue: deque[int], schedule
 
 
 def _windowed(
-    queue: deque[int], under_way: UnderWay, submit: Submit, at_once: Callable[[], int]
+    queue: deque[int], under_way: UnderWay, submit: Submit, at_once: Callable[[], int], begun: Callable[[int], None]
 ) -> Iterator[tuple[int, Future[Row]]]:
-    """Indices as they finish, with up to ``at_once()`` tasks under way; it is 0 where there are no workers."""
+    """Indices as they finish, with up to ``at_once()`` tasks under way; it is 0 where there are no workers.
+
+    begun: called with the task that is under way for longest, whenever that changes.
+    """
+    first = None
     while queue or under_way:
         limit = at_once()
         for _ in range(min(len(queue), max(limit, 1) - len(under_way))):
             future = submit(queue[0])
             under_way[future] = queue.popleft()
+        longest = next(iter(under_way.values()))
+        if longest != first:
+            begun(first := longest)
         finished = wait(under_way, timeout=_PATIENCE, return_when=FIRST_COMPLETED).done
         if not finished and limit == 0:
             raise HeavyTopError(
@@ -174,32 +201,30 @@ def _windowed(
             del under_way[future]
 
 
-def _measure(kind: Kind, task: Task, saved: Saved) -> Row:
+def measure(kind: Kind, task: Task, saved: Saved) -> Row:
     """The row of ``task``, also where it cannot be known; raises InputError with its name for impossible data."""
     from heavytop.suite.rows import data_of, failed, unmeasured
 
+    begin_row()
     try:
         row = kind.measure(task, saved)
         row.data = data_of(task, row.starts)
         return row
     except PeerFailed as error:
         return failed(task, error.cause)
+    except Unsupported as error:
+        return unmeasured(task, error)
     except (OutOfReach, Contradiction) as error:
         return unmeasured(task, error)
     except InputError as error:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
 
 
-def _ended_by_peer(task: Task, times: int) -> Row | None:
-    """The failed row of a task that ended its process, where an integrator of another package ran in it; else None."""
-    from heavytop.integrate.peers import BUILT_IN
-    from heavytop.integrate.registry import INTEGRATORS
+def ended_its_process(task: Task, times: int) -> Row:
+    """The failed row of a task whose third-party integrator ended its process."""
     from heavytop.suite.rows import failed
 
-    subject = task.key.subject
-    if subject.what != "computed" or subject.name in BUILT_IN or subject.name in INTEGRATORS:
-        return None
-    return failed(task, f"{subject.name} ended its process {times} times")
+    return failed(task, f"{task.key.subject.name} ended its process {times} times")
 
 
 def _measure_as(expected: Versions, kind: Kind, task: Task) -> Row:
@@ -209,10 +234,10 @@ def _measure_as(expected: Versions, kind: Kind, task: Task) -> Row:
     if other:
         raise InputError(f"A worker has {', '.join(other)}.", _SAME)
     with _one_task:
-        return _measure(kind, task, Saved())
+        return measure(kind, task, Saved())
 
 
-def _begin(*_kinds: Kind) -> None:
+def begin_worker(*_kinds: Kind) -> None:
     """In a new process, which leaves interrupts to its parent.
 
     With the kinds all that measures was imported.  None of it is garbage ever: it is not looked at again.
@@ -232,7 +257,7 @@ def _end_with_the_parent() -> None:
 @contextmanager
 def _pool(workers: int, kinds: Kinds) -> Iterator[ProcessPoolExecutor]:
     with ProcessPoolExecutor(
-        workers, mp_context=ChildContext(), initializer=_begin, initargs=tuple(kinds.values())
+        workers, mp_context=ChildContext(), initializer=begin_worker, initargs=tuple(kinds.values())
     ) as pool:
         try:
             yield pool

@@ -24,8 +24,10 @@ from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, PeerFailed
-from heavytop.integrate.peers.contract import Contained, contained, quiet, said
-from heavytop.integrate.trajectory import Trajectory
+from heavytop.integrate.peers.command import Command, CommandIntegrator
+from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
+from heavytop.integrate.peers.source import Source
+from heavytop.integrate.trajectory import Outcome, Trajectory
 from heavytop.processes import ChildContext
 
 GROUP = "heavytop.peers"
@@ -33,6 +35,10 @@ HERE = "heavytop.integrate.peers"
 _REMEDY = "Install the peers with: pip install 'heavytop[peers]'"
 
 Peer = Callable[..., Trajectory]
+STEP_LIMIT = 10**7
+"""Steps that are handed to a third-party integrator as a limit, where it takes one."""
+_PATIENCE = 60
+"""Seconds that a third-party package has to say what it is set by."""
 
 
 class BuiltIn(NamedTuple):
@@ -69,8 +75,21 @@ def known() -> dict[str, EntryPoint]:
     return found
 
 
-def peer(name: str) -> Peer:
-    """The peer of that name, imported; raises InputError for an unknown one and for one that cannot be imported."""
+def name_of(which: str | Source) -> str:
+    """The name in rows of an integrator that is named or defined by its source."""
+    return which if isinstance(which, str) else which.name
+
+
+def is_third_party(name: str) -> bool:
+    """Whether an integrator of that name is not one of this program's."""
+    return name not in BUILT_IN
+
+
+def peer(which: str | Source) -> Peer:
+    """The peer, imported; raises InputError for an unknown one and for one that cannot be imported."""
+    if not isinstance(which, str):
+        return which.load()
+    name = which
     entry = known().get(name)
     if entry is None:
         raise InputError(f"Unknown integrator {name[:60]!r}.", f"Known: {', '.join(known())}.")
@@ -89,60 +108,90 @@ def peer(name: str) -> Peer:
     return loaded  # type: ignore[no-any-return]
 
 
-def require(name: str) -> None:
+def require(which: str | Source) -> None:
     """Raises InputError for an unknown integrator, and for one of this program's that cannot be imported.
 
     One of another package is not imported: how that goes is for the rows to say.
     """
-    if name not in known() or name in BUILT_IN:
-        peer(name)
+    if isinstance(which, str) and (which not in known() or which in BUILT_IN):
+        peer(which)
 
 
-def ready(name: str, setting: tuple[str, Fraction] | None = None) -> Contained:
-    """The peer of that name with ``setting``, ("tolerance", 1e-9) or ("step", 1/50): nothing is looked up in its calls.
+def ready(which: str | Source, setting: tuple[str, Fraction] | None = None) -> Peer:
+    """The peer with ``setting``, ("tolerance", 1e-9) or ("step", 1/50): nothing is looked up in its calls.
 
     Its calls raise PeerFailed for whatever others do wrong (:mod:`heavytop.integrate.peers.contract`).
     Raises InputError for an unknown integrator and for a setting that one of this program's does not have; PeerFailed
     where another package's cannot be used.
     """
-    own = name in BUILT_IN
+    name, own = name_of(which), which in BUILT_IN if isinstance(which, str) else False
+    if isinstance(which, Command):
+        return _program(which, setting)
     try:
-        chosen = peer(name)
+        chosen = peer(which)
     except InputError as error:
-        if own or name not in known():
+        if own or (isinstance(which, str) and which not in known()):
             raise
         raise PeerFailed(error.cause.removesuffix(".")) from None
-    if setting is None:
-        return Contained(name, chosen, own)
-    with contained(name, " when its arguments were looked at"):
-        arguments = inspect.signature(chosen).parameters
-        takes = setting[0] in arguments or any(each.kind is each.VAR_KEYWORD for each in arguments.values())
-    if not takes and own:
-        raise InputError(f"The integrator {name} has no {setting[0]}.", "Fixed steps take a step, others a tolerance.")
-    if not takes:
-        raise PeerFailed(f"{name} has no {setting[0]}")
-    return Contained(name, partial(chosen, **dict([setting])), own)
+    declared = getattr(chosen, "declared", None)
+    declared = declared if isinstance(declared, Declared) else None
+    given: dict[str, Any] = dict([setting] if setting else [])
+    if setting is not None or not own:
+        with contained(name, " when its arguments were looked at"):
+            arguments = inspect.signature(chosen).parameters
+            takes_any = any(each.kind is each.VAR_KEYWORD for each in arguments.values())
+        for knob in given:
+            if knob not in arguments and not takes_any and own:
+                raise InputError(
+                    f"The integrator {name} has no {knob}.", "Fixed steps take a step, others a tolerance."
+                )
+            if knob not in arguments and not takes_any:
+                raise PeerFailed(f"{name} has no {knob}")
+        if "step_limit" in arguments and not own:
+            given["step_limit"] = STEP_LIMIT
+    return Contained(name, partial(chosen, **given) if given else chosen, own, declared)
 
 
-def knob(name: str) -> str:
+def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:
+    """The program with that setting; one that says that it failed raises PeerFailed with what it said."""
+    if setting is not None and setting[0] != command.knob:
+        raise PeerFailed(f"{command.name} has no {setting[0]}")
+    integrate: Peer = CommandIntegrator(command)
+
+    def call(*arguments: Any, **options: Any) -> Trajectory:
+        run = integrate(*arguments, **options, **dict([setting] if setting else []))
+        if run.outcome is Outcome.FAILED:
+            raise PeerFailed(f"{command.name} failed: {run.flags['failure']}")
+        return run
+
+    return call
+
+
+def knob(which: str | Source) -> str:
     """What a peer is set by: "step", "tolerance", or "" for neither, as for one that cannot be used."""
+    if isinstance(which, Command):
+        return which.knob
     for each in ("step", "tolerance"):
         try:
-            ready(name, (each, Fraction(1, 100)))
+            ready(which, (each, Fraction(1, 100)))
         except (InputError, PeerFailed):
             continue
         return each
     return ""
 
 
-def knob_apart(name: str) -> str:
-    """:func:`knob`; one of another package is looked at in a process of its own, which it may end."""
-    if name in BUILT_IN:
-        return knob(name)
+def knob_apart(which: str | Source) -> str:
+    """:func:`knob`; a third-party one is looked at in a process of its own, which it may end, or never leave."""
+    if isinstance(which, Command) or (isinstance(which, str) and which in BUILT_IN):
+        return knob(which)
     with ProcessPoolExecutor(1, mp_context=ChildContext()) as pool:
         try:
-            return pool.submit(knob, name).result()
+            return pool.submit(knob, which).result(timeout=_PATIENCE)
         except BrokenProcessPool:
+            return ""
+        except TimeoutError:
+            for process in list((pool._processes or {}).values()):
+                process.kill()
             return ""
 
 

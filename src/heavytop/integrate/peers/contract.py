@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from copy import deepcopy
+from dataclasses import dataclass
 from fractions import Fraction
 from math import isfinite
 from numbers import Real
@@ -22,7 +23,7 @@ from typing import Any
 
 import numpy
 
-from heavytop.errors import HeavyTopError, PeerFailed
+from heavytop.errors import HeavyTopError, PeerFailed, Unsupported
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, exact, number
 from heavytop.top.equations import HEAVY_TOP, System
@@ -127,6 +128,33 @@ def said(what: object) -> str:
     return line if len(line) <= _MOST_SAID else f"{line[: _MOST_SAID - 1]}…"
 
 
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """What an integrator declares that it can do; None where it declares nothing.
+
+    systems: names such as "heavy_top".  directions: "forward", "backward".  precisions: names of formats, "real:BITS"
+    for any number of bits.
+    """
+
+    systems: tuple[str, ...] | None = None
+    directions: tuple[str, ...] | None = None
+    precisions: tuple[str, ...] | None = None
+
+    def require(self, name: str, system: System, end: Fraction, precision: Precision) -> None:
+        """Raises Unsupported for a motion of ``system`` to the time ``end`` that is not among what is declared."""
+        direction = "backward" if end < 0 else "forward"
+        generic = f"{precision.family}:BITS"
+        asked = (
+            ("the system", system.name, self.systems, (system.name,)),
+            ("the direction", direction, self.directions, (direction,)),
+            ("the format", precision.name, self.precisions, (precision.name, generic)),
+        )
+        for what, value, declared, forms in asked:
+            if declared is not None and not set(forms) & set(declared):
+                can = ", ".join(declared) or "none"
+                raise Unsupported(f"{name} declares that it cannot do {what} {value}.", f"It can do: {can}.")
+
+
 Run = Callable[[Problem, Sequence[Fraction], Fraction | None], Trajectory]
 """A problem in its format, times, and a tolerance or None for the peer's own."""
 
@@ -152,11 +180,11 @@ class Contained:
     """A peer that keeps the contract: the call of :mod:`heavytop.integrate.peers`, or PeerFailed.
 
     own: whether it is one of this program's: these say in words what they cannot be asked, and end as ``non_finite``
-    where a state is not finite, which is a finding about them and no failure.
+    where a state is not finite, which is a finding about them and no failure.  declared: what it says that it can do.
     """
 
-    def __init__(self, name: str, call: Any, own: bool) -> None:
-        self.name, self.call, self.own = name, call, own
+    def __init__(self, name: str, call: Any, own: bool, declared: Declared | None = None) -> None:
+        self.name, self.call, self.own, self.declared = name, call, own, declared
 
     def __call__(
         self,
@@ -168,9 +196,14 @@ class Contained:
         system: System = HEAVY_TOP,
         **setting: Any,
     ) -> Trajectory:
-        """The run; raises PeerFailed for one that breaks the contract, and what an own peer raises for bad input."""
+        """The run; raises PeerFailed for one that breaks the contract, and what an own peer raises for bad input.
+
+        Raises Unsupported, and calls nothing, for what the peer declares that it cannot do.
+        """
         problem = Problem.of(top, start, precision, system)
         asked = [exact(number(time, precision)) for time in times]
+        if self.declared is not None:
+            self.declared.require(self.name, system, asked[-1], precision)
         # copies, so that what a peer does to its arguments is its own affair
         given = deepcopy((top, start, tuple(times), precision))
         with contained(self.name, own=self.own):

@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 
 import numpy
 
-from heavytop.errors import InputError, PeerFailed
-from heavytop.integrate.peers.contract import with_tolerance
+from heavytop.errors import InputError, PeerFailed, quoted
+from heavytop.integrate.peers.contract import Declared, with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
 from heavytop.top import heavy_top
@@ -30,7 +30,8 @@ class Given:
     """A problem in double.
 
     start: shape (6,).  times: shape (n,), strictly monotone away from 0.  numbers: shape (7,), the parameters I, n, λ.
-    setting: the tolerance, or the step of a method with fixed steps.
+    setting: the tolerance, or the step of a method with fixed steps.  step_limit: steps after which an adaptive method
+    should give up, with the states so far and ``Outcome.STEP_LIMIT``.
     """
 
     system: System
@@ -38,6 +39,7 @@ class Given:
     times: Any
     numbers: Any
     setting: float
+    step_limit: int = 10**7
 
     @property
     def parameters(self) -> Parameters:
@@ -66,11 +68,35 @@ class Solved:
 Solve = Callable[[Given], Solved]
 
 
-def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") -> Callable[..., Trajectory]:
-    """``solve`` as a peer.  knob: tolerance, or step for a method with fixed steps.
+def double_peer(
+    name: str,
+    order: int,
+    solve: Solve,
+    knob: str = "tolerance",
+    *,
+    systems: Sequence[str] | None = None,
+    directions: Sequence[str] | None = None,
+    precisions: Sequence[str] | None = None,
+) -> Callable[..., Trajectory]:
+    """``solve`` as a peer, a callable that ``integrator`` takes wherever it takes a name.
 
-    The peer raises InputError for a format other than double, for times out of order and for a setting out of range.
+    Arguments:
+        name: in rows and messages.
+        order: of the method; 0 where it has none to declare.
+        solve: takes a :class:`Given` and returns a :class:`Solved`.
+        knob: "tolerance", or "step" for a method with fixed steps.
+        systems, directions, precisions: what it declares that it can do, such as ["heavy_top"], ["forward"],
+            ["double"]: the rows of a plan that ask for anything else are ``unsupported``, and no failures.  None
+            declares nothing: a row that it cannot do is then ``failed``.
+
+    Returns:
+        The peer, called as ``peer(top, start, times, precision, *, system, tolerance)`` (or ``step``).  It raises
+        InputError for a format other than double, for times out of order and for a setting out of range.
+
+    Raises:
+        InputError: for declarations that are not lists of text.
     """
+    declared = Declared(*(_declared(each) for each in (systems, directions, precisions)))
 
     def integrate(problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Trajectory:
         given = _given(name, knob, problem, times, setting)
@@ -94,7 +120,15 @@ def double_peer(name: str, order: int, solve: Solve, knob: str = "tolerance") ->
     def by_tolerance(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | None) -> Trajectory:
         return integrate(problem, times, FINEST if tolerance is None else tolerance)
 
-    return with_step if knob == "step" else with_tolerance(by_tolerance)
+    peer: Any = with_step if knob == "step" else with_tolerance(by_tolerance)
+    peer.integrator_name, peer.declared = name, declared
+    return peer  # type: ignore[no-any-return]
+
+
+def _declared(names: Sequence[str] | None) -> tuple[str, ...] | None:
+    if names is not None and (isinstance(names, str) or not all(isinstance(each, str) for each in names)):
+        raise InputError(f"{quoted(names)} declares nothing.", 'Give a list of names such as ["heavy_top"], or None.')
+    return None if names is None else tuple(names)
 
 
 def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], setting: Fraction) -> Given:

@@ -1,0 +1,540 @@
+"""Integrators that are programs: text over standard input and output, a line a thing, one process for many requests.
+
+The protocol is in docs/commands.md.  A :class:`Command` is what a TOML table says of the program, a :class:`Session`
+its running process, and a :class:`CommandIntegrator` the call of :mod:`heavytop.integrate.peers`.  Whatever the program
+does comes out as a Trajectory that keeps the contract or as PeerFailed, and its process group ends with this process.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import re
+import select
+import shutil
+import signal
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from fractions import Fraction
+from itertools import pairwise
+from math import ceil, inf, isfinite
+from pathlib import Path
+from threading import Lock
+from time import monotonic, perf_counter
+from typing import Any, Literal
+
+import msgspec
+import numpy
+
+from heavytop.errors import InputError, PeerFailed, Unsupported
+from heavytop.integrate.peers.contract import Declared, said
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
+from heavytop.processes import Guard
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.times import check_times
+from heavytop.written_numbers import number as written_number
+
+HELLO = "heavytop-integrator 1"
+DEFAULT_STEP = Fraction(1, 100)
+NOT_COUNTED = {"steps": "not counted"}
+"""The flag of a run whose program did not say how many steps it took."""
+_MOST_LINE = 1 << 20
+_MOST_ERRORS = 2000
+_CHUNK = 1 << 16
+_LOOK = 0.1
+"""Seconds between two looks whether a silent program is still there."""
+_FAREWELL = 0.3
+"""Seconds that a program has to end after `quit`."""
+_MOST_OVERHEAD = 1e-3
+"""Seconds of a request without times that are taken off at most: what a program does there is its own affair."""
+_LEAST_SHARE = 0.1
+"""Of the seconds of a request, which remain at least: less than its noise is not measured."""
+_DECIMAL = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_STATE_OF_DOUBLES = {width: re.compile(rb"state(?:[ \t]+" + _DECIMAL + rb"){%d}" % (1 + width)) for width in (6, 9)}
+_PAIRS = {"steps": int, "evaluations": int, "seconds": float}
+
+
+class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A program that integrates, as the table `[[integrator]]` describes it.
+
+    name: in rows.  command: the program and its arguments, relative to ``folder``.  setting: what it is set by.
+    precisions, systems, directions, attitude: what it declares that it can do.  timeout: seconds of one request.
+    hex: whether it is given hexadecimal numbers.  folder: of the file; its working directory.
+    """
+
+    name: str
+    command: tuple[str, ...]
+    setting: Literal["step", "tolerance", "none"] = "tolerance"
+    order: int = 0
+    precisions: tuple[str, ...] = (DOUBLE.name,)
+    language: str = ""
+    timeout: str | int | float = "600"
+    systems: tuple[str, ...] = (HEAVY_TOP.name,)
+    directions: tuple[Literal["forward", "backward"], ...] = ("forward", "backward")
+    attitude: bool = False
+    hex: bool = False
+    folder: str = ""
+
+    @property
+    def knob(self) -> str:
+        """What it is set by: "step", "tolerance", or "" for neither."""
+        return "" if self.setting == "none" else self.setting
+
+    @property
+    def seconds(self) -> float:
+        """Of one request, at most."""
+        return float(exact(str(self.timeout)))
+
+    @property
+    def declared(self) -> Declared:
+        """What it can do."""
+        return Declared(self.systems, self.directions, self.precisions)
+
+    def load(self) -> CommandIntegrator:
+        """What integrates with it; nothing is started yet."""
+        return CommandIntegrator(self)
+
+    def argv(self) -> list[str]:
+        """The program as an absolute path and its arguments; raises PeerFailed where there is none to run."""
+        program, *rest = self.command
+        place = str(Path(self.folder, program)) if "/" in program else shutil.which(program) or ""
+        if not os.path.isfile(place):
+            raise PeerFailed(f"{self.name}: there is no program {said(program)}")
+        if not os.access(place, os.X_OK):
+            raise PeerFailed(f"{self.name}: {said(program)} is not executable")
+        return [os.path.abspath(place), *rest]
+
+
+class CommandIntegrator:
+    """The call of :mod:`heavytop.integrate.peers` for a program; every failure of the program is PeerFailed."""
+
+    def __init__(self, command: Command) -> None:
+        self.command = command
+
+    def __call__(
+        self,
+        top: HeavyTop,
+        start: State,
+        times: Sequence[Fraction],
+        precision: Precision = DOUBLE,
+        *,
+        system: System = HEAVY_TOP,
+        xi: tuple[Fraction, ...] | None = None,
+        **setting: Fraction,
+    ) -> Trajectory:
+        """The run; its seconds are those of the request here, less those of one without times.
+
+        Raises Unsupported for what the program declares that it cannot do, InputError for a setting that it does not
+        have, PeerFailed for whatever else goes wrong.  A program that says ``failed`` is a Trajectory to there whose
+        outcome is ``failed``.
+        """
+        command = self.command
+        instants = check_times(times)
+        command.declared.require(command.name, system, instants[-1], precision)
+        if xi is not None and not command.attitude:
+            raise Unsupported(f"{command.name} declares that it does not carry the attitude.", "Ask for no attitude.")
+        value = self._setting(setting, precision)
+        problem = Problem.of(top, start, precision, system, xi)
+        grid = [exact(number(time, precision)) for time in instants]
+        request = Request(problem, grid, value, command.hex)
+        with session(command) as program:
+            overhead = program.empty_request(problem)
+            reply = program.ask(request)
+        return self._trajectory(request, reply, max(reply.wall - overhead, _LEAST_SHARE * reply.wall))
+
+    def _setting(self, given: dict[str, Fraction], precision: Precision) -> Fraction | None:
+        knob = self.command.knob
+        for name in given:
+            if name != knob:
+                raise InputError(f"The integrator {self.command.name} has no {name}.", f"It is set by: {knob or '-'}.")
+        if not knob:
+            return None
+        value = given.get(knob)
+        if value is None:
+            return DEFAULT_STEP if knob == "step" else precision.eps
+        if value <= 0 or (knob == "tolerance" and value > 1):
+            limits = "above 0" if knob == "step" else "above 0, up to 1"
+            raise InputError(f"{self.command.name} cannot use the {knob} {decimal_text(value, 6)}.", f"Give {limits}.")
+        return exact(number(value, precision))
+
+    def _trajectory(self, request: Request, reply: Reply, seconds: float) -> Trajectory:
+        command, problem, done = self.command, request.problem, len(reply.states)
+        flags = {command.knob: number_text(request.setting, problem.precision)} if request.setting else {}
+        steps = reply.counts.get("steps")
+        if steps is None and command.knob == "step" and not reply.failure:
+            assert request.setting is not None
+            steps = sum(ceil(abs(b - a) / request.setting) for a, b in pairwise([Fraction(0), *request.times]))
+        if steps is None:
+            flags |= NOT_COUNTED
+        if reply.failure:
+            flags["failure"] = reply.failure
+        spent = {"compile": 0.0, "run": seconds}
+        own = reply.counts.get("seconds")
+        return Trajectory(
+            problem,
+            command.name,
+            tuple(request.times[:done]),
+            tuple(reply.states),
+            Outcome.FAILED if reply.failure else Outcome.SUCCESS,
+            request.times[done - 1] if done else Fraction(0),
+            int(steps or 0),
+            command.order,
+            spent if own is None else spent | {"program": own},
+            flags,
+            reply.counts.get("evaluations"),
+        )
+
+
+def number_text(value: Fraction, precision: Precision, hexadecimal: bool = False) -> str:
+    """A number of the format as text that is exactly that number once it is read in the format."""
+    if hexadecimal:
+        return f"{'-' if value < 0 else ''}0x{abs(value.numerator):x}p{1 - value.denominator.bit_length()}"
+    return f"{float(value):.17g}" if precision == DOUBLE else decimal_text(value, precision.digits)
+
+
+class Request:
+    """A problem with its times, as a program is asked for it.
+
+    times: exact numbers of the format; none for a request that does nothing.  setting: of the format, or None.
+    """
+
+    def __init__(
+        self, problem: Problem, times: Sequence[Fraction], setting: Fraction | None, hexadecimal: bool
+    ) -> None:
+        self.problem, self.times, self.setting, self.hex = problem, list(times), setting, hexadecimal
+        self.width = 6 if problem.xi is None else 9
+
+    def text(self, label: int) -> bytes:
+        """Its lines."""
+        p, precision = self.problem.parameters, self.problem.precision
+        rotor = (0, Fraction(p.rotor), 0) if self.problem.system is GYROSTAT else (0, 0, 0)
+        lines = {
+            "run": [str(label)],
+            "system": [self.problem.system.name],
+            "inertia": self._numbers(p.inertia),
+            "moment": self._numbers(p.moment),
+            "rotor": self._numbers(rotor),
+            "state": self._numbers([*self.problem.start.flat, *(self.problem.xi or ())]),
+            "precision": [precision.name],
+            "setting": self._numbers([] if self.setting is None else [self.setting]),
+            "times": [str(len(self.times)), *self._numbers(self.times)],
+        }
+        return "".join(f"{name} {' '.join(words)}\n" for name, words in lines.items() if words).encode() + b"go\n"
+
+    def _numbers(self, values: Sequence[Any]) -> list[str]:
+        return [number_text(Fraction(value), self.problem.precision, self.hex) for value in values]
+
+
+class Reply:
+    """What a program answered: states of the format, counts, and what it says went wrong; wall: seconds here."""
+
+    def __init__(self, name: str, request: Request) -> None:
+        self.name, self.request = name, request
+        self.precision = request.problem.precision
+        self.states: list[Any] = []
+        self.counts: dict[str, Any] = {}
+        self.failure = ""
+        self.wall = 0.0
+        self._due = [float(time) for time in request.times] if self.precision == DOUBLE else []
+        self._pattern = _STATE_OF_DOUBLES[request.width]
+
+    def take(self, line: bytes) -> bool:
+        """Takes a line, and says whether it was the last; raises PeerFailed for one that breaks the protocol."""
+        if self._due and self._pattern.fullmatch(line):
+            time, *values = map(float, line.split()[1:])
+            if len(self.states) < len(self._due) and time == self._due[len(self.states)] and isfinite(sum(values)):
+                self.states.append(numpy.array(values))
+                return False
+        words = self._words(line)
+        if words[0] == "state":
+            self._take_state(words[1:])
+            return False
+        if words[0] == "failed":
+            self.failure = said(" ".join(words[1:])) or "without a reason"
+            return True
+        if words[0] != "done":
+            raise PeerFailed(f"{self.name} wrote {said(repr(' '.join(words)))}, which is no line of the protocol")
+        self._take_counts(words[1:])
+        missing = len(self.request.times) - len(self.states)
+        if missing:
+            raise PeerFailed(f"{self.name} said done after {len(self.states)} of {len(self.request.times)} states")
+        return True
+
+    def _words(self, line: bytes) -> list[str]:
+        try:
+            return line.decode("utf-8").split() or [""]
+        except UnicodeDecodeError:
+            raise PeerFailed(f"{self.name} wrote {said(line[:40])}, which is not UTF-8") from None
+
+    def _take_state(self, words: list[str]) -> None:
+        place, width = len(self.states), self.request.width
+        if place >= len(self.request.times):
+            raise PeerFailed(f"{self.name} wrote more states than the {place} times that it was asked for")
+        if len(words) != 1 + width:
+            raise PeerFailed(f"{self.name} wrote a state of {len(words) - 1} numbers after its time instead of {width}")
+        time, *values = (self._number(word) for word in words)
+        due = self.request.times[place]
+        if time is None or exact(time) != due:
+            shown = decimal_text(due, 17)
+            raise PeerFailed(f"{self.name} wrote the state at {said(words[0])} where that at {shown} was due")
+        if any(value is None or not numpy.isfinite(value) for value in values):
+            raise PeerFailed(f"{self.name} wrote a state that is not finite at t = {said(words[0])}")
+        self.states.append(numpy.array(values))
+
+    def _number(self, word: str) -> Any:
+        """A number of the format; None for NaN and infinities."""
+        try:
+            value = written_number(word, "a number")
+            return None if value is None else number(value, self.precision)
+        except InputError as error:
+            comma = ": write a decimal point, not a comma" if "," in word else ""
+            if not comma and "outside the exponent range" in error.cause:
+                comma = f": outside the range of {self.precision.name}"
+            raise PeerFailed(f"{self.name} wrote {said(repr(word))}, which is no number{comma}") from None
+
+    def _take_counts(self, words: list[str]) -> None:
+        if len(words) % 2:
+            raise PeerFailed(f"{self.name} wrote done {said(' '.join(words))}, not names and numbers by turns")
+        for name, word in zip(words[::2], words[1::2], strict=True):
+            if name not in _PAIRS:
+                continue
+            try:
+                value = _PAIRS[name](word) if word.isascii() and "_" not in word else -1
+            except ValueError:
+                value = -1
+            if not 0 <= value < inf:
+                raise PeerFailed(f"{self.name} counts {said(word)} {name}")
+            self.counts[name] = value
+
+
+class Session:
+    """A running program, which serves one request after the other.
+
+    Whoever gets an exception from it ends it with :meth:`close`.  greeting: what it said after ``ready``.
+    """
+
+    def __init__(self, command: Command) -> None:
+        self.command, self.name = command, command.name
+        self.requests = 0
+        self._overhead, self._began_row = _MOST_OVERHEAD, False
+        self._unread, self._errors = b"", b""
+        argv = command.argv()
+        self._guard = Guard()
+        try:
+            self.process = subprocess.Popen(
+                argv,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                cwd=command.folder or None,
+                bufsize=0,
+                process_group=self._guard.group,
+            )
+        except OSError as error:
+            self._guard.end()
+            raise PeerFailed(f"{self.name} cannot be started: {said(error)}") from None
+        self._pipes = [each for each in (self.process.stdin, self.process.stdout, self.process.stderr) if each]
+        self._in, self._out, self._err = (each.fileno() for each in self._pipes)
+        for descriptor in (self._in, self._out, self._err):
+            os.set_blocking(descriptor, False)
+        self._poll = select.poll()
+        self._poll.register(self._out, select.POLLIN)
+        self._poll.register(self._err, select.POLLIN)
+        self.greeting = ""
+        try:
+            self._exchange(f"{HELLO}\n".encode(), self._greeted, "ready")
+        except BaseException:
+            self.close()
+            raise
+
+    def _greeted(self, line: bytes) -> bool:
+        text = line.decode("utf-8", "replace")
+        if text.split()[:1] != ["ready"]:
+            raise PeerFailed(f"{self.name} began with {said(repr(text))} instead of ready NAME VERSION")
+        self.greeting = said(text.partition("ready")[2])
+        return True
+
+    def empty_request(self, problem: Problem) -> float:
+        """Seconds of a request without times, which begins each row; the least of this process, and at most 1 ms."""
+        if not self._began_row:
+            for _ in range(1 if self.requests else 2):  # the first of a process is slow
+                wall = self.ask(Request(problem, [], None, self.command.hex)).wall
+                self._overhead = min(self._overhead, wall)
+            self._began_row = True
+        return self._overhead
+
+    def end_row(self) -> None:
+        """The next request begins a row."""
+        self._began_row = False
+
+    @property
+    def lost_between_rows(self) -> bool:
+        """Whether the program ended by itself after the last request of a row."""
+        return not self._began_row and self.process.poll() is not None
+
+    def ask(self, request: Request) -> Reply:
+        """The answer to a request; raises PeerFailed for one that breaks the protocol, and after the timeout."""
+        self.requests += 1
+        reply = Reply(self.name, request)
+        text = request.text(self.requests)
+        began = perf_counter()
+        self._exchange(text, reply.take, "done")
+        reply.wall = perf_counter() - began
+        return reply
+
+    def _exchange(self, text: bytes, take: Callable[[bytes], bool], awaited: str) -> None:
+        """Writes ``text`` and hands over line after line until ``take`` has its last; nothing may be left then."""
+        deadline = monotonic() + self.command.seconds
+        waiting = memoryview(text)
+        self._poll.register(self._in, select.POLLOUT)
+        while True:
+            if waiting:
+                waiting = self._write(waiting)
+            if self._lines(take):
+                return
+            left = deadline - monotonic()
+            if left <= 0:
+                raise self._failed(f"did not say {awaited} within {self.command.seconds:g} s")
+            events = self._poll.poll(1000 * min(left, _LOOK))
+            if not events and self.process.poll() is not None and not self._drained():
+                raise self._failed(f"{self._end()} before it said {awaited}")
+            self._receive([descriptor for descriptor, _ in events], awaited)
+
+    def _write(self, waiting: memoryview) -> memoryview:
+        with suppress(BlockingIOError):
+            try:
+                waiting = waiting[os.write(self._in, waiting) :]
+            except BrokenPipeError:  # it reads no more; what it wrote before is still read
+                waiting = memoryview(b"")
+        if not waiting:
+            self._poll.unregister(self._in)
+        return waiting
+
+    def _lines(self, take: Callable[[bytes], bool]) -> bool:
+        """Hands over the whole lines that are there."""
+        if b"\n" not in self._unread:
+            if len(self._unread) > _MOST_LINE:
+                raise self._failed(f"wrote a line of more than {_MOST_LINE} characters")
+            return False
+        *lines, self._unread = self._unread.split(b"\n")
+        for place, line in enumerate(lines, 1):
+            try:
+                last = take(line)
+            except PeerFailed as error:
+                raise self._failed(error.cause.removeprefix(f"{self.name} ")) from None
+            if last:
+                if place < len(lines) or self._unread:
+                    raise self._failed(f"wrote more after {said(repr(line.decode('utf-8', 'replace')))}")
+                return True
+        return False
+
+    def _receive(self, readable: list[int], awaited: str) -> None:
+        if self._err in readable:
+            self._read_errors()
+        if self._out in readable:
+            found = self._read(self._out)
+            if found == b"":
+                raise self._failed(f"{self._end()} before it said {awaited}")
+            self._unread += found or b""
+
+    def _drained(self) -> bool:
+        """Whether a program that has ended left something to read."""
+        found = self._read(self._out)
+        self._unread += found or b""
+        return bool(found)
+
+    def _read(self, descriptor: int) -> bytes | None:
+        """What is there; empty at the end, None where nothing is there yet."""
+        try:
+            return os.read(descriptor, _CHUNK)
+        except BlockingIOError:
+            return None
+
+    def _read_errors(self) -> None:
+        found = self._read(self._err)
+        if found == b"":
+            with suppress(KeyError):
+                self._poll.unregister(self._err)
+        self._errors = (self._errors + (found or b""))[-_MOST_ERRORS:]
+
+    def _end(self) -> str:
+        with suppress(subprocess.TimeoutExpired):
+            code = self.process.wait(_FAREWELL)
+            return f"ended with exit code {code}" if code >= 0 else f"was ended by {signal.Signals(-code).name}"
+        return "closed its output"
+
+    def _failed(self, what: str) -> PeerFailed:
+        """The failure, with the last that the program wrote on standard error."""
+        for _ in range(4):
+            self._read_errors()
+        lines = [said(line) for line in self._errors.decode("utf-8", "replace").splitlines() if line.strip()]
+        told = f"; its standard error ends with: {said(' | '.join(lines[-3:])[-180:])}" if lines else ""
+        return PeerFailed(f"{self.name} {what}{told}")
+
+    def close(self, farewell: float = 0.0) -> None:
+        """Ends the program: `quit`, so many seconds, then its whole process group is killed."""
+        with suppress(OSError):
+            os.write(self._in, b"quit\n")
+        for pipe in self._pipes:
+            with suppress(OSError):
+                pipe.close()
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(farewell)
+        self._guard.end()
+        self.process.wait()
+
+
+_idle: dict[Command, list[Session]] = {}
+_lock = Lock()
+
+
+@contextmanager
+def session(command: Command) -> Iterator[Session]:
+    """A running program of its own for the caller's thread, ended where anything goes wrong, else kept for the next."""
+    with _lock:
+        found = _idle.get(command, [])
+        program = found.pop() if found else None
+    if program is not None and program.lost_between_rows:
+        program.close()
+        program = None
+    program = program or Session(command)
+    try:
+        yield program
+    except BaseException:
+        program.close()
+        raise
+    with _lock:
+        _idle.setdefault(command, []).append(program)
+
+
+def begin_row() -> None:
+    """The next request to each program is preceded by one without times, whose seconds are the cost of asking."""
+    with _lock:
+        for programs in _idle.values():
+            for program in programs:
+                program.end_row()
+
+
+def close_all() -> None:
+    """Ends every program that is not in use."""
+    with _lock:
+        programs = [program for found in _idle.values() for program in found]
+        _idle.clear()
+    for program in programs:
+        program.close(_FAREWELL)
+
+
+atexit.register(close_all)
+
+
+def greeting(command: Command) -> str:
+    """Name and version as the program says them, or why it cannot be started."""
+    try:
+        program = Session(command)
+    except PeerFailed as error:
+        return f"not started: {error.cause}"
+    program.close(_FAREWELL)
+    return program.greeting

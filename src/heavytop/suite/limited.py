@@ -1,0 +1,217 @@
+"""Tasks in processes of their own, each under a time limit where a third-party integrator runs in it.
+
+Every worker is one process with one task, so that a task that does not end is ended with its process, also where it is
+stuck in native code, and nothing but that task is lost.  The process leads a process group, which ends as a whole: what
+an integrator started does not outlive it.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from dataclasses import dataclass, field
+from time import monotonic
+from typing import Any
+
+from heavytop.errors import OutOfTime
+from heavytop.processes import ChildContext, Guard
+from heavytop.records import Row
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.kind import Kind, Kinds
+from heavytop.suite.rows import failed
+from heavytop.suite.task import Task
+from heavytop.suite.workers import begin_worker, died, ended_its_process, measure
+
+_BASE = 30.0
+"""Seconds that every row may take."""
+_TIMES = 10.0
+"""How many times as long as expected a row may take beside that."""
+_LEAST = 10.0
+"""Seconds of a row of an integrator that keeps running out of time."""
+_MOST_DEATHS = 3
+
+
+@dataclass(slots=True)
+class _Record:
+    """What the rows of one integrator took: seconds over the expected cost, at most, and how many just ran out."""
+
+    ratio: float = 1.0
+    lost: int = 0
+
+
+@dataclass(slots=True)
+class RowLimits:
+    """Seconds that a row of a third-party integrator may take.
+
+    30 s and ten times its expected cost: that of heyoka for the same row, times the largest ratio of seconds to cost
+    among the integrator's finished rows, and at least that.  Each row in succession that ran out of time divides the
+    next limit, by 2, 3, ..., down to 10 s.  fixed: the limit of every row in the place of all that.
+    """
+
+    fixed: float | None = None
+    _records: dict[str, _Record] = field(default_factory=dict)
+
+    def seconds(self, task: Task, cost: float) -> float:
+        """The limit of a row that begins now."""
+        if self.fixed is not None:
+            return self.fixed
+        record = self._of(task)
+        return max((_BASE + _TIMES * cost * record.ratio) / (1 + record.lost), _LEAST)
+
+    def finished(self, task: Task, cost: float, seconds: float) -> None:
+        """A row ended by itself."""
+        record = self._of(task)
+        record.lost, record.ratio = 0, max(record.ratio, seconds / cost)
+
+    def ran_out(self, task: Task) -> None:
+        """A row was stopped at its limit."""
+        self._of(task).lost += 1
+
+    def _of(self, task: Task) -> _Record:
+        return self._records.setdefault(task.key.subject.name, _Record())
+
+
+class _Worker:
+    """A process for one task at a time, started when it is first used."""
+
+    def __init__(self, kinds: Kinds) -> None:
+        self._kinds = kinds
+        self._pool: ProcessPoolExecutor | None = None
+        self._guard: Guard | None = None
+        self._hello: Future[int] | None = None
+        self.index = -1
+        self.row: Future[Row] | None = None
+        self.began = 0.0
+        self.limit: float | None = None
+
+    @property
+    def left(self) -> float | None:
+        """Seconds until its task is to be ended; None for no limit, or where the process is not yet there."""
+        if self.limit is None or self._guard is None:
+            return None
+        return self.began + self.limit - monotonic()
+
+    def submit(self, index: int, limit: float | None, *arguments: Any) -> None:
+        """Begins a task: its time runs from when the process is there."""
+        self.index, self.limit, self.began = index, limit, monotonic()
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(
+                1, mp_context=ChildContext(), initializer=_lead_group, initargs=tuple(self._kinds.values())
+            )
+            self._hello = self._pool.submit(os.getpid)
+        try:
+            self.row = self._pool.submit(measure, *arguments)
+        except BrokenProcessPool:  # it died between two tasks
+            self.end()
+            self.submit(index, limit, *arguments)
+
+    def awaited(self) -> list[Future[Any]]:
+        """What is to be waited for: the process, then its row."""
+        return [each for each in (self._hello, self.row) if each is not None]
+
+    def greet(self) -> None:
+        """Puts a guard into the group of a process that has just begun, and starts its clock."""
+        if self._hello is not None and self._hello.done():
+            with suppress(BrokenProcessPool, OSError):  # a process that is gone is noticed with its row
+                self._guard = Guard(self._hello.result())
+            self._hello, self.began = None, monotonic()
+
+    def end(self) -> None:
+        """Kills the process and whatever it started."""
+        if self._pool is not None:
+            for process in list((self._pool._processes or {}).values()):
+                if process.pid is not None:
+                    with suppress(ProcessLookupError, PermissionError):
+                        os.killpg(process.pid, signal.SIGKILL)
+                process.kill()
+        if self._guard is not None:
+            self._guard.end()
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+        self._pool = self._guard = self._hello = self.row = None
+
+
+def _lead_group(*kinds: Kind) -> None:
+    """In a new process: it leads a process group of its own."""
+    os.setpgid(0, 0)
+    begin_worker(*kinds)
+
+
+def in_limited_processes(
+    tasks: Sequence[Task],
+    kinds: Kinds,
+    queue: deque[int],
+    workers: int,
+    saved: Callable[[int], Saved],
+    begun: Callable[[Task], None],
+    row_timeout: float | None,
+) -> Iterator[tuple[int, Row]]:
+    """(index of the task, its row) as they finish.
+
+    Rows of third-party integrators come first, the quick ones before the long ones, whose limits rest on them.  A task
+    whose process died is run again, three times in all; then it is a row that failed, or where the integrator is this
+    program's, a HeavyTopError.
+    """
+    costs = {index: kinds[tasks[index].key.kind].cost(tasks[index]) for index in queue}
+    waiting = deque(sorted(queue, key=lambda i: (0, costs[i]) if tasks[i].is_third_party else (1, -costs[i])))
+    limits, deaths = RowLimits(row_timeout), Counter[int]()
+    pool = [_Worker(kinds) for _ in range(max(workers, 1))]
+    try:
+        while waiting or any(worker.row for worker in pool):
+            for worker in pool:
+                if worker.row is None and waiting:
+                    index = waiting.popleft()
+                    task = tasks[index]
+                    limit = limits.seconds(task, costs[index]) if task.is_third_party else None
+                    begun(task)
+                    worker.submit(index, limit, kinds[task.key.kind], task, saved(index))
+            _wait(pool)
+            for worker in pool:
+                worker.greet()
+                if worker.row is None:
+                    continue
+                index = worker.index
+                try:
+                    row = _ended(worker, tasks[index], costs[index], limits)
+                except BrokenProcessPool:
+                    worker.end()
+                    deaths[index] += 1
+                    if deaths[index] < _MOST_DEATHS:
+                        waiting.appendleft(index)
+                        continue
+                    if not tasks[index].is_third_party:
+                        raise died(tasks[index], deaths[index]) from None
+                    row = ended_its_process(tasks[index], deaths[index])
+                if row is not None:
+                    yield index, row
+    finally:
+        for worker in pool:
+            worker.end()
+
+
+def _wait(pool: Sequence[_Worker]) -> None:
+    """Until a process is there, a row is done, or a limit is reached."""
+    futures = [future for worker in pool if worker.row is not None for future in worker.awaited()]
+    left = [worker.left for worker in pool if worker.row is not None]
+    wait(futures, min((max(each, 0.0) for each in left if each is not None), default=None), FIRST_COMPLETED)
+
+
+def _ended(worker: _Worker, task: Task, cost: float, limits: RowLimits) -> Row | None:
+    """The row of a worker that has ended or had to be; None where it goes on.  Raises BrokenProcessPool."""
+    assert worker.row is not None
+    if worker.row.done():
+        row = worker.row.result()
+        worker.row = None
+        limits.finished(task, cost, monotonic() - worker.began)
+        return row
+    if worker.left is None or worker.left > 0:
+        return None
+    limit = worker.limit
+    worker.end()
+    limits.ran_out(task)
+    return failed(task, f"{task.key.subject.name} was stopped after {limit:.3g} s", OutOfTime)
