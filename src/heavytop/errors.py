@@ -46,9 +46,16 @@ class OutOfReach(HeavyTopError):
 
 
 class PeerFailed(HeavyTopError):
-    """An integrator of others that raised or broke its contract; says which and how.  Its row says so, others go on."""
+    """An integrator of others that raised or broke its contract; says which and how.  Its row says so, others go on.
+
+    answered: whether it said itself that it failed, or gave a state that is not finite, and kept the protocol.
+    """
 
     exit_code = 3
+
+    def __init__(self, cause: str, remedy: str = "", answered: bool = False) -> None:
+        super().__init__(cause, remedy)
+        self.answered = answered
 
 
 class Unsupported(InputError):

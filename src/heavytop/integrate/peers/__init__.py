@@ -161,7 +161,7 @@ def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:
     def call(*arguments: Any, **options: Any) -> Trajectory:
         run = integrate(*arguments, **options, **dict([setting] if setting else []))
         if run.outcome is Outcome.FAILED:
-            raise PeerFailed(f"{command.name} failed: {run.flags['failure']}")
+            raise PeerFailed(f"{command.name} failed: {run.flags['failure']}", answered=True)
         return run
 
     return call

@@ -154,11 +154,17 @@ class CommandIntegrator:
             return None
         value = given.get(knob)
         if value is None:
-            return DEFAULT_STEP if knob == "step" else precision.eps
+            return self.default(precision)
         if value <= 0 or (knob == "tolerance" and value > 1):
             limits = "above 0" if knob == "step" else "above 0, up to 1"
             raise InputError(f"{self.command.name} cannot use the {knob} {decimal_text(value, 6)}.", f"Give {limits}.")
         return exact(number(value, precision))
+
+    def default(self, precision: Precision) -> Fraction | None:
+        """The setting where none is asked for: the step 1/100 as a number of the format, or the eps of the format."""
+        if self.command.knob == "step":
+            return exact(number(DEFAULT_STEP, precision))
+        return precision.eps if self.command.knob else None
 
     def _trajectory(self, request: Request, reply: Reply, seconds: float) -> Trajectory:
         command, problem, done = self.command, request.problem, len(reply.states)
@@ -281,7 +287,7 @@ class Reply:
             shown = decimal_text(due, 17)
             raise PeerFailed(f"{self.name} wrote the state at {said(words[0])} where that at {shown} was due")
         if any(value is None or not numpy.isfinite(value) for value in values):
-            raise PeerFailed(f"{self.name} wrote a state that is not finite at t = {said(words[0])}")
+            raise PeerFailed(f"{self.name} wrote a state that is not finite at t = {said(words[0])}", answered=True)
         self.states.append(numpy.array(values))
 
     def _number(self, word: str) -> Any:
@@ -424,7 +430,9 @@ class Session:
             try:
                 last = take(line)
             except PeerFailed as error:
-                raise self._failed(error.cause.removeprefix(f"{self.name} ")) from None
+                failure = self._failed(error.cause.removeprefix(f"{self.name} "))
+                failure.answered = error.answered
+                raise failure from None
             if last:
                 if place < len(lines) or self._unread:
                     raise self._failed(f"wrote more after {said(repr(line.decode('utf-8', 'replace')))}")
@@ -473,6 +481,17 @@ class Session:
         lines = [said(line) for line in self._errors.decode("utf-8", "replace").splitlines() if line.strip()]
         told = f"; its standard error ends with: {said(' | '.join(lines[-3:])[-180:])}" if lines else ""
         return PeerFailed(f"{self.name} {what}{told}")
+
+    def ends_after(self, text: bytes, seconds: float) -> bool:
+        """Whether the program ends by itself within so many seconds of ``text`` and the end of its input."""
+        with suppress(OSError):
+            os.write(self._in, text)
+        if not text:
+            self._pipes[0].close()
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(seconds)
+            return True
+        return False
 
     def close(self, farewell: float = 0.0) -> None:
         """Ends the program: `quit`, so many seconds, then its whole process group is killed."""

@@ -237,7 +237,7 @@ class Contained:
         self._require(named, "no name of an integrator")
         return Trajectory(
             problem,
-            run.integrator,
+            run.integrator if self.own else self.name,
             times,
             states,
             run.outcome,

@@ -1,0 +1,39 @@
+"""`check-integrator`."""
+
+from __future__ import annotations
+
+from textwrap import fill
+from typing import Annotated
+
+import typer
+
+from heavytop.cli.app import Json, app, print_json
+
+
+@app.command(name="check-integrator")
+def check_integrator(
+    integrator: Annotated[str, typer.Argument(help="A name of `heavytop list`, mine.toml or mine.py:solve.")],
+    json: Json = False,
+) -> None:
+    """Go through the contract of an integrator and say in plain sentences what is wrong.
+
+    Exit code 0 if nothing is violated, 1 if something is, 2 if there is no such integrator or file.
+    """
+    from dataclasses import asdict
+
+    from heavytop.api.integrators import check_integrator as check
+    from heavytop.cli.progress import waiting
+
+    with waiting("checking", 300):
+        found = check(integrator)
+    violated = [each for each in found if each.verdict == "violated"]
+    if json:
+        verdict = "violated" if violated else "kept"
+        print_json({"integrator": integrator, "verdict": verdict, "checks": [asdict(each) for each in found]})
+    else:
+        width = max(len(each.check) for each in found)
+        for each in found:
+            head = f"{each.verdict:8}  {each.check:{width}}  "
+            print(fill(each.text, 100, initial_indent=head, subsequent_indent=" " * len(head)))
+        print(f"\n{len(violated)} of {len(found)} violated." if violated else "\nNothing is violated.")
+    raise typer.Exit(1 if violated else 0)

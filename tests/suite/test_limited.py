@@ -1,0 +1,246 @@
+"""A run always ends: rows of third-party integrators have a time limit and a process of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from time import monotonic, sleep
+
+import pytest
+
+import heavytop as ht
+from heavytop.errors import InputError
+from heavytop.kinds import KINDS
+from heavytop.report.policy import Policy
+from heavytop.suite.limited import RowLimits
+from heavytop.suite.plan import read
+from reports import all_good, compare, rows
+
+PROGRAM = Path(__file__).parents[1] / "faulty_program.py"
+MODULE = """
+import os, re, subprocess, time
+from pathlib import Path
+from heavytop.integrate.peers.double import Solved, double_peer
+from heavytop.integrate.trajectory import Outcome
+
+def solve(given):
+    field, y, t, states = given.system.field, given.start.copy(), 0.0, []
+    assert given.step_limit == 10**7
+    for end in given.times:
+        h = (end - t) / 50
+        for _ in range(50):
+            half = y + [h / 2 * k for k in field(given.parameters, y)]
+            y = y + [h * k for k in field(given.parameters, half)]
+        t = end
+        states.append(y)
+    return Solved(states, t, 50 * len(given.times))
+
+def sleeps(given):
+    time.sleep(1000)
+
+def stuck(given):  # in one call of C that holds the interpreter
+    subprocess.Popen(["sleep", "987"])
+    re.match("(a+)+$", 60 * "a" + "b")
+
+forward = double_peer("forward", 2, solve, directions=["forward"], systems=["heavy_top"], precisions=["double"])
+"""
+PLAN = """name = "faults"
+row_timeout = "2"
+integrators = ["mine.py:solve", "mine.py:sleeps", "mine.py:stuck", "mine.py:forward"]
+[[integrator]]
+name = "silent"
+command = ["{python}", "{program}", "silent"]
+[[integrator]]
+name = "forks"
+command = ["{python}", "{program}", "forks"]
+setting = "step"
+"""
+TABLE = """[[measure]]
+kind = "drift"
+cases = ["euler"]
+integrator = "{name}"
+runs = [{{ precision = "{precision}", horizon = "2", samples = 4 }}]
+"""
+
+
+def plan(folder: Path, *names: str, precision: str = "double") -> Path:
+    (folder / "mine.py").write_text(MODULE)
+    head = PLAN.format(python=sys.executable, program=PROGRAM)
+    tables = [TABLE.format(name=name, precision=precision) for name in names]
+    (folder / "plan.toml").write_text(head + "".join(tables))
+    return folder / "plan.toml"
+
+
+def running(*words: str) -> list[str]:
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            line = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
+        except OSError:
+            continue
+        if all(word in line for word in words):
+            found.append(folder.name)
+    return found
+
+
+def gone(*words: str) -> bool:
+    end = monotonic() + 20
+    while running(*words) and monotonic() < end:
+        sleep(0.05)
+    return not running(*words)
+
+
+def test_rows_that_do_not_end_are_ended_and_all_others_are_measured(tmp_path: Path) -> None:
+    names = ("mine.py:solve", "mine.py:sleeps", "mine.py:stuck", "silent", "forks")
+    file = plan(tmp_path, *names)
+    line = [sys.executable, "-m", "heavytop", "run", "--plan", str(file), "--out", str(tmp_path / "out")]
+    done = subprocess.run([*line, "--workers", "1"], capture_output=True, text=True, timeout=240, check=False)
+    assert (done.returncode, done.stderr) == (3, "")
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    outcomes = {row["integrator"]: row["outcome"] for row in report["rows"]}
+    expected = ("success", "out_of_time", "out_of_time", "out_of_time", "success")
+    assert outcomes == dict(zip(names, expected, strict=True))
+    against = {row["integrator"]: row["against"] for row in report["rows"]}
+    assert against["mine.py:stuck"] == "nothing: mine.py:stuck was stopped after 2 s in euler"
+    assert "mine.py:sleeps was stopped after 2 s in euler in double" in done.stdout
+    assert report["environment"]["integrators"] == {"forks": "faulty 1.2", "silent": "faulty 1.2"}
+    for words in ((str(PROGRAM),), ("sleep", "987")):
+        assert gone(*words)
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
+def test_whatever_ends_a_run_ends_what_it_started(tmp_path: Path, end: int) -> None:
+    file = plan(tmp_path, "silent", "mine.py:stuck")
+    line = [sys.executable, "-m", "heavytop", "run", "--plan", str(file), "--out", str(tmp_path / "out")]
+    with subprocess.Popen(
+        [*line, "--workers", "2", "--row-timeout", "100"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as parent:
+        wait = monotonic() + 60
+        while not (running(str(PROGRAM), "silent") and running("sleep", "987")) and monotonic() < wait:
+            sleep(0.05)
+        os.kill(parent.pid, end)
+        said = parent.communicate(timeout=30)[1]  # its standard error ends with the last process that holds it
+    assert parent.returncode == (130 if end == signal.SIGINT else -9)
+    assert ("interrupted" in said) == (end == signal.SIGINT)
+    assert gone(str(PROGRAM))
+    assert gone("sleep", "987")
+
+
+def test_what_an_integrator_declares_that_it_cannot_do_is_no_failure(tmp_path: Path) -> None:
+    def measured(precision: str) -> ht.Report:
+        tasks = read(str(plan(tmp_path, "mine.py:forward", precision=precision)), KINDS)[2]
+        found = [row for _, row in rows(tasks, 1)]
+        return ht.Report("heavytop-report/2", {"name": "p"}, {}, found)
+
+    lacking, able = measured("quad"), measured("double")
+    assert [row.outcome for row in (*lacking.rows, *able.rows)] == ["unsupported", "success"]
+    assert all_good(lacking.rows)
+    assert lacking.verdict == "complete"
+    lost, gained = (ht.Report("heavytop-report/2", {}, {}, each.rows) for each in (lacking, able))
+    lost.rows[0].key = gained.rows[0].key  # the same row in two versions
+    lost.rows[0].precision = gained.rows[0].precision
+    for baseline, candidate, verdict, code in (
+        (lost, lost, "same", 0),
+        (gained, lost, "worse", 1),
+        (lost, gained, "better", 0),
+    ):
+        found = compare(baseline, candidate, Policy())
+        assert (found.verdict, found.exit_code) == (verdict, code)
+        assert compare(baseline, candidate, Policy(), list_same=False).verdict == verdict
+    failed = ht.Report("heavytop-report/2", {}, {}, [replace_outcome(lost.rows[0], "failed")])
+    for pair in ((failed, lost), (lost, failed)):
+        assert compare(*pair, Policy()).exit_code == 3
+
+
+def replace_outcome(row, outcome: str):
+    import msgspec
+
+    return msgspec.structs.replace(row, outcome=outcome)
+
+
+def test_the_limit_of_a_row_follows_its_cost_and_what_the_others_took(tmp_path: Path) -> None:
+    task = read(str(plan(tmp_path, "mine.py:solve")), KINDS)[2][0]
+    other = replace(task, key=read(str(plan(tmp_path, "mine.py:sleeps")), KINDS)[2][0].key)
+    limits = RowLimits()
+    assert [limits.seconds(task, cost) for cost in (1.0, 5.0)] == [40, 80]
+    limits.finished(task, 2.0, 1.0)  # quicker than heyoka: no less time
+    assert limits.seconds(task, 1.0) == 40
+    limits.finished(task, 2.0, 20.0)
+    limits.finished(task, 2.0, 6.0)
+    assert limits.seconds(task, 3.0) == 330  # ten times the slowest
+    assert limits.seconds(other, 3.0) == 60
+    found = []
+    for _ in range(5):
+        found.append(limits.seconds(other, 3.0))
+        limits.ran_out(other)
+    assert found == [60, 30, 20, 15, 12]
+    assert limits.seconds(other, 0.1) == 10
+    limits.finished(other, 1.0, 1.0)
+    assert limits.seconds(other, 3.0) == 60
+    assert RowLimits(7.0).seconds(task, 100.0) == 7
+
+
+def test_a_time_limit_that_is_none_is_refused(tmp_path: Path) -> None:
+    file = plan(tmp_path, "mine.py:solve")
+    for bad in (0, -1, "soon", "1e99"):
+        with pytest.raises(InputError):
+            ht.run(file, out=tmp_path / "out", row_timeout=bad)
+    file.write_text(file.read_text().replace('"2"', '"never"', 1))
+    with pytest.raises(InputError, match="never"):
+        ht.run(file, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "cause"),
+    [
+        ('name = "silent"', 'name = "forks"', "one name to two integrators"),
+        ('name = "silent"', 'name = "words"', "built-in"),
+        ('"mine.py:solve"', '"mine"', "is no file"),
+        ('"mine.py:solve"', '"absent.toml"', "cannot be read"),
+        ('name = "silent"', "", "name"),
+    ],
+)
+def test_integrators_of_a_plan_that_cannot_be_are_refused(tmp_path: Path, old: str, new: str, cause: str) -> None:
+    file = plan(tmp_path, "forks")
+    file.write_text(file.read_text().replace(old, new, 1))
+    with pytest.raises(InputError, match=cause):
+        read(str(file), KINDS)
+
+
+def test_progress_names_the_row_that_is_running(tmp_path: Path) -> None:
+    tasks = read(str(plan(tmp_path, "heyoka", "words")), KINDS)[2]
+    heard: list[str] = []
+    for index, _ in rows(tasks, 1, begun=lambda task: heard.append(task.label)):
+        assert heard[-1] == tasks[index].label
+    assert sorted(heard) == sorted(task.label for task in tasks)
+
+
+def solved(given):
+    """A solver that never moves."""
+    from heavytop.integrate.peers.double import Solved
+
+    return Solved([given.start] * len(given.times), given.times[-1], 1)
+
+
+def test_a_callable_is_an_integrator_without_a_package(tmp_path: Path) -> None:
+    top = ht.HeavyTop((3, 2, 1), 1, (0, 0, "1/2"))
+    start = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+    local = lambda given: solved(given)  # noqa: E731
+    for given, name in ((solved, "test_limited.py:solved"), (local, "")):
+        run = ht.propagate(top, start, [1, 2], integrator=given)
+        assert run.outcome is ht.Outcome.SUCCESS
+        assert (run.to_numpy()[1] == [0.1, 0.4, 0.9, 0.6, 0, 0.8]).all()
+        assert not name or run.integrator == name
+    file = tmp_path / "plan.toml"
+    file.write_text('name = "p"\n' + TABLE.format(name="heyoka", precision="double"))
+    report = ht.run(file, out=tmp_path / "out", integrator=local, workers=1)
+    assert [row.outcome for row in report.rows] == ["success", "success"]
+    for bad in (lambda: 0, lambda a, b: 0, 3, int):
+        with pytest.raises(InputError):
+            ht.propagate(top, start, [1], integrator=bad)
