@@ -1,12 +1,35 @@
-"""The contract of integrators, from Python."""
+"""Integrators of one's own, from Python: their contract, and a folder to begin with."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
 
+from heavytop.errors import InputError, quoted
 from heavytop.integrate.peers.source import named
+from heavytop.suite.files import replace
 from heavytop.suite.integrator_check import Checked, check
+
+
+class Language(NamedTuple):
+    """A language of `heavytop new`: what the program is called and started by, and what is done to build it."""
+
+    title: str
+    file: str
+    command: str
+    build: str = "make"
+
+
+LANGUAGES = {
+    "python": Language("Python", "mine.py", '["python3", "mine.py"]', "python3 --version"),
+    "c": Language("C", "mine.c", '["./mine"]'),
+    "cpp": Language("C++", "mine.cpp", '["./mine"]'),
+    "rust": Language("Rust", "mine.rs", '["./mine"]'),
+    "julia": Language("Julia", "mine.jl", '["julia", "--startup-file=no", "mine.jl"]', "julia --version"),
+    "fortran": Language("Fortran", "mine.f90", '["./mine"]'),
+}
 
 
 def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
@@ -22,3 +45,34 @@ def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
         InputError: for an unknown integrator, and a file that describes none.
     """
     return check(named(integrator))
+
+
+def new_integrator(folder: Path, language: str) -> list[str]:
+    """Write a program that integrates, with its gate, into a new folder; returns the names of the files.
+
+    Raises InputError for an unknown language, a folder that holds anything and one that cannot be written.
+    """
+    if language not in LANGUAGES:
+        raise InputError(f"There is no program in {quoted(language)}.", f"Use {', '.join(LANGUAGES)}.")
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise InputError(f"{folder} already holds other content.", "Give a new folder.")
+        about = LANGUAGES[language]
+        files = _texts("common") | _texts(language)
+        files[".github/workflows/heavytop.yml"] = files.pop("workflow.yml")
+        words = {"COMMAND": about.command, "LANGUAGE": about.title, "BUILD": about.build, "FILE": about.file}
+        for name in ("mine.toml", "README.md", ".github/workflows/heavytop.yml"):
+            for word, text in words.items():
+                files[name] = files[name].replace(word, text)
+        for name, text in sorted(files.items()):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            replace(folder / name, text.encode())
+    except OSError as error:
+        raise InputError(f"{folder} cannot be written: {error.strerror}.", "Give a folder that can be.") from None
+    return sorted(files)
+
+
+def _texts(part: str) -> dict[str, str]:
+    """The files of that part, by name."""
+    place = resources.files("heavytop.api") / "starters" / part
+    return {each.name.removesuffix(".txt"): each.read_text("utf-8") for each in place.iterdir() if each.is_file()}

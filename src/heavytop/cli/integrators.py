@@ -1,13 +1,14 @@
-"""`check-integrator`."""
+"""`check-integrator` and `new`."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from textwrap import fill
 from typing import Annotated
 
 import typer
 
-from heavytop.cli.app import Json, app, print_json
+from heavytop.cli.app import Json, app, command, print_json
 
 
 @app.command(name="check-integrator")
@@ -37,3 +38,20 @@ def check_integrator(
             print(fill(each.text, 100, initial_indent=head, subsequent_indent=" " * len(head)))
         print(f"\n{len(violated)} of {len(found)} violated." if violated else "\nNothing is violated.")
     raise typer.Exit(1 if violated else 0)
+
+
+@command
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder.")],
+    language: Annotated[str, typer.Option(help="python, c, cpp, rust, julia or fortran.")] = "python",
+) -> int:
+    """Write a program that integrates the heavy top, with its gate, into a new folder.
+
+    It works at once: mine.toml describes the program, gate.toml is the plan that measures it.
+    """
+    from heavytop.api.integrators import LANGUAGES, new_integrator
+
+    files = new_integrator(folder, language)
+    print(f"{folder}: {', '.join(files)}")
+    print(f"Next: cd {folder}; {LANGUAGES[language].build}; heavytop check-integrator mine.toml")
+    return 0

@@ -1,0 +1,60 @@
+# The heavy top by the classical Runge-Kutta method: requests on standard input, answers on standard output.
+
+# Ω' and γ' of M' = M × Ω + P γ × r, γ' = γ × Ω; M = IΩ, n = P r
+function field(I, n, y)
+    w1, w2, w3, g1, g2, g3 = y
+    return [
+        ((I[2] - I[3]) * w2 * w3 + g2 * n[3] - g3 * n[2]) / I[1],
+        ((I[3] - I[1]) * w3 * w1 + g3 * n[1] - g1 * n[3]) / I[2],
+        ((I[1] - I[2]) * w1 * w2 + g1 * n[2] - g2 * n[1]) / I[3],
+        g2 * w3 - g3 * w2,
+        g3 * w1 - g1 * w3,
+        g1 * w2 - g2 * w1,
+    ]
+end
+
+# y after one step of size h: replace this by your method
+function step(f, y, h)
+    k1 = f(y)
+    k2 = f(y + h / 2 * k1)
+    k3 = f(y + h / 2 * k2)
+    k4 = f(y + h * k3)
+    return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+end
+
+# answers a request: a state for each time, then done
+function run(given)
+    I, n, y, times = (given[name] for name in ("inertia", "moment", "state", "times"))
+    h = haskey(given, "setting") ? given["setting"][1] : 0.01
+    time, steps = 0.0, 0
+    for last in times[2:end]
+        count = ceil(Int, abs(last - time) / h)
+        for _ in 1:count
+            y = step(z -> field(I, n, z), y, (last - time) / count)
+        end
+        time, steps = last, steps + count
+        println("state ", time, " ", join(y, " "))
+        flush(stdout)
+    end
+    println("done steps ", steps, " evaluations ", 4 * steps)
+end
+
+function main()
+    given = Dict{String,Vector{Float64}}()
+    for line in eachline(stdin)
+        name, words... = split(line)
+        if name == "heavytop-integrator"
+            println("ready mine 1.0")
+        elseif name == "go"
+            run(given)
+            empty!(given)
+        elseif name == "quit"
+            break
+        else
+            given[name] = [x for x in tryparse.(Float64, words) if x !== nothing]
+        end
+        flush(stdout)
+    end
+end
+
+main()
