@@ -182,7 +182,8 @@ def line(change: Change) -> str:
         return worst.reason or f"only in the {'candidate' if worst.verdict is Verdict.NEW else 'baseline'}"
     digits, count = change.digits, len(list(folded(change)))
     more = f"; {_count(count, 'quantity', 'quantities')} changed" if count > 1 else ""
-    if digits is not None and abs(digits[0] - digits[1]) >= _DIGITS_MOVED:
+    better = change.verdict is Verdict.BETTER
+    if digits is not None and abs(digits[0] - digits[1]) >= _DIGITS_MOVED and (digits[1] > digits[0]) is better:
         return f"digits right {digits_text(digits[0])} → {digits_text(digits[1])}{more}"
     said = f"{clip(worst.metric, 40)} {short(worst.baseline or '-')} → {short(worst.candidate or '-')}"
     if worst.metric.startswith("series "):
