@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
+import msgspec
 import pytest
 from rich.console import Console
 
@@ -153,15 +154,17 @@ def test_a_history_marks_each_step_at_the_report_it_came_with() -> None:
     assert document["tracks"][0]["values"] == track.values
 
 
-def test_a_history_has_a_page_with_a_chart_a_metric_and_its_steps() -> None:
+def test_a_history_has_a_page_with_a_chart_for_each_row_and_its_steps() -> None:
     names, reports = three()
     tracks = history(reports, Policy())
     page = history_page([HOSTILE, *names[1:]], reports, tracks)
     assert page == history_page([HOSTILE, *names[1:]], reports, tracks)
     assert "<script" not in page
-    drawn = [t for t in tracks if sum(logarithm(value) is not None for value in t.values) > 1]
+    drawn = {t.row for t in tracks if sum(logarithm(value) is not None for value in t.values) > 1}
     assert page.count("<figure class") == len(drawn) > 3
-    assert "worse at 3: 6.6 bits lost" in page
+    for name in names[1:]:
+        assert f">{name}</text>" in page
+    assert "drift_energy_max worse at 3: 6.6 bits lost" in page
     assert "1e-10 ▲ worse" in page
     for track in tracks:
         assert (track.metric or "whole row") in page
@@ -169,7 +172,8 @@ def test_a_history_has_a_page_with_a_chart_a_metric_and_its_steps() -> None:
     quiet = history_page(names, reports, missing)
     assert "<figure class" not in quiet
     assert "missing" in quiet
-    many = history_page(names, reports, 60 * tracks)
+    rows = [msgspec.structs.replace(t, row=t.row._replace(case=f"{i}")) for i in range(130) for t in tracks[:1]]
+    many = history_page(names, reports, rows)
     assert many.count("<figure class") == 120
     assert "more in the table alone" in many
 
