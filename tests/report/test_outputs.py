@@ -209,3 +209,16 @@ def test_no_control_character_gets_out_to_a_terminal_or_breaks_xml() -> None:
 if __name__ == "__main__":
     for file, make in MADE.items():
         (GOLDEN / file).write_text(make(), "utf-8")
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 160])
+def test_no_name_is_broken_inside_a_word_however_narrow_the_terminal(width: int) -> None:
+    names = ["ershkov-partial-2/backward", "a-very-long-name-of-a-case-nobody-would-like-to-see-broken"]
+    made = table(["case", "format", "largest error"], [[name, "double-double", "1.25e-13 ± 0.31"] for name in names])
+    console = Console(width=width, record=True, file=open("/dev/null", "w"), highlight=False)  # noqa: SIM115
+    console.print(made)
+    console.file.close()
+    text = console.export_text()
+    assert max(map(len, text.splitlines())) <= width
+    for word in (*names, "double-double", "1.25e-13"):
+        assert word in text
