@@ -23,6 +23,7 @@ from heavytop.report.junit import comparison_junit
 from heavytop.report.markdown import comparison_markdown
 from heavytop.report.policy import Policy
 from heavytop.report.section import logarithm
+from heavytop.report.text import table
 from reports import compare, comparison_page, history, replace, report_page, summary
 from small_reports import error, report, row
 
