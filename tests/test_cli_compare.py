@@ -42,8 +42,9 @@ def test_files_are_written_beside_the_text_and_say_the_same(reports, monkeypatch
     names = ["--markdown", "out.md", "--junit", "out.xml", "--json"]
     assert heavytop(monkeypatch, "compare", "old", "worse", *names) == 1
     document = json.loads(capsys.readouterr().out)
-    assert set(document) == {"verdict", "rows", "environment"}
-    assert "worse | drift euler heyoka double | drift\\_energy\\_max" in Path("out.md").read_text()
+    assert list(document) == ["verdict", "findings", "rows", "environment"]
+    assert document["findings"][0].startswith("Drift of the energy 1e-12 → 5e-12 on euler")
+    assert "worse | drift euler heyoka double | drift\\_energy: max" in Path("out.md").read_text()
     assert ElementTree.parse("out.xml").getroot().get("failures") == "1"
     assert {path.name for path in reports.iterdir()} == {"old", "worse", "same", "out.md", "out.xml"}
 

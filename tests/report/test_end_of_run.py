@@ -75,7 +75,7 @@ def test_parts_that_are_too_long_are_cut_where_they_are_longest_and_say_so() -> 
     assert len(found) == 12
     assert found[0] == "a"
     assert found[-4:] == ["c0", "c1", "c2", "c3"]
-    assert found[7] == "  and 24 lines more"
+    assert found[6:8] == ["  and 24 lines more", "b29"]
     assert fitted(parts, 100) == [line for part in parts for line in part]
 
 

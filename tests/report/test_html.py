@@ -269,8 +269,9 @@ def test_a_comparison_draws_both_and_lists_the_worst_first(pages: dict[str, Page
     assert "Not everything could be compared" not in text
     assert "Something is worse than in the baseline." in text
     table = text[text.index("worst first") :]
-    assert "3.0 digits lost" in table
+    assert "digits right 10.0 → 7.0" in table
     assert table.index("bits lost") < table.index("the baseline ended as time_limit")
+    assert text.index("Digits right 10.0 → 7.0 on euler at T = 1000 (heyoka, double)") < text.index("worst first")
 
 
 def test_a_comparison_of_a_report_with_itself_says_so(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
+import msgspec
 import pytest
 from rich.console import Console
 
@@ -22,6 +23,7 @@ from heavytop.report.junit import comparison_junit
 from heavytop.report.markdown import comparison_markdown
 from heavytop.report.policy import Policy
 from heavytop.report.section import logarithm
+from heavytop.report.text import table
 from reports import compare, comparison_page, history, replace, report_page, summary
 from small_reports import error, report, row
 
@@ -115,9 +117,10 @@ def hostile() -> Comparison:
 
 def test_hostile_names_do_not_get_out_of_a_markdown_cell() -> None:
     text = comparison_markdown(hostile())
-    (line,) = [line for line in text.splitlines() if line.startswith("| worse")]
-    assert len(line) < 1000
-    assert line.replace(r"\|", "").count("|") == 7
+    row, quantity = [line for line in text.splitlines() if line.startswith("| worse")]
+    assert max(map(len, text.splitlines())) < 1000
+    assert row.replace(r"\|", "").count("|") == 4
+    assert quantity.replace(r"\|", "").count("|") == 7
     assert "<script>" not in text.replace(r"\<", "")
 
 
@@ -152,15 +155,17 @@ def test_a_history_marks_each_step_at_the_report_it_came_with() -> None:
     assert document["tracks"][0]["values"] == track.values
 
 
-def test_a_history_has_a_page_with_a_chart_a_metric_and_its_steps() -> None:
+def test_a_history_has_a_page_with_a_chart_for_each_row_and_its_steps() -> None:
     names, reports = three()
     tracks = history(reports, Policy())
     page = history_page([HOSTILE, *names[1:]], reports, tracks)
     assert page == history_page([HOSTILE, *names[1:]], reports, tracks)
     assert "<script" not in page
-    drawn = [t for t in tracks if sum(logarithm(value) is not None for value in t.values) > 1]
+    drawn = {t.row for t in tracks if sum(logarithm(value) is not None for value in t.values) > 1}
     assert page.count("<figure class") == len(drawn) > 3
-    assert "worse at 3: 6.6 bits lost" in page
+    for name in names[1:]:
+        assert f">{name}</text>" in page
+    assert "drift_energy_max worse at 3: 6.6 bits lost" in page
     assert "1e-10 ▲ worse" in page
     for track in tracks:
         assert (track.metric or "whole row") in page
@@ -168,7 +173,8 @@ def test_a_history_has_a_page_with_a_chart_a_metric_and_its_steps() -> None:
     quiet = history_page(names, reports, missing)
     assert "<figure class" not in quiet
     assert "missing" in quiet
-    many = history_page(names, reports, 60 * tracks)
+    rows = [msgspec.structs.replace(t, row=t.row._replace(case=f"{i}")) for i in range(130) for t in tracks[:1]]
+    many = history_page(names, reports, rows)
     assert many.count("<figure class") == 120
     assert "more in the table alone" in many
 
@@ -204,3 +210,16 @@ def test_no_control_character_gets_out_to_a_terminal_or_breaks_xml() -> None:
 if __name__ == "__main__":
     for file, make in MADE.items():
         (GOLDEN / file).write_text(make(), "utf-8")
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 160])
+def test_no_name_is_broken_inside_a_word_however_narrow_the_terminal(width: int) -> None:
+    names = ["ershkov-partial-2/backward", "a-very-long-name-of-a-case-nobody-would-like-to-see-broken"]
+    made = table(["case", "format", "largest error"], [[name, "double-double", "1.25e-13 ± 0.31"] for name in names])
+    console = Console(width=width, record=True, file=open("/dev/null", "w"), highlight=False)  # noqa: SIM115
+    console.print(made)
+    console.file.close()
+    text = console.export_text()
+    assert max(map(len, text.splitlines())) <= width
+    for word in (*names, "double-double", "1.25e-13"):
+        assert word in text

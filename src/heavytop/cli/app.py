@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -89,10 +90,12 @@ def command(function: Callable[..., int]) -> Callable[..., None]:
 
 
 def show_on_terminal(renderable: Any) -> None:
-    """Print text or a rich table, as wide as the terminal, or 160 columns into a file."""
+    """Print text or a rich table, as wide as the terminal or COLUMNS says, or 160 columns into a file."""
     from rich.console import Console
 
-    console = Console(highlight=False, soft_wrap=False, width=None if sys.stdout.isatty() else 160)
+    console = Console(
+        highlight=False, soft_wrap=False, width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else 160
+    )
     console.print(renderable)
 
 

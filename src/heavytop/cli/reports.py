@@ -22,6 +22,7 @@ def compare(
     markdown: Annotated[Path | None, typer.Option(help="Write what changed as Markdown.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write what changed as JUnit XML.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that draws both on the same axes.")] = None,
+    full: Annotated[bool, typer.Option("--full", help="Print every metric that changed.")] = False,
     json: Json = False,
 ) -> int:
     """Compare two reports; exit 1 if anything is worse.
@@ -58,7 +59,7 @@ def compare(
     else:
         from heavytop.report.comparison_text import comparison
 
-        show_on_terminal(comparison(result))
+        show_on_terminal(comparison(result, full))
     return result.exit_code
 
 

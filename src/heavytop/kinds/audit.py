@@ -81,8 +81,11 @@ class Audit(Kind):
         found: dict[tuple[str, str], list[str]] = {}
         for row in rows:
             found.setdefault((_verdict(row)[0], row.system), []).append(row.case)
-        said = (f"{', '.join(claims)}: {verdict} for {system}" for (verdict, system), claims in found.items())
-        return [line for sentence in said for line in wrapped(f"Claims {sentence}.")]
+        said = (
+            f"{', '.join(claims)}: {verdict} for {_SYSTEMS.get(system, system)}."
+            for (verdict, system), claims in found.items()
+        )
+        return [line for sentence in said for line in wrapped(f"Ershkov's claims {sentence}")]
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
         """Whether the claims are motions of the heavy top."""

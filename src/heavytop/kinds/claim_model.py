@@ -142,7 +142,7 @@ class ClaimModel(Kind):
             if PARTS.text in row.metrics and row.key.direction != "backward":
                 found.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
         said = ((case, ", ".join(f"{t} ({branch})" for branch, t in times.items())) for case, times in found.items())
-        return [line for case, times in said for line in wrapped(f"{case}: Ω is off by 1 % of α at |t| = {times}")]
+        return [line for case, t in said for line in wrapped(f"{case}: Ω off by 1 % of α = Ω3(0)/2 at |t| = {t}")]
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
         """The first time at which a claimed Ω is off by 1 %."""

@@ -66,14 +66,24 @@ def _cut(line: str) -> str:
 
 
 def fitted(parts: Sequence[Sequence[str]], most: int) -> list[str]:
-    """The lines of all parts; where they are more than ``most``, the longest parts are cut, which say by how much."""
+    """The lines of all parts; where they are more than ``most``, the longest parts are cut in the middle, which say by
+    how much: the last line of a table is its finest setting.
+    """
     sizes = [len(part) for part in parts]
     while sum(sizes) > most and max(sizes) > _FEWEST:
         sizes[sizes.index(max(sizes))] -= 1
     found: list[str] = []
     for part, size in zip(parts, sizes, strict=True):
-        found += part if size == len(part) else [*part[: size - 1], f"  and {len(part) - size + 1} lines more"]
+        found += part if size == len(part) else _without_middle(part, size)
     return found[:most]
+
+
+def _without_middle(part: Sequence[str], size: int) -> list[str]:
+    """``size`` lines of a longer part, at least two: its first ones, how many are left out, and its last one."""
+    last = size > _FEWEST
+    left_out = len(part) - size + 1
+    lines = f"  and {left_out} {'line' if left_out == 1 else 'lines'} more"
+    return [*part[: size - 1 - last], lines, *(part[-1:] if last else [])]
 
 
 def wrapped(text: str, indent: str = "  ") -> list[str]:

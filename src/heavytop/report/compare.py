@@ -8,6 +8,7 @@ from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.records import Identity, Row
+from heavytop.report.findings import RANK, Change, Changes, sentences
 from heavytop.report.kind import Kinds
 from heavytop.report.policy import Policy
 from heavytop.report.row_comparison import Finding, RowComparison
@@ -18,32 +19,33 @@ __all__ = ["Comparison", "Finding", "compare"]
 
 _MACHINE = ("system", "machine", "processor", "simd_width_double", "cpu_features")
 
-_FIRST = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Verdict.NEW)
-
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
     """All findings, and the differences of the plans and environments.
 
-    same: how many metrics are the same, where these are not among the findings.  changed: all findings but the
-    same, the worst first.
+    same: how many metrics are the same, where these are not among the findings.  sentences: what changed, at most
+    eight, the most telling first.  rows: those that changed, the worst first.  changed: all findings but the same, the
+    worst first.
     """
 
     findings: list[Finding]
     environment: list[tuple[str, str, str]]
     same: int = 0
+    sentences: list[str] = field(default_factory=list)
+    rows: list[Change] = field(default_factory=list)
     changed: list[Finding] = field(init=False)
 
     def __post_init__(self) -> None:
         changed = [finding for finding in self.findings if finding.verdict is not Verdict.SAME]
-        object.__setattr__(self, "changed", sorted(changed, key=lambda finding: _FIRST.index(finding.verdict)))
+        object.__setattr__(self, "changed", sorted(changed, key=lambda finding: RANK.index(finding.verdict)))
 
     @property
     def tally(self) -> dict[Verdict, int]:
         """How many findings of each verdict, the worst first and the same last."""
         verdicts = [finding.verdict for finding in self.changed]
         same = self.same + len(self.findings) - len(self.changed)
-        counts = {verdict: verdicts.count(verdict) for verdict in _FIRST} | {Verdict.SAME: same}
+        counts = {verdict: verdicts.count(verdict) for verdict in RANK} | {Verdict.SAME: same}
         return {verdict: count for verdict, count in counts.items() if count}
 
     @property
@@ -65,6 +67,7 @@ class Comparison:
         """The document of `compare --json`."""
         return {
             "verdict": self.verdict,
+            "findings": self.sentences,
             "rows": [finding.to_json() for finding in self.findings],
             "environment": [{"name": n, "baseline": a, "candidate": b} for n, a, b in self.environment],
         }
@@ -78,8 +81,9 @@ def compare(
     list_same: False to count what plainly stayed the same in place of listing it.
     Raises InputError where neither report has a row, or the policy leaves nothing to compare.
     """
-    findings: list[Finding] = []
+    found: list[list[Finding]] = []
     missing: list[tuple[int, Row]] = []
+    changes = Changes()
     timed = _timed(policy, baseline.environment, candidate.environment)
     checked = isinstance(baseline, Brief), isinstance(candidate, Brief)
     rows = RowComparison(policy, kinds, timed, list_same, checked)
@@ -87,23 +91,29 @@ def compare(
     for row in baseline.rows:
         match = others.take(row.identity)
         if match is not None:
-            findings += rows.compare(row, match)
+            found.append(changes.add(row, match, rows.compare(row, match)))
         elif not rows.ignores(row):
-            missing.append((len(findings), row))
-            findings.append(Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing"))
+            missing.append((len(found), row))
+            found.append([Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")])
     for place, row in missing:
         if (match := others.take_elsewhere(row.identity)) is not None:
-            findings[place] = rows.compare(row, match)[0]
-    findings += [
-        Finding(row.identity, "", Verdict.NEW, None, row.outcome) for row in others.left() if not rows.ignores(row)
-    ]
+            found[place] = rows.compare(row, match)[:1]
+        changes.add(row, match, found[place])
+    for row in others.left():
+        if not rows.ignores(row):
+            new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
+            found.append(changes.add(None, row, [new]))
+    findings = [finding for each in found for finding in each]
     if not findings and not rows.same:
         raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
+    same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
     return Comparison(
         findings,
         _differences({"plan": baseline.plan}, {"plan": candidate.plan})
         + _differences(baseline.environment, candidate.environment),
         rows.same,
+        sentences(changes, same),
+        changes.worst_first,
     )
 
 

@@ -2,34 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from heavytop.report.brief import wrapped
 from heavytop.report.compare import Comparison, Finding
+from heavytop.report.findings import line
 from heavytop.report.names import row_name
 from heavytop.report.printable import printable
 from heavytop.report.text import short, table
 from heavytop.report.verdicts import Verdict
 
 _MOST = 200
-"""Findings of the table: more scroll away."""
+"""Rows listed, and metrics of the table of all: more scroll away."""
 _STYLE = {Verdict.WORSE: "red", Verdict.BETTER: "green", Verdict.MISSING: "yellow", Verdict.INCOMPARABLE: "yellow"}
 
 
-def comparison(result: Comparison) -> RenderableType:
-    """Verdict first, then what changed, then the differences of the plans and environments."""
+def comparison(result: Comparison, full: bool = False) -> RenderableType:
+    """Verdict and findings first, then a line for each row that changed, the worst first, then what else differs.
+
+    full: every metric that changed in place of a line for each row.
+    """
     parts: list[RenderableType] = [Text(headline(result), style="bold")]
-    if result.tally.keys() <= {Verdict.MISSING, Verdict.NEW}:
-        parts.append(Text("The two have no row in common. Were they made with the same plan?"))
-    if result.changed:
-        columns = ("verdict", "row", "metric", "baseline", "candidate", "why")
-        parts.append(table(columns, map(_cells, result.changed[:_MOST]), words=6))
-        if len(result.changed) > _MOST:
-            parts.append(Text(f" and {len(result.changed) - _MOST} more: --json lists all, --html FILE draws them"))
+    parts += [Text(printable(line)) for sentence in result.sentences for line in wrapped(f"- {sentence}")]
+    if result.rows:
+        parts += [Text(), *(_metrics(result) if full else _rows(result))]
     if result.environment:
-        parts.append(Text("Environments differ:", style="bold"))
+        parts += [Text(), Text("Environments differ:", style="bold")]
         parts += [Text(printable(f"  {name}: {old} -> {new}")) for name, old, new in result.environment]
     return Group(*parts)
+
+
+def _rows(result: Comparison) -> Iterator[RenderableType]:
+    """A line for each row, the worst first; broken between words alone."""
+    for change in result.rows[:_MOST]:
+        verdict = change.verdict.value
+        lines = wrapped(printable(f"{verdict:12}  {row_name(change.identity)}: {line(change)}"), " " * 14)
+        for number, each in enumerate(lines):
+            shown = Text(each)
+            shown.stylize(_STYLE.get(change.verdict, ""), 0, 0 if number else len(verdict))
+            yield shown
+    if len(result.rows) > _MOST:
+        yield Text(f"and {len(result.rows) - _MOST} more: --json lists all, --html FILE draws them")
+    yield Text("Every metric: --full", style="dim")
+
+
+def _metrics(result: Comparison) -> Iterator[RenderableType]:
+    columns = ("verdict", "row", "metric", "baseline", "candidate", "why")
+    yield table(columns, map(_cells, result.changed[:_MOST]), words=6)
+    if len(result.changed) > _MOST:
+        yield Text(f" and {len(result.changed) - _MOST} more: --json lists all, --html FILE draws them")
 
 
 def _cells(finding: Finding) -> list[str | Text]:

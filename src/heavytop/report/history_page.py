@@ -1,36 +1,40 @@
-"""A history as a page: one small chart a metric over the reports, every step beyond noise marked."""
+"""A history as a page: one chart for each row over the reports, every step beyond noise marked."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import PurePath
 
 from heavytop.report.history import MARK, Track
 from heavytop.report.names import row_name
-from heavytop.report.section import Key, Section, clip, draw, logarithm, scientific
+from heavytop.report.printable import printable
+from heavytop.report.section import Key, Section, clip, draw, logarithm, numbered, scientific
 from heavytop.report.store import AnyReport
-from heavytop.report.svg import Picture, decades, finish, new_axes, quiet_style
+from heavytop.report.svg import COLOURS, End, Picture, decades, finish, new_axes, quiet_style, room, spoken
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
 
-MOST_PICTURES = 120
-_VALUE = Key("value", 0, "o")
+MOST_PICTURES, MOST_CURVES = 120, 6
 _STEPS = {
-    Verdict.WORSE: Key("worse than the report before", 1, "^", line=False),
-    Verdict.BETTER: Key("better", 2, "v", line=False),
-    Verdict.INCOMPARABLE: Key("incomparable", 4, "D", line=False),
+    Verdict.WORSE: Key("worse than the report before", 5, "^", line=False),
+    Verdict.BETTER: Key("better", 5, "v", line=False),
+    Verdict.INCOMPARABLE: Key("incomparable", 5, "D", line=False),
 }
+_NAME = 12
+"""Characters of a report's name on an axis."""
 
 
 def history_page(names: Sequence[str], reports: Sequence[AnyReport], tracks: Sequence[Track]) -> str:
     """The page of ``tracks`` over ``reports``; the same input gives the same bytes.
 
     names: of the reports, the oldest first.  A metric without a positive number at two reports or more is in the table
-    of its row alone; of more than 120 charts the first are drawn, those with steps before the others.
+    of its row alone; of a row the first six metrics are drawn, and of more than 120 rows the first, those with steps
+    before the others.
     """
     from heavytop.report.html import render
 
     with quiet_style():
-        changed, unchanged = _sections(names, tracks)
+        changed, unchanged = _sections(_ticks(names, reports), tracks)
     steps = [verdict for track in tracks for verdict, _ in track.steps.values()]
     return render(
         "history.html.j2",
@@ -51,26 +55,38 @@ def _made(report: AnyReport) -> tuple[str, str]:
     return clip(str(version)), clip(str(report.environment.get("commit") or "")[:12])
 
 
-def _sections(names: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Section], list[Section]]:
-    """One a row of the reports, in their order: those with a step, and those without."""
+def _ticks(names: Sequence[str], reports: Sequence[AnyReport]) -> list[str]:
+    """What stands on the axis for each report: heavytop's version where all differ, else the name of its folder."""
+    versions = [_made(report)[0] for report in reports]
+    if all(versions) and len(set(versions)) == len(versions):
+        return [clip(version, _NAME) for version in versions]
+    return [clip(PurePath(name).name or name, _NAME) for name in names]
+
+
+def _sections(ticks: Sequence[str], tracks: Sequence[Track]) -> tuple[list[Section], list[Section]]:
+    """One for each row of the reports, in their order: those with a step, and those without."""
     found: tuple[list[Section], list[Section]] = [], []
     rows: dict[str, list[Track]] = {}
     for track in tracks:
         rows.setdefault(row_name(track.row), []).append(track)
-    drawable = sorted((track for track in tracks if len(_points(track)) > 1), key=lambda track: not track.steps)
-    drawn = {id(track) for track in drawable[:MOST_PICTURES]}
+    drawn = sorted(rows, key=lambda name: not any(track.steps for track in rows[name]))[:MOST_PICTURES]
     for number, (name, own) in enumerate(rows.items()):
         section = Section(f"row-{number}", clip(name, 120), [])
-        section.columns = ["metric", *(str(index) for index in range(1, len(names) + 1))]
-        for track in own:
-            if id(track) in drawn:
-                section.pictures.append(_picture(section, track, len(names), f"h{number}-{len(section.pictures)}"))
-            section.rows.append([clip(track.metric or "whole row"), *_cells(track)])
-        missing = sum(len(_points(track)) > 1 for track in own) - len(section.pictures)
-        if missing:
+        section.columns = ["metric", *(str(index) for index in range(1, len(ticks) + 1))]
+        section.rows = [[clip(track.metric or "whole row"), *_cells(track)] for track in own]
+        drawable = sorted((track for track in own if len(_points(track)) > 1), key=_interest)
+        if drawable and name in drawn:
+            section.pictures.append(_picture(section, drawable[:MOST_CURVES], ticks, f"h{number}"))
+        missing = len(drawable) - (MOST_CURVES if section.pictures else 0)
+        if missing > 0:
             section.notes.append(f"{missing} more in the table alone; --metric and --case choose which are drawn.")
         found[not any(track.steps for track in own)].append(section)
     return found
+
+
+def _interest(track: Track) -> tuple[bool, bool]:
+    """Tracks with steps first, and of a quantity the largest over the samples."""
+    return not track.steps, track.metric.endswith(("_rms", "_final"))
 
 
 def _cells(track: Track) -> list[str]:
@@ -89,23 +105,31 @@ def _points(track: Track) -> dict[int, float]:
     return {number: value for number, value in logs.items() if value is not None}
 
 
-def _picture(section: Section, track: Track, count: int, name: str) -> Picture:
-    points = _points(track)
-    axes = new_axes("report", "value", height=2.2)
-    draw(axes, section.key(_VALUE), [number + 1 for number in points], list(points.values()), every=None)
-    for number, (verdict, _) in sorted(track.steps.items()):
-        key = _STEPS.get(verdict)
-        if key and number in points:
-            draw(axes, section.key(key), [number + 1], [points[number]], size=7)
-    axes.set_xlim(0.7, count + 0.3)
-    axes.xaxis.get_major_locator().set_params(integer=True)
-    low, high = min(points.values()), max(points.values())
-    pad = max(1.0, 0.15 * (high - low))
-    axes.set_ylim(low - pad, high + pad)
+def _picture(section: Section, tracks: Sequence[Track], ticks: Sequence[str], name: str) -> Picture:
+    """The metrics of one row over the reports, each named at its end, their steps marked."""
+    labels = [clip(track.metric or "whole row", 30) for track in tracks]
+    axes = new_axes("report", "value", 2.4 + 0.17 * len(tracks), room(labels))
+    heard: list[str] = []
+    reasons: list[str] = []
+    ends: list[End] = []
+    heights: list[float] = []
+    for place, (track, label) in enumerate(zip(tracks, labels, strict=True)):
+        points, key = _points(track), numbered(label, place)
+        draw(axes, key, [number + 1 for number in points], list(points.values()), every=None)
+        for number, (verdict, reason) in sorted(track.steps.items()):
+            mark = _STEPS.get(verdict)
+            if mark and number in points:
+                draw(axes, section.key(mark), [number + 1], [points[number]], size=7)
+            reasons.append(f"{label} {verdict.value} at {number + 1}: {reason}")
+        last = max(points)
+        ends.append(End(label, COLOURS[key.colour], last + 1, points[last]))
+        values = ", ".join(f"{number + 1}: {scientific(value)}" for number, value in points.items())
+        heard.append(f"{label} over the reports: {values}.")
+        heights += points.values()
+    axes.set_xlim(0.7, len(ticks) + 0.3)
+    shown = range(0, len(ticks), -(-len(ticks) // 6))
+    axes.set_xticks([number + 1 for number in shown], [printable(ticks[number]) for number in shown])
+    pad = max(1.0, 0.15 * (max(heights) - min(heights)))
+    axes.set_ylim(min(heights) - pad, max(heights) + pad)
     decades(axes.yaxis, 5)
-    values = ", ".join(f"{number + 1}: {scientific(value)}" for number, value in points.items())
-    reasons = [
-        f"{verdict.value} at {number + 1}: {reason}" for number, (verdict, reason) in sorted(track.steps.items())
-    ]
-    title = clip(track.metric or "whole row")
-    return finish(axes, title, f"{title} over the reports. {values}.", name, clip("; ".join(reasons), 200))
+    return finish(axes, section.title, spoken(heard), name, clip("; ".join(reasons), 200), ends)

@@ -13,11 +13,12 @@ from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
 from heavytop.measure.digits import RELATIVE, digits_kept
-from heavytop.records import UNMEASURED, Identity, Report, Row
+from heavytop.records import UNMEASURED, Report, Row
 from heavytop.report.compare import Comparison, Finding
+from heavytop.report.findings import Change, folded, line, statistics
 from heavytop.report.kind import Kinds, MakeSection, kind_of
 from heavytop.report.names import row_name
-from heavytop.report.section import Section, Sources, clip, logarithm
+from heavytop.report.section import Section, Sources, clip
 from heavytop.report.svg import quiet_style
 from heavytop.report.text import failed, short
 from heavytop.report.work_precision import ERRORS
@@ -28,7 +29,7 @@ MOST_ROWS = 500
 MOST_WORST = 50
 MOST_FAILURES = 50
 MOST_METRICS = 100
-MOST_FINDINGS = 500
+MOST_CHANGED = 200
 
 
 def write_report(report: Report, path: Path, kinds: Kinds) -> None:
@@ -77,10 +78,6 @@ def _gave_up(row: Row, kinds: Kinds) -> bool:
 
 def comparison_page(baseline: Report, candidate: Report, comparison: Comparison, kinds: Kinds) -> str:
     """The page of a comparison: verdict, changed rows, both reports on the same axes."""
-    changed = comparison.changed
-    motions: dict[Identity, list[Finding]] = {}
-    for finding in changed[:MOST_FINDINGS]:
-        motions.setdefault(finding.row, []).append(finding)
     sources = [("baseline", baseline), ("candidate", candidate)]
     return render(
         "comparison.html.j2",
@@ -88,9 +85,9 @@ def comparison_page(baseline: Report, candidate: Report, comparison: Comparison,
         baseline=baseline,
         comparison=comparison,
         tally={verdict.value: count for verdict, count in comparison.tally.items()},
-        changed=motions,
-        left_out=max(0, len(changed) - MOST_FINDINGS),
-        sections=sections(sources, kinds, dict.fromkeys(finding.row.case for finding in changed)),
+        changed=comparison.rows[:MOST_CHANGED],
+        left_out=max(0, len(comparison.rows) - MOST_CHANGED),
+        sections=sections(sources, kinds, dict.fromkeys(change.identity.case for change in comparison.rows)),
         differences=[[clip(part, 200) for part in each] for each in comparison.environment],
         environment=candidate.environment,
     )
@@ -161,25 +158,9 @@ def metric_cells(row: Row) -> list[list[str]]:
     ]
 
 
-def change(findings: Sequence[Finding]) -> str:
-    """What happened to one motion: digits lost or gained where an error moved, of the relative one if it did; else why.
-
-    The first finding is the worst.
-    """
-    worst = [finding for finding in findings if finding.verdict == findings[0].verdict]
-    moved = {finding.metric: lost for finding in worst if (lost := _digits_moved(finding)) is not None}
-    if not moved:
-        return worst[0].reason
-    lost = moved.get(RELATIVE.text, max(moved.values(), key=abs))
-    return f"{abs(lost):.1f} digits {'lost' if lost > 0 else 'gained'}"
-
-
-def _digits_moved(finding: Finding) -> float | None:
-    """Of an error that both reports have as a number; None for laws, timings and words."""
-    if finding.timing or ("error" not in finding.metric.split("_") and not finding.metric.startswith("drift")):
-        return None
-    old, new = logarithm(finding.baseline), logarithm(finding.candidate)
-    return None if old is None or new is None else new - old
+def quantities(changed: Change) -> list[tuple[str, Finding]]:
+    """Each quantity of a row that changed with the statistics of it that did, and the worst finding about it."""
+    return [(statistics(name, found), found[0]) for name, found in folded(changed)]
 
 
 def commands(report: Report) -> list[str]:
@@ -221,7 +202,8 @@ def render(template: str, **context: Any) -> str:
         "row_name": row_name,
         "main_metric": main_metric,
         "metric_cells": metric_cells,
-        "change": change,
+        "change": line,
+        "folded": quantities,
     }
     environment.globals |= {"most_metrics": MOST_METRICS}
     return environment.get_template(template).render(**context)

@@ -12,7 +12,7 @@ from typing import Any
 
 from heavytop.measure.growth import BENT, CLASSES, FEWEST_SAMPLES, NEAR
 from heavytop.records import Row, Series
-from heavytop.report.section import DASHED, TIME, Key, Section, Sources, clip, draw, numbered, points, scientific
+from heavytop.report.section import DASHED, TIME, Key, Keys, Section, Sources, clip, draw, points, scientific
 from heavytop.report.svg import COLOURS, End, decades, finish, new_axes, spoken
 from heavytop.report.text import short
 
@@ -126,11 +126,8 @@ def _curve(axes: Any, key: Key, row: Row, name: str, power: float) -> tuple[Tren
 
 def method_growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """The section of the page: energy drift and phase error of the three methods, with the power of t of each."""
-    chosen: list[tuple[Key, Row]] = []
-    for source, report in sources:
-        for place, row in enumerate(alike(report.rows)):
-            label = f"{row.integrator}, {source}" if source else row.integrator
-            chosen.append((numbered(label, place, source == "baseline"), row))
+    keys = Keys()
+    chosen = [(keys.key(row.integrator, source), row) for source, report in sources for row in alike(report.rows)]
     if not chosen:
         return None
     section = Section(

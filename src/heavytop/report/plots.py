@@ -9,19 +9,19 @@ from typing import Any, NamedTuple
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.records import Law, Metric, Quantity, Row, Series
-from heavytop.report.names import variant, with_source
+from heavytop.report.names import variant
 from heavytop.report.section import (
     DASHED,
     MOST_PLOTS,
     TIME,
     Key,
+    Keys,
     Section,
     Sources,
     clip,
     draw,
     left_out,
     logarithm,
-    numbered,
     points,
     scientific,
 )
@@ -65,14 +65,12 @@ class _Chart(NamedTuple):
 def growth(sources: Sources, first: Iterable[str] = ()) -> Section | None:
     """Drift and state error over time, on logarithmic axes that the plots of a case share; cases ``first``."""
     cases: dict[str, list[tuple[Key, Row]]] = {}
-    keys: dict[str, Key] = {}
+    keys = Keys()
     for source, report in sources:
         for row in report.rows:
             if row.bits and any(column.of(row) for column in _COLUMNS):
-                label = with_source(
-                    ", ".join(part for part in (clip(row.precision, 20), variant(row, sources)) if part), source
-                )
-                key = keys.setdefault(label, numbered(label, len(keys), source == "baseline"))
+                label = ", ".join(part for part in (clip(row.precision, 20), variant(row, sources)) if part)
+                key = keys.key(label, source)
                 cases.setdefault(row.case, []).append((key, row))
     if not cases:
         return None

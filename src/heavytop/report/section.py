@@ -19,6 +19,8 @@ from heavytop.report.svg import COLOURS, MARKERS, Picture
 MOST_PLOTS = 12
 TIME = "|t| (time units of the data)"
 DASHED = (0, (6.0, 3.0))
+_DASHES = ("", "6 3", "2 2", "8 2 2 2")
+"""Of SVG, in line widths; the first is a whole line."""
 
 Sources = Sequence[tuple[str, Report]]
 
@@ -124,10 +126,25 @@ def points(series: Series, shift: float = 0.0, scale: float = 1.0) -> tuple[list
     return [x for x, _ in pairs], [y for _, y in pairs]
 
 
+class Keys:
+    """Entries of curves by their labels, in the order in which they come: a baseline has the look of its candidate."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, int] = {}
+
+    def key(self, label: str, source: str = "") -> Key:
+        """The entry of a curve of that label in the report ``source``."""
+        place = self._places.setdefault(label, len(self._places))
+        return numbered(f"{label}, {source}" if source else label, place, source == "baseline")
+
+
 def numbered(label: str, place: int, old: bool = False) -> Key:
-    """The entry of the curve that is the ``place``-th: no two of the first thirty look alike."""
+    """The entry of the curve that is the ``place``-th: no two of the first thirty-six look alike; further ones, from
+    one turn through the colours to the next, differ in their dashes.
+    """
     turn = place // len(COLOURS)
-    return Key(clip(label, 50), place % len(COLOURS), MARKERS[(place + turn) % len(MARKERS)], old=old)
+    marker = MARKERS[(place + turn) % len(MARKERS)]
+    return Key(clip(label, 50), place % len(COLOURS), marker, _DASHES[turn % len(_DASHES)], old)
 
 
 def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6, every: float | None = 0.07) -> None:
@@ -138,7 +155,8 @@ def draw(axes: Any, key: Key, x: Any, y: Any, size: float = 3.6, every: float | 
     colour = COLOURS[key.colour]
     style: dict[str, Any] = {"lw": 4.5, "alpha": 0.5, "mfc": "none", "ms": size + 2} if key.old else {"ms": size}
     spread = every if key.line and len(x) > 1 else None
-    style |= {"ls": "-" if key.line else "none", "marker": key.marker, "mec": colour, "markevery": spread}
+    dashes: Any = (0, tuple(map(float, key.dash.split()))) if key.dash else "-"
+    style |= {"ls": dashes if key.line else "none", "marker": key.marker, "mec": colour, "markevery": spread}
     axes.plot(x, y, color=colour, label=key.label, **style)
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from textwrap import wrap
+from typing import Any
 
-from rich.console import Group, RenderableType
+from rich.cells import cell_len
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.table import Table
 from rich.text import Text
 
@@ -118,14 +122,61 @@ def title(text: str) -> Text:
     return Text(text, style="bold")
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[str | Text]], words: int = 1) -> Table:
-    """A table without lines; its first ``words`` columns are words, the others are numbers."""
-    made = Table(box=None, pad_edge=True, header_style="dim")
-    for index, column in enumerate(columns):
-        made.add_column(Text(printable(column)), justify="left" if index < words else "right", overflow="fold")
-    for row in rows:
-        made.add_row(*(cell if isinstance(cell, Text) else Text(printable(cell)) for cell in row))
-    return made
+@dataclass(slots=True)
+class Lines:
+    """A table without lines, as wide as where it is printed; where its words do not fit beside each other, a block for
+    each row: its first cell, and then every other one behind the name of its column.  No word is broken.
+
+    words: how many first columns are words; the others are numbers.  left: the last column is words too.
+    """
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Text]]
+    words: int = 1
+    left: bool = False
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """A table, or blocks."""
+        cells = [[Text(column) for column in self.columns], *self.rows]
+        widths = [max(cell_len(word) for row in cells for word in [*row[i].plain.split(" "), ""]) for i in self._all]
+        if sum(widths) + 2 * len(widths) > options.max_width:
+            yield from self._blocks(options.max_width)
+            return
+        made = Table(box=None, pad_edge=True, header_style="dim")
+        for index, (column, width) in enumerate(zip(self.columns, widths, strict=True)):
+            wide = max(row[index].cell_len for row in cells)
+            made.add_column(
+                Text(column),
+                justify="left" if self._is_words(index) else "right",
+                no_wrap=wide == width,
+                min_width=width,
+            )
+        for row in self.rows:
+            made.add_row(*row)
+        yield made
+
+    @property
+    def _all(self) -> range:
+        return range(len(self.columns))
+
+    def _is_words(self, index: int) -> bool:
+        return index < self.words or (self.left and index == len(self.columns) - 1)
+
+    def _blocks(self, width: int) -> Iterator[Text]:
+        for first, *rest in self.rows:
+            yield first
+            pairs = zip(self.columns[1:], rest, strict=True)
+            said = ";  ".join(f"{column} {cell.plain}".strip() for column, cell in pairs if cell.plain.strip())
+            yield from map(Text, wrap(said, width - 4, initial_indent="    ", subsequent_indent="    ", **_WHOLE_WORDS))
+
+
+_WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False}
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[str | Text]], words: int = 1, left: bool = False) -> Lines:
+    """A table without lines; its first ``words`` columns are words, the others are numbers; ``left``: not the last."""
+    cells = [[cell if isinstance(cell, Text) else Text(printable(cell)) for cell in row] for row in rows]
+    return Lines([printable(column) for column in columns], cells, words, left)
 
 
 def both(lines: Iterable[tuple[Row, Sequence[str]]]) -> list[list[str]]:
@@ -136,7 +187,7 @@ def both(lines: Iterable[tuple[Row, Sequence[str]]]) -> list[list[str]]:
     return [[(case if len(rows) > 1 else rows[0].case) + name, *cells] for (case, name, *cells), rows in found.items()]
 
 
-def motions(rows: Sequence[Row]) -> Table:
+def motions(rows: Sequence[Row]) -> Lines:
     """Digits right, distance from the true motion and drift of every integral, a line a row."""
     lines = []
     for row in rows:
@@ -171,9 +222,7 @@ def motions(rows: Sequence[Row]) -> Table:
         "across",
         "drift of each integral",
     ]
-    made = table(columns, lines)
-    made.columns[-1].justify = "left"
-    return made
+    return table(columns, lines, left=True)
 
 
 def drifts(row: Row) -> list[tuple[str, Metric]]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from heavytop.records import Row
-from heavytop.report.section import Key, Section, Sources, Table, clip, draw, left_out, numbered, scientific
+from heavytop.report.section import Keys, Section, Sources, Table, clip, draw, left_out, scientific
 from heavytop.report.svg import COLOURS, End, Picture, decades, finish, new_axes, room, spoken
 from heavytop.report.text import short
 from heavytop.report.work_precision import ERRORS, Lead, Line, leads, panels, seconds_text
@@ -62,7 +62,7 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
     )
     cases = list(dict.fromkeys(row.case for _, row in rows))
     left_out(section, len(cases) - MOST_CASES, "case")
-    keys: dict[str, Key] = {}
+    keys = Keys()
     for number, case in enumerate(cases[:MOST_CASES]):
         lines = [(source, line) for source, report in sources for line in panels(report.rows).get(case, ())]
         section.pictures.append(_picture(lines, keys, f"{clip(case, 40)}: time against error", f"work-{number}"))
@@ -86,7 +86,7 @@ def _lead_cells(lead: Lead, source: str) -> list[str]:
     ]
 
 
-def _picture(lines: Sequence[tuple[str, Line]], keys: dict[str, Key], title: str, name: str) -> Picture:
+def _picture(lines: Sequence[tuple[str, Line]], keys: Keys, title: str, name: str) -> Picture:
     names = [clip(line.label, 30) + (f", {source}" if source else "") for source, line in lines]
     height = max(3.4, 1 + 0.17 * len(lines))
     axes = new_axes("error (units of Ω and γ)", "time of a run (s)", height, room(names))
@@ -94,7 +94,7 @@ def _picture(lines: Sequence[tuple[str, Line]], keys: dict[str, Key], title: str
     decades(axes.yaxis)
     heard, ends = [], []
     for (source, line), label in zip(lines, names, strict=True):
-        key = keys.setdefault(label, numbered(label, len(keys), source == "baseline"))
+        key = keys.key(clip(line.label, 30), source)
         points = sorted((point.log10, math.log10(point.seconds)) for point in line.points)
         if points:
             draw(axes, key, [x for x, _ in points], [y for _, y in points], 4.2, every=None)

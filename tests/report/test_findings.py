@@ -1,0 +1,108 @@
+"""The sentences that open a comparison: what is wrong, the most telling first."""
+
+import pytest
+
+from heavytop.measure.scalar import of_fraction
+from heavytop.precision import exact
+from heavytop.records import Against, Law, Row, Subject
+from heavytop.report.findings import MOST
+from heavytop.report.policy import Policy
+from report_helpers import error
+from reports import compare, replace
+from small_reports import report, row
+
+DIGITS = "solution_error_relative_max"
+
+
+def rk5(**changes: object) -> Row:
+    return row(integrator="mine:rk5", **changes)
+
+
+def step(**changes: object) -> Row:
+    order = of_fraction(exact(changes.pop("seen", "5")), "value")
+    return rk5(measure="local_error", metrics={"local_error_ulp_max": error("3"), "observed_order": order}, order=5)
+
+
+def found(old: list[Row], new: list[Row]) -> list[str]:
+    return compare(report(*old), report(*new), Policy()).sentences
+
+
+def test_an_order_leads_then_failures_digits_laws_and_that_nothing_else_changed() -> None:
+    healthy = [
+        step(),
+        rk5(case="lagrange", metrics={DIGITS: error("1.2e-9")}),
+        rk5(case="pendulum", metrics={DIGITS: error("1e-9")}),
+        rk5(case="delone"),
+        rk5(case="grioli", measure="growth", metrics={}, laws={"solution_error_along": Law("t^0.5", 9, 0.5, 0.4, 0.6)}),
+    ]
+    faulty = [
+        step(seen="2"),
+        replace(healthy[1], metrics={DIGITS: error("3e-8")}),
+        replace(healthy[2], metrics={DIGITS: error("5e-9")}),
+        replace(healthy[3], outcome="failed", metrics={}, reference=Against("none", reason="it returned NaN")),
+        replace(healthy[4], laws={"solution_error_along": Law("t", 9, 1.0, 0.9, 1.1)}),
+    ]
+    said = found(healthy, faulty)
+    assert said[0] == "Order observed 5 → 2 in single steps on euler (mine:rk5, double)."
+    assert said[1] == "1 row of mine:rk5 failed: it returned NaN."
+    assert said[2] == "Digits right 8.9 → 7.5 on lagrange at T = 100 (mine:rk5, double), fewer on 1 other row too."
+    assert said[3].startswith("The error along the flow grows like t (was t^0.5) on grioli")
+    assert said[-1] == "Nothing else changed."
+    assert len(said) == 5
+
+
+def test_a_report_against_itself_has_one_sentence() -> None:
+    assert found([row()], [row()]) == ["Nothing changed: 2 metrics are the same within rounding noise."]
+
+
+def work(steps: int, size: str, **changes: object) -> Row:
+    subject = Subject("computed", "mine:rk5", step=f"1/{steps}")
+    made = rk5(case="euler/T=100", measure="work_precision", metrics={"error_max": error(size)}, steps=steps, **changes)
+    return replace(made, key=replace(made.key, subject=subject))
+
+
+@pytest.mark.parametrize(
+    ("errors", "said"),
+    [
+        (("1e-4", "1e-8", "1e-9"), "Order observed 4.0 → 1.0 on euler from 100 to 1000 steps"),
+        (("1e-4", "1e-6", "1e-8"), "Order observed 4.0 → 2.0 on euler from 10 to 100 steps"),
+        (("1e-4", "1e-7", "1e-7"), "Order observed 4.0 → 0.0 on euler from 100 to 1000 steps"),
+    ],
+)
+def test_the_order_of_refined_settings_shows_where_it_falls(errors: tuple[str, ...], said: str) -> None:
+    counts = (10, 100, 1000)
+    healthy = [work(n, f"1e-{4 * i}") for i, n in enumerate(counts, 1)]
+    faulty = [work(n, size) for n, size in zip(counts, errors, strict=True)]
+    first = found(healthy, faulty)[0]
+    assert first.startswith(said)
+    assert first.endswith("(mine:rk5, double).")
+    assert found(healthy, healthy)[0].startswith("Nothing changed")
+
+
+def test_other_steps_at_the_same_setting_are_said() -> None:
+    old, new = rk5(metrics={DIGITS: error("1e-9")}, steps=1000), rk5(metrics={DIGITS: error("1e-8")}, steps=700)
+    assert "Steps 1000 → 700 at the same setting on euler at T = 100 (mine:rk5, double)." in found([old], [new])
+    assert not any("Steps" in each for each in found([old], [replace(new, steps=1010)]))
+
+
+def test_there_are_never_more_than_eight_and_the_rest_is_counted() -> None:
+    cases = [f"case-{i}" for i in range(40)]
+    old = [row(case=case, integrator=f"mine:{case}", metrics={DIGITS: error("1e-9")}) for case in cases]
+    new = [replace(each, metrics={DIGITS: error("1e-5")}) for each in old]
+    said = found(old, new)
+    assert len(said) == MOST
+    assert said[-1] == f"{40 - (MOST - 1)} other rows changed."
+
+
+def test_what_is_worse_comes_before_what_is_better() -> None:
+    old = [rk5(case=case, metrics={DIGITS: error("1e-9")}) for case in ("a", "b")]
+    new = [replace(old[0], metrics={DIGITS: error("1e-12")}), replace(old[1], metrics={DIGITS: error("1e-8")})]
+    said = found(old, new)
+    assert said[0].startswith("Digits right 9.0 → 8.0 on b")
+    assert said[1].startswith("Digits right 9.0 → 12.0 on a")
+
+
+def test_two_reports_without_a_common_row_say_so() -> None:
+    said = found([row(case="a")], [row(case="b")])
+    assert said == ["1 row of heyoka is missing.", "1 row of heyoka is new.", said[-1]]
+    assert "no row in common" in said[-1]
