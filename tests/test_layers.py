@@ -32,6 +32,7 @@ MAY_IMPORT = {
     "api": MOTIONS | {"measure", "suite", "report", "kinds"},
     "cli": MOTIONS | {"measure", "suite", "report", "kinds", "api"},
     "__main__": {"cli"},
+    "pytest_plugin": GROUND | {"suite", "api"},
     "__init__": GROUND | {"top", "integrate", "measure", "api"},
 }
 

@@ -1,0 +1,126 @@
+"""The pytest fixture ``heavytop_gate``: an integrator, or its states, gated on the digits that are right.
+
+pytest imports this module in every session where heavytop is installed; heavytop itself is loaded when a test uses it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from heavytop.api.scores import Score
+
+_COMPARISONS = ("<", "<=", "==", "!=", ">", ">=")
+
+
+class DigitsRight(float):
+    """Digits right at every sample; nan, which no comparison holds for, where that is not known.
+
+    explanation: what a failed assertion says beside the number, a line each.
+    """
+
+    explanation: tuple[str, ...] = ()
+
+
+class Gated:
+    """What ``heavytop_gate`` found.  score: as :func:`heavytop.score` returns it.
+
+    digits_right: a number, or nan where the run did not reach its last time or there is no reference.
+    """
+
+    def __init__(self, score: Score) -> None:
+        self.score = score
+        known = score.digits_right if score.outcome == "success" else None
+        self.digits_right = DigitsRight(math.nan if known is None else known)
+        self.digits_right.explanation = tuple(_explained(score))
+
+    def __repr__(self) -> str:
+        return repr(self.score)
+
+
+Gate = Callable[..., Gated]
+
+
+@pytest.fixture(scope="session")
+def heavytop_gate() -> Gate:
+    """A function ``heavytop_gate(integrator_or_states, case="lagrange")``; see :func:`gate`."""
+    return gate
+
+
+def gate(
+    integrator_or_states: Any,
+    case: str = "lagrange",
+    *,
+    times: Sequence[Any] | None = None,
+    precision: str = "double",
+    **options: Any,
+) -> Gated:
+    """How many digits an integrator keeps on a built-in case, or states that some program computed have.
+
+    Arguments:
+        integrator_or_states: a name of `heavytop list`, "mine.toml", "./mine.py:solve", a callable, a Trajectory, or
+            states of shape (n, 6) in the order Ω1 Ω2 Ω3 γ1 γ2 γ3 at ``times``.
+        case: a name of `heavytop list`.
+        times: exact numbers, strictly monotone away from 0; None for 1, 2, ..., 10, with states necessary.
+        precision: the format.
+        options: of :func:`heavytop.propagate`, such as ``tolerance``.
+
+    Raises:
+        InputError: for what is no case, integrator, time or state.
+        PeerFailed: where the integrator breaks its contract.
+    """
+    import heavytop as ht
+    from heavytop.errors import InputError
+    from heavytop.suite.cases import case as case_named
+
+    known = case_named(case)
+    given = integrator_or_states
+    if isinstance(given, str) or callable(given):
+        wanted = list(range(1, 11)) if times is None else times
+        given = ht.propagate(
+            known.top, known.start, wanted, precision, integrator=given, system=known.system, **options
+        )
+    name = "given"
+    if isinstance(given, ht.Trajectory):
+        if given.outcome is not ht.Outcome.SUCCESS:
+            pytest.fail(f"{case}: {given!r}", pytrace=False)
+        times, given, name = given.times, given.states, given.integrator
+    if times is None:
+        raise InputError("States come without their times.", "Give heavytop_gate(states, times=[...]).")
+    return Gated(
+        ht.score(
+            times,
+            given,
+            top=known.top,
+            start=known.start,
+            precision=precision,
+            system=known.system,
+            name=case,
+            integrator=name,
+        )
+    )
+
+
+def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str] | None:
+    """What a failed comparison of digits says: the numbers, then what the score found."""
+    digits = next((side for side in (left, right) if isinstance(side, DigitsRight)), None)
+    if digits is None or op not in _COMPARISONS:
+        return None
+    return [f"{_shown(left)} {op} {_shown(right)} digits right", *digits.explanation]
+
+
+def _explained(score: Score) -> Iterator[str]:
+    """Few lines, for pytest shows eight: what was scored, what explains its error, the largest errors and drifts."""
+    yield repr(score).splitlines()[0]
+    yield from score.diagnosis[:2]
+    for label, sizes in (("largest error", score.distance), ("largest drift", score.drift)):
+        if sizes:
+            yield f"{label}: " + ", ".join(f"{name} {float(size.max):.2g}" for name, size in sizes.items())
+
+
+def _shown(side: object) -> str:
+    return f"{side:.1f}" if isinstance(side, DigitsRight) else repr(side)
