@@ -228,12 +228,28 @@ def test_a_broken_peer_is_an_error_in_words(name: str, cause: str) -> None:
     assert cause in str(peers.available()[name])
 
 
-def test_a_peer_that_is_not_installed_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "CyRK", None)
-    monkeypatch.delitem(sys.modules, "heavytop.integrate.peers.cyrk", raising=False)
-    with pytest.raises(InputError, match="cyrk:DOP853 is not available") as caught:
-        peers.peer("cyrk:DOP853")
-    assert "heavytop[peers]" in caught.value.remedy
+@pytest.mark.parametrize(
+    ("module", "names"),
+    [
+        ("scipy", {"scipy:DOP853", "scipy:LSODA", "scipy:Radau"}),
+        ("CyRK", {"cyrk:DOP853", "cyrk:Vern8"}),
+        ("numba", {"cyrk:DOP853", "cyrk:Vern8"}),
+        ("sksundae", {"sundials:CVODE"}),
+        ("diffrax", {"diffrax:Dopri8"}),
+    ],
+)
+def test_a_peer_that_is_not_installed_says_how_to_get_it(
+    monkeypatch: pytest.MonkeyPatch, module: str, names: set[str]
+) -> None:
+    before = {name for name, reason in peers.available().items() if reason is None}
+    monkeypatch.setitem(sys.modules, module, None)
+    after = {name for name, reason in peers.available().items() if reason is None}
+    assert before - after == names
+    for name in names:
+        with pytest.raises(InputError, match=f"needs {module}, which is not installed") as caught:
+            peers.require(name)
+        assert "pip install 'heavytop[peers]'" in caught.value.remedy
+        assert "pip install 'heavytop[peers]'" in str(peers.available()[name])
 
 
 def test_without_numba_the_field_is_evaluated_in_python() -> None:

@@ -42,10 +42,15 @@ _PATIENCE = 60
 
 
 class BuiltIn(NamedTuple):
-    """Where one of this program's is, as ``module:name``, and the package that it needs, if it is an extra."""
+    """Where one of this program's is, as ``module:name``, and the modules of extras that it needs."""
 
     place: str
-    package: str = ""
+    needs: tuple[str, ...] = ()
+
+    @property
+    def lacks(self) -> str:
+        """The first of them that is not installed; "" where none lacks."""
+        return next((module for module in self.needs if find_spec(module) is None), "")
 
 
 BUILT_IN = {
@@ -53,13 +58,13 @@ BUILT_IN = {
     "heyoka:constants": BuiltIn(f"{HERE}.heyoka_taylor:constants"),
     "heyoka:lanes": BuiltIn(f"{HERE}.heyoka_taylor:lanes"),
     "words": BuiltIn("heavytop.integrate.words:propagate_words"),
-    "scipy:DOP853": BuiltIn(f"{HERE}.scipy_ivp:dop853", "scipy"),
-    "scipy:LSODA": BuiltIn(f"{HERE}.scipy_ivp:lsoda", "scipy"),
-    "scipy:Radau": BuiltIn(f"{HERE}.scipy_ivp:radau", "scipy"),
-    "cyrk:DOP853": BuiltIn(f"{HERE}.cyrk:dop853", "CyRK"),
-    "cyrk:Vern8": BuiltIn(f"{HERE}.cyrk:vern8", "CyRK"),
-    "sundials:CVODE": BuiltIn(f"{HERE}.sundials:cvode", "sksundae"),
-    "diffrax:Dopri8": BuiltIn(f"{HERE}.diffrax_dopri8:dopri8", "diffrax"),
+    "scipy:DOP853": BuiltIn(f"{HERE}.scipy_ivp:dop853", ("scipy",)),
+    "scipy:LSODA": BuiltIn(f"{HERE}.scipy_ivp:lsoda", ("scipy",)),
+    "scipy:Radau": BuiltIn(f"{HERE}.scipy_ivp:radau", ("scipy",)),
+    "cyrk:DOP853": BuiltIn(f"{HERE}.cyrk:dop853", ("CyRK", "numba")),
+    "cyrk:Vern8": BuiltIn(f"{HERE}.cyrk:vern8", ("CyRK", "numba")),
+    "sundials:CVODE": BuiltIn(f"{HERE}.sundials:cvode", ("sksundae",)),
+    "diffrax:Dopri8": BuiltIn(f"{HERE}.diffrax_dopri8:dopri8", ("diffrax",)),
     "mpmath:odefun": BuiltIn(f"{HERE}.mpmath_taylor:odefun"),
     "splitting:2": BuiltIn(f"{HERE}.splitting:order2"),
     "splitting:4": BuiltIn(f"{HERE}.splitting:order4"),
@@ -93,6 +98,8 @@ def peer(which: str | Source) -> Peer:
     entry = known().get(name)
     if entry is None:
         raise InputError(f"Unknown integrator {name[:60]!r}.", f"Known: {', '.join(known())}.")
+    if name in BUILT_IN and (missing := BUILT_IN[name].lacks):
+        raise InputError(f"The integrator {name} needs {missing}, which is not installed.", _REMEDY)
     try:
         with quiet():
             loaded: Any = entry.load()
@@ -196,19 +203,18 @@ def knob_apart(which: str | Source) -> str:
 
 
 def available() -> dict[str, str | None]:
-    """For each peer: None if it is installed, else the reason why it cannot be used.
+    """For each peer: None if it can be used, else why not, and the remedy.
 
-    One of this program's is not imported: its package is looked for.  One of another package is.
+    One of this program's is not imported: the packages that it needs are looked for.  One of another package is.
     """
     found: dict[str, str | None] = {}
     for name in known():
-        built_in = BUILT_IN.get(name)
         found[name] = None
-        if built_in is None or (built_in.package and find_spec(built_in.package) is None):
+        if name not in BUILT_IN or BUILT_IN[name].lacks:
             try:
                 peer(name)
             except InputError as error:
-                found[name] = error.cause
+                found[name] = str(error)
     return found
 
 
