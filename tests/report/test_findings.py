@@ -106,3 +106,10 @@ def test_two_reports_without_a_common_row_say_so() -> None:
     said = found([row(case="a")], [row(case="b")])
     assert said == ["1 row of heyoka is missing.", "1 row of heyoka is new.", said[-1]]
     assert "no row in common" in said[-1]
+
+
+@pytest.mark.parametrize(("last", "between"), [("1e-12", True), ("1e-7", False)])
+def test_a_last_state_that_is_as_it_was_points_to_the_dense_output(last: str, between: bool) -> None:
+    old = rk5(metrics={DIGITS: error("1e-12"), "solution_error_omega_final": error("1e-12")})
+    new = replace(old, metrics={DIGITS: error("1e-6"), "solution_error_omega_final": error(last)})
+    assert ("errors are between steps" in found([old], [new])[0]) is between

@@ -31,6 +31,8 @@ RANK = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Ve
 _ORDER_MOVED = 0.5
 """An order between two settings that moved by less is no finding: errors near rounding bend it by as much."""
 _DIGITS_MOVED = 0.05
+_ENDS_AS_BEFORE = 0.5
+"""Decades by which the error of the last state may have grown where the dense output alone is worse."""
 _STEPS_MOVED = 0.02
 """Decades: a step size control that rounds otherwise moves the steps by less."""
 _MOST_KEPT = 20_000
@@ -86,8 +88,12 @@ class Change(NamedTuple):
         return max((moved for each in self.findings if (moved := self.decades(each)) is not None), default=0.0)
 
     def decades(self, finding: Finding) -> float | None:
-        """Decades by which an error grew; None for what is no error, or not a number in both rows."""
-        old, new = (self.metric(row, finding.metric) for row in (self.old, self.new))
+        """Decades by which the error of a finding grew; None for what is no error, or not a number in both rows."""
+        return self.decades_of(finding.metric)
+
+    def decades_of(self, name: str) -> float | None:
+        """The same of a metric by its name."""
+        old, new = (self.metric(row, name) for row in (self.old, self.new))
         if old is None or new is None or old.log10 is None or new.log10 is None or old.kind != "error":
             return None
         return new.log10 - old.log10
@@ -164,7 +170,7 @@ def sentences(changes: Changes, same: int) -> list[str]:
     found += _whole_rows(changes.rows, Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
     for verdicts in ({Verdict.WORSE, Verdict.INCOMPARABLE}, {Verdict.BETTER}):
         rows = [change for change in changes.worst_first if change.verdict in verdicts]
-        for make in (_digits_moved, _laws_moved, _steps_moved, _others_moved):
+        for make in (_digits_moved, _steps_moved, _laws_moved, _others_moved):
             found += make(rows, verdicts)
     found = [*found, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1]
     told = frozenset[Identity]().union(*(each.rows for each in found))
@@ -337,6 +343,8 @@ def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
         old, new = map(digits_text, worst.digits)
         also = len(changes) - 1
         more = f", {'fewer' if sign > 0 else 'more'} on {_count(also, 'other row')} too" if also else ""
+        if sign > 0 and all(_ends_as_before(change) for change in changes):
+            more += "; the last state is as it was: errors are between steps, of the dense output"
         yield Sentence(f"Digits right {old} → {new} on {_where(worst)}{more}.", frozenset(c.identity for c in changes))
 
 
@@ -357,6 +365,18 @@ def _steps(change: Change) -> float:
     assert change.old is not None
     assert change.new is not None
     return math.log10(change.new.steps / change.old.steps)
+
+
+def _ends_as_before(change: Change) -> bool:
+    """Whether of a row whose digits fell the last state is as right as it was."""
+    moved = [] if change.old is None else [change.decades_of(name) for name in _finals(change.old)]
+    return bool(moved) and all(each is not None and each < _ENDS_AS_BEFORE for each in moved)
+
+
+def _finals(row: Row) -> list[str]:
+    """The metrics of the error at the last sample."""
+    found = ((name, metric.quantity) for name, metric in row.metrics.items())
+    return [name for name, q in found if q and q.name in _DIGITS and q.statistic == "final"]
 
 
 def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
