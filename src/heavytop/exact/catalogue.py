@@ -29,6 +29,7 @@ from heavytop.exact.lagrange import Lagrange
 from heavytop.exact.pendulum import Pendulum
 from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
+from heavytop.exact.spherical import SphericalTop
 from heavytop.exact.staude import Staude
 from heavytop.exact.steklov import Steklov
 from heavytop.exact.validated import Validated
@@ -100,6 +101,7 @@ _HEAVY_TOP: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (Euler, _KEEP),
     (Pendulum, _KEEP),
     (Lagrange, CYCLIC),
+    (SphericalTop, _KEEP),
     (BobylevSteklov, ALL),
     (HessPendulum, CYCLIC),
     (Delone, CYCLIC),
