@@ -20,6 +20,7 @@ from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.grioli import Grioli
 from heavytop.exact.gyrostat import Gyrostat
 from heavytop.exact.hess import Hess
@@ -108,6 +109,7 @@ _HEAVY_TOP: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (Steklov, CYCLIC),
     (Hess, CYCLIC),
     (Kovalevskaya, CYCLIC),
+    (GoryachevChaplyginRest, CYCLIC),
     (GoryachevChaplygin, CYCLIC),
 )
 _GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
