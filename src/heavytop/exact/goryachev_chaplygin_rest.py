@@ -6,7 +6,7 @@ In the notation of :mod:`heavytop.exact.goryachev_chaplygin_abel`, with G = 0, |
 
 In the time τ, dτ = dt/(u1 − u2), each moves by itself and log u grows by ± κτ there.  With p_k = tan(φ_k/2) of
 
-    u1 = (2κ/√a) p1/w1,   u2 = −(2κ/√a) p2/w2,   w_k² = 1 + p_k⁴ − 2 (h/a) p_k²
+    u1 = (2κ/√a) p1/w1,   u2 = −(2κ/√a) p2/w2,   w_k² = 1 + p_k⁴ − 2 (h/a) p_k² = (p_k² − h/a)² + κ²/a²
 
 p_k ∝ e^(κτ), so that p1/p2 is constant, and t = ∫ (u1 − u2) dτ = (F(φ1|m) + F(φ2|m))/√a, m = (a + h)/(2a).  Euler's
 addition theorem solves these two equations: with γ = (·, γ2, γ3) at rest in the turned frame, e² = γ2² + γ3² = (κ/c)²
@@ -38,11 +38,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import count
 from typing import Any
 
 from flint import acb, arb
 
-from heavytop.errors import NotInClass
+from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import Undecided, ball
 from heavytop.exact.closed_form import ClosedForm, constant, instant, series_length
@@ -53,6 +54,8 @@ from heavytop.exact.one_gap import in_units
 from heavytop.exact.separated import require_plane_centre
 from heavytop.precision import shown
 from heavytop.top.heavy_top import dot
+
+_MOST_VALUES = 1 << 14
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,19 +193,29 @@ class RestMotion:
         return Place(self, s * delta / (far + side * near), side, root)
 
     def swept(self, end: arb) -> arb:
-        """The integral of dΛ/dy from 0 to ``end``."""
-        (one, two), double = self.shares, 2 * self.energy / self.size
+        """The integral of dΛ/dy from 0 to ``end``; raises OutOfReach where the quadrature takes too long."""
+        (one, two), cosine, sine = self.shares, self.energy / self.size, self.speed / self.size
 
         def width(square: acb, analytic: bool) -> acb:
-            return (1 + square * square - square * double).sqrt(analytic=analytic)
+            return ((square - cosine) ** 2 + sine * sine).sqrt(analytic=analytic)
+
+        taken = count()
 
         def slope(y: acb, analytic: bool) -> acb:
+            if next(taken) > _MOST_VALUES:
+                return acb("nan")
             w1, w2 = width(y * one * one, analytic), width(y * two * two, analytic)
             return 1 / (w1.sqrt(analytic=analytic) * w2.sqrt(analytic=analytic) * (one * w2 + two * w1))
 
         middle = acb(end.mid())
         # FLINT integrates to exact ends; the rest by the mean value theorem
-        total = acb.integral(slope, acb(0), middle) + (acb(end) - middle) * slope(acb(end), False)
+        total = (acb(end) - middle) * slope(acb(end), False) + acb.integral(slope, acb(0), middle)
+        if next(taken) > _MOST_VALUES:
+            raise OutOfReach(
+                f"The azimuth of M takes more than {_MOST_VALUES} values of its integrand: gamma at rest is all but "
+                "in line with the centre of mass, or all but level beside it.",
+                "Integrate the attitude along with it.",
+            )
         return -4 * self.tilt * self.across * self.upright * total.real
 
 
@@ -225,7 +238,8 @@ class Place:
         return tangents, [self._width(p * p) for p in tangents], shares
 
     def _width(self, square: Any) -> Any:
-        return (1 + square * square - square * (2 * self.motion.energy / self.motion.size)).sqrt()
+        off, sine = square - self.motion.energy / self.motion.size, self.motion.speed / self.motion.size
+        return (off * off + sine * sine).sqrt()
 
     def state(self) -> list[Any]:
         """The six components in the turned frame."""
