@@ -193,7 +193,7 @@ class FourierBound:
                 self.largest *= 4 / (self.width.cosh() - 1)
             self.farthest = abs(middle) + reach * self.width.cosh()
             excess = 7 * self.largest / (rest.density(middle) * (1 - (-self.width).exp()))
-            self.wanted = 2 * (float(excess.log()) + self.bits * log(2)) / float(self.width)
+            self.wanted = float(2 * (excess.log() + self.bits * log(2)) / self.width)
 
     def terms(self, most: int) -> int:
         """N, 2^k or 3·2^k, with an error of the sums below the working precision."""
