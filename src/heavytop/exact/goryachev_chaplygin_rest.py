@@ -30,6 +30,15 @@ time after the rest: two elliptic integrals, from u1 and u2.
     dΛ/dy = −4 e γ2 γ3/(√(w1w2) ((e − γ2) w2 + (e + γ2) w1))
 
 which is integrated as it stands, from the rest on, by FLINT's validated quadrature; γ3² y runs from 0 to 1 and back.
+
+*h = a.*  Then rest is reached at the upright equilibrium only, in infinite time, and all of it is elementary:
+u1 = 2√a sech v1, u2 = −2√a sech v2, with s_k = sech v_k, v1 + v2 = √a t + const and a constant
+
+    Δ = sinh v1 − sinh v2 = 2 cosh ½(v1 + v2) sinh ½(v1 − v2)
+    p = −σ√a (s1s2)^(3/2) Δ      q = −σ√a (s1s2)^(3/2) (1 + sinh v1 sinh v2)      r = 2√a (s1 − s2)
+    cγ1 = a − 2a (s1² − s1s2 + s2²)      cγ2 = 2a (s1³ sinh v1 − s2³ sinh v2)/(s1 + s2)
+    cγ3 = 2aσ (s1s2)^(3/2) (sinh v1 + sinh v2)/(s1 + s2)
+
 Source: D. N. Goryachev, Mat. sbornik 21 (1900) 431; derived here from the separated variables.
 """
 
@@ -39,7 +48,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import count
-from typing import Any
+from typing import Any, TypeVar
 
 from flint import acb, arb
 
@@ -60,10 +69,11 @@ _MOST_VALUES = 1 << 14
 
 @dataclass(frozen=True, slots=True)
 class GoryachevChaplyginRest(WithBearing, ClosedForm):
-    """A motion of the Goryachev-Chaplygin top, the small moment on axis 3, that starts at rest or comes to it.
+    """A motion of the Goryachev-Chaplygin top, the small moment on axis 3, that starts at rest, comes to it or tends
+    to it.
 
-    Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0, G = 0 and |h| < a, all exactly, and for
-    rotations about axis 3.
+    Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0, G = 0 and h² ≤ a², all exactly, for rotations
+    about axis 3, and for equilibria.
     """
 
     method = "closed form: Goryachev, through rest, Jacobi functions"
@@ -76,13 +86,15 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
         level = Level.of(self.top, self.start)
         if level.third != 0:
             raise NotInClass(f"It needs G = 0, but G = {shown(level.third)}.", "Use GoryachevChaplygin.")
-        room = level.moment_square * level.gamma_square - level.energy**2
-        if room <= 0:
+        room = _room(level)
+        if room < 0:
             raise NotInClass(
                 f"h^2 exceeds |P r|^2 |gamma|^2 by {shown(-room)}: it never comes to rest.", "Use GoryachevChaplygin."
             )
         if not any(level.omega[:2]) and (level.omega[2] or level.gamma[2] == 0):
             raise NotInClass("It turns about axis 3.", "Such a motion is a pendulum's.")
+        if room == 0 and not any(level.omega):
+            raise NotInClass("It is in equilibrium.", "Such a motion is constant.")
 
     def own_time(self, time: Fraction) -> Fraction:
         """In the level's unit."""
@@ -92,12 +104,14 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
         motion = _motion(self)
         level = motion.level
-        found = motion.at(instant(level.rate * time)).state()
+        found = motion.state(instant(level.rate * time))
         return in_units([*level.in_body(found[:3]), *level.in_body(found[3:])], level.rate, level.size)
 
     def bearing(self, time: Fraction) -> Bearing:
-        """See :class:`heavytop.exact.azimuth.WithBearing`: M, along γ × n at rest."""
+        """See :class:`heavytop.exact.azimuth.WithBearing`: M, along γ × n at rest; not for h = a."""
         motion = _motion(self)
+        if isinstance(motion, UprightMotion):
+            raise OutOfReach("The azimuth of M is not known for h = a.", "Integrate the attitude along with it.")
         with series_length(1):
             place = motion.at(ball(motion.level.rate * time))
             gamma, momentum = (motion.level.in_body(v) for v in (place.state()[3:], place.momentum()))
@@ -105,8 +119,34 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
 
 
 @kept
-def _motion(case: GoryachevChaplyginRest) -> RestMotion:
-    return RestMotion.of(Level.of(case.top, case.start))
+def _motion(case: GoryachevChaplyginRest) -> RestMotion | UprightMotion:
+    level = Level.of(case.top, case.start)
+    return RestMotion.of(level) if _room(level) else UprightMotion.of(level)
+
+
+def _room(level: Level) -> Fraction:
+    """κ² = a² − h²."""
+    return level.moment_square * level.gamma_square - level.energy**2
+
+
+def _speeds(level: Level) -> list[tuple[arb, arb]]:
+    """(|u_k|, y_k) at the start."""
+    (_, w2, _, _, g2, g3), c = level.turned(), ball(level.moment_square).sqrt()
+    return [(abs(u), c * (2 * w2 * g3 - g2 * u)) for u in separated_start(level)]
+
+
+def _the_one(level: Level, possible: Sequence[Signed]) -> Signed:
+    """The motion, of two that differ in σ, that starts as the level says; raises Undecided where balls do not tell."""
+    with series_length(1):
+        turned = level.turned()
+        found = [
+            motion
+            for motion in possible
+            if all(one.overlaps(other) for one, other in zip(motion.state(arb(0)), turned, strict=True))
+        ]
+    if len(found) != 1:
+        raise Undecided
+    return found[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +173,7 @@ class RestMotion:
     def of(cls, level: Level) -> RestMotion:
         """At the working precision; raises Undecided where it does not suffice."""
         a, c, h = size_of(level), ball(level.moment_square).sqrt(), ball(level.energy)
-        room = ball(level.moment_square * level.gamma_square - level.energy**2)
+        room = ball(_room(level))
         speed = room.sqrt()
         # a − h or a + h, whichever cancels, from their product
         above, below = (a + h, room / (a + h)) if level.energy > 0 else (room / (a - h), a - h)
@@ -142,33 +182,23 @@ class RestMotion:
         at_rest = cls(level, h, a, c, speed, tilt, turned[4], turned[5], (tilt, tilt), functions, arb(0))
         if not any(level.omega):
             return at_rest._with_shares(*_parted(tilt, turned[4], turned[5]))
-        tangents, origin = at_rest._passed(turned, above, below)
+        tangents, origin = at_rest._passed(above, below)
         shares = [2 * tilt * p / (tangents[0] + tangents[1]) for p in tangents]
         upright = (shares[0] * shares[1]).sqrt()
         moving = replace(at_rest, across=(shares[1] - shares[0]) / 2, origin=origin)._with_shares(*shares)
-        possible = [replace(moving, upright=sign * upright) for sign in (1, -1)]
-        with series_length(1):
-            possible = [
-                motion
-                for motion in possible
-                if all(one.overlaps(other) for one, other in zip(motion.at(arb(0)).state(), turned, strict=True))
-            ]
-        if len(possible) != 1:
-            raise Undecided
-        return possible[0]
+        return _the_one(level, [replace(moving, upright=sign * upright) for sign in (1, -1)])
 
     def _with_shares(self, first: arb, second: arb) -> RestMotion:
         return replace(self, shares=(first, second))
 
-    def _passed(self, turned: Sequence[arb], above: arb, below: arb) -> tuple[list[arb], arb]:
+    def _passed(self, above: arb, below: arb) -> tuple[list[arb], arb]:
         """p1 and p2 at the start, and √a t/2 since the rest; above, below: a + h and a − h."""
         tangents, origin = [], arb(0)
-        for u in separated_start(self.level):
+        for u, slope in _speeds(self.level):
             # (a − h + u²/2)(a + h), sin²φ and cos φ
             scale = (below + u * u / 2) * above
             square = self.size * u * u / scale
-            slope = self.moment * (2 * turned[1] * turned[5] - turned[4] * u)
-            cosine = slope * self.speed / (abs(u) * scale)
+            cosine = slope * self.speed / (u * scale)
             delta = (below * above / scale).sqrt()
             if cosine > 0:
                 less, more = square / (1 + cosine), 1 + cosine
@@ -181,6 +211,10 @@ class RestMotion:
             # half of F(φ|m) has sn² = (1 − cos φ)/(1 + Δ), Δ² = 1 − m sin²φ
             origin += legendre_f(less / (1 + delta), both / (1 + delta), both / more)
         return tangents, origin
+
+    def state(self, time: Any) -> list[Any]:
+        """The six components in the turned frame at a number or series."""
+        return self.at(time).state()
 
     def at(self, time: Any) -> Place:
         """The place at a number or series."""
@@ -276,6 +310,54 @@ class Place:
         motion = self.motion
         here = motion.swept(self.lift * self.lift)
         return here if self.side > 0 else 2 * motion.swept(1 / (motion.upright * motion.upright)) - here
+
+
+@dataclass(frozen=True, slots=True)
+class UprightMotion:
+    """A level with h = a at one working precision.
+
+    size, moment: a and c.  sum, difference: v1 + v2 at the start, and Δ.  sign: σ.
+    """
+
+    level: Level
+    size: arb
+    moment: arb
+    sum: arb
+    difference: arb
+    sign: int
+
+    @classmethod
+    def of(cls, level: Level) -> UprightMotion:
+        """At the working precision; raises Undecided where it does not suffice."""
+        # sinh v = −2y/|u|³
+        one, two = (-2 * y / u**3 for u, y in _speeds(level))
+        c, total = ball(level.moment_square).sqrt(), one.asinh() + two.asinh()
+        return _the_one(level, [cls(level, size_of(level), c, total, one - two, sign) for sign in (1, -1)])
+
+    def state(self, time: Any) -> list[Any]:
+        """The six components in the turned frame at a number or series."""
+        a, root = self.size, self.size.sqrt()
+        half = (time * root + self.sum) / 2
+        up, down = half.exp(), (-half).exp()
+        # sinh and cosh of (v1 − v2)/2
+        sine = self.difference / (up + down)
+        cosine = (sine * sine + 1).sqrt()
+        sinh, cosh = (up - down) / 2, (up + down) / 2
+        one, two = sinh * cosine + cosh * sine, sinh * cosine - cosh * sine
+        s1, s2 = (1 / (x * x + 1).sqrt() for x in (one, two))
+        product = s1 * s2
+        power, across = self.sign * product * product.sqrt(), 2 * a / (self.moment * (s1 + s2))
+        return [
+            -root * power * self.difference,
+            -root * power * (1 + one * two),
+            2 * root * (s1 - s2),
+            (a - 2 * a * (s1 * s1 - product + s2 * s2)) / self.moment,
+            across * (s1**3 * one - s2**3 * two),
+            across * power * (one + two),
+        ]
+
+
+Signed = TypeVar("Signed", RestMotion, UprightMotion)
 
 
 def _parted(tilt: arb, across: arb, upright: arb) -> tuple[arb, arb]:
