@@ -72,8 +72,8 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
     """A motion of the Goryachev-Chaplygin top, the small moment on axis 3, that starts at rest, comes to it or tends
     to it.
 
-    Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0, G = 0 and h² ≤ a², all exactly, for rotations
-    about axis 3, and for equilibria.
+    Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0, G = 0 and h² ≤ a², all exactly, and for
+    rotations about axis 3 and equilibria.
     """
 
     method = "closed form: Goryachev, through rest, Jacobi functions"
@@ -92,9 +92,7 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
                 f"h^2 exceeds |P r|^2 |gamma|^2 by {shown(-room)}: it never comes to rest.", "Use GoryachevChaplygin."
             )
         if not any(level.omega[:2]) and (level.omega[2] or level.gamma[2] == 0):
-            raise NotInClass("It turns about axis 3.", "Such a motion is a pendulum's.")
-        if room == 0 and not any(level.omega):
-            raise NotInClass("It is in equilibrium.", "Such a motion is constant.")
+            raise NotInClass("It turns about axis 3, or is in equilibrium.", "Such a motion is a pendulum's.")
 
     def own_time(self, time: Fraction) -> Fraction:
         """In the level's unit."""

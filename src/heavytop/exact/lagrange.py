@@ -233,7 +233,7 @@ def _prepared(motion: Lagrange) -> _Prepared:
         [ball(a) / length for a in axis],
     )
     companions = prepared.companions(winding, *both)
-    plain = axis == (_ZERO, _ZERO, _ONE)
+    plain = motion.frame == ((_ONE, _ZERO, _ZERO), (_ZERO, _ZERO, _ONE))
     spin = ball(dot(axis, motion.start.omega))
     return _Prepared(prepared, companions, spin, size, width.sqrt(), None if plain else directions)
 
