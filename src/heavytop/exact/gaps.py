@@ -170,8 +170,8 @@ class Gap:
         """See :class:`heavytop.exact.abel.Variable`; raises OutOfReach where floats do not hold the coefficients."""
         if not (np.isfinite(self._floats).all() and np.isfinite(self._mean_floats).all() and self._mean_floats.any()):
             raise OutOfReach(
-                "The period of a separated variable is beyond the range of binary64: moments, weight and rates differ by "
-                "too many decades.",
+                "The period of a separated variable is beyond the range of binary64: moments, weight and rates "
+                "differ by too many decades.",
                 "Choose numbers of less different size.",
             )
         found: NDArray[np.float64] = self._mean_floats * phase + self._floats @ np.sin(self._orders * phase)
