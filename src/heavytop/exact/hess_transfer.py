@@ -40,7 +40,7 @@ _SHARE, _WIDEST, _RATIO = 0.75, 1.5, 8
 _STEEPEST = 32
 """The largest κr."""
 _ARCS, _BOUND_BITS = 32, 64
-MOST_SEGMENTS = 128
+MOST_SEGMENTS = 96
 _MOST_WORK, _WORK_BITS = 2048, 256
 """Segments times the square of the working precision over so many bits: some 20 s of one core."""
 Matrix = tuple[Any, Any, Any, Any]
