@@ -14,6 +14,7 @@ from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.grioli import Grioli, grioli_motion
 from heavytop.exact.gyrostat import Gyrostat
 from heavytop.exact.hess import Hess
@@ -21,6 +22,7 @@ from heavytop.exact.hess_pendulum import HessPendulum
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.lagrange import Lagrange
 from heavytop.exact.pendulum import Pendulum
+from heavytop.exact.spherical import SphericalTop
 from heavytop.exact.staude import Staude, staude_motion
 from heavytop.exact.steklov import Steklov, steklov_motion
 from heavytop.exact.validated import Validated
@@ -43,6 +45,10 @@ SAMPLES = {
     ),
     GoryachevChaplygin: GoryachevChaplygin(
         HeavyTop((4, 4, 1), "1/2", ("6/5", "2/3", 0)), State(("3/4", "1/2", -2), ("2/3", 0, 1))
+    ),
+    SphericalTop: SphericalTop(HeavyTop((2, 2, 2), "1/2", (1, 2, 3)), State(("1/5", "-1/3", 2), ("3/5", 0, "4/5"))),
+    GoryachevChaplyginRest: GoryachevChaplyginRest(
+        HeavyTop((4, 4, 1), "1/2", ("6/5", "2/3", 0)), State((0, 0, 0), ("2/3", "1/3", 1))
     ),
     HessPendulum: HessPendulum(HeavyTop((6, 4, 3), 1, (2, 0, 2)), State(("3/5", "6/5", "-6/5"), ("2/7", "3/7", "6/7"))),
     Steklov: steklov_motion(F(1), F(1, 5), F(6, 5), F(2)),

@@ -1,20 +1,25 @@
 """Hess' tops: random motions, small M·γ, pendulums, attitude, and what is refused."""
 
 import random
+from contextlib import suppress
 from fractions import Fraction
+from time import process_time
 
 import pytest
-from flint import arb, arb_mat
+from flint import acb, arb, arb_mat
 from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
-from heavytop.errors import NotInClass
+from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.catalogue import find
 from heavytop.exact.hess import Hess
 from heavytop.exact.hess_pendulum import HessPendulum
-from heavytop.exact.hess_transfer import Segment, System2, Transfer
+from heavytop.exact.hess_transfer import MOST_SEGMENTS, Segment, System2, Transfer, plan
+from heavytop.exact.scales import unit_of_time
 from heavytop.exact.validated import Validated
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.measure.reference import reference
+from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State, dot
 
 F = Fraction
 TOP = HeavyTop((8, 6, 3), 1, (1, 0, 2))
@@ -103,9 +108,9 @@ def test_pendulums_swing_turn_over_and_start_from_rest(omega, gamma, turning):
 def test_the_first_terms_left_out_lie_within_the_tail():
     with working_precision(200):
         system = System2(*map(ball, SYSTEM))
-        segment = Segment.of(system, 0.0, 0.4)
+        segment = Segment.of(system, 0.0, 0.4, system.bound(arb(0.05), 0.4))
     with working_precision(600):
-        longer = Segment.of(system, 0.0, 0.4)
+        longer = Segment.of(system, 0.0, 0.4, system.bound(arb(0.05), 0.4))
         for short, long in zip(segment.parts, longer.parts, strict=True):
             for order, coefficient in enumerate(long.coeffs()):
                 assert abs(coefficient).upper() <= segment.growth.upper()
@@ -178,3 +183,74 @@ def test_heights_that_all_but_rest_are_levels_like_any_other(lift):
     motion = Hess(top, State((F(1) + lift, 0, 0), (F(1), 0, F(-1))))
     assert_solves(motion, F(7, 3))
     assert_narrow(motion, F(10**6))
+
+
+def short_time(top, start):
+    return F(1, 8) / F(2) ** unit_of_time(HEAVY_TOP.parameters(top, start), start.flat)
+
+
+def assert_answered(top, start, digits=40):
+    """Proven digits with the attitude, or a refusal in words, in little time; twice the bits agree."""
+    time, begun = short_time(top, start), process_time()
+    with suppress(OutOfReach):
+        solution = find(top, start)
+        reference(top, start, [time], digits, attitude=dot(start.gamma, start.gamma) == 1)
+        pairs = zip(solution.state(time, 140), solution.state(time, 220), strict=True)
+        assert all(a.overlaps(b) for a, b in pairs)
+    assert process_time() - begun < 10
+
+
+@pytest.mark.parametrize("power", [3, 300])
+def test_area_integrals_next_to_nothing_are_proven_or_named(power):
+    start = State(("1/4", F(1, 10**power), "-1/3"), (0, 1, 0))
+    assert_answered(TOP, start)
+    begun, found = process_time(), find(TOP, start)
+    if power <= 3:
+        assert_narrow(found, F(10**6))
+    else:
+        with pytest.raises(OutOfReach, match=r"Hess: .*(M·gamma is all but 0|degenerate)"):
+            found.state(F(10**6), 140)
+    assert process_time() - begun < 10
+
+
+@pytest.mark.parametrize("seed", range(0, 6, 2))
+def test_moments_of_any_ratio_are_proven_or_refused_in_words(seed):
+    rng = random.Random(seed)
+    first, third, a, c = (positive(rng) * F(10) ** rng.choice((0, rng.randint(-100, 100))) for _ in range(4))
+    share = (a / c) ** 2
+    top = HeavyTop((first, first * third * (1 + share) / (first * share + third), third), 1, (a, 0, c))
+    w1 = positive(rng)
+    start = State((w1, rational(rng), -first * a * w1 / (third * c)), (F(2, 3), F(-1, 3), F(2, 3)))
+    assert_answered(top, start)
+
+
+@pytest.mark.parametrize(("power", "side"), [(10, 1), (60, -1)])
+def test_centres_all_but_at_rest_have_an_attitude_or_a_refusal_in_words(power, side):
+    """M small, n·γ within ``small`` of its least or largest value; the pole of the azimuth all but meets the gap."""
+    small = F(1, 10**power)
+    # γ = (±n/|n| turned by about `small`), a rational unit vector; n along (3, 0, 4)
+    top = HeavyTop((1, F(25 * 2, 9 + 32), 2), 1, (3, 0, 4))
+    cosine, sine = (1 - small**2) / (1 + small**2), 2 * small / (1 + small**2)
+    gamma = (side * F(3, 5) * cosine, side * sine, side * F(4, 5) * cosine)
+    for w1, w2 in ((small, small), (F(1), small)):
+        start = State((w1, w2, -F(3, 8) * w1), gamma)
+        assert_answered(top, start)
+
+
+def test_what_the_plan_of_the_linear_system_counts():
+    with working_precision(300):
+        few, many = (System2(arb(1), arb(2) ** -k, arb(1), arb(2) ** (-k // 2) / 3, arb(1) / 5) for k in (4, 20))
+        assert len(plan(few)) < len(plan(many)) < MOST_SEGMENTS
+        for system in (few, many):
+            for left, radius, bound in plan(system):
+                # no disc meets a cut, κr is within its limit, and κ is right on the circle
+                assert left * left + float(system.width()) ** 2 > radius * radius
+                assert radius * float(bound) <= 33
+                for entry in system.entries(arb(left) + radius / 8 + radius * acb(0, 1)):
+                    assert abs(entry) <= bound
+        with pytest.raises(OutOfReach, match="more than 96 segments"):
+            plan(System2(arb(1), arb(2) ** -400, arb(1), arb(2) ** -200, arb(1) / 5))
+        with pytest.raises(OutOfReach, match="more than 96 segments"):
+            plan(System2(arb(1), arb(1), arb(1), arb(1), arb(10) ** 9))
+    with working_precision(40_000), pytest.raises(OutOfReach, match="too many at 40000 bits"):
+        Transfer.of(few)

@@ -122,7 +122,12 @@ class Inversion:
         first = [float(c - n) * v.turn for v, c, n in zip(self.variables, cells, turns, strict=True)]
         if not all(cell.is_finite() for cell in cells):
             return lost
-        return self._refined(self._estimated(first, rest), rest), turns
+        try:
+            with np.errstate(all="ignore"):
+                estimated = self._estimated(first, rest)
+            return self._refined(estimated, rest), turns
+        except (ZeroDivisionError, np.linalg.LinAlgError):
+            return lost
 
     def _estimated(self, phases: list[float], rest: arb_mat) -> list[float]:
         """Newton's iteration in floats, every step as short as it must be to come nearer."""

@@ -20,6 +20,7 @@ from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.grioli import Grioli
 from heavytop.exact.gyrostat import Gyrostat
 from heavytop.exact.hess import Hess
@@ -29,6 +30,7 @@ from heavytop.exact.lagrange import Lagrange
 from heavytop.exact.pendulum import Pendulum
 from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
+from heavytop.exact.spherical import SphericalTop
 from heavytop.exact.staude import Staude
 from heavytop.exact.steklov import Steklov
 from heavytop.exact.validated import Validated
@@ -100,12 +102,14 @@ _HEAVY_TOP: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (Euler, _KEEP),
     (Pendulum, _KEEP),
     (Lagrange, CYCLIC),
+    (SphericalTop, _KEEP),
     (BobylevSteklov, ALL),
     (HessPendulum, CYCLIC),
     (Delone, CYCLIC),
     (Steklov, CYCLIC),
     (Hess, CYCLIC),
     (Kovalevskaya, CYCLIC),
+    (GoryachevChaplyginRest, CYCLIC),
     (GoryachevChaplygin, CYCLIC),
 )
 _GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (

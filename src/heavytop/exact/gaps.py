@@ -167,7 +167,13 @@ class Gap:
         return [c * phase + total + e for c, total, e in zip(self.means, sums, self.errors, strict=True)]
 
     def estimates(self, phase: float) -> NDArray[np.float64]:
-        """See :class:`heavytop.exact.abel.Variable`."""
+        """See :class:`heavytop.exact.abel.Variable`; raises OutOfReach where floats do not hold the coefficients."""
+        if not (np.isfinite(self._floats).all() and np.isfinite(self._mean_floats).all() and self._mean_floats.any()):
+            raise OutOfReach(
+                "The period of a separated variable is beyond the range of binary64: moments, weight and rates "
+                "differ by too many decades.",
+                "Choose numbers of less different size.",
+            )
         found: NDArray[np.float64] = self._mean_floats * phase + self._floats @ np.sin(self._orders * phase)
         return found
 
@@ -193,7 +199,7 @@ class FourierBound:
                 self.largest *= 4 / (self.width.cosh() - 1)
             self.farthest = abs(middle) + reach * self.width.cosh()
             excess = 7 * self.largest / (rest.density(middle) * (1 - (-self.width).exp()))
-            self.wanted = 2 * (float(excess.log()) + self.bits * log(2)) / float(self.width)
+            self.wanted = float(2 * (excess.log() + self.bits * log(2)) / self.width)
 
     def terms(self, most: int) -> int:
         """N, 2^k or 3·2^k, with an error of the sums below the working precision."""
@@ -278,7 +284,9 @@ def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
 
 
 def significant(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The rows without the terms that no float sees."""
+    """The rows without the terms that no float sees; as they are where floats do not hold them."""
+    if not np.isfinite(rows).all():
+        return rows
     sizes = np.abs(rows) / np.abs(rows).max(axis=1, keepdims=True).clip(min=np.finfo(float).tiny)
     kept = np.flatnonzero(sizes.max(axis=0) > np.finfo(float).eps / 64)
     return rows[:, : kept[-1] + 1] if kept.size else rows[:, :1]

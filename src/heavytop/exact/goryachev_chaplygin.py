@@ -6,8 +6,8 @@ that does not depend on the time; the attitude is beside them (:mod:`heavytop.ex
 
 Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other.
 Where one variable tends to it the motion is asymptotic (:mod:`heavytop.exact.asymptotic`), and one may rest on it
-(:mod:`heavytop.exact.resting`).  Motions where both tend to it (G = 0) or both rest are refused; so are motions so near
-to them that the Fourier series do not resolve them, with the distance.
+(:mod:`heavytop.exact.resting`).  Motions where both tend to it (G = 0: :mod:`heavytop.exact.goryachev_chaplygin_rest`)
+or both rest are refused; so are motions so near to them that the Fourier series do not resolve them, with the distance.
 Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904).
 """
 
@@ -91,7 +91,8 @@ def _require_done(level: Level) -> None:
     def test() -> None:
         curve = roots(level)
         ends = gap_ends(level, curve, separated_start(level))
-        if any(curve[number].counts == (1, 1) for pair in ends for number in pair):
+        # 0 is a root of both factors only, once of each, or twice for h = a
+        if any(min(curve[number].counts) > 0 for pair in ends for number in pair):
             raise LevelNotDone("The level is degenerate: G = 0, and both separated variables tend to 0.", REMEDY)
         moving = [(low, high) for low, high in ends if low != high]
         if resting is not None and all(_passes(curve, pair, resting) for pair in moving):

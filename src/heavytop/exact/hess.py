@@ -38,7 +38,7 @@ from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import Gap, Roots
 from heavytop.exact.hess_level import Level, require_hess
-from heavytop.exact.hess_transfer import System2, Transfer
+from heavytop.exact.hess_transfer import System2, Transfer, plan
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import in_units
 from heavytop.exact.separated import REMEDY, decide
@@ -95,8 +95,15 @@ def _motion(case: Hess) -> HessMotion:
 
 @whole_evaluation
 def _require_reach(level: Level) -> None:
-    """Raises LevelNotDone where the Fourier series of the elliptic integral is too long."""
-    decide(lambda: level.gap(_MOST_TERMS), "The level is all but degenerate", _LEAST)
+    """Raises LevelNotDone where the Fourier series of the elliptic integral is too long, or the linear system."""
+    decide(lambda: plan(_linear(level, level.gap(_MOST_TERMS))), "The level is all but degenerate", _LEAST)
+
+
+def _linear(level: Level, gap: Gap) -> System2:
+    """The linear system over the phase of the gap."""
+    (_, high, top), energy = level.roots(), ball(level.energy)
+    torque = ball(level.moment_square).sqrt() * ball(level.area)
+    return System2(gap.reach, energy - high, top - high, torque, ball(level.skew))
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +129,9 @@ class HessMotion:
 
         Raises Undecided where it does not suffice, OutOfReach where the series need too many terms.
         """
-        gap, (_, high, top) = level.gap(), level.roots()
+        gap = level.gap()
         energy, area, size = ball(level.energy), ball(level.area), ball(level.moment_square).sqrt()
-        linear = System2(gap.reach, energy - high, top - high, size * area, ball(level.skew))
+        linear = _linear(level, gap)
         matrix = Transfer.of(linear)
         height = ball(level.height)
         speed = ball(dot(level.moment, cross(level.gamma, level.omega)))

@@ -10,13 +10,16 @@ E and top lie above the gap; b and c are analytic but for cuts upwards from iβ 
 *Tail.*  On a disc of radius r < √(x² + β²) about a place x, 0 ≤ x ≤ π, let |b|, |c| ≤ κ: their largest values are on
 its circle, which is covered by balls.  A solution with |u|, |v| ≤ 1 in the middle is analytic in the disc and at most
 e^(κr) (Gronwall's lemma along a radius), so that its Taylor coefficients are at most e^(κr)/r^n, and what follows the
-first L terms at a distance δ < r is at most e^(κr) (δ/r)^L/(1 − δ/r).  Segments grow away from 0 with the discs.
+first L terms at a distance δ < r is at most e^(κr) (δ/r)^L/(1 − δ/r).  Segments grow away from 0 with the discs; where
+κr is large they are shorter.  There are log(1/β) of them for small β (M·γ all but 0) and κ for large κ (moments of very
+different size): both are counted before any of them is made.
 
 *The matrix.*  Y(θ), Y(0) = 1, is the product over segments of 0 ≤ θ ≤ π.  b and c are even, so with J = diag(1, −1)
 Y(−θ) = J Y(θ) J, and the matrix over a period is Y(2π) = J Y(π)⁻¹ J Y(π).  det Y = 1.
 
-*The polynomials.*  If Y is right up to ε^(n − 1), Y + Y ∫ adj(Y) (A Y − Y') is up to ε^(2n − 1): both the neglected
-factor 1 + O(ε^n) and det Y − 1 = O(ε^n) multiply a residual of order ε^(n − 1).
+*The polynomials.*  n u_n = Σ_j b_(n−1−j) v_j, and so on.  Terms of the lower half of a range, once known, are
+multiplied into the sums of its upper half all at once, halves of halves likewise: products of polynomials, which cost
+less than their terms one by one.
 """
 
 from __future__ import annotations
@@ -28,12 +31,18 @@ from typing import Any
 
 from flint import acb, arb, arb_mat, arb_poly, arb_series
 
+from heavytop.errors import OutOfReach
 from heavytop.exact.balls import Undecided, working_precision
 from heavytop.exact.flint_context import current_precision, series_length
 
 _SHARE, _WIDEST, _RATIO = 0.75, 1.5, 8
 """The radius of a disc over its distance from a cut; its largest; how many times a segment's half length it is."""
+_STEEPEST = 32
+"""The largest κr."""
 _ARCS, _BOUND_BITS = 32, 64
+MOST_SEGMENTS = 96
+_MOST_WORK, _WORK_BITS = 2048, 256
+"""Segments times the square of the working precision over so many bits: some 20 s of one core."""
 Matrix = tuple[Any, Any, Any, Any]
 
 
@@ -52,8 +61,8 @@ class System2:
         sine = (phase / 2).sin()
         lowered = 2 * self.reach * sine * sine
         square = 2 * (self.energy + lowered)
-        half = (2 * (self.top + lowered)).rsqrt() / 2
-        turning, bending = self.torque / square, self.skew * square.sqrt()
+        half, inverse = (2 * (self.top + lowered)).rsqrt() / 2, square.rsqrt()
+        turning, bending = self.torque * inverse * inverse, self.skew * square * inverse
         return (turning - bending) * half, -(turning + bending) * half
 
     def width(self) -> arb:
@@ -86,12 +95,10 @@ class Segment:
     parts: tuple[arb_poly, ...]
 
     @classmethod
-    def of(cls, system: System2, left: float, radius: float) -> Segment:
-        """The segment that begins at ``left``, at the working precision."""
+    def of(cls, system: System2, left: float, radius: float, bound: arb) -> Segment:
+        """The segment that begins at ``left``, at the working precision; bound: κ."""
         place = arb(left) + radius / _RATIO
-        growth = (radius * system.bound(place, radius)).exp()
-        if not growth.is_finite():
-            raise Undecided
+        growth = (radius * bound).exp()
         length = ceil((current_precision() + 8 + log2(float(growth.upper()))) / log2(_RATIO)) + 2
         return cls(place, radius, growth, polynomials(system, place, radius, length))
 
@@ -102,6 +109,36 @@ class Segment:
         tail = arb(0, (self.growth * size**length / (1 - size)).upper()) if size < 1 else arb("nan")
         one, two, three, four = (part(away) + tail for part in self.parts)
         return arb_mat([[one, two], [three, four]])
+
+
+def plan(system: System2) -> list[tuple[float, float, arb]]:
+    """Where each segment begins, the radius of its disc, and κ there.
+
+    Raises Undecided where the working precision does not suffice, OutOfReach for more than MOST_SEGMENTS.
+    """
+    width, left = float(system.width().lower()), 0.0
+    if not width > 0:
+        raise Undecided
+    found: list[tuple[float, float, arb]] = []
+    while left < pi:
+        radius = min(_WIDEST, _SHARE * hypot(left, width))
+        while True:
+            bound = system.bound(arb(left) + radius / _RATIO, radius)
+            if not bound.is_finite():
+                raise Undecided
+            steep = float(radius * bound)
+            if steep <= _STEEPEST:
+                break
+            radius *= max(_STEEPEST / steep / 2, 2.0**-100)
+        found.append((left, radius, bound))
+        left += 2 * radius / _RATIO
+        if len(found) > MOST_SEGMENTS:
+            raise OutOfReach(
+                f"The linear system over the period has more than {MOST_SEGMENTS} segments: M·gamma is all but 0, or "
+                "the moments differ by many decades.",
+                "Ask for an earlier time.",
+            )
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,21 +155,26 @@ class Transfer:
 
     @classmethod
     def of(cls, system: System2) -> Transfer:
-        """At the working precision; raises Undecided where it does not suffice."""
-        width, left = float(system.width().lower()), 0.0
-        if not width > 0:
-            raise Undecided
+        """At the working precision.
+
+        Raises Undecided where it does not suffice, OutOfReach where there is too much to do at so many bits.
+        """
+        planned = plan(system)
+        work = len(planned) * (current_precision() / _WORK_BITS) ** 2
+        if work > _MOST_WORK:
+            raise OutOfReach(
+                f"The linear system of Hess' top has {len(planned)} segments, too many at {current_precision()} bits.",
+                "Ask for fewer digits.",
+            )
         now = arb_mat([[1, 0], [0, 1]])
         lefts, segments, before = [], [], []
-        while left < pi:
-            radius = min(_WIDEST, _SHARE * hypot(left, width))
-            segment = Segment.of(system, left, radius)
+        for left, radius, bound in planned:
+            segment = Segment.of(system, left, radius, bound)
             right = left + 2 * radius / _RATIO
             lefts.append(left)
             segments.append(segment)
             before.append(_adjugate(segment.at(arb(left))) * now)
             now = segment.at(arb(right) if right < pi else arb.pi()) * before[-1]
-            left = right
         return cls(tuple(lefts), tuple(segments), tuple(before), _mirrored(_adjugate(now)) * now)
 
     def at(self, phase: arb, turns: int) -> arb_mat:
@@ -162,26 +204,29 @@ def polynomials(system: System2, place: arb, radius: float, length: int) -> tupl
     """The first ``length`` Taylor coefficients in ε of Y(place + radius ε), Y(place) = 1: four polynomials, by rows."""
     with series_length(length):
         b, c = (radius * entry for entry in system.entries(arb_series([place, radius], prec=length)))
-    y: Matrix = (arb_series([1]), arb_series([0]), arb_series([0]), arb_series([1]))
-    right = 1
-    while right < length:
-        wanted = min(2 * right, length)
-        with series_length(wanted):
-            y = _doubled(tuple(arb_series(x.coeffs(), prec=wanted) for x in y), b, c, right, wanted)
-        right = wanted
-    return tuple(arb_poly(x.coeffs()) for x in y)
+    rates = b.coeffs(), c.coeffs()
+    # by columns: u and v of Y's first, u and v of its second
+    y = [[arb(one)] + [arb(0)] * (length - 1) for one in (1, 0, 0, 1)]
+    _fill(y, [[arb(0)] * length for _ in y], rates, 0, length)
+    return arb_poly(y[0]), arb_poly(y[2]), arb_poly(y[1]), arb_poly(y[3])
 
 
-def _doubled(y: tuple[arb_series, ...], b: arb_series, c: arb_series, right: int, wanted: int) -> Matrix:
-    """Y with ``wanted`` ≤ 2·``right`` terms, from ``right`` of them."""
-    y1, y2, y3, y4 = y
-    slopes = (b * y3, b * y4, c * y1, c * y2)
-    rest = [slope - x.derivative() for slope, x in zip(slopes, y, strict=True)]
-    # up to ε^(right − 2) it is 0, as the terms there are right
-    r1, r2, r3, r4 = (arb_series([*[0] * (right - 1), *x.coeffs()[right - 1 :]], prec=wanted) for x in rest)
-    z1, z2 = (y4 * r1 - y2 * r3).integral(), (y4 * r2 - y2 * r4).integral()
-    z3, z4 = (y1 * r3 - y3 * r1).integral(), (y1 * r4 - y3 * r2).integral()
-    return (y1 + y1 * z1 + y2 * z3, y2 + y1 * z2 + y2 * z4, y3 + y3 * z1 + y4 * z3, y4 + y3 * z2 + y4 * z4)
+def _fill(y: list[list[arb]], sums: list[list[arb]], rates: tuple[list[arb], list[arb]], first: int, last: int) -> None:
+    """The terms ``first`` to ``last`` − 1 of u and v, whose ``sums`` hold what the terms before contribute to n u_n."""
+    if last - first == 1:
+        for row, total in zip(y, sums, strict=True):
+            if first:
+                row[first] = total[first] / first
+        return
+    middle = (first + last) // 2
+    _fill(y, sums, rates, first, middle)
+    b, c = (arb_poly(rate[: last - first - 1]) for rate in rates)
+    for k, rate in enumerate((b, c, b, c)):
+        # u' = b v and v' = c u
+        product = rate * arb_poly(y[k ^ 1][first:middle])
+        for n in range(middle, last):
+            sums[k][n] += product[n - 1 - first]
+    _fill(y, sums, rates, middle, last)
 
 
 def _power(matrix: arb_mat, exponent: int) -> arb_mat:

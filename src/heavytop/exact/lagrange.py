@@ -18,10 +18,17 @@ All of it rational, whatever s is.  The axis of symmetry in space, e3·(ξ + iη
 
 and gives the attitude.  Sleeping tops, steady and regular precession, cusps, loops, passages through the poles, the
 spherical pendulum (L = 0) and the motions asymptotic to a sleeping top are starts like any other.
+
+*The axis of symmetry* need not be axis 3, nor its direction rational (:mod:`heavytop.exact.spherical`).  Let a be an
+exact vector along it, u and v = a × u exact vectors across it, A = |a|, and n = νa.  With x = a·γ in place of γ3 and
+g = γ·u + i γ·v/A, w likewise, L = a·M/A and Ω3 = a·Ω/A, all of the above but √(A²) stays rational:
+
+    x'² = (2/I1)(E − νx)(A²s² − x²) − (A²C0 − (a·M) x)²/(A I1)²,    κ and ℘'(V) of g and w are rational multiples of iA
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -66,6 +73,11 @@ class Lagrange(ClosedForm):
             )
 
     @property
+    def frame(self) -> tuple[Vector, Vector]:
+        """(u, a): a vector along the axis of symmetry and one across it."""
+        return (_ONE, _ZERO, _ZERO), (_ZERO, _ZERO, _ONE)
+
+    @property
     def parameters(self) -> Parameters:
         """The parameters of the field."""
         return Parameters(self.top.inertia, self.top.moment, _ZERO)
@@ -76,42 +88,48 @@ class Lagrange(ClosedForm):
         point = prepared.motion.lattice.point(time, length if length > 1 else 0)
         inverse = 1 / prepared.motion.denominator(point)
         g, w = prepared.horizontal.at(point, inverse)
-        return [real(w), imag(w), prepared.spin, real(g), imag(g), prepared.motion.position(point, inverse)]
+        height = prepared.motion.position(point, inverse)
+        return [*prepared.composed(real(w), imag(w), prepared.spin), *prepared.composed(real(g), imag(g), height)]
 
     @property
     def constants(self) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
-        """(n, L, C0, E, s²)."""
-        (o1, o2, o3), gamma, (i1, _, i3) = self.start.omega, self.start.gamma, self.top.inertia
-        n = self.top.moment[2]
-        area = dot(self.top.angular_momentum(self.start.omega), gamma)
-        return n, i3 * o3, area, i1 * (o1 * o1 + o2 * o2) / 2 + n * gamma[2], dot(gamma, gamma)
+        """(ν, a·M, C0, E, s²)."""
+        omega, gamma, moment, axis = self.start.omega, self.start.gamma, self.top.moment, self.frame[1]
+        square = dot(axis, axis)
+        momentum = self.top.angular_momentum(omega)
+        energy = self.top.inertia[0] * (dot(omega, omega) - dot(omega, axis) ** 2 / square) / 2 + dot(moment, gamma)
+        return dot(moment, axis) / square, dot(axis, momentum), dot(momentum, gamma), energy, dot(gamma, gamma)
 
     def quartic(self) -> QuarticMotion:
-        """x = γ3 on its cubic."""
+        """x = a·γ on its cubic."""
         n, spin, area, energy, square = self.constants
-        i1 = self.top.inertia[0]
-        (o1, o2, _), (g1, g2, g3) = self.start.omega, self.start.gamma
+        i1, axis = self.top.inertia[0], self.frame[1]
+        length = dot(axis, axis)
         cubic = (
-            2 * energy * square / i1 - area**2 / i1**2,
-            2 * area * spin / i1**2 - 2 * n * square / i1,
-            -2 * energy / i1 - spin**2 / i1**2,
+            length * (2 * energy * square / i1 - area**2 / i1**2),
+            2 * area * spin / i1**2 - 2 * n * length * square / i1,
+            -2 * energy / i1 - spin**2 / (length * i1**2),
             2 * n / i1,
         )
-        return QuarticMotion(cubic, g3, o2 * g1 - o1 * g2)
+        speed = dot(axis, cross(self.start.gamma, self.start.omega))
+        return QuarticMotion(cubic, dot(axis, self.start.gamma), speed)
 
     def winding(self) -> Winding:
         """V and κ of g and w."""
         n, spin, area, energy, _ = self.constants
-        i1 = self.top.inertia[0]
-        slope = (area * n - energy * spin) / (2 * i1**2)
-        return Winding((4 * i1 * energy - spin**2) / (12 * i1**2), slope, spin / (2 * i1) - self.start.omega[2], _ONE)
+        i1, axis = self.top.inertia[0], self.frame[1]
+        length = dot(axis, axis)
+        slope = (area * n - energy * spin / length) / (2 * i1**2)
+        rate = (spin / (2 * i1) - dot(axis, self.start.omega)) / length
+        return Winding((4 * i1 * energy - spin**2 / length) / (12 * i1**2), slope, rate, length)
 
     def axis_winding(self) -> Winding:
         """V and κ of the axis of symmetry in space; needs γ != 0."""
         n, spin, area, energy, square = self.constants
-        i1 = self.top.inertia[0]
-        value = (4 * i1 * energy * square + 2 * spin**2 * square - 3 * area**2) / (12 * i1**2 * square)
-        cubic = area**3 - 2 * area * energy * i1 * square - area * spin**2 * square + 2 * i1 * spin * n * square**2
+        i1, axis = self.top.inertia[0], self.frame[1]
+        spin_square = spin**2 / dot(axis, axis)
+        value = (4 * i1 * energy * square + 2 * spin_square * square - 3 * area**2) / (12 * i1**2 * square)
+        cubic = area**3 - 2 * area * energy * i1 * square - area * spin_square * square + 2 * i1 * spin * n * square**2
         return Winding(value, -cubic / (4 * i1**3 * square**2), area / (2 * i1 * square), square)
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
@@ -126,7 +144,7 @@ class Lagrange(ClosedForm):
             if time == 0:
                 return start
             # ξ need not be rational: carry one exact vector ⟂ γ and its companion across it
-            basis = _across(self.start.gamma)
+            basis = across(self.start.gamma)
             exact, norm = balls(basis), ball(dot(basis, basis))
             size = ball(dot(self.start.gamma, self.start.gamma)).sqrt()
             with series_length(1):
@@ -140,20 +158,23 @@ class Lagrange(ClosedForm):
         return to_bits(evaluate, bits, time, 2)
 
     def _carried(self, basis: Vector, time: Fraction) -> list[arb]:
-        """The vector :func:`_across` γ, fixed in space, at ``time``.
+        """The vector :func:`across` γ, fixed in space, at ``time``.
 
         Z = ξ + iη, h = Z3 and Z± = Z1 ± iZ2 obey Z₊ ḡ = −h (x − s), Z₋ g = −h (x + s) and, as h' = (Z × Ω)3,
         Z₋ w − Z₊ w̄ = 2i h'.
         """
-        if not any((*self.start.omega[:2], *self.start.gamma[:2])):
+        axis = self.frame[1]
+        if not any((*cross(self.start.omega, axis), *cross(self.start.gamma, axis))):
             return rotate(balls(basis), self.start.omega, ball(time))
         prepared = _prepared(self)
         point = prepared.motion.lattice.point(time, 2)
         inverse = 1 / prepared.motion.denominator(point)
         (h,), (g, w) = (c.at(point, inverse) for c in (_axis(self), prepared.horizontal))
         x, size = prepared.motion.position(point, inverse)[0], ball(self.constants[4]).sqrt()
-        plus, minus = _sides(h[0], coefficient(h, 1), g[0], w[0], x, size)
-        return [((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real, h[0].real]
+        length, across = prepared.axis, prepared.across
+        plus, minus = _sides(h[0] / length, coefficient(h, 1) / length, g[0] / across, w[0] / across, x / length, size)
+        found = ((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real
+        return prepared.composed(found[0] * across, found[1] * across, h[0].real)
 
 
 def _sides(h: acb, slope: acb, g: acb, w: acb, x: arb, size: arb) -> tuple[acb, acb]:
@@ -168,7 +189,7 @@ def _sides(h: acb, slope: acb, g: acb, w: acb, x: arb, size: arb) -> tuple[acb, 
     return (twist * w - h * (x - size) * g) / weight, minus
 
 
-def _across(gamma: Vector) -> Vector:
+def across(gamma: Vector) -> Vector:
     """An exact vector ⟂ γ, not 0."""
     candidates = ((_ZERO, gamma[2], -gamma[1]), (-gamma[2], _ZERO, gamma[0]))
     return candidates[0] if any(candidates[0]) else candidates[1]
@@ -176,23 +197,56 @@ def _across(gamma: Vector) -> Vector:
 
 @dataclass(frozen=True, slots=True)
 class _Prepared:
+    """All that does not depend on the time.
+
+    spin: a·Ω.  axis, across: |a| and |u|.  directions: u, v and a over |u|², |u|²|a| and |a|²; None for axes 1, 2, 3.
+    """
+
     motion: PreparedMotion
     horizontal: Companions
     spin: arb
+    axis: arb
+    across: arb
+    directions: tuple[list[arb], ...] | None
+
+    def composed(self, first: Any, second: Any, third: Any) -> list[Any]:
+        """The vector whose products with u, v/|a| and a are these numbers or series."""
+        if self.directions is None:
+            return [first, second, third]
+        parts = zip(*self.directions, strict=True)
+        return [first * u + second * v + third * a for u, v, a in parts]
 
 
 @kept
 def _prepared(motion: Lagrange) -> _Prepared:
-    prepared, winding = motion.quartic().prepared(), motion.winding()
+    prepared, winding, (across, axis) = motion.quartic().prepared(), motion.winding(), motion.frame
     rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)
-    both = (turned(rows[axis], rows[axis + 1], winding) for axis in (3, 0))
-    return _Prepared(prepared, prepared.companions(winding, *both), ball(motion.start.omega[2]))
+    beside = cross(axis, across)
+    both = (
+        turned(_along(across, rows[k : k + 3]), [y / winding.square for y in _along(beside, rows[k : k + 3])], winding)
+        for k in (3, 0)
+    )
+    width, size, length = ball(dot(across, across)), ball(winding.square).sqrt(), ball(winding.square)
+    directions = (
+        [ball(u) / width for u in across],
+        [ball(v) / (width * size) for v in beside],
+        [ball(a) / length for a in axis],
+    )
+    companions = prepared.companions(winding, *both)
+    plain = motion.frame == ((_ONE, _ZERO, _ZERO), (_ZERO, _ZERO, _ONE))
+    spin = ball(dot(axis, motion.start.omega))
+    return _Prepared(prepared, companions, spin, size, width.sqrt(), None if plain else directions)
+
+
+def _along(direction: Vector, rows: Sequence[Sequence[Fraction]]) -> list[Fraction]:
+    """The derivatives of a vector's product with a fixed one, from those of its components."""
+    return [dot(direction, values) for values in zip(*rows, strict=True)]
 
 
 @kept
 def _axis(motion: Lagrange) -> Companions:
-    """h = Z3 of Z = ξ + iη, η = γ × ξ/s, for the vector ξ that is :func:`_across` γ at t = 0, fixed in space."""
-    vector = _across(motion.start.gamma)
+    """h = a·Z of Z = ξ + iη, η = γ × ξ/s, for the vector ξ that is :func:`across` γ at t = 0, fixed in space."""
+    vector = across(motion.start.gamma)
     winding, square = motion.axis_winding(), dot(motion.start.gamma, motion.start.gamma)
     # s Z = s ξ + i γ × ξ, so Z = ξ + i s (γ × ξ/s²)
     normal = tuple(c / square for c in cross(motion.start.gamma, vector))
@@ -201,9 +255,9 @@ def _axis(motion: Lagrange) -> Companions:
 
 
 def _derivatives(motion: Lagrange, fixed: tuple[Fraction, ...]) -> list[Fraction]:
-    """The derivatives at 0 of the third component of a vector fixed in space."""
+    """The derivatives at 0 of a·ξ of a vector ξ fixed in space."""
 
     def field(p: Parameters, y: Any) -> tuple[Any, ...]:
         return (*heavy_top(p, y[:6]), *HEAVY_TOP.attitude(p, y[:6], y[6:]))
 
-    return taylor(field, motion.parameters, (*motion.start.flat, *fixed), 4)[8]
+    return _along(motion.frame[1], taylor(field, motion.parameters, (*motion.start.flat, *fixed), 4)[6:])

@@ -1,16 +1,19 @@
-"""The physical pendulum: rotation about a principal axis k held level, centre of mass in the plane across it.
+"""The physical pendulum: rotation about a principal axis held level, centre of mass in the plane across it.
 
-Ω = Ω_k e_k stays along axis k only if the torque does: (γ × n)_i = (γ × n)_j = 0, n = P r.  While Ω_k is not 0 the
-part of γ across k turns, so that asks n_k = 0 and γ_k = 0, unless γ ∥ e_k ∥ n, which is a steady rotation.
-With N = |n||γ| and x the angle of γ from −n in the plane (i, j, k cyclic), x' = −Ω_k:
+The axis e, a unit vector, is principal where I e = K e: one of the three, any equatorial axis of a symmetric top, any
+axis at all of a spherical one.  Ω = w e stays along it only if the torque does: γ × n ∥ e, n = P r.  While w is not 0
+the part of γ across e turns, so that asks n·e = 0 and γ·e = 0, unless γ ∥ e ∥ n, which is a steady rotation.
+With N = |n||γ| and x the angle of γ from −n in the plane across e, x' = −w:
 
-    x'' = −(N/I_k) sin x,   h = ½ I_k Ω_k² + n·γ = ½ I_k x'² − N cos x
+    x'' = −(N/K) sin x,   h = ½ K w² + n·γ = ½ K x'² − N cos x
 
-    h ≤ N:  sin(x/2) = σ √m sn u,  cos(x/2) = dn u,  x' = 2σ √m ω cn u,  m = (h + N)/(2N),  ω² = N/I_k
-    h > N:  sin(x/2) = σ sn u,     cos(x/2) = cn u,  x' = 2σ ω dn u,     m = 2N/(h + N),    ω² = (h + N)/(2 I_k)
+    h ≤ N:  sin(x/2) = σ √m sn u,  cos(x/2) = dn u,  x' = 2σ √m ω cn u,  m = (h + N)/(2N),  ω² = N/K
+    h > N:  sin(x/2) = σ sn u,     cos(x/2) = cn u,  x' = 2σ ω dn u,     m = 2N/(h + N),    ω² = (h + N)/(2K)
 
 u = ω t + u0, and σ is the sign of x' at t = 0; h = N is the separatrix, m = 1.  Every vector fixed in space turns
-about e_k through x(t) − x(0).  Source: Whittaker, Analytical Dynamics, chapter IV; DLMF 22.19.
+about e through x(t) − x(0).  The direction of e is that of Ω, or of γ × n at rest: rational, though its length need
+not be, so that the conditions are tested exactly.
+Source: Whittaker, Analytical Dynamics, chapter IV; DLMF 22.19.
 """
 
 from __future__ import annotations
@@ -28,49 +31,53 @@ from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.motion import kept
 from heavytop.precision import shown
-from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.top.heavy_top import Vector, cross, dot
+
+_REMEDY = "It turns about a principal axis, with P r and gamma across it."
 
 
 @dataclass(frozen=True, slots=True)
 class Pendulum(WithAttitude):
     """Libration, rotation, separatrix and equilibria about any principal axis, |γ| as it is.
 
-    Raises NotInClass unless, exactly, Ω lies along one principal axis with P r and γ in the plane across it, P r ≠ 0
-    and γ ≠ 0.
+    Raises NotInClass unless, exactly, Ω, or γ × P r at rest, lies along a principal axis with P r and γ in the plane
+    across it, P r ≠ 0 and γ ≠ 0.
     """
 
     method = "closed form: physical pendulum, Jacobi functions"
 
     def __post_init__(self) -> None:
-        if not any(self.top.moment) or not any(self.start.gamma):
+        moment, gamma, axis = self.top.moment, self.start.gamma, self.axis
+        if not any(moment) or not any(gamma):
             raise NotInClass("A pendulum needs P r != 0 and gamma != 0.", "Without a torque the motion is Euler's.")
-        if not _axes(self.top, self.start):
-            omega, moment, gamma = self.start.omega, self.top.moment, self.start.gamma
-            turning = [k for k in range(3) if omega[k] != 0]
-            if len(turning) > 1:
-                cause = f"Omega = ({', '.join(map(shown, omega))}) is not along a principal axis."
-            elif turning:
-                k = turning[0]
-                cause = (
-                    f"About axis {k + 1}, (P r)_{k + 1} = {shown(moment[k])} and gamma_{k + 1} = {shown(gamma[k])} "
-                    "are not both 0."
-                )
-            else:
-                cause = "At rest, P r and gamma do not lie in one plane across a principal axis."
+        name = "Omega" if any(self.start.omega) else "At rest, the torque gamma x P r"
+        written = f"{name} = ({', '.join(map(shown, self._direction()))})"
+        if any(cross(self.top.angular_momentum(axis), axis)):
+            raise NotInClass(f"Not a pendulum: {written} is not along a principal axis.", _REMEDY)
+        along, up = dot(moment, axis), dot(gamma, axis)
+        if along or up:
             raise NotInClass(
-                f"Not a pendulum: {cause}", "It turns about a principal axis, with P r and gamma across it."
+                f"Not a pendulum: {written}, and along this axis e, P r·e = {shown(along)} and gamma·e = {shown(up)} "
+                "are not both 0.",
+                _REMEDY,
             )
 
+    def _direction(self) -> Vector:
+        omega, torque = self.start.omega, cross(self.start.gamma, self.top.moment)
+        return omega if any(omega) else torque
+
     @property
-    def axis(self) -> int:
-        """The principal axis k (0, 1 or 2) it turns about."""
-        return _axes(self.top, self.start)[0]
+    def axis(self) -> Vector:
+        """A vector along the axis it turns about, its largest component ± 1; 0 where it is in equilibrium."""
+        direction = self._direction()
+        largest = max(map(abs, direction)) or Fraction(1)
+        first, second, third = (component / largest for component in direction)
+        return first, second, third
 
     @property
     def steady(self) -> bool:
         """It stands still: at rest where no torque acts."""
-        k, n, gamma = self.axis, self.top.moment, self.start.gamma
-        return self.start.omega[k] == 0 and n[(k + 1) % 3] * gamma[(k + 2) % 3] == n[(k + 2) % 3] * gamma[(k + 1) % 3]
+        return not any(self._direction())
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -148,9 +155,9 @@ def swing(
 
 @dataclass(frozen=True, slots=True)
 class _Lattice:
-    """All that does not depend on the time.  axis: k.  half: (cos, sin) of x(0)/2."""
+    """All that does not depend on the time.  axis: e.  half: (cos, sin) of x(0)/2."""
 
-    axis: int
+    axis: list[arb]
     swing: Swing
     half: tuple[arb, arb]
     gamma: list[arb]
@@ -160,18 +167,15 @@ class _Lattice:
         cosine0, sine0 = self.half
         c, s = cosine * cosine0 + sine * sine0, sine * cosine0 - cosine * sine0
         cosine, sine = c * c - s * s, 2 * c * s
-        k = self.axis
-        i, j = (k + 1) % 3, (k + 2) % 3
-        omega: list[Any] = [arb(0)] * 3
-        omega[k] = -speed
 
         def carry(vector: Sequence[Any]) -> list[Any]:
-            result = list(vector)
-            result[i] = cosine * vector[i] - sine * vector[j]
-            result[j] = sine * vector[i] + cosine * vector[j]
-            return result
+            along, across = dot(self.axis, vector), cross(self.axis, vector)
+            return [
+                along * e + cosine * (v - along * e) + sine * w
+                for e, v, w in zip(self.axis, vector, across, strict=True)
+            ]
 
-        return omega, carry
+        return [-speed * e for e in self.axis], carry
 
 
 @kept
@@ -179,26 +183,19 @@ def _lattice(case: Pendulum) -> _Lattice | None:
     """None where it stands still."""
     if case.steady:
         return None
-    k = case.axis
-    i, j = (k + 1) % 3, (k + 2) % 3
-    n, gamma, inertia = case.top.moment, case.start.gamma, case.top.inertia[k]
-    kinetic = inertia * case.start.omega[k] ** 2 / 2
-    torque = n[i] * gamma[j] - n[j] * gamma[i]
+    n, gamma, axis = case.top.moment, case.start.gamma, case.axis
+    length = dot(axis, axis)
+    inertia = dot(axis, case.top.angular_momentum(axis)) / length
+    rate = dot(case.start.omega, axis)
+    kinetic = inertia * rate**2 / length / 2
+    torque = dot(cross(gamma, n), axis)
     square = dot(n, n) * dot(gamma, gamma)
-    moving, half = swing(inertia, kinetic, dot(n, gamma), square, sign(-case.start.omega[k]), sign(-torque))
-    return _Lattice(k, moving, half, balls(gamma))
+    moving, half = swing(inertia, kinetic, dot(n, gamma), square, sign(-rate), sign(torque))
+    size = ball(length).sqrt()
+    return _Lattice([ball(component) / size for component in axis], moving, half, balls(gamma))
 
 
 def _sum(square: Fraction, value: Fraction, product: Fraction) -> arb:
     """√square + value, without cancellation: product = square − value²; an exact 0 where it is 0."""
     root = ball(square).sqrt()
     return root + ball(value) if value >= 0 else ball(product) / (root - ball(value))
-
-
-def _axes(top: HeavyTop, start: State) -> list[int]:
-    """The axes about which this is a pendulum."""
-    return [
-        k
-        for k in range(3)
-        if top.moment[k] == start.gamma[k] == start.omega[(k + 1) % 3] == start.omega[(k + 2) % 3] == 0
-    ]

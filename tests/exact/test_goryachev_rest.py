@@ -1,0 +1,163 @@
+"""Goryachev's motions, G = 0 and M·γ = 0: from rest, through rest, tending to it; states, attitude and refusals."""
+
+import random
+from contextlib import suppress
+from fractions import Fraction
+from time import process_time
+
+import pytest
+from proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
+
+from heavytop.errors import NotInClass, OutOfReach
+from heavytop.exact import goryachev_chaplygin_rest
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
+from heavytop.exact.balls import working_precision
+from heavytop.exact.catalogue import find
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.goryachev_chaplygin_rest import GoryachevChaplyginRest
+from heavytop.exact.validated import Validated
+from heavytop.measure.reference import reference
+from heavytop.top.heavy_top import HeavyTop, State
+
+F = Fraction
+TOP = HeavyTop((4, 4, 1), 1, (1, 0, 0))
+UNIT = (F(2, 3), F(-1, 3), F(2, 3))
+FAR = F(10**6)
+
+
+def from_rest(seed):
+    """The centre anywhere in the plane of the equal moments, γ of any length."""
+    rng = random.Random(seed)
+    i3 = positive(rng)
+    top = HeavyTop((4 * i3, 4 * i3, i3), rng.choice((1, -2)), (rational(rng), rational(rng) or F(1), 0))
+    g1, g2, g3 = triple(rng)
+    return GoryachevChaplyginRest(top, State((0, 0, 0), (g1, g2, g3 or F(1, 3))))
+
+
+def moving(seed):
+    """A start with G = 0 that moves, and comes to rest."""
+    rng = random.Random(seed)
+    while True:
+        p, q, r, g1 = rational(rng) or F(1), rational(rng) or F(1), rational(rng), rational(rng)
+        g3 = r * (p * p + q * q) / p
+        start = State((p, q, r), (g1, (-r * g3 / 4 - p * g1) / q, g3))
+        try:
+            return GoryachevChaplyginRest(TOP, start)
+        except NotInClass:
+            continue
+
+
+# h = a: 4 s² + 4 s γ1 = (p γ1/q)²
+TENDING = [State((3, 4, 0), (200, -150, 0)), State((-3, 4, 0), (F(-200, 9), F(-50, 3), 0))]
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("make", [from_rest, moving])
+def test_every_random_motion_solves_all_six_equations(make, seed):
+    motion, rng = make(seed), random.Random(seed)
+    assert_solves(motion, rational(rng, size=30))
+    assert_solves(motion, -rational(rng))
+    assert_narrow(motion, FAR)
+    assert_attitude(motion, rational(rng))
+    found = find(motion.top, motion.start)
+    assert isinstance(found, GoryachevChaplyginRest)
+
+
+@pytest.mark.parametrize("start", TENDING)
+def test_motions_that_tend_to_rest_are_elementary(start):
+    motion = GoryachevChaplyginRest(TOP, start)
+    enclosure = Validated(TOP, start)
+    for time in (F(1, 3), F(-1)):
+        assert_solves(motion, time)
+        assert all(a.overlaps(b) for a, b in zip(motion.state(time, 170), enclosure.state(time, 170), strict=True))
+    for time in (FAR, -FAR):
+        assert_narrow(motion, time)
+        assert motion.state(time, 170)[3].overlaps(motion.state(3 * time, 170)[3])
+    with pytest.raises(OutOfReach, match="h = a"):
+        motion.attitude(F(1), 100)
+    assert reference(TOP, start, [1], 20).method.startswith("closed form: Goryachev")
+
+
+@pytest.mark.parametrize("motion", [from_rest(1), from_rest(5), moving(1), moving(2)])
+def test_the_enclosure_holds_the_closed_form(motion):
+    enclosure = Validated(motion.top, motion.start)
+    for time in (F(3, 2), F(-2)):
+        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
+        assert all(a.overlaps(b) for a, b in pairs)
+
+
+def test_the_enclosure_holds_the_attitude_over_several_rests():
+    """The body rests again every 4 K(m)/√a, some 7 units of time."""
+    motion = GoryachevChaplyginRest(TOP, State((0, 0, 0), UNIT))
+    assert_meets(motion, (F(3), F(8), F(-12)))
+
+
+@pytest.mark.parametrize("make", [from_rest, moving])
+def test_a_motion_goes_back_the_way_that_it_came(make):
+    motion = make(3)
+    with working_precision(300):
+        own = goryachev_chaplygin_rest._motion(motion)
+        whole = 4 * own.functions.quarter / own.size.sqrt()
+        since = 2 * own.origin / own.size.sqrt()
+        for share in (F(1, 3), F(7, 5)):
+            here = own.at(whole * share.numerator / share.denominator - since).state()
+            back = own.at(-whole * share.numerator / share.denominator - since).state()
+            later = own.at(whole * (2 - share).numerator / share.denominator - since).state()
+            for other in (back, later):
+                assert all((a + b).contains(0) for a, b in zip(here[:3], other[:3], strict=True))
+                assert all(a.overlaps(b) for a, b in zip(here[3:], other[3:], strict=True))
+
+
+@pytest.mark.parametrize("axes", ALL)
+def test_any_naming_of_the_axes_and_any_units(axes):
+    for power in (-100, 0, 100):
+        size = F(10) ** power
+        top = HeavyTop((4 * size, 4 * size, size), size * size, (1, F(1, 3), 0))
+        start = State((0, 0, 0), UNIT)
+        found = find(renamed_top(top, axes), renamed_state(start, axes))
+        assert "Goryachev" in found.method
+        record = reference(found.top, found.start, [F(7, 3), -FAR], 40, attitude=True)
+        assert record.attitude_method == record.method
+
+
+@pytest.mark.parametrize("power", [1, 3, 10, 100, 300])
+def test_directions_all_but_level_upright_or_hanging(power):
+    small = F(1, 10**power)
+    for gamma in ((small, F(3, 5), F(4, 5)), (F(3, 5), small, 1), (F(3, 5), 1, small), (1, small, small)):
+        begun = process_time()
+        motion = GoryachevChaplyginRest(TOP, State((0, 0, 0), gamma))
+        assert_narrow(motion, F(7, 3), 40)
+        assert all(a.overlaps(b) for a, b in zip(motion.state(FAR, 140), motion.state(FAR, 300), strict=True))
+        with suppress(OutOfReach):
+            motion.attitude(F(7, 3), 140)
+        assert process_time() - begun < 5
+
+
+def test_a_thousand_digits_and_fifty_at_a_million_are_quick():
+    motion = GoryachevChaplyginRest(TOP, State((0, 0, 0), UNIT))
+    assert_narrow(motion, FAR, 1000)
+    motion.attitude(FAR, 175)
+    begun = process_time()
+    for step in range(20):
+        motion.state(FAR + step, 175)
+    assert process_time() - begun < 1
+
+
+def test_what_is_outside_is_refused_with_the_test_that_failed():
+    for top, start, message in (
+        (TOP, State((1, 0, 0), (1, 0, 0)), "M·gamma = 4"),
+        (TOP, State((1, 0, 1), (0, 1, 0)), "G = 1"),
+        (TOP, State((0, 2, 0), (F(4, 5), 0, F(3, 5))), r"h\^2 exceeds"),
+        (TOP, State((0, 0, "1/3"), (F(4, 5), F(3, 5), 0)), "turns about axis 3"),
+        (TOP, State((0, 0, 0), (F(4, 5), F(3, 5), 0)), "turns about axis 3"),
+        (TOP, State((0, 0, 0), (1, 0, 0)), "turns about axis 3"),
+        (HeavyTop((4, 4, 2), 1, (1, 0, 0)), State((0, 0, 0), UNIT), "I1 - 4 I3 = -4"),
+    ):
+        with pytest.raises(NotInClass, match=message):
+            GoryachevChaplyginRest(top, start)
+
+
+@pytest.mark.parametrize("start", [State((0, 0, 0), UNIT), moving(1).start, *TENDING])
+def test_the_general_class_refuses_these_levels(start):
+    with pytest.raises(NotInClass, match="both separated variables"):
+        GoryachevChaplygin(TOP, start)

@@ -1,0 +1,149 @@
+"""Symmetric tops about axes of irrational direction: spherical tops, pendulums about any equatorial axis."""
+
+import random
+from fractions import Fraction
+from itertools import product
+from time import process_time
+
+import pytest
+from proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
+
+from heavytop.errors import NotInClass
+from heavytop.exact.catalogue import find, matches
+from heavytop.exact.lagrange import Lagrange
+from heavytop.exact.pendulum import Pendulum
+from heavytop.exact.spherical import SphericalTop
+from heavytop.exact.validated import Validated
+from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+
+F = Fraction
+UNIT = (F(2, 3), F(-1, 3), F(2, 3))
+FAR = F(10**6)
+SLEEPING = HeavyTop((2, 2, 2), 1, (1, 2, 3)), State((3, 6, 9), (2, 4, 6))
+ASYMPTOTIC = HeavyTop((1, 1, 1), 1, (0, 0, 1)), State((0, 2, 0), (0, 0, -1))
+
+
+def random_spherical(seed):
+    rng = random.Random(seed)
+    inertia = [positive(rng)] * 3
+    return SphericalTop(HeavyTop(inertia, rng.choice((1, -2)), triple(rng)), State(triple(rng), triple(rng)))
+
+
+def random_tilted(seed, spherical):
+    """A pendulum about an axis of the plane of the equal moments, or about any axis."""
+    rng = random.Random(seed)
+    i1, i3 = positive(rng), positive(rng)
+    axis = (rational(rng), rational(rng) or F(1), rational(rng) if spherical else F(0))
+    inertia = (i1, i1, i1) if spherical else (i1, i1, i3)
+    centre, gamma = (cross(axis, triple(rng)) for _ in range(2))
+    rate = rational(rng) if seed % 3 else F(0)
+    return Pendulum(HeavyTop(inertia, 2, centre), State([rate * e for e in axis], gamma))
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_every_random_spherical_top_solves_all_six_equations(seed):
+    motion, rng = random_spherical(seed), random.Random(seed)
+    assert_solves(motion, rational(rng, size=30))
+    assert_narrow(motion, FAR)
+    assert_attitude(motion, rational(rng))
+
+
+@pytest.mark.parametrize("spherical", [False, True])
+@pytest.mark.parametrize("seed", range(12))
+def test_every_random_tilted_pendulum_solves_all_six_equations(seed, spherical):
+    motion, rng = random_tilted(seed, spherical), random.Random(seed)
+    assert_solves(motion, rational(rng, size=30))
+    assert_narrow(motion, FAR)
+    assert_attitude(motion, rational(rng))
+    assert isinstance(find(motion.top, motion.start), Pendulum)
+
+
+@pytest.mark.parametrize("motion", [random_spherical(1), random_spherical(4), random_tilted(2, False)])
+def test_the_enclosure_holds_states_and_attitude(motion):
+    top, omega = motion.top, motion.start.omega
+    enclosure = Validated(top, motion.start)
+    for time in (F(3, 2), F(-2)):
+        pairs = zip(motion.state(time, 180), enclosure.state(time, 180), strict=True)
+        assert all(a.overlaps(b) for a, b in pairs)
+    if isinstance(motion, SphericalTop):
+        assert_meets(SphericalTop(top, State(omega, UNIT)), (F(3, 2), F(-2)))
+
+
+def test_a_spherical_top_with_its_centre_on_an_axis_is_lagranges():
+    """The same motion with the centre on axis 3, and by the class that takes any direction."""
+    for weight, bits in product((F(3, 2), 1, -4), (60, 400)):
+        top, start = HeavyTop((2, 2, 2), weight, (0, 0, 1)), State(("1/5", "1/3", -2), UNIT)
+        plain, other = Lagrange(top, start), SphericalTop(top, start)
+        for time in (F(7, 3), -FAR):
+            assert all(a.overlaps(b) for a, b in zip(plain.state(time, bits), other.state(time, bits), strict=True))
+            pairs = zip(plain.attitude(time, bits), other.attitude(time, bits), strict=True)
+            assert all(a.overlaps(b) for a, b in pairs)
+
+
+def test_a_rational_turn_of_the_body_turns_the_motion():
+    """About an axis of rational length the turned body is Lagrange's about axis 3, which shares no frame with it."""
+    turn = ((F(2, 3), F(1, 3), F(2, 3)), (F(-2, 3), F(2, 3), F(1, 3)), (F(-1, 3), F(-2, 3), F(2, 3)))
+    spherical = HeavyTop((3, 3, 3), 2, [5 * x for x in turn[2]])
+    start = State(("1/5", "1/3", -2), UNIT)
+    there = State(*([dot(row, v) for row in turn] for v in (start.omega, start.gamma)))
+    plain = Lagrange(HeavyTop((3, 3, 3), 2, (0, 0, 5)), there)
+    for time in (F(7, 3), FAR):
+        found, known = SphericalTop(spherical, start).state(time, 170), plain.state(time, 170)
+        for half in (slice(3), slice(3, 6)):
+            for row, value in zip(turn, known[half], strict=True):
+                total = sum((w * int(x * 3) for w, x in zip(found[half], row, strict=True)), found[0] * 0)
+                assert total.overlaps(3 * value)
+
+
+@pytest.mark.parametrize(("top", "start"), [SLEEPING, ASYMPTOTIC], ids=["sleeping", "asymptotic"])
+def test_degenerate_cubics_are_motions_like_any_other(top, start):
+    motion = SphericalTop(top, start)
+    for time in (F(7, 3), F(-30)):
+        assert_solves(motion, time)
+        assert_attitude(motion, time)
+
+
+@pytest.mark.parametrize("power", [-300, -100, -30, 30, 100, 300])
+def test_directions_all_but_along_an_axis(power):
+    size = F(10) ** power
+    top = HeavyTop((2, 2, 2), 1, (1, size, 3))
+    motion = SphericalTop(top, State(("1/5", "1/3", -2), UNIT))
+    begun = process_time()
+    assert_narrow(motion, F(7, 3), 40)
+    assert all(a.overlaps(b) for a, b in zip(motion.state(F(1), 140), motion.state(F(1), 300), strict=True))
+    tilted = Pendulum(HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((1, size, 0), (0, 0, 1)))
+    assert_narrow(tilted, F(7, 3), 40)
+    assert process_time() - begun < 5
+
+
+def test_fifty_digits_at_a_million_are_quick():
+    motion = SphericalTop(HeavyTop((2, 2, 2), 1, (1, 2, 3)), State((1, "1/2", 3), UNIT))
+    motion.state(FAR, 175)
+    begun = process_time()
+    for step in range(20):
+        motion.state(FAR + step, 175)
+    assert process_time() - begun < 1
+
+
+def test_several_forms_of_one_motion_agree():
+    tilted = random_tilted(2, True)
+    forms = list(matches(tilted.top, tilted.start))
+    assert {type(form) for form in forms} >= {Pendulum, SphericalTop}
+    states = [form.state(F(13, 3), 200) for form in forms]
+    assert all(a.overlaps(b) for other in states[1:] for a, b in zip(states[0], other, strict=True))
+
+
+def test_what_is_outside_is_refused_with_the_test_that_failed():
+    with pytest.raises(NotInClass, match="I2 - I3 = 1/7"):
+        SphericalTop(HeavyTop((2, 2, "13/7"), 1, (1, 2, 3)), State((1, 2, 3), UNIT))
+    with pytest.raises(NotInClass, match="P r = 0"):
+        SphericalTop(HeavyTop((2, 2, 2), 0, (1, 2, 3)), State((1, 2, 3), UNIT))
+    tilted = HeavyTop((2, 2, 1), 1, (4, -3, 1))
+    gamma = (F(4), F(-3), F(2))
+    assert Pendulum(tilted, State((3, 4, 0), gamma)).axis == (F(3, 4), 1, 0)
+    with pytest.raises(NotInClass, match=r"Omega = \(3, 4, 1/9\) is not along a principal axis"):
+        Pendulum(tilted, State((3, 4, "1/9"), gamma))
+    with pytest.raises(NotInClass, match=r"P r·e = 0 and gamma·e = 1/4 are not both 0"):
+        Pendulum(tilted, State((3, 4, 0), (4, F(-11, 4), 2)))
+    with pytest.raises(NotInClass, match=r"torque gamma x P r = .* is not along a principal axis"):
+        Pendulum(HeavyTop((2, 2, 1), 1, (1, 2, 3)), State((0, 0, 0), UNIT))
