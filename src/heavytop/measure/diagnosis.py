@@ -41,7 +41,7 @@ _RIGHT = 1e-2
 """... which is off by no more than that, ..."""
 _FEW_OF, _MOST_ALONE = 4, 8
 """... and if they are at most one in four of all, and so many."""
-_LONG = 4
+_LONG = 1.5
 """The last interval between times is no measure of a state if it is so many times the longest other."""
 
 
@@ -83,7 +83,7 @@ def diagnose(
     with numpy.errstate(all="ignore"):  # what overflows explains nothing
         given = suspect(top, start, system, times, states, int(measured.argmax()) if len(measured) else None)
         truth = None if given is None else given.supposed(given.times)
-        if _only_rounded(rounding(states, precision, 1), relative_error, given, truth):
+        if _only_rounded(rounding(states, precision, 1), relative_error, None if given is None else given.trusted()):
             return _rounded(written, relative_error)
         mistake = _still(given, states, relative_error) or _off_alone(given, times, measured)
         if mistake is None and given is not None and given.rows:
@@ -99,14 +99,15 @@ def _rounded(written: Rounding | None, error: float | None) -> list[Diagnosis]:
     return [Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})]
 
 
-def _only_rounded(written: Rounding | None, error: float | None, given: Suspect | None, truth: Array | None) -> bool:
+def _only_rounded(written: Rounding | None, error: float | None, given: Suspect | None) -> bool:
     """Whether every component that is looked at is the true one, rounded as it is written."""
     if written is None or (error is not None and error > EXPLAINS * written.error):
         return False
-    if given is None or truth is None or not given.rows:
+    truth = None if given is None or not given.rows else given.supposed(given.times)
+    if given is None or truth is None:
         return error is not None
     units, sizes = (numpy.repeat([value, 1.0], 3) for value in (float(given.units.time), given.rate))
-    allowed = EXPLAINS * written.spacing(given.states / units) / 2 * units + _WORTH_ASKING * sizes
+    allowed = EXPLAINS * written.spacing(given.states / units) / 2 * units + 10 * _WORTH_ASKING * sizes
     return bool((numpy.abs(given.states - truth) <= allowed).all())
 
 

@@ -30,6 +30,7 @@ _NEAR = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10)
 _MOST_CHANGED = 3
 _MARGIN = 30.0
 """How many errors of the samples a fitted number may be off."""
+_AT_ONCE = 1e-3
 _LATER = 2
 """The last sample must be so many times as late as the first for a start to be told from the method's own errors."""
 
@@ -154,7 +155,7 @@ def another_start(given: Suspect) -> Found | None:
     first = _as_state(given.states[0])
     back = motion(given.top, first, given.system, [-times[0]])
     truth = given.supposed(times[:1])
-    if back is None or truth is None:
+    if back is None or truth is None or not _shows_at_once(given, truth):
         return None
     start = _as_state(back[0])
     error = given.error(given.supposed(times, start=start))
@@ -169,7 +170,15 @@ def another_start(given: Suspect) -> Found | None:
         for name, value, change, size, unit in zip(names, back[0], off, sizes, units, strict=True)
         if change > noise * size
     )
-    return Data("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error
+    return (Data("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error) if numbers else None
+
+
+def _shows_at_once(given: Suspect, first: Array) -> bool:
+    """Whether the first sample is off by a notable part of the largest error: a motion that magnifies the errors of a
+    method may look like one from another start.
+    """
+    early, largest = given.at(given.rows[:1]).error(first), given.error(given.supposed(given.times))
+    return early >= _AT_ONCE * largest
 
 
 def another_top(given: Suspect) -> Found | None:

@@ -18,6 +18,8 @@ _TURNS = 1 / (2 * numpy.pi)
 _RPM = 60 * _TURNS
 UNITS_OF_OMEGA = {"degrees": _DEGREES, "turns": _TURNS, "rpm": _RPM}
 """Of angular velocity, each as a multiple of radians per time unit; rpm where times are in seconds."""
+_FEWEST = 3
+"""Numbers of which one factor may be told."""
 _PRESENT = 1e-6
 """A column of the true states counts as 0 below this part of its vector."""
 _MEANINGS: dict[str, tuple[float, float, bool]] = {
@@ -97,7 +99,7 @@ def scaled(given: Suspect, truth: Array) -> Iterator[tuple[str, dict[str, str], 
     groups += [("column_scaled", slice(column, column + 1)) for column in range(6)]
     for kind, columns in groups:
         true, whole = truth[:, columns], truth[:, :3] if columns.start < 3 else truth[:, 3:]
-        if numpy.abs(true).max() <= _PRESENT * numpy.abs(whole).max():
+        if true.size < _FEWEST or numpy.abs(true).max() <= _PRESENT * numpy.abs(whole).max():
             continue
         fitted = float((given.states[:, columns] * true).sum() / (true * true).sum())
         if not numpy.isfinite(fitted) or not fitted:
@@ -118,6 +120,8 @@ def _divided(given: Suspect, truth: Array, columns: slice, factor: float) -> flo
 
 def constant_column(given: Suspect, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
     """A column that is the same in every state, and the error of the other five."""
+    if len(given.rows) < _FEWEST:
+        return
     for column in numpy.flatnonzero((given.all_states == given.all_states[0]).all(axis=0)):
         states = given.states.copy()
         states[:, column] = truth[:, column]

@@ -32,10 +32,10 @@ _STEPS = 50_000
 """Of heyoka, for one supposed motion: a tenth of a second."""
 FARTHEST = 3000.0
 """Radians that the body may turn until the last supposed time."""
-_MOVED = 2.0**-48
-"""Part by which a start is moved to see what the motion makes of roundings, ..."""
-_TRUSTED = 1e-10
-"""... and the relative change of a state from which on heyoka's is not trusted."""
+_OTHER_UNIT = Fraction(11, 10)
+"""Of time and of moments: all data are rounded otherwise in it."""
+_TRUSTED = 1e-11
+"""heyoka's states are trusted until those in other units part from them by so much, relative to their size."""
 _USUAL = 3.0
 """Decades by which a unit may be off before another is taken."""
 MOST_AT_ONCE = 2000
@@ -114,12 +114,17 @@ class Suspect:
         return self.at(range(sum(reached))).trusted()
 
     def trusted(self) -> Suspect:
-        """The same up to where the motion makes more of a rounding of the start than an error that is asked about."""
-        truth = self.supposed(self.times) if self.rows else None
-        moved = self.supposed(self.times, start=_moved(self.start, self.rate))
-        if truth is None or moved is None:
+        """The same up to where the motion makes more of roundings than an error that is asked about."""
+        truth, unit = self.supposed(self.times) if self.rows else None, _OTHER_UNIT
+        if truth is None:
             return self
-        far = replace(self, states=moved).errors(truth) > _TRUSTED
+        top = HeavyTop([i * unit for i in self.top.inertia], self.top.weight / unit, self.top.centre)
+        start = State([w / unit for w in self.start.omega], self.start.gamma)
+        other = motion(top, start, self.system, [time * unit for time in self.times])
+        if other is None:
+            return self
+        states = other * ([float(unit)] * 3 + [1.0] * 3)
+        far = replace(self, states=states).errors(truth) > _TRUSTED
         return self.at(self.rows[: int(numpy.argmax(far))]) if far.any() else self
 
     def follows(self, row: int) -> Array | None:
@@ -187,13 +192,6 @@ def suspect(
     found = Suspect(top, start, system, tuple(times), array[1:], tuple(rows), array[1:][rows], rate, units)
     trusted = found.trusted()
     return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else found
-
-
-def _moved(start: State, rate: float) -> State:
-    """A start that is off by a rounding in every component, in either direction."""
-    part, unit = Fraction(_MOVED), Fraction(rate)
-    omega = [w + sign * part * max(abs(w), unit) for sign, w in zip((1, -1, 1), start.omega, strict=True)]
-    return State(omega, [g + sign * part for sign, g in zip((-1, 1, 1), start.gamma, strict=True)])
 
 
 def turning_rate(top: HeavyTop, start: State) -> Fraction:

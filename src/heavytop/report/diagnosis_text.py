@@ -86,7 +86,7 @@ def _said(found: Diagnosis, system: str) -> str:
         case "weight":
             return f"The states fit another weight: {named}"
         case "start":
-            return f"The states fit another start: {named or 'one that differs by less than can be told'}"
+            return f"The states fit another start: {named}"
         case "top":
             return f"The states fit another top: {named}"
         case "one_state":
