@@ -170,7 +170,7 @@ def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: i
         return bool(before < reached < last)
 
     start = [] if targets[0] == 0 else [engine.time]
-    grid = numpy.array([*start, *targets, end])
+    grid = numpy.concatenate([numpy.array([*start, targets[0]]), numpy.array(targets[1:]), numpy.array([end])])
     _, _, _, steps, _, states = engine.propagate_grid(grid, callback=goes_on, max_steps=most or 0)
     if len(states) != len(grid) - 1 or not numpy.isfinite(states[-1]).all():
         return None

@@ -67,7 +67,7 @@ def _in_order(values: list[Fraction]) -> list[float]:
     What is rounded to different doubles is in their order, so these times need not be compared.
     """
     try:
-        doubles = [value.numerator / value.denominator for value in values]
+        doubles = [above / below for above, below in map(Fraction.as_integer_ratio, values)]
     except OverflowError:
         return []
     sizes = doubles if doubles and doubles[-1] > 0 else [-value for value in doubles]
