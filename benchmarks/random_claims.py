@@ -312,7 +312,7 @@ _COMPOSED = [
 _STATES = [
     ["1/2", "2/3", "3/4", "2/3", "1/3", "2/3"],
     ["1", "2", "1", "3/5", "0", "4/5"],
-    ["1/3", "-1/2", "2", "1/2", "1/3", "1/5"],
+    ["1/3", "-1/2", "2", "2/7", "3/7", "6/7"],
 ]
 _FALSE_INTEGRALS = ["{0} + Omega1", "{0}*Omega2", "Omega1^2 + Omega2^2", "{0} + 1e-25*Omega3*gamma1", "Omega3"]
 _TRAPS = [
@@ -357,12 +357,12 @@ def _conditional(draw: random.Random) -> Claim:
     if draw.random() < 0.5:
         base = "(Omega3*(Omega1^2 + Omega2^2) - n/c*Omega1*gamma3)"
         value = draw.choice(["{0}", "{0}^2", "exp({0})", "sqrt(1 + {0}^2)", "atan({0})"]).format(base)
-        table = _integral(value, [["1", "-1", "5", "1", "1", "0"], ["1", "0", "0", "0", "1/2", "0"]])
+        table = _integral(value, [["4", "-3", "5", "3/5", "4/5", "0"], ["1", "0", "0", "0", "1", "0"]])
         table |= {"assume": ["c > 0"], "parameters": {"c": "1", "n": "3/2"}}
         table["top"] = {"inertia": ["4*c", "4*c", "c"], "weight": "1", "centre": ["n", "0", "0"]}
         table["integral"]["where"] = [draw.choice(["", "2*"]) + "(4*Omega1*gamma1 + 4*Omega2*gamma2 + Omega3*gamma3)"]
         return Claim(table, "true", "where")
-    table = _integral("a*x*Omega1 + c*z*Omega3", [["1", "1/2", "-3", "1", "2", "3"]], kind="relation")
+    table = _integral("a*x*Omega1 + c*z*Omega3", [["1", "1/2", "-3", "2/3", "1/3", "2/3"]], kind="relation")
     table |= {"assume": ["a > 0", "b > 0", "c > 0", "z > 0"], "relations": ["a*(b - c)*x^2 - c*(a - b)*z^2"]}
     table["parameters"] = {"a": "9", "b": "5", "c": "4", "x": "4", "z": "3"}
     table["top"] = {"inertia": ["a", "b", "c"], "weight": "1", "centre": ["x", "0", "z"]}
@@ -509,6 +509,8 @@ class Numbers:
 
     def _of_integral(self, names: dict[str, Any], draw: random.Random) -> list[Any]:
         y = [mpmath.mpf(draw.uniform(-2, 2)) for _ in STATE]
+        size = mpmath.sqrt(sum(part**2 for part in y[3:]))
+        y[3:] = [part / size for part in y[3:]]
         field, step = self._field(names, y), mpmath.mpf(10) ** (-DIGITS // 3)
 
         def value(shift: int) -> Any:

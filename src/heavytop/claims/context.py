@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ import sympy
 from flint import arb
 
 from heavytop.claims.assume import Assumed, assume, comparison
-from heavytop.claims.conditions import Need, condition, is_exactly_zero
+from heavytop.claims.conditions import Kind, Need, condition, is_exactly_zero
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
@@ -20,7 +20,7 @@ from heavytop.claims.real_zeros import conditions_for_zero
 from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import Setting
 from heavytop.claims.statements import SYSTEMS
-from heavytop.errors import InputError
+from heavytop.errors import InputError, quoted
 from heavytop.precision import exact
 from heavytop.top.equations import GYROSTAT, Parameters, System
 
@@ -28,6 +28,8 @@ TIME = sympy.Symbol("t", real=True)
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
 _RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
 _SAMPLE_BITS = 512
+_OF_THE_TOP = "The moments, the weight and the centre of mass of a top are constant: use numbers and parameters."
+_OF_PARAMETERS = "Relations are between parameters; conditions on the state stand in where of [integral]."
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +45,16 @@ class Context:
     rotor: sympy.Expr | None
     needs: frozenset[Need]
     rotor_needs: frozenset[Need]
+
+    def with_rotor(self, rotor: sympy.Expr | None, is_constant: bool) -> Context:
+        """The context with the rotor in this form; raises InputError unless it is shown to be constant in time."""
+        if not is_constant:
+            text = quoted(str(self.rotor))[1:-1]
+            raise InputError(
+                f"top.rotor: {text} is not shown to be constant in time.",
+                "The rotor of a gyrostat turns at a constant rate: use parameters, or first integrals of its motion.",
+            )
+        return replace(self, rotor=rotor)
 
     @property
     def systems(self) -> tuple[System, ...]:
@@ -80,6 +92,10 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
     rotor = None if top.rotor is None else parse(top.rotor, names, "top.rotor")
     relations = [parse(text, names, "relations") for text in content.relations]
+    _check_constant("top.inertia", moments, _OF_THE_TOP)
+    _check_constant("top.centre", arm[:3], _OF_THE_TOP)
+    _check_constant("top.weight", arm[3:], _OF_THE_TOP)
+    _check_constant("relations", relations, _OF_PARAMETERS)
     weight = arm.pop()
     inertia, centre = (tuple(part.expression for part in parts) for parts in (moments, arm))
     context = Context(
@@ -106,6 +122,16 @@ def three(texts: Iterable[str], names: dict[str, Formula], where: str) -> tuple[
     """The formulas of three texts."""
     first, second, third = (parse(text, names, f"{where}[{index}]") for index, text in enumerate(texts))
     return first, second, third
+
+
+def _check_constant(where: str, formulas: Sequence[Formula], remedy: str) -> None:
+    """Raises InputError where a formula, or what it needs, depends on the time or the state, directly or not."""
+    for formula in formulas:
+        free = formula.expression.free_symbols.union(*(need.expression.free_symbols for need in formula.needs))
+        moving = sorted(map(str, free & {TIME, *STATE}))
+        if moving:
+            text = quoted(str(formula.expression))[1:-1]
+            raise InputError(f"{where}: {text} depends on {', '.join(moving)}.", remedy)
 
 
 def _check_samples(context: Context, bounds: list[tuple[sympy.Expr, sympy.Expr]]) -> None:
@@ -136,9 +162,28 @@ def setting_of(context: Context, variable: sympy.Symbol) -> Setting:
     """The setting of a claim in this context."""
     a = context.assumed
     relations = tuple(part for relation in context.relations for part in conditions_for_zero(relation))
+    bodies = _body_needs(context.top.inertia)
     return Setting(
-        variable, a.positive, context.samples, a.greater, relations=relations, facts=a.facts, ranges=a.ranges
+        variable,
+        a.positive,
+        context.samples,
+        a.greater,
+        relations=relations,
+        facts=a.facts,
+        ranges=a.ranges,
+        bodies=bodies,
     )
+
+
+def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
+    """No principal moment of a rigid body exceeds the sum of the other two; () for moments that are numbers.
+
+    A claim about one top is judged about that top, as the equations do not mind; one about many is not refuted by a
+    top that no body is.
+    """
+    if not any(moment.free_symbols for moment in inertia):
+        return ()
+    return tuple(Need(Kind.NONNEGATIVE, sum(inertia) - 2 * moment) for moment in inertia)
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,7 @@ class UserMotion(FileClaim):
     def __post_init__(self) -> None:
         FileClaim.__post_init__(self)
         assert self.content.motion is not None
+        object.__setattr__(self, "context", _with_constant_rotor(self.context, _domain(self.content)))
         motion = _read_motion(self.content, self.content.motion, self.context)
         object.__setattr__(self, "motion", motion)
 
@@ -71,6 +72,14 @@ class UserMotion(FileClaim):
         if system is about:
             return verdict_of([row for row in rows if row.equation in ("1.1", "1.2")])
         return verdict_of(judge([s for s in self.statements(system) if s.equation in ("1.1", "1.2")], self.setting))
+
+
+def _with_constant_rotor(context: Context, domain: Domain) -> Context:
+    """The rotor as the algebra writes it, without t; raises InputError where t is left."""
+    if context.rotor is None or TIME not in context.rotor.free_symbols:
+        return context
+    rotor = shortest(context.rotor, setting_of(context, TIME), domain)
+    return context.with_rotor(rotor, TIME not in rotor.free_symbols)
 
 
 def _read_motion(content: ClaimFile, table: MotionTable, context: Context) -> Motion:
