@@ -28,6 +28,8 @@ TIME = sympy.Symbol("t", real=True)
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
 _RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
 _SAMPLE_BITS = 512
+_MOST_BITS = 6_640
+"""Of numerator and denominator of a number in a sample: 2000 digits."""
 _OF_THE_TOP = "The moments, the weight and the centre of mass of a top are constant: use numbers and parameters."
 _OF_PARAMETERS = "Relations are between parameters; conditions on the state stand in where of [integral]."
 
@@ -102,7 +104,10 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
         names,
         symbols,
         assume(bounds, inertia, symbols.values()),
-        tuple({symbols[name]: exact(value) for name, value in row.items()} for row in sample_rows(content.parameters)),
+        tuple(
+            {symbols[name]: sample_number(value, name) for name, value in row.items()}
+            for row in sample_rows(content.parameters)
+        ),
         tuple(relation.expression for relation in relations),
         Parameters(inertia, tuple(weight.expression * part for part in centre), sympy.Integer(0)),
         None if rotor is None else rotor.expression,
@@ -111,6 +116,17 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     )
     _check_samples(context, bounds)
     return context
+
+
+def sample_number(text: str, what: str) -> Fraction:
+    """The exact number of a sample, a state or a time; raises InputError for one of thousands of digits."""
+    try:
+        value = exact(text)
+    except InputError as error:
+        raise InputError(f"{what}: {error.cause}", error.remedy) from None
+    if max(value.numerator.bit_length(), value.denominator.bit_length()) > _MOST_BITS:
+        raise InputError(f"{what} = {quoted(text)[1:-1]} is too long a number.", "Use numbers of at most 2000 digits.")
+    return value
 
 
 def needs_of(formulas: Iterable[Formula]) -> frozenset[Need]:

@@ -27,16 +27,10 @@ from heavytop.exact.balls import working_precision
 
 _EVERYWHERE = "proven all over the domain"
 # rational, with |γ| = 1, on no surface of low degree with small coefficients
-_SOME_STATE = dict(
-    zip(
-        ("Omega1", "Omega2", "Omega3", "gamma1", "gamma2", "gamma3"),
-        (
-            Fraction(*pair)
-            for pair in ((17, 13), (-29, 31), (37, 23), (98838, 136763), (-61370, 136763), (71895, 136763))
-        ),
-        strict=True,
-    )
-)
+_SOME_STATE = {
+    **dict(zip(("Omega1", "Omega2", "Omega3"), (Fraction(17, 13), Fraction(-29, 31), Fraction(37, 23)), strict=True)),
+    **{f"gamma{axis}": Fraction(part, 136763) for axis, part in enumerate((98838, -61370, 71895), 1)},
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import ClassVar
 import sympy
 
 from heavytop.claims.conditions import Need
-from heavytop.claims.context import TIME, Context, FileClaim, needs_of, setting_of, three
+from heavytop.claims.context import TIME, Context, FileClaim, needs_of, sample_number, setting_of, three
 from heavytop.claims.expression import Formula
 from heavytop.claims.from_file import ClaimFile, MotionTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
@@ -17,7 +17,6 @@ from heavytop.claims.prover import shortest
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Setting, Statement
 from heavytop.claims.statements import SYMBOLIC, Motion, Triple, attitude, motion_statements
 from heavytop.errors import InputError
-from heavytop.precision import exact
 from heavytop.top.angles import omega_from_angles
 from heavytop.top.equations import GYROSTAT, System
 
@@ -122,7 +121,7 @@ def _domain(content: ClaimFile) -> Domain:
     domain = _DOMAINS[content.domain]
     if content.times is None:
         return domain
-    times = tuple(exact(time) for time in content.times)
+    times = tuple(sample_number(time, "times") for time in content.times)
     if any(time * domain.sign < 0 or (domain is AFTER and time == 0) for time in times):
         raise InputError(
             f"A time of {', '.join(content.times)} lies outside {domain.label}.", "Change times or domain."

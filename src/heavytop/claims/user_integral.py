@@ -13,7 +13,7 @@ import sympy
 
 from heavytop.claims.algebra import Assumptions, Field
 from heavytop.claims.conditions import Need, is_exactly_zero
-from heavytop.claims.context import STATE, TIME, Context, FileClaim, needs_of, setting_of
+from heavytop.claims.context import STATE, TIME, Context, FileClaim, needs_of, sample_number, setting_of
 from heavytop.claims.expression import Formula, parse
 from heavytop.claims.from_file import IntegralTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
@@ -23,7 +23,7 @@ from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import ALL, Flow, Formulas, Place, Setting, Statement
 from heavytop.claims.structure import Names
 from heavytop.errors import InputError
-from heavytop.precision import exact, shown
+from heavytop.precision import shown
 from heavytop.top.equations import GYROSTAT, System
 
 Rate = Callable[[sympy.Expr], sympy.Expr]
@@ -84,7 +84,7 @@ class UserIntegral(FileClaim):
 
     def _states(self, conditions: Sequence[sympy.Expr], parameters: Mapping[sympy.Symbol, Fraction]) -> list[Place]:
         """The states of the file; without them states of our own, on the conditions where such are found."""
-        given = [dict(zip(STATE, map(exact, values), strict=True)) for values in self._table.states or _STATES]
+        given = _numbers(self._table.states or _STATES)
         if self._table.states is not None:
             return given
         needs = needs_of([self.value, *self.where])
@@ -176,10 +176,18 @@ class UserIntegral(FileClaim):
         return [], tuple(name for name, rows in found.items() if verdict_of(rows) == "holds")
 
 
+def _numbers(states: Sequence[Sequence[str]]) -> list[Place]:
+    """The states of a file, exactly."""
+    return [
+        {symbol: sample_number(text, f"states: {symbol}") for symbol, text in zip(STATE, values, strict=True)}
+        for values in states
+    ]
+
+
 def _check_states(table: IntegralTable) -> None:
     """Raises InputError for a state that no body has: off |γ| = 1."""
-    for index, values in enumerate(table.states or (), 1):
-        size = sum(exact(value) ** 2 for value in values[3:])
+    for index, state in enumerate(_numbers(table.states or ()), 1):
+        size = sum((state[symbol] ** 2 for symbol in STATE[3:]), Fraction(0))
         if size != 1:
             raise InputError(
                 f"State {index} of [integral] has |gamma|^2 = {shown(size)}, not 1: gamma is a unit vector.",
