@@ -5,7 +5,9 @@ inverse functions, quotients, half angles, exponentials), and of mistakes: a wro
 nowhere real, a side condition that the flow does not keep.  mpmath evaluates the formulas as written, in real numbers,
 at random points, and takes the derivatives by differences: nothing of heavytop's algebra is used for it.
 
-    python benchmarks/random_claims.py [--claims 2000] [--points 200] [--seed 1]
+    python benchmarks/random_claims.py [--claims 2000] [--points 200] [--seed 1] [--traps]
+
+--traps: the families of claim_traps.py instead, each of which invites a false ``holds`` in a way of its own.
 """
 
 from __future__ import annotations
@@ -551,21 +553,48 @@ class Outcome:
     reason: str
 
 
+def trap_outcomes(count: int, seed: int) -> Iterator[Outcome]:
+    """The audits of ``count`` claims of the families of claim_traps.py, in turn.
+
+    A claim that is no claim about a body must be refused, or undecided.
+    """
+    import claim_traps
+
+    draw = random.Random(seed)
+    for number in range(count):
+        table, known, family, about = claim_traps.FAMILIES[number % len(claim_traps.FAMILIES)](draw)
+        claim = Claim(table, known, family, about)
+        begin = time.process_time()
+        verdict, reason = _verdict(claim)
+        spent = time.process_time() - begin
+        fault = ""
+        if verdict == "holds":
+            fault = "false holds" if known in ("false", "refused") else ""
+            if found := claim_traps.contradiction(table, about, draw):
+                fault, reason = "false holds", found
+        if verdict == "refuted" and known in ("true", "refused"):
+            fault = "false refuted"
+        yield Outcome(claim, verdict, fault, spent, reason)
+
+
+def _verdict(claim: Claim) -> tuple[str, str]:
+    """(verdict, what leaves it undecided)."""
+    try:
+        report = audit_claim(claim_from_table(claim.table, "random"), system(claim.system))
+    except InputError as error:
+        return f"refused: {error.cause}", ""
+    open_rows = [row for row in report.rows if row.holds is None]
+    texts = [f"{c.text} ({c.reason})" for row in open_rows for c in row.conditions if not c.discharged]
+    return report.verdict, "; ".join(dict.fromkeys([*texts, *(row.residual for row in open_rows)]))
+
+
 def outcomes(count: int, points: int, seed: int) -> Iterator[Outcome]:
     """The audits of ``count`` random claims."""
     draw = random.Random(seed)
     for _ in range(count):
         claim = random_claim(draw)
         begin = time.process_time()
-        reason = ""
-        try:
-            report = audit_claim(claim_from_table(claim.table, "random"), system(claim.system))
-            verdict = report.verdict
-            open_rows = [row for row in report.rows if row.holds is None]
-            texts = [f"{c.text} ({c.reason})" for row in open_rows for c in row.conditions if not c.discharged]
-            reason = "; ".join(dict.fromkeys([*texts, *(row.residual for row in open_rows)]))
-        except InputError as error:
-            verdict = f"refused: {error.cause}"
+        verdict, reason = _verdict(claim)
         seconds = time.process_time() - begin
         passed = passes(claim, points, draw)
         fault = ""
@@ -581,10 +610,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     for name, value in (("claims", 2000), ("points", 200), ("seed", 1)):
         parser.add_argument(f"--{name}", type=int, default=value)
+    parser.add_argument("--traps", action="store_true")
     options = parser.parse_args()
     counts: Counter[tuple[str, str]] = Counter()
     seconds = []
-    for outcome in outcomes(options.claims, options.points, options.seed):
+    traps = trap_outcomes(options.claims, options.seed)
+    for outcome in traps if options.traps else outcomes(options.claims, options.points, options.seed):
         counts[outcome.claim.truth, outcome.verdict.partition(":")[0]] += 1
         seconds.append(outcome.seconds)
         if outcome.fault or (outcome.claim.truth == "true" and outcome.verdict != "holds"):
