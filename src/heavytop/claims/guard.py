@@ -60,7 +60,7 @@ def in_time(path: str, system_name: str, seconds: float = SECONDS) -> Audit:
     try:
         answer = msgspec.json.decode(done.stdout, type=Answer)
     except msgspec.DecodeError:
-        if _NO_MEMORY in done.stderr:  # FLINT ends the process
+        if _NO_MEMORY in done.stdout + done.stderr:  # FLINT ends the process
             raise _no_memory(path) from None
         raise AuditEnded(f"{path}: the process of the audit {_end_of(done)}.", "Try again.") from None
     if answer.report is not None:

@@ -56,6 +56,7 @@ class Region:
         self._divisors: dict[tuple[bool, str], bool] = {}
         self._needs = statement.formulas.needs
         self.regularity = Regularity(field, self.is_nowhere_zero)
+        self._everywhere = Regularity(field) if statement.flow is not None else self.regularity
 
     def _holds(self, place: Place) -> bool:
         a = self.field.assumptions
@@ -139,14 +140,15 @@ class Region:
             return True
         if all(tower.generators[i].kind == "symbol" for i in used(p)):
             return self._flow is None or self._is_nonzero_at_some_state(p, self._flow)
-        if not self._is_connected() or self.regularity.obstacle_of_generators(used(p), analytic=True):
+        # what is not 0 where the flow keeps it so may part the domain
+        if not self._is_connected() or self._everywhere.obstacle_of_generators(used(p), analytic=True):
             return False
         return any(self._is_nonzero_at(p, place) for place in self._places)
 
     def _is_connected(self) -> bool:
         """Linear inequalities bound a convex domain."""
         a = self.field.assumptions
-        bounds = [*a.facts, *(symbol - bound for symbol, bound in a.greater)]
+        bounds = [*a.facts, *a.weak, *(symbol - bound for symbol, bound in a.greater)]
         return not a.nonzero and all(
             bound.is_polynomial() and sympy.Poly(bound).total_degree() <= 1 for bound in bounds if bound.free_symbols
         )

@@ -64,13 +64,18 @@ class UserMotion(FileClaim):
                 yield Statement("3.2", component, "smooth", self.motion.domain, ours - theirs, text, formulas)
 
     def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
-        """No steps; the systems whose (1.1), (1.2) are proven."""
+        """No steps; the systems whose (1.1), (1.2) are proven, with |γ| = 1."""
         return [], tuple(s.name for s in self.context.systems if self._verdict(s, about, rows) == "holds")
 
     def _verdict(self, system: System, about: System, rows: Sequence[Row]) -> str:
         if system is about:
-            return verdict_of([row for row in rows if row.equation in ("1.1", "1.2")])
-        return verdict_of(judge([s for s in self.statements(system) if s.equation in ("1.1", "1.2")], self.setting))
+            return verdict_of([row for row in rows if _is_of_motion(row)])
+        return verdict_of(judge([s for s in self.statements(system) if _is_of_motion(s)], self.setting))
+
+
+def _is_of_motion(row: Row | Statement) -> bool:
+    """(1.1), (1.2), and |γ|² = 1 of (1.3)."""
+    return row.equation in ("1.1", "1.2") or (row.equation, row.component) == ("1.3", 1)
 
 
 def _with_constant_rotor(context: Context, domain: Domain) -> Context:
