@@ -5,11 +5,16 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
+import sympy
 from test_where import TOPS
 
+from heavytop.claims.algebra import Field
 from heavytop.claims.audit import audit_claim
+from heavytop.claims.context import STATE, TIME
 from heavytop.claims.from_file import claim_from_table
 from heavytop.claims.judge import Audit
+from heavytop.claims.proof import Region
+from heavytop.claims.statement import ALL, Flow, Formulas, Setting, Statement
 from heavytop.errors import InputError
 from heavytop.top.equations import system
 
@@ -261,3 +266,16 @@ def test_a_radicand_is_0_where_a_factor_of_it_is_whatever_the_sign_of_the_other(
     """M·γ = 0 is kept, and there the other factor is negative."""
     states = {"states": [["1", "2", "1", "3/5", "0", "4/5"]]}
     assert judged(integral(value.format(ENERGY, AREA), said=states)).verdict != "holds"
+
+
+def test_what_is_0_all_over_the_unit_sphere_is_0_on_no_thin_set():
+    """A divisor may be 0 on a set without interior, of the states with |γ| = 1."""
+    off = sum(x**2 for x in STATE[3:]) - 1
+    flow = Flow(lambda e: sympy.Integer(0), frozenset(STATE), always=(off,))
+    statement = Statement("", 1, "", ALL, off, "", Formulas(), flow)
+    setting = Setting(TIME, (), ())
+    field = Field(setting.assumptions(0), [off, STATE[0]])
+    region = Region(field, setting, statement, [])
+    assert not region.is_zero_nowhere_dense(field.enter(off).numerator)
+    assert region.is_zero_nowhere_dense(field.enter(off + 1).numerator)
+    assert region.is_zero_nowhere_dense(field.enter(STATE[0]).numerator)
