@@ -5,7 +5,9 @@ inverse functions, quotients, half angles, exponentials), and of mistakes: a wro
 nowhere real, a side condition that the flow does not keep.  mpmath evaluates the formulas as written, in real numbers,
 at random points, and takes the derivatives by differences: nothing of heavytop's algebra is used for it.
 
-    python benchmarks/random_claims.py [--claims 2000] [--points 200] [--seed 1]
+    python benchmarks/random_claims.py [--claims 2000] [--points 200] [--seed 1] [--traps]
+
+--traps: the families of claim_traps.py instead, each of which invites a false ``holds`` in a way of its own.
 """
 
 from __future__ import annotations
@@ -312,7 +314,7 @@ _COMPOSED = [
 _STATES = [
     ["1/2", "2/3", "3/4", "2/3", "1/3", "2/3"],
     ["1", "2", "1", "3/5", "0", "4/5"],
-    ["1/3", "-1/2", "2", "1/2", "1/3", "1/5"],
+    ["1/3", "-1/2", "2", "2/7", "3/7", "6/7"],
 ]
 _FALSE_INTEGRALS = ["{0} + Omega1", "{0}*Omega2", "Omega1^2 + Omega2^2", "{0} + 1e-25*Omega3*gamma1", "Omega3"]
 _TRAPS = [
@@ -357,12 +359,12 @@ def _conditional(draw: random.Random) -> Claim:
     if draw.random() < 0.5:
         base = "(Omega3*(Omega1^2 + Omega2^2) - n/c*Omega1*gamma3)"
         value = draw.choice(["{0}", "{0}^2", "exp({0})", "sqrt(1 + {0}^2)", "atan({0})"]).format(base)
-        table = _integral(value, [["1", "-1", "5", "1", "1", "0"], ["1", "0", "0", "0", "1/2", "0"]])
+        table = _integral(value, [["4", "-3", "5", "3/5", "4/5", "0"], ["1", "0", "0", "0", "1", "0"]])
         table |= {"assume": ["c > 0"], "parameters": {"c": "1", "n": "3/2"}}
         table["top"] = {"inertia": ["4*c", "4*c", "c"], "weight": "1", "centre": ["n", "0", "0"]}
         table["integral"]["where"] = [draw.choice(["", "2*"]) + "(4*Omega1*gamma1 + 4*Omega2*gamma2 + Omega3*gamma3)"]
         return Claim(table, "true", "where")
-    table = _integral("a*x*Omega1 + c*z*Omega3", [["1", "1/2", "-3", "1", "2", "3"]], kind="relation")
+    table = _integral("a*x*Omega1 + c*z*Omega3", [["1", "1/2", "-3", "2/3", "1/3", "2/3"]], kind="relation")
     table |= {"assume": ["a > 0", "b > 0", "c > 0", "z > 0"], "relations": ["a*(b - c)*x^2 - c*(a - b)*z^2"]}
     table["parameters"] = {"a": "9", "b": "5", "c": "4", "x": "4", "z": "3"}
     table["top"] = {"inertia": ["a", "b", "c"], "weight": "1", "centre": ["x", "0", "z"]}
@@ -509,6 +511,8 @@ class Numbers:
 
     def _of_integral(self, names: dict[str, Any], draw: random.Random) -> list[Any]:
         y = [mpmath.mpf(draw.uniform(-2, 2)) for _ in STATE]
+        size = mpmath.sqrt(sum(part**2 for part in y[3:]))
+        y[3:] = [part / size for part in y[3:]]
         field, step = self._field(names, y), mpmath.mpf(10) ** (-DIGITS // 3)
 
         def value(shift: int) -> Any:
@@ -549,21 +553,48 @@ class Outcome:
     reason: str
 
 
+def trap_outcomes(count: int, seed: int) -> Iterator[Outcome]:
+    """The audits of ``count`` claims of the families of claim_traps.py, in turn.
+
+    A claim that is no claim about a body must be refused, or undecided.
+    """
+    import claim_traps
+
+    draw = random.Random(seed)
+    for number in range(count):
+        table, known, family, about = claim_traps.FAMILIES[number % len(claim_traps.FAMILIES)](draw)
+        claim = Claim(table, known, family, about)
+        begin = time.process_time()
+        verdict, reason = _verdict(claim)
+        spent = time.process_time() - begin
+        fault = ""
+        if verdict == "holds":
+            fault = "false holds" if known in ("false", "refused") else ""
+            if found := claim_traps.contradiction(table, about, draw):
+                fault, reason = "false holds", found
+        if verdict == "refuted" and known in ("true", "refused"):
+            fault = "false refuted"
+        yield Outcome(claim, verdict, fault, spent, reason)
+
+
+def _verdict(claim: Claim) -> tuple[str, str]:
+    """(verdict, what leaves it undecided)."""
+    try:
+        report = audit_claim(claim_from_table(claim.table, "random"), system(claim.system))
+    except InputError as error:
+        return f"refused: {error.cause}", ""
+    open_rows = [row for row in report.rows if row.holds is None]
+    texts = [f"{c.text} ({c.reason})" for row in open_rows for c in row.conditions if not c.discharged]
+    return report.verdict, "; ".join(dict.fromkeys([*texts, *(row.residual for row in open_rows)]))
+
+
 def outcomes(count: int, points: int, seed: int) -> Iterator[Outcome]:
     """The audits of ``count`` random claims."""
     draw = random.Random(seed)
     for _ in range(count):
         claim = random_claim(draw)
         begin = time.process_time()
-        reason = ""
-        try:
-            report = audit_claim(claim_from_table(claim.table, "random"), system(claim.system))
-            verdict = report.verdict
-            open_rows = [row for row in report.rows if row.holds is None]
-            texts = [f"{c.text} ({c.reason})" for row in open_rows for c in row.conditions if not c.discharged]
-            reason = "; ".join(dict.fromkeys([*texts, *(row.residual for row in open_rows)]))
-        except InputError as error:
-            verdict = f"refused: {error.cause}"
+        verdict, reason = _verdict(claim)
         seconds = time.process_time() - begin
         passed = passes(claim, points, draw)
         fault = ""
@@ -579,10 +610,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     for name, value in (("claims", 2000), ("points", 200), ("seed", 1)):
         parser.add_argument(f"--{name}", type=int, default=value)
+    parser.add_argument("--traps", action="store_true")
     options = parser.parse_args()
     counts: Counter[tuple[str, str]] = Counter()
     seconds = []
-    for outcome in outcomes(options.claims, options.points, options.seed):
+    traps = trap_outcomes(options.claims, options.seed)
+    for outcome in traps if options.traps else outcomes(options.claims, options.points, options.seed):
         counts[outcome.claim.truth, outcome.verdict.partition(":")[0]] += 1
         seconds.append(outcome.seconds)
         if outcome.fault or (outcome.claim.truth == "true" and outcome.verdict != "holds"):

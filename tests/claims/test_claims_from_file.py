@@ -107,11 +107,11 @@ def test_a_conditional_integral_holds_on_its_condition_alone():
         "integral": {
             "value": "Omega3*(Omega1^2 + Omega2^2) - n/I3*Omega1*gamma3",
             "where": ["4*Omega1*gamma1 + 4*Omega2*gamma2 + Omega3*gamma3"],
-            "states": [["1", "-1", "5", "1", "1", "0"]],
+            "states": [["1", "-1", "-3", "3/5", "0", "4/5"]],
         },
     }
     assert verdict(content).verdict == "holds"
-    content["integral"] |= {"where": [], "states": [["1", "2", "5", "1", "1", "3"]]}
+    content["integral"] |= {"where": [], "states": [["1", "2", "5", "3/5", "0", "4/5"]]}
     assert verdict(content).verdict == "refuted"
 
 
@@ -123,7 +123,7 @@ def test_hess_relation_is_invariant_under_its_relation_between_the_parameters():
         "parameters": {"I1": "9", "I2": "5", "I3": "4", "a": "4", "c": "3"},
         "relations": ["I1*(I2 - I3)*a^2 - I3*(I1 - I2)*c^2"],
         "top": {"inertia": ["I1", "I2", "I3"], "weight": "1", "centre": ["a", "0", "c"]},
-        "integral": {"value": "I1*a*Omega1 + I3*c*Omega3", "states": [["1", "1/2", "-3", "1", "2", "3"]]},
+        "integral": {"value": "I1*a*Omega1 + I3*c*Omega3", "states": [["1", "1/2", "-3", "2/3", "1/3", "2/3"]]},
     }
     assert verdict(content).verdict == "holds"
     content["relations"] = []

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import os
+import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from importlib.resources import files
 
 import pytest
@@ -49,3 +54,75 @@ def test_a_process_without_memory_says_so(monkeypatch):
     monkeypatch.setattr(guard, "_CHILD", "print('{\"memory\": true}')")
     with pytest.raises(InputError, match="more than 3 GB"):
         guard.in_time(EXAMPLE, "heavy_top")
+
+
+TOP = '[top]\ninertia = ["2", "3", "4"]\nweight = "1"\ncentre = ["1", "2", "3"]\n'
+SUM = " + ".join(f"{n}*Omega1*Omega2^{n}" for n in range(1, 13))
+TWELVE = f'name = "x"\nkind = "integral"\n{TOP}[integral]\nvalue = "{{}}"\n'
+HOSTILE = {
+    "a sine of twelve terms": TWELVE.format(f"sin({SUM})"),
+    "nested sines": TWELVE.format("sin(1+" * 40 + "Omega1" + ")" * 40),
+    "powers of powers": TWELVE.format("9^9^9"),
+    "a number of 100000 digits": 'name = "x"\nkind = "integral"\nparameters = {a = "1e99999"}\n'
+    + TWELVE.format("sin(a)").partition("\n")[2].partition("\n")[2],
+    "an integer of 5000 digits": f"name = {'9' * 5000}\n",
+    "dotted keys": "a." * 20_000 + "b = 1\n",
+    "a relation in the time": 'relations = ["t"]\n' + TWELVE.format("Omega1"),
+    "a relation in the state": 'relations = ["Omega1*gamma2"]\n' + TWELVE.format("Omega1"),
+    "conditions of high degree": TWELVE.format("Omega1")
+    + "where = ["
+    + ", ".join(f'"Omega1^{n}*gamma1 + Omega2^{n} - Omega3^{n - 1}*gamma3 + Omega1*Omega2 - {n}"' for n in (4, 5, 6))
+    + "]\n",
+}
+
+
+@pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
+def test_whatever_a_file_holds_its_audit_ends_in_time_with_a_verdict_or_a_reason(tmp_path, text):
+    """Reading and parsing included: nothing of the file is looked at in the caller's process."""
+    path, begin = tmp_path / "claim.toml", time.monotonic()
+    path.write_text(text)
+    with suppress(InputError):
+        assert guard.in_time(str(path), "heavy_top", seconds=4).verdict in ("undecided", "refuted")
+    assert time.monotonic() - begin < 8
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_file_that_never_comes_to_an_end_is_given_up_and_no_process_is_left(tmp_path, monkeypatch):
+    path = tmp_path / "pipe.toml"
+    os.mkfifo(path)
+    with pytest.raises(InputError, match="was stopped"):
+        guard.in_time(str(path), "heavy_top", seconds=1)
+    # a child whose caller is gone ends by itself
+    command = [sys.executable, "-c", guard._CHILD, json.dumps(sys.path), str(path), "heavy_top", "1"]
+    assert subprocess.run(command, capture_output=True, timeout=20, check=False).returncode == -signal.SIGALRM
+
+
+def test_a_hard_limit_of_memory_below_its_own_is_kept(tmp_path):
+    resource = pytest.importorskip("resource")
+    code = (
+        "import resource; resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30));"
+        "from heavytop.claims.guard import _limit_memory; _limit_memory();"
+        "print(resource.getrlimit(resource.RLIMIT_AS)[0] >> 30)"
+    )
+    assert resource
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["2"]
+
+
+def test_flint_without_memory_says_so(monkeypatch):
+    code = "import os, sys; sys.stderr.write('Exception (FLINT). Unable to allocate memory.\\n'); os.abort()"
+    monkeypatch.setattr(guard, "_CHILD", code)
+    with pytest.raises(InputError, match="more than 3 GB"):
+        guard.in_time(EXAMPLE, "heavy_top")
+
+
+def test_nested_beyond_the_stack_says_so(monkeypatch):
+    monkeypatch.setattr(guard, "_CHILD", "print('{\"depth\": true}')")
+    with pytest.raises(InputError, match="nested too deeply"):
+        guard.in_time(EXAMPLE, "heavy_top")
+
+
+def test_a_path_that_is_none_is_refused():
+    for path in ("a\0b.toml", "missing\udcff.toml"):
+        with pytest.raises(InputError, match="cannot be read"):
+            audit(path)

@@ -36,6 +36,41 @@ def test_no_verdict_is_false_and_what_is_true_by_construction_holds(random_claim
     assert len(missed) <= max(1, len(true) / 20), missed
 
 
+def test_no_family_of_traps_gets_a_false_verdict(random_claims, monkeypatch):
+    monkeypatch.syspath_prepend(str(_PATH.parent))
+    found = list(random_claims.trap_outcomes(42, 4))
+    assert [(o.fault, o.reason, o.claim.table) for o in found if o.fault] == []
+    assert len({o.claim.family for o in found}) == 14
+    refused = [o for o in found if o.claim.truth == "refused"]
+    assert [o.claim.table for o in refused if not o.verdict.startswith(("refused", "undecided"))] == []
+
+
+def test_numbers_contradict_what_the_flow_leaves_or_changes(random_claims, monkeypatch):
+    """The check that the verdicts are held to, on claims that are false and on their true neighbours."""
+    import random
+
+    monkeypatch.syspath_prepend(str(_PATH.parent))
+    import claim_traps
+
+    draw = random.Random(1)
+    free = {"inertia": ["2", "3", "4"], "centre": ["0", "0", "0"]}
+    square = "4*Omega1^2 + 9*Omega2^2 + 16*Omega3^2"
+    for value, where, wrong in (
+        ("Omega1", ["Omega2"], "condition is left"),
+        (square, [], ""),
+        (f"{square} + 1e-2*Omega1", [], "value changes"),
+        (f"{square} + 0*sqrt(Omega1)", [], "no value"),
+    ):
+        assert wrong in claim_traps.contradiction(claim_traps._integral(value, where, **free), "heavy_top", draw)
+        assert bool(wrong) == bool(
+            claim_traps.contradiction(claim_traps._integral(value, where, **free), "heavy_top", draw)
+        )
+    plane = {"inertia": ["2", "3", "4"], "centre": ["0", "0", "1"]}
+    half = ["Omega2", "Omega3", "gamma1", "sqrt(Omega1^2) - Omega1"]
+    assert not claim_traps.contradiction(claim_traps._integral("1", half[:3], **plane), "heavy_top", draw)
+    assert claim_traps.contradiction(claim_traps._integral("1", half, **plane), "heavy_top", draw)
+
+
 def test_the_evaluation_of_its_own_sees_a_mistake_and_what_is_not_real(random_claims):
     import random
 

@@ -68,7 +68,7 @@ TRUE = [
     ("free", f"sin({FREE_AREA})", (), "relation"),
     ("free", "sqrt(4*Omega1^2 + 9*Omega2^2 + 25*Omega3^2) - 2", (), "relation"),
     ("free", "Omega1 - sqrt(5)*Omega3", (), "relation"),
-    ("free", "gamma1^2 + gamma2^2 + gamma3^2", ("sqrt(gamma1^2 + gamma2^2 + gamma3^2) - 1/2",), "integral"),
+    ("free", "4*Omega1^2 + 9*Omega2^2 + 25*Omega3^2", ("sqrt(gamma1^2 + gamma2^2 + gamma3^2) - 1",), "integral"),
     ("free", f"cos({FREE_AREA})*(4*Omega1^2 + 9*Omega2^2 + 25*Omega3^2)", (FREE_AREA,), "integral"),
 ]
 FALSE = [

@@ -33,7 +33,7 @@ class Assumptions:
     positive: symbols > 0.  greater: pairs (symbol, expression) with symbol > expression.
     variable: the symbol that moves.  variable_sign: its sign on the domain, 0 for both; strict: it is not 0 there.
     relations: expressions that are 0.  facts: expressions that are > 0.  nonzero: symbols that are not 0.
-    ranges: closed intervals of symbols.
+    ranges: closed intervals of symbols.  weak: expressions that are >= 0.
     """
 
     variable: sympy.Symbol
@@ -45,6 +45,7 @@ class Assumptions:
     facts: tuple[sympy.Expr, ...] = ()
     nonzero: tuple[sympy.Symbol, ...] = ()
     ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...] = ()
+    weak: tuple[sympy.Expr, ...] = ()
 
 
 class Field:
@@ -83,10 +84,11 @@ class Field:
             self.tower.signs.ranges[_index(self.enter(symbol))] = ends
         for symbol, bound in a.greater:
             self._declare_greater(symbol, bound)
-        for fact in a.facts:
-            value = self.enter(fact)
-            below = self.tower.signs.of(value.denominator)
-            self.tower.signs.declare(value.numerator, Sign(below.value, True))
+        for strict, facts in ((True, a.facts), (False, a.weak)):
+            for fact in facts:
+                value = self.enter(fact)
+                below = self.tower.signs.of(value.denominator)
+                self.tower.signs.declare(value.numerator, Sign(below.value, strict))
 
     def _declare_greater(self, symbol: sympy.Symbol, bound: sympy.Expr) -> None:
         """symbol = bound + excess."""
@@ -151,6 +153,21 @@ class Field:
         relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
         one = self.tower.one
         return bool(relations) and forces_zero([*relations, *self.tower.relations(), p], one, radical=False)
+
+    def vanishes_on(self, expression: sympy.Expr, zero: sympy.Expr) -> bool:
+        """True only where the expression is a multiple of the polynomial ``zero``, off the divisors of the tower."""
+        try:
+            return not divmod(self.enter(expression).numerator, self.enter(zero).numerator)[1]
+        except Unprovable:
+            return False
+
+    def relations_exclude_each_other(self) -> bool:
+        """True only where no real or complex point lies on all relations."""
+        try:
+            relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
+        except Unprovable:
+            return False
+        return bool(relations) and forces_zero([*relations, *self.tower.relations()], self.tower.one, radical=False)
 
     def is_constant(self, value: Quotient) -> bool:
         """True where only generators that are constant in time are left."""

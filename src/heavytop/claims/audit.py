@@ -49,12 +49,17 @@ def find_claim(name: str) -> Auditable:
         from heavytop.claims.ershkov_audit import GeneralClaim, PartialClaim
 
         return GeneralClaim() if name == "ershkov-general" else PartialClaim()
+    from heavytop.claims.from_file import read_claim
+
+    return read_claim(_path(name))
+
+
+def _path(name: str) -> Path:
+    """The path of a claim in TOML; raises InputError for any other name."""
     path = Path(name)
     if path.suffix != ".toml":
         raise InputError(f"Unknown claim {name[:60]!r}.", f"Use {', '.join(PAPER)} or the path of a TOML file.")
-    from heavytop.claims.from_file import read_claim
-
-    return read_claim(path)
+    return path
 
 
 def audit(
@@ -66,11 +71,9 @@ def audit(
     Raises InputError for an unknown claim or system and for a file that cannot be read.
     """
     about = system(system_name)
-    claim = find_claim(name)
     if name in PAPER:
-        return audit_claim(claim, about, progress)
-    claim.statements(about)  # what cannot be stated is said at once
-    return in_time(name, about.name)
+        return audit_claim(find_claim(name), about, progress)
+    return in_time(str(_path(name)), about.name)
 
 
 def audit_claim(claim: Auditable, about: System, progress: Callable[[int, int], None] = lambda done, of: None) -> Audit:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ import sympy
 from flint import arb
 
 from heavytop.claims.assume import Assumed, assume, comparison
-from heavytop.claims.conditions import Need, condition, is_exactly_zero
+from heavytop.claims.conditions import Kind, Need, condition, is_exactly_zero
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
@@ -20,7 +20,7 @@ from heavytop.claims.real_zeros import conditions_for_zero
 from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import Setting
 from heavytop.claims.statements import SYSTEMS
-from heavytop.errors import InputError
+from heavytop.errors import InputError, quoted
 from heavytop.precision import exact
 from heavytop.top.equations import GYROSTAT, Parameters, System
 
@@ -28,6 +28,10 @@ TIME = sympy.Symbol("t", real=True)
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
 _RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
 _SAMPLE_BITS = 512
+_MOST_BITS = 6_640
+"""Of numerator and denominator of a number in a sample: 2000 digits."""
+_OF_THE_TOP = "The moments, the weight and the centre of mass of a top are constant: use numbers and parameters."
+_OF_PARAMETERS = "Relations are between parameters; conditions on the state stand in where of [integral]."
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +47,16 @@ class Context:
     rotor: sympy.Expr | None
     needs: frozenset[Need]
     rotor_needs: frozenset[Need]
+
+    def with_rotor(self, rotor: sympy.Expr | None, is_constant: bool) -> Context:
+        """The context with the rotor in this form; raises InputError unless it is shown to be constant in time."""
+        if not is_constant:
+            text = quoted(str(self.rotor))[1:-1]
+            raise InputError(
+                f"top.rotor: {text} is not shown to be constant in time.",
+                "The rotor of a gyrostat turns at a constant rate: use parameters, or first integrals of its motion.",
+            )
+        return replace(self, rotor=rotor)
 
     @property
     def systems(self) -> tuple[System, ...]:
@@ -80,13 +94,20 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
     rotor = None if top.rotor is None else parse(top.rotor, names, "top.rotor")
     relations = [parse(text, names, "relations") for text in content.relations]
+    _check_constant("top.inertia", moments, _OF_THE_TOP)
+    _check_constant("top.centre", arm[:3], _OF_THE_TOP)
+    _check_constant("top.weight", arm[3:], _OF_THE_TOP)
+    _check_constant("relations", relations, _OF_PARAMETERS)
     weight = arm.pop()
     inertia, centre = (tuple(part.expression for part in parts) for parts in (moments, arm))
     context = Context(
         names,
         symbols,
         assume(bounds, inertia, symbols.values()),
-        tuple({symbols[name]: exact(value) for name, value in row.items()} for row in sample_rows(content.parameters)),
+        tuple(
+            {symbols[name]: sample_number(value, name) for name, value in row.items()}
+            for row in sample_rows(content.parameters)
+        ),
         tuple(relation.expression for relation in relations),
         Parameters(inertia, tuple(weight.expression * part for part in centre), sympy.Integer(0)),
         None if rotor is None else rotor.expression,
@@ -95,6 +116,17 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     )
     _check_samples(context, bounds)
     return context
+
+
+def sample_number(text: str, what: str) -> Fraction:
+    """The exact number of a sample, a state or a time; raises InputError for one of thousands of digits."""
+    try:
+        value = exact(text)
+    except InputError as error:
+        raise InputError(f"{what}: {error.cause}", error.remedy) from None
+    if max(value.numerator.bit_length(), value.denominator.bit_length()) > _MOST_BITS:
+        raise InputError(f"{what} = {quoted(text)[1:-1]} is too long a number.", "Use numbers of at most 2000 digits.")
+    return value
 
 
 def needs_of(formulas: Iterable[Formula]) -> frozenset[Need]:
@@ -106,6 +138,16 @@ def three(texts: Iterable[str], names: dict[str, Formula], where: str) -> tuple[
     """The formulas of three texts."""
     first, second, third = (parse(text, names, f"{where}[{index}]") for index, text in enumerate(texts))
     return first, second, third
+
+
+def _check_constant(where: str, formulas: Sequence[Formula], remedy: str) -> None:
+    """Raises InputError where a formula, or what it needs, depends on the time or the state, directly or not."""
+    for formula in formulas:
+        free = formula.expression.free_symbols.union(*(need.expression.free_symbols for need in formula.needs))
+        moving = sorted(map(str, free & {TIME, *STATE}))
+        if moving:
+            text = quoted(str(formula.expression))[1:-1]
+            raise InputError(f"{where}: {text} depends on {', '.join(moving)}.", remedy)
 
 
 def _check_samples(context: Context, bounds: list[tuple[sympy.Expr, sympy.Expr]]) -> None:
@@ -136,9 +178,28 @@ def setting_of(context: Context, variable: sympy.Symbol) -> Setting:
     """The setting of a claim in this context."""
     a = context.assumed
     relations = tuple(part for relation in context.relations for part in conditions_for_zero(relation))
+    bodies = _body_needs(context.top.inertia)
     return Setting(
-        variable, a.positive, context.samples, a.greater, relations=relations, facts=a.facts, ranges=a.ranges
+        variable,
+        a.positive,
+        context.samples,
+        a.greater,
+        relations=relations,
+        facts=a.facts,
+        ranges=a.ranges,
+        bodies=bodies,
     )
+
+
+def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
+    """No principal moment of a rigid body exceeds the sum of the other two; () for moments that are numbers.
+
+    A claim about one top is judged about that top, as the equations do not mind; one about many is not refuted by a
+    top that no body is.
+    """
+    if not any(moment.free_symbols for moment in inertia):
+        return ()
+    return tuple(Need(Kind.NONNEGATIVE, sum(inertia) - 2 * moment) for moment in inertia)
 
 
 @dataclass(frozen=True)

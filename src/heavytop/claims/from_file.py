@@ -87,7 +87,7 @@ def read_claim(path: Path) -> Auditable:
         raise InputError(f"{path} is longer than {_MAX_BYTES} bytes.", "A claim is a page of formulas.")
     try:
         table = tomllib.loads(raw.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # an integer of too many digits is a ValueError of its own
         raise InputError(f"{path} is not TOML: {str(error)[:200]}.", _REMEDY) from None
     return claim_from_table(table, str(path))
 

@@ -1,12 +1,13 @@
 """The audit of a file in a process of its own, with an end to its time and memory.
 
 The algebra of an honest claim takes seconds; that of a hostile or hopeless one can take forever, and cannot be
-interrupted from within.
+interrupted from within.  The file is opened, read and parsed in that process too.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -14,12 +15,15 @@ import sys
 import msgspec
 
 from heavytop.claims.judge import Audit
-from heavytop.errors import HeavyTopError, InputError
+from heavytop.errors import HeavyTopError, InputError, quoted
 
 SECONDS = 20
 _BYTES = 3 << 30
+# the process ends itself that much later, where nobody is left to stop it
+_GRACE = 2
 # the program of the child: it imports nothing of the caller's script, so that this needs no main guard there
 _CHILD = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from heavytop.claims.guard import child; child()"
+_NO_MEMORY = b"Unable to allocate memory"
 _TOO_LARGE = "Use fewer independent roots and exponentials, lower powers, or split the claim."
 
 
@@ -30,32 +34,46 @@ class AuditEnded(HeavyTopError):
 
 
 class Answer(msgspec.Struct, frozen=True):
-    """What the child says: a report, or (cause, remedy) of an error, or that its memory was used up."""
+    """What the child says: a report, or (cause, remedy) of an error, or that its memory or stack was used up."""
 
     report: Audit | None = None
     error: tuple[str, str] | None = None
     memory: bool = False
+    depth: bool = False
 
 
 def in_time(path: str, system_name: str, seconds: float = SECONDS) -> Audit:
-    """The audit of the claim in a file; raises InputError where it takes longer than ``seconds`` or 3 GB.
+    """The audit of the claim in a file; raises InputError where it takes more than ``seconds``, 3 GB or the stack.
 
     Raises AuditEnded with what happened where the process of the audit ends without an answer.
     """
-    command = [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path), path, system_name]
+    last = str(math.ceil(seconds) + _GRACE)
+    command = [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path), path, system_name, last]
     try:
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=seconds, check=False)
     except subprocess.TimeoutExpired:
         raise InputError(f"{path}: the audit took more than {seconds:g} s and was stopped.", _TOO_LARGE) from None
+    except ValueError as error:
+        raise InputError(f"{quoted(path)} cannot be read: {error}.", "Give the path of a claim in TOML.") from None
+    except OSError as error:
+        raise AuditEnded(f"{path}: the process of the audit cannot be started: {error.strerror}.") from None
     try:
         answer = msgspec.json.decode(done.stdout, type=Answer)
     except msgspec.DecodeError:
+        if _NO_MEMORY in done.stdout + done.stderr:  # FLINT ends the process
+            raise _no_memory(path) from None
         raise AuditEnded(f"{path}: the process of the audit {_end_of(done)}.", "Try again.") from None
     if answer.report is not None:
         return answer.report
     if answer.error is not None:
         raise InputError(*answer.error)
-    raise InputError(f"{path}: the audit took more than {_BYTES >> 30} GB and was stopped.", _TOO_LARGE)
+    if answer.depth:
+        raise InputError(f"{path}: the formulas are nested too deeply, and the audit was stopped.", _TOO_LARGE)
+    raise _no_memory(path)
+
+
+def _no_memory(path: str) -> InputError:
+    return InputError(f"{path}: the audit took more than {_BYTES >> 30} GB and was stopped.", _TOO_LARGE)
 
 
 def _end_of(done: subprocess.CompletedProcess[bytes]) -> str:
@@ -71,18 +89,22 @@ def _end_of(done: subprocess.CompletedProcess[bytes]) -> str:
 
 
 def child() -> None:
-    """The audit of ``sys.argv[2:]`` = path, system: one JSON document of :class:`Answer` on standard output."""
+    """The audit of ``sys.argv[2:]`` = path, system, seconds: a JSON document of :class:`Answer` on standard output."""
+    path, system_name, seconds = sys.argv[2:]
+    if hasattr(signal, "alarm"):
+        signal.alarm(int(seconds))
     _limit_memory()
     from heavytop.claims.audit import audit_claim, find_claim
     from heavytop.top.equations import system
 
-    path, system_name = sys.argv[2:]
     try:
         answer = Answer(report=audit_claim(find_claim(path), system(system_name)))
     except HeavyTopError as error:
-        answer = Answer(error=(error.cause, error.remedy))
+        answer = Answer(error=(_printable(error.cause), error.remedy))
     except MemoryError:
         answer = Answer(memory=True)
+    except RecursionError:
+        answer = Answer(depth=True)
     sys.stdout.buffer.write(msgspec.json.encode(answer))
 
 
@@ -92,4 +114,11 @@ def _limit_memory() -> None:
         import resource
     except ImportError:
         return
-    resource.setrlimit(resource.RLIMIT_AS, (_BYTES, _BYTES))
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    most = _BYTES if hard == resource.RLIM_INFINITY else min(_BYTES, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
+def _printable(text: str) -> str:
+    """Text that JSON can carry: a path may hold bytes that are no characters."""
+    return text.encode(errors="replace").decode()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 import sympy
@@ -20,11 +21,16 @@ from heavytop.claims.rational import Quotient
 from heavytop.claims.real_zeros import on_conditions
 from heavytop.claims.regularity import Regularity
 from heavytop.claims.sign import NUMBER_BITS, Unprovable, used
-from heavytop.claims.statement import Place, Setting, Statement
+from heavytop.claims.statement import Flow, Place, Setting, Statement
 from heavytop.claims.structure import sign_of
 from heavytop.exact.balls import working_precision
 
 _EVERYWHERE = "proven all over the domain"
+# rational, with |γ| = 1, on no surface of low degree with small coefficients
+_SOME_STATE = {
+    **dict(zip(("Omega1", "Omega2", "Omega3"), (Fraction(17, 13), Fraction(-29, 31), Fraction(37, 23)), strict=True)),
+    **{f"gamma{axis}": Fraction(part, 136763) for axis, part in enumerate((98838, -61370, 71895), 1)},
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +47,16 @@ class Region:
 
     def __init__(self, field: Field, setting: Setting, statement: Statement, places: Sequence[Place]) -> None:
         self.field = field
+        self._statement = statement
         self._setting = setting
         self._flow = statement.flow
         self._places = [place for place in places if self._holds(place)]
         self._thin: dict[str, bool] = {}
+        self._kept: dict[str, bool] = {}
         self._divisors: dict[tuple[bool, str], bool] = {}
+        self._needs = statement.formulas.needs
         self.regularity = Regularity(field, self.is_nowhere_zero)
+        self._everywhere = Regularity(field) if statement.flow is not None else self.regularity
 
     def _holds(self, place: Place) -> bool:
         a = self.field.assumptions
@@ -61,20 +71,58 @@ class Region:
         return bool(self._setting.relations) and self.field.never_zero_on_relations(p)
 
     def is_kept(self, p: Any) -> bool:
-        """p' = c p along the flow, with c continuous: p keeps its sign."""
-        if self._flow is None:
-            return False
-        field = self.field
+        """p' = c p along the flow, with p and c continuous, off a set without interior: p keeps its sign."""
+        key = str(p)
+        if key not in self._kept:
+            self._kept[key] = False  # what is asked of p on the way to the answer about p
+            self._kept[key] = self._flow is not None and self._is_kept(p, self._flow)
+        return self._kept[key]
+
+    def _is_kept(self, p: Any, flow: Flow) -> bool:
         try:
-            expression = field.expression(Quotient(p, field.tower.one))
-            if not expression.free_symbols & self._flow.state:
+            expression = self.field.expression(Quotient(p, self.field.tower.one))
+            if not expression.free_symbols & flow.state:
                 return False
-            rate = field.enter(self._flow.rate(expression))
-            cofactor = field.tower.divide(rate, Quotient(p, field.tower.one))
+            rate = flow.rate(expression)
+            field = Field(self.field.assumptions, [expression, rate])
+            divisors = list(field.tower.divisors.values())
+            value = field.enter(expression)
+            cofactor = field.tower.divide(field.enter(rate), value)
         except Unprovable:
             return False
-        strict = Regularity(field)
-        return not strict.obstacle(cofactor)
+        regularity = Regularity(field)
+        if regularity.obstacle(cofactor) or regularity.obstacle(value):
+            return False
+        own = Region(field, self._setting, self._statement, self._places)
+        return all(own.is_zero_nowhere_dense(divisor) for divisor in divisors)
+
+    def leaves(self, rate: sympy.Expr) -> str:
+        """Why a relation with this rate may not stay 0; "" where it does.
+
+        It does where its rate is a combination of the relations with factors that are continuous where these are 0.
+        """
+        try:
+            field = Field(self.field.assumptions, [rate, *self.field.assumptions.relations])
+        except Unprovable as error:
+            return error.cause
+        if not field.vanishes(rate) and not field.is_forced(rate, radical=False):
+            return "its rate is not shown to be 0 there"
+        own = Region(field, self._setting, self._statement, self._places)
+        divisor = next(own.divisors(forced=True), "")
+        return divisor and f"its rate is divided by {divisor}, which may be 0 there"
+
+    def _is_excluded(self, p: Any) -> bool:
+        """The claim is made where p is not 0, as it is written, and p keeps its sign."""
+        one = self.field.tower.one
+        for need in self._needs:
+            if need.kind is not Kind.NONNEGATIVE:
+                try:
+                    value = self.field.enter(need.expression)
+                except Unprovable:
+                    continue
+                if value.denominator == one and not divmod(value.numerator, p)[1]:
+                    return self.is_kept(p)
+        return False
 
     def is_zero_nowhere_dense(self, p: Any) -> bool:
         """0 on a set without interior at most."""
@@ -88,19 +136,34 @@ class Region:
         index = next(iter(used(p)))
         if len(used(p)) == 1 and p == tower.gens[index] and tower.generators[index].kind == "root":
             return self.is_zero_nowhere_dense(tower.radicand(index))
-        if all(tower.generators[i].kind == "symbol" for i in used(p)) or tower.signs.of(p).strict:
+        if tower.signs.of(p).strict:
             return True
-        if not self._is_connected() or self.regularity.obstacle_of_generators(used(p), analytic=True):
+        if all(tower.generators[i].kind == "symbol" for i in used(p)):
+            return self._flow is None or self._is_nonzero_at_some_state(p, self._flow)
+        # what is not 0 where the flow keeps it so may part the domain
+        if not self._is_connected() or self._everywhere.obstacle_of_generators(used(p), analytic=True):
             return False
         return any(self._is_nonzero_at(p, place) for place in self._places)
 
     def _is_connected(self) -> bool:
         """Linear inequalities bound a convex domain."""
         a = self.field.assumptions
-        bounds = [*a.facts, *(symbol - bound for symbol, bound in a.greater)]
+        bounds = [*a.facts, *a.weak, *(symbol - bound for symbol, bound in a.greater)]
         return not a.nonzero and all(
             bound.is_polynomial() and sympy.Poly(bound).total_degree() <= 1 for bound in bounds if bound.free_symbols
         )
+
+    def _is_nonzero_at_some_state(self, p: Any, flow: Flow) -> bool:
+        """A polynomial that is not 0 all over |γ| = 1 is 0 on no open part of it."""
+        try:
+            expression = self.field.expression(Quotient(p, self.field.tower.one)).xreplace(dict(flow.names))
+            values = {symbol: _SOME_STATE.get(str(symbol)) for symbol in expression.free_symbols}
+            others = (Fraction(2 * n + 7, 3 * n + 5) for n in range(len(values)))
+            return not evaluate(
+                expression, {s: next(others) if v is None else v for s, v in values.items()}, NUMBER_BITS
+            ).contains(0)
+        except Unprovable:
+            return False
 
     def _is_nonzero_at(self, p: Any, place: Place) -> bool:
         meanings = {index: self.field.meaning(index) for index in used(p)}
@@ -122,10 +185,23 @@ class Region:
 
     def discharge(self, need: Need) -> str:
         """How it is discharged all over the region; "" where it is not."""
-        on_relations = on_conditions(need.expression, self._setting.relations)
+        if self.fails_everywhere(need):
+            return ""
+        on_relations = on_conditions(need.expression, [*self._setting.relations, *self._always])
         return self._discharge(need) or (
             self._discharge(replace(need, expression=on_relations)) if on_relations != need.expression else ""
         )
+
+    def fails_everywhere(self, need: Need) -> str:
+        """What its expression is at every state of a body, where that does not meet it; else ""."""
+        value = on_conditions(need.expression, self._always)
+        if value.free_symbols or replace(need, expression=value).is_met({}) is not False:
+            return ""
+        return f"it is {value}" + (" where |gamma| = 1" if self._always else "")
+
+    @property
+    def _always(self) -> tuple[sympy.Expr, ...]:
+        return () if self._flow is None else self._flow.always
 
     def _discharge(self, need: Need) -> str:
         plain = sign_of(need.expression)
@@ -143,9 +219,16 @@ class Region:
         apart = need.kind is Kind.NONZERO and bool(value.numerator) and self._factors_nowhere_zero(value.numerator)
         if apart or need.kind.is_met_by(sign):
             return _EVERYWHERE
-        if self._flow is not None and value.numerator and self.is_kept(value.numerator):
+        if self.keeps_sign(value, need.kind):
             return "kept by the flow: where it is so at first, it stays so"
         return ""
+
+    def keeps_sign(self, value: Quotient, kind: Kind) -> bool:
+        """Along the flow: its numerator does, and its denominator, unless only that it is not 0 is asked."""
+        if self._flow is None or not value.numerator or not self.is_kept(value.numerator):
+            return False
+        below = self.field.tower.signs.factors(value.denominator)[1]
+        return kind is Kind.NONZERO or all(self.is_nowhere_zero(factor) for factor, _ in below)
 
     def _factors_nowhere_zero(self, p: Any) -> bool:
         return all(
@@ -188,4 +271,8 @@ class Region:
                     yield text
 
     def _divisor_is_never_zero(self, p: Any) -> bool:
-        return all(self.is_nowhere_zero(factor) for factor, _ in self.field.tower.signs.factors(p)[1])
+        tower = self.field.tower
+        return all(
+            tower.signs.of(factor).strict or self._is_apart(factor) or self._is_excluded(factor)
+            for factor, _ in tower.signs.factors(p)[1]
+        )

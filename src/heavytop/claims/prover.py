@@ -58,8 +58,10 @@ class Prover:
     def _make(
         self, statements: Sequence[Statement], sign: int, strict: bool, parts: Iterable[sympy.Expr]
     ) -> Field | None:
-        facts = (*statements[0].domain.facts, *self._kept_facts(statements[0]))
-        assumptions = self._setting.assumptions(sign, strict=strict, facts=facts)
+        kept = self._kept_facts(statements[0])
+        facts = (*statements[0].domain.facts, *(n.expression for n in kept if n.kind is Kind.POSITIVE))
+        weak = tuple(need.expression for need in kept if need.kind is Kind.NONNEGATIVE)
+        assumptions = self._setting.assumptions(sign, strict=strict, facts=facts, weak=weak)
         expressions = dict.fromkeys([*(s.residual for s in statements), *parts])
         for statement in statements:
             f = statement.formulas
@@ -70,8 +72,8 @@ class Prover:
         except Unprovable:
             return None
 
-    def _kept_facts(self, statement: Statement) -> list[sympy.Expr]:
-        """Of a first integral: what has to be positive for it to be real, and stays so under the flow."""
+    def _kept_facts(self, statement: Statement) -> list[Need]:
+        """Of a first integral: what has to be positive or 0 for it to be real, and stays so under the flow."""
         if statement.flow is None:
             return []
         needs = [need for need in _sorted(statement.formulas.needs) if need.kind is not Kind.NONZERO]
@@ -80,8 +82,9 @@ class Prover:
         except Unprovable:
             return []
         region = Region(base, self._setting, statement, [])
-        kept = [need.expression for need in needs if region.is_kept(base.enter(need.expression).numerator)]
-        return [expression for expression in kept if base.tower.sign(base.enter(expression)) != PLUS]
+        values = {need: base.enter(need.expression) for need in needs if not region.fails_everywhere(need)}
+        kept = [need for need, value in values.items() if region.keeps_sign(value, need.kind)]
+        return [need for need in kept if base.tower.sign(values[need]) != PLUS]
 
     def _region(self, statement: Statement, sign: int, *, strict: bool) -> Region | None:
         field = self.field(statement, sign, strict=strict)
@@ -123,9 +126,13 @@ class Prover:
         """The divisors that stand against the proof; None where there is no proof."""
         if region is None:
             return None
-        if region.field.vanishes(statement.residual):
-            return list(region.divisors(forced=False))
-        radical = statement.flow is None or not statement.flow.is_relation
+        flow = statement.flow
+        if region.field.vanishes(statement.residual) or (
+            flow is not None and any(region.field.vanishes_on(statement.residual, zero) for zero in flow.always)
+        ):
+            # where the relations are 0 a divisor may be so too, however thin the set of its zeros is elsewhere
+            return list(region.divisors(forced=flow is not None and bool(self._setting.relations)))
+        radical = flow is None or not flow.is_relation
         if region.field.is_forced(statement.residual, radical=radical):
             return list(region.divisors(forced=True))
         return None
@@ -133,10 +140,21 @@ class Prover:
     def _sample(self, statement: Statement) -> Condition:
         places = self.places(statement)
         if not places:
-            return Condition(_SAMPLE, False, "no sample is proven to lie on the relations")
+            return Condition(_SAMPLE, False, self._why_no_place(statement))
         if any(self.is_defined(statement, place) for place in places):
             return Condition(_SAMPLE, True, "checked in balls")
         return Condition(_SAMPLE, False, "at no sample in the domain is every formula defined and real")
+
+    def _why_no_place(self, statement: Statement) -> str:
+        setting = self._setting
+        if not any(all(need.is_met(sample) for need in setting.bodies) for sample in setting.samples):
+            return "at no sample is each principal moment at most the sum of the others: no body has such moments"
+        region = self._region(statement, statement.domain.sign, strict=False)
+        if region is not None and region.field.relations_exclude_each_other():
+            within = " within |gamma| = 1" if statement.flow is not None else ""
+            return f"the relations exclude each other{within}: no motion lies on them"
+        on_sphere = ", at a state with |gamma| = 1" if statement.flow is not None else ""
+        return f"no sample is proven to lie on the relations{on_sphere}"
 
     def is_defined(self, statement: Statement, place: Place) -> bool:
         """Whether every formula and the residual is certainly defined and real at a place."""
@@ -174,7 +192,10 @@ class Prover:
                 found[need] = _AT_THE_END
             elif not how and continuous and inner.is_removable(need):
                 found[need] = _REMOVABLE
-        conditions = [Condition(need.text, bool(how), how or "not shown") for need, how in found.items()]
+        conditions = [
+            Condition(need.text, bool(how), how or whole.fails_everywhere(need) or "not shown")
+            for need, how in found.items()
+        ]
         for text, values, obstacle in ((_CONTINUOUS, f.values, against[0]), (_ATTITUDE, f.attitude, against[1])):
             if values:
                 conditions.append(Condition(text, not obstacle, obstacle or "by the rules of composition"))
@@ -185,9 +206,9 @@ class Prover:
     def _kept(self, statement: Statement, region: Region) -> Iterable[Condition]:
         """The side conditions are invariant: their rates are combinations of them."""
         for text, rate in statement.flow.kept if statement.flow is not None else ():
-            kept = region.field.vanishes(rate) or region.field.is_forced(rate, radical=False)
-            reason = "its rate is a combination of the conditions" if kept else "its rate is not shown to be 0 there"
-            yield Condition(f"{text} = 0 is kept by the flow", kept, reason)
+            against = region.leaves(rate)
+            reason = against or "its rate is a combination of the conditions"
+            yield Condition(f"{text} = 0 is kept by the flow", not against, reason)
 
 
 def shortest(formula: sympy.Expr, setting: Setting, domain: Domain) -> sympy.Expr:

@@ -120,6 +120,14 @@ def on_conditions(e: sympy.Expr, conditions: Sequence[sympy.Expr]) -> sympy.Expr
     return _rest(e.xreplace(shorter), divisors)
 
 
+def all_over(e: sympy.Expr, zeros: Sequence[sympy.Expr]) -> sympy.Expr:
+    """``e`` as it is where the polynomials ``zeros`` are 0: every polynomial in it is reduced by them."""
+    if not e.args or is_small_polynomial(e):
+        return _rest(e, zeros)
+    value = e.func(*(all_over(part, zeros) for part in e.args))
+    return e if value.has(sympy.zoo, sympy.oo, sympy.nan, sympy.I) else value
+
+
 def _rest(e: sympy.Expr, divisors: Sequence[sympy.Expr]) -> sympy.Expr:
     """What division leaves, if that is shorter."""
     if not e.free_symbols or not is_small_polynomial(e):

@@ -63,7 +63,10 @@ class Signs:
         self._below_one.add(index)
 
     def declare(self, p: Any, sign: Sign) -> None:
-        """The claim assumes this sign of ``p``: it is that of the factors whose sign nothing else tells."""
+        """The claim assumes this sign of ``p``: it is that of the factors whose sign nothing else tells.
+
+        A sign that is not strict tells nothing of a factor where another may be 0.
+        """
         constant, factors = self.factors(p)
         total = Sign(1 if constant > 0 else -1, True)
         open_factors = []
@@ -73,7 +76,9 @@ class Signs:
             if power % 2 and not (known.value and known.strict):
                 open_factors.append(factor)
             else:
-                total = total.times(known if power % 2 else Sign(1, True))
+                total = total.times(known if power % 2 else Sign(1, known.strict or sign.strict))
+        if not sign.strict and not total.strict:
+            return
         known = Sign(sign.value * total.value, sign.strict)
         if len(open_factors) == 1:
             self._facts.append((open_factors[0], known))

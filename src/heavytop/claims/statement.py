@@ -66,7 +66,8 @@ class Flow:
 
     rate: the derivative along it.  kept: the relations that have to be invariant, with their text.
     state: the variables.  is_relation: whether the statement is that a relation stays 0.
-    always: what is 0 at every state of a body, so that a witness has to lie there.
+    always: what is 0 at every state of a body and stays so, so that a witness has to lie there: |γ|² - 1.
+    names: symbols of ``state`` that stand for a first integral.
     """
 
     rate: Callable[[sympy.Expr], sympy.Expr]
@@ -74,6 +75,7 @@ class Flow:
     kept: tuple[tuple[str, sympy.Expr], ...] = ()
     is_relation: bool = False
     always: tuple[sympy.Expr, ...] = ()
+    names: Mapping[sympy.Symbol, sympy.Expr] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +103,7 @@ class Setting:
     samples: exact parameter sets.  parts: names with expressions through which a residual may be written, such as γ3.
     constants: the same for constant factors, such as k/2.  relations: what is 0 wherever the claim is made.
     facts: expressions that are > 0.  nonzero: symbols that are not 0.  ranges: closed intervals of symbols.
+    bodies: what the parameters have to meet for a body with the moments of the claim to exist.
     """
 
     variable: sympy.Symbol
@@ -113,8 +116,16 @@ class Setting:
     facts: tuple[sympy.Expr, ...] = ()
     nonzero: tuple[sympy.Symbol, ...] = ()
     ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...] = ()
+    bodies: tuple[Need, ...] = ()
 
-    def assumptions(self, sign: int, *, strict: bool = False, facts: tuple[sympy.Expr, ...] = ()) -> Assumptions:
+    def assumptions(
+        self,
+        sign: int,
+        *,
+        strict: bool = False,
+        facts: tuple[sympy.Expr, ...] = (),
+        weak: tuple[sympy.Expr, ...] = (),
+    ) -> Assumptions:
         """What the algebra may use on a domain where the variable has this sign (strict: and is not 0)."""
         return Assumptions(
             self.variable,
@@ -126,11 +137,14 @@ class Setting:
             (*self.facts, *facts),
             self.nonzero,
             self.ranges,
+            weak,
         )
 
     def places(self, statement: Statement) -> Iterator[Place]:
-        """Exact parameters and points of the domain of ``statement`` that lie on all relations, proven."""
+        """Exact parameters of bodies, and points of the domain of ``statement``, that lie on all relations, proven."""
         for sample in self.samples:
+            if not all(need.is_met(sample) for need in self.bodies):
+                continue
             for point in statement.domain.points:
                 place = {self.variable: point, **sample}
                 if all(is_exactly_zero(relation, place) for relation in self.relations):

@@ -73,9 +73,9 @@ class Names:
         self._names: dict[sympy.Expr, sympy.Symbol | None] = {}
 
     @property
-    def symbols(self) -> list[sympy.Symbol]:
-        """Those given so far."""
-        return [name for name in self._names.values() if name is not None]
+    def meanings(self) -> dict[sympy.Symbol, sympy.Expr]:
+        """Those given so far, with what they stand for."""
+        return {name: e for e, name in self._names.items() if name is not None}
 
     def put_into(self, e: sympy.Expr) -> sympy.Expr:
         """``e`` with its first integrals replaced by their symbols."""

@@ -9,7 +9,7 @@ from typing import ClassVar
 import sympy
 
 from heavytop.claims.conditions import Need
-from heavytop.claims.context import TIME, Context, FileClaim, needs_of, setting_of, three
+from heavytop.claims.context import TIME, Context, FileClaim, needs_of, sample_number, setting_of, three
 from heavytop.claims.expression import Formula
 from heavytop.claims.from_file import ClaimFile, MotionTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
@@ -17,7 +17,6 @@ from heavytop.claims.prover import shortest
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Setting, Statement
 from heavytop.claims.statements import SYMBOLIC, Motion, Triple, attitude, motion_statements
 from heavytop.errors import InputError
-from heavytop.precision import exact
 from heavytop.top.angles import omega_from_angles
 from heavytop.top.equations import GYROSTAT, System
 
@@ -38,6 +37,7 @@ class UserMotion(FileClaim):
     def __post_init__(self) -> None:
         FileClaim.__post_init__(self)
         assert self.content.motion is not None
+        object.__setattr__(self, "context", _with_constant_rotor(self.context, _domain(self.content)))
         motion = _read_motion(self.content, self.content.motion, self.context)
         object.__setattr__(self, "motion", motion)
 
@@ -64,13 +64,26 @@ class UserMotion(FileClaim):
                 yield Statement("3.2", component, "smooth", self.motion.domain, ours - theirs, text, formulas)
 
     def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
-        """No steps; the systems whose (1.1), (1.2) are proven."""
+        """No steps; the systems whose (1.1), (1.2) are proven, with |γ| = 1."""
         return [], tuple(s.name for s in self.context.systems if self._verdict(s, about, rows) == "holds")
 
     def _verdict(self, system: System, about: System, rows: Sequence[Row]) -> str:
         if system is about:
-            return verdict_of([row for row in rows if row.equation in ("1.1", "1.2")])
-        return verdict_of(judge([s for s in self.statements(system) if s.equation in ("1.1", "1.2")], self.setting))
+            return verdict_of([row for row in rows if _is_of_motion(row)])
+        return verdict_of(judge([s for s in self.statements(system) if _is_of_motion(s)], self.setting))
+
+
+def _is_of_motion(row: Row | Statement) -> bool:
+    """(1.1), (1.2), and |γ|² = 1 of (1.3)."""
+    return row.equation in ("1.1", "1.2") or (row.equation, row.component) == ("1.3", 1)
+
+
+def _with_constant_rotor(context: Context, domain: Domain) -> Context:
+    """The rotor as the algebra writes it, without t; raises InputError where t is left."""
+    if context.rotor is None or TIME not in context.rotor.free_symbols:
+        return context
+    rotor = shortest(context.rotor, setting_of(context, TIME), domain)
+    return context.with_rotor(rotor, TIME not in rotor.free_symbols)
 
 
 def _read_motion(content: ClaimFile, table: MotionTable, context: Context) -> Motion:
@@ -113,7 +126,7 @@ def _domain(content: ClaimFile) -> Domain:
     domain = _DOMAINS[content.domain]
     if content.times is None:
         return domain
-    times = tuple(exact(time) for time in content.times)
+    times = tuple(sample_number(time, "times") for time in content.times)
     if any(time * domain.sign < 0 or (domain is AFTER and time == 0) for time in times):
         raise InputError(
             f"A time of {', '.join(content.times)} lies outside {domain.label}.", "Change times or domain."
