@@ -16,9 +16,10 @@ def check_integrator(
     integrator: Annotated[str, typer.Argument(help="A name of `heavytop list`, mine.toml or mine.py:solve.")],
     json: Json = False,
 ) -> None:
-    """Go through the contract of an integrator and say in plain sentences what is wrong.
+    """Go through the contract of an integrator.
 
-    Exit code 0 if nothing is violated, 1 if something is, 2 if there is no such integrator or file.
+    It says in plain sentences what is wrong.  Exit code 0 if nothing is violated, 1 if something is, 2 if there is no
+    such integrator or file.
     """
     from dataclasses import asdict
 
