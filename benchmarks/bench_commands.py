@@ -82,7 +82,7 @@ def main() -> None:
 
 
 def _growth(program: Path, command: Command, row: list[Request]) -> tuple[float, ...]:
-    """Wall time alone and through the protocol; processor time of the program alone, behind pipes, and of the reader."""
+    """Wall time alone and here; processor time of the program alone and behind pipes, and of the reader."""
     before = _children()
     own, busy = bare(program, row), _children() - before
     session, before, began = Session(command), _children(), process_time()

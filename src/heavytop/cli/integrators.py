@@ -46,9 +46,9 @@ def new(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder.")],
     language: Annotated[str, typer.Option(help="python, c, cpp, rust, julia or fortran.")] = "python",
 ) -> int:
-    """Write a program that integrates the heavy top, with its gate, into a new folder.
+    """Begin an integrator and its gate in a new folder.
 
-    It works at once: mine.toml describes the program, gate.toml is the plan that measures it.
+    It holds a program that integrates the heavy top by RK4, in the language asked for.  It works at once: mine.toml describes the program, gate.toml is the plan that measures it.
     """
     from heavytop.api.integrators import LANGUAGES, new_integrator
 
