@@ -48,7 +48,8 @@ def new(
 ) -> int:
     """Begin an integrator and its gate in a new folder.
 
-    It holds a program that integrates the heavy top by RK4, in the language asked for.  It works at once: mine.toml describes the program, gate.toml is the plan that measures it.
+    It holds a program that integrates the heavy top by RK4, in the language asked for.  It works at once: mine.toml
+    describes the program, gate.toml is the plan that measures it.
     """
     from heavytop.api.integrators import LANGUAGES, new_integrator
 

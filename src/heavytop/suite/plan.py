@@ -19,6 +19,7 @@ from typing import Any, cast, get_args
 import msgspec
 
 from heavytop.errors import InputError, quoted
+from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers import known as known_integrators
 from heavytop.integrate.peers.source import Source, command_of, commands_in, named, seconds_of
 from heavytop.integrate.trajectory import Problem
@@ -144,6 +145,8 @@ def beside(plan: Plan, integrator: str | Source) -> Plan:
     """
     if integrator == HEYOKA:
         raise InputError(f"{HEYOKA} is what others are compared with.", "Name another with --integrator, or none.")
+    if not isinstance(integrator, str) and not is_third_party(integrator.name):
+        raise InputError(f"The integrator {integrator.name} has the name of a built-in one.", _RENAME)
     require_integrator(integrator)
     added = [other for table in plan.measure if (other := table.beside(integrator)) is not None]
     if not added:

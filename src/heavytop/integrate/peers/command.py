@@ -44,6 +44,7 @@ NOT_COUNTED = {"steps": "not counted"}
 _MOST_LINE = 1 << 20
 _MOST_ERRORS = 2000
 _CHUNK = 1 << 16
+_GREETING = 20.0
 _MANY = 4
 """States still due, from which on they are read several at a time: each waking of the reader slows the program."""
 _NAP, _NAP_SHARE = 1e-3, 1 / 32
@@ -570,9 +571,10 @@ atexit.register(close_all)
 
 
 def greeting(command: Command) -> str:
-    """Name and version as the program says them, or why it cannot be started."""
+    """Name and version as the program says them within 20 s, or why it cannot be started."""
+    seconds = str(min(command.seconds, _GREETING))
     try:
-        program = Session(command)
+        program = Session(msgspec.structs.replace(command, timeout=seconds))
     except PeerFailed as error:
         return f"not started: {error.cause}"
     program.close(_FAREWELL)
