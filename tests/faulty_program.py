@@ -48,6 +48,7 @@ INSTEAD = {  # of the answer to a request with times
     "busy": lambda: next(i for i in iter(int, 1)),
     "crashes": lambda: os.kill(os.getpid(), signal.SIGSEGV),
     "leaves": lambda: sys.exit(0),
+    "leaves a child behind": lambda: os._exit(5) if os.fork() else hang(),
     "not utf-8": lambda: (sys.stdout.buffer.write(b"\xff\xfe\n"), sys.stdout.flush(), hang()),
     "closes its output": lambda: (os.close(1), hang()),
     "a line without an end": lambda: (sys.stdout.write("9" * 3_000_000), sys.stdout.flush(), hang()),

@@ -46,6 +46,7 @@ FAILURES = {
     "too slow": "did not say done within 1 s",
     "crashes": "was ended by SIGSEGV before it said done",
     "leaves": "ended with exit code 0 before it said done",
+    "leaves a child behind": "ended with exit code 5 before it said done",
     "ends in the middle": "ended with exit code 1 before it said done",
     "no line end": "ended with exit code 0 before it said done",
     "dies at the third request": "ended with exit code 1 before it said done; its standard error ends with: out of",

@@ -66,7 +66,7 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     sweep: list[Sweep] = []
     integrator: list[dict[str, Any]] = []
     integrators: list[str] = []
-    row_timeout: str = ""
+    row_timeout: str | int | float = ""
 
 
 def read(name: str, kinds: Kinds, seed: int = 0, integrator: str | Source = "") -> tuple[Plan, str, Sequence[Task]]:
@@ -133,7 +133,7 @@ def definitions(plan: Plan, folder: Path) -> dict[str, Source]:
         raise InputError(f"The plan {plan.name} defines the integrator {name}, which is there already.", _RENAME)
     if len(defined) < len(found):
         raise InputError(f"The plan {plan.name} gives one name to two integrators.", _RENAME)
-    if plan.row_timeout:
+    if plan.row_timeout != "":
         seconds_of(plan.row_timeout, "row_timeout")
     return defined
 
