@@ -48,6 +48,7 @@ INSTEAD = {  # of the answer to a request with times
     "busy": lambda: next(i for i in iter(int, 1)),
     "crashes": lambda: os.kill(os.getpid(), signal.SIGSEGV),
     "leaves": lambda: sys.exit(0),
+    "leaves a child behind": lambda: os._exit(5) if os.fork() else hang(),
     "not utf-8": lambda: (sys.stdout.buffer.write(b"\xff\xfe\n"), sys.stdout.flush(), hang()),
     "closes its output": lambda: (os.close(1), hang()),
     "a line without an end": lambda: (sys.stdout.write("9" * 3_000_000), sys.stdout.flush(), hang()),
@@ -85,6 +86,8 @@ def shown(fault, values, place):
             texts.append("0")
         case "six digits":
             texts = [f"{value:.6g}" for value in values]
+        case "fifteen digits":
+            texts = [f"{value:.15g}" for value in values]
         case "single precision":
             import struct
 
@@ -111,6 +114,8 @@ def answer(fault, given):
     for place, text in enumerate(times):
         end = float(text)
         count = math.ceil(abs(end - t) / h)
+        if fault == "begins badly":
+            y = [value + 1e-9 * rate for value, rate in zip(y, HEAVY_TOP.field(p, y), strict=True)]
         for _ in range(count):
             y = step(lambda y: HEAVY_TOP.field(p, y), y, (end - t) / count)
         t, steps = end, steps + count
@@ -167,6 +172,8 @@ def main():
             return
         elif name == "go":
             requests += 1
+            if fault == "naps":
+                time.sleep(0.03)
             if fault == "dies at the third request" and requests == 3:
                 sys.exit("out of memory")
             if int(given["times"][0]) and fault in INSTEAD:

@@ -15,6 +15,7 @@ import from_a_wheel
 import heavytop as ht
 from documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
 from heavytop.cli import app
+from heavytop.integrate.peers.source import commands_in
 from heavytop.kinds import KINDS
 from heavytop.report import policy
 from heavytop.suite import plan
@@ -93,6 +94,8 @@ def read_toml(text: str, folder: Path) -> None:
         points = content["project"]["entry-points"]["heavytop.peers"]
         lines = [f"{key} = {value}" for key, value in points.items()]
         (info / "entry_points.txt").write_text("\n".join(["[heavytop.peers]", *lines]))
+    elif "integrator" in content:
+        assert commands_in(file)
     elif "kind" in content:
         assert ht.audit(file).verdict in ("holds", "refuted")
     else:

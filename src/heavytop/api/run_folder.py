@@ -128,7 +128,8 @@ def prepare(
         parquet.require_pyarrow()
     which = named(integrator)
     loaded, digest, tasks = read(plan, KINDS, seed, which)
-    timeout = loaded.row_timeout or None if row_timeout is None else row_timeout
+    of_plan = None if loaded.row_timeout == "" else loaded.row_timeout
+    timeout = of_plan if row_timeout is None else row_timeout
     if workers is not None and whole(workers, "--workers") < 1:
         raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
     if workers is not None and scheduler is not None:

@@ -14,7 +14,7 @@ from heavytop.cli.app import app
 from heavytop.errors import HeavyTopError
 
 # the commands, in the order of `heavytop --help`
-from heavytop.cli import run, reports, export, motions, score, claims, selftest, integrators, listing  # noqa: F401
+from heavytop.cli import run, reports, motions, score, claims, selftest, integrators, listing  # noqa: F401
 
 
 _COMPLETE = "_HEAVYTOP_COMPLETE"

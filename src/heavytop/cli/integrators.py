@@ -16,9 +16,10 @@ def check_integrator(
     integrator: Annotated[str, typer.Argument(help="A name of `heavytop list`, mine.toml or mine.py:solve.")],
     json: Json = False,
 ) -> None:
-    """Go through the contract of an integrator and say in plain sentences what is wrong.
+    """Go through the contract of an integrator.
 
-    Exit code 0 if nothing is violated, 1 if something is, 2 if there is no such integrator or file.
+    It says in plain sentences what is wrong.  Exit code 0 if nothing is violated, 1 if something is, 2 if there is no
+    such integrator or file.
     """
     from dataclasses import asdict
 
@@ -45,9 +46,10 @@ def new(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder.")],
     language: Annotated[str, typer.Option(help="python, c, cpp, rust, julia or fortran.")] = "python",
 ) -> int:
-    """Write a program that integrates the heavy top, with its gate, into a new folder.
+    """Begin an integrator and its gate in a new folder.
 
-    It works at once: mine.toml describes the program, gate.toml is the plan that measures it.
+    It holds a program that integrates the heavy top by RK4, in the language asked for.  It works at once: mine.toml
+    describes the program, gate.toml is the plan that measures it.
     """
     from heavytop.api.integrators import LANGUAGES, new_integrator
 

@@ -1,4 +1,4 @@
-"""`compare`, `history` and `show`."""
+"""`compare`, `history`, `show` and `export`."""
 
 from __future__ import annotations
 
@@ -158,4 +158,26 @@ def show(
             tables.write(parquet, found.rows, found.plan)
     for path in filter(None, (parquet, html)):
         print(path)
+    return 0
+
+
+@command
+def export(
+    report: Annotated[Path, typer.Argument(help="Report or its folder.")],
+    to: Annotated[str, typer.Option(help="bencher, github-action-benchmark, asv, junit or csv.")],
+    out: Annotated[Path | None, typer.Option(help="Write it there, not on standard output.")] = None,
+) -> int:
+    """Write a report in the format of another tool.
+
+    Of each number smaller is better: log10 of error and drift, exponents of growth laws, seconds.
+    """
+    from heavytop.kinds import KINDS
+    from heavytop.report import store
+    from heavytop.report.export import export as exported
+
+    text = exported(store.read(report, KINDS), to, KINDS)
+    if out is None:
+        print(text, end="")
+    else:
+        _write([(out, text)])
     return 0

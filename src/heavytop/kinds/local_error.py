@@ -72,7 +72,7 @@ def _lines(rows: Sequence[Row]) -> list[list[str]]:
             row.precision,
             str(row.samples if row.key.subject.name != HEYOKA else row.steps),
             *(short(row.metrics[q.text].value) if q.text in row.metrics else "-" for q in quantities),
-            "-" if row.order is None else str(row.order),
+            str(row.order) if row.order else "-",
             row.outcome,
         ]
         for row in rows
@@ -149,5 +149,7 @@ def _said(row: Row) -> str:
     order = row.metrics.get(local_error.ORDER.text)
     if order is None:
         return f"{text} at most."
+    if not row.order:
+        return f"{text} at most; its order is {order.value}."
     declared = "as it says" if order.value == str(row.order) else f"not the {row.order} that it says"
     return f"{text} at most; its order is {order.value}, {declared}."

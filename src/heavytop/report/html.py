@@ -13,14 +13,14 @@ from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
 from heavytop.measure.digits import RELATIVE, digits_kept
-from heavytop.records import UNMEASURED, Report, Row
+from heavytop.records import UNMEASURED, UNSUPPORTED, Report, Row
 from heavytop.report.compare import Comparison, Finding
 from heavytop.report.findings import Change, folded, line, statistics
 from heavytop.report.kind import Kinds, MakeSection, kind_of
 from heavytop.report.names import row_name
 from heavytop.report.section import Section, Sources, clip
 from heavytop.report.svg import quiet_style
-from heavytop.report.text import failed, short
+from heavytop.report.text import failed, short, unsupported
 from heavytop.report.work_precision import ERRORS
 from heavytop.suite.files import replace
 from heavytop.suite.plan import BUILT_IN
@@ -52,6 +52,8 @@ def report_page(report: Report, kinds: Kinds) -> str:
         cards=list(chain.from_iterable(cards.values())),
         failures=failures[:MOST_FAILURES],
         failed=len(failures),
+        not_supported=unsupported(report.rows),
+        lacking=sum(row.outcome == UNSUPPORTED for row in report.rows),
         gave_up=Counter(kind_of(row, kinds).may_give_up for row in report.rows if _gave_up(row, kinds)),
         not_finite=not_finite,
         overflowed=all(kind_of(row, kinds).may_overflow for row in not_finite),

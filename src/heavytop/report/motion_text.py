@@ -10,6 +10,7 @@ from rich.text import Text
 
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
+from heavytop.report.printable import printable
 from heavytop.report.text import short
 
 _NAMES = ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3", "ξ1", "ξ2", "ξ3", "φ", "θ", "ψ")
@@ -29,7 +30,8 @@ def motion_text(motion: Motion) -> RenderableType:
             values += [*motion.attitude[index], *motion.angles[index]]
         parts += [Text(), _at(time, values)]
     if not motion.complete:
-        parts += [Text(), Text(f"Reached t = {motion.to_json()['time_reached']} only.", style="bold")]
+        why = f" {run.integrator} says: {printable(run.flags['failure'])}" if "failure" in run.flags else ""
+        parts += [Text(), Text(f"Reached t = {motion.to_json()['time_reached']} only.{why}", style="bold")]
     elif motion.drift:
         found = [(metric.quantity, metric) for metric in motion.drift.values()]
         worst = [(quantity.component, metric) for quantity, metric in found if quantity and quantity.statistic == "max"]

@@ -19,6 +19,7 @@ from typing import Any, cast, get_args
 import msgspec
 
 from heavytop.errors import InputError, quoted
+from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers import known as known_integrators
 from heavytop.integrate.peers.source import Source, command_of, commands_in, named, seconds_of
 from heavytop.integrate.trajectory import Problem
@@ -65,7 +66,7 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     sweep: list[Sweep] = []
     integrator: list[dict[str, Any]] = []
     integrators: list[str] = []
-    row_timeout: str = ""
+    row_timeout: str | int | float = ""
 
 
 def read(name: str, kinds: Kinds, seed: int = 0, integrator: str | Source = "") -> tuple[Plan, str, Sequence[Task]]:
@@ -132,7 +133,7 @@ def definitions(plan: Plan, folder: Path) -> dict[str, Source]:
         raise InputError(f"The plan {plan.name} defines the integrator {name}, which is there already.", _RENAME)
     if len(defined) < len(found):
         raise InputError(f"The plan {plan.name} gives one name to two integrators.", _RENAME)
-    if plan.row_timeout:
+    if plan.row_timeout != "":
         seconds_of(plan.row_timeout, "row_timeout")
     return defined
 
@@ -144,6 +145,8 @@ def beside(plan: Plan, integrator: str | Source) -> Plan:
     """
     if integrator == HEYOKA:
         raise InputError(f"{HEYOKA} is what others are compared with.", "Name another with --integrator, or none.")
+    if not isinstance(integrator, str) and not is_third_party(integrator.name):
+        raise InputError(f"The integrator {integrator.name} has the name of a built-in one.", _RENAME)
     require_integrator(integrator)
     added = [other for table in plan.measure if (other := table.beside(integrator)) is not None]
     if not added:

@@ -76,11 +76,11 @@ def rows(
     Raises HeavyTopError with the name of the task that killed its worker each time, or where a cluster was lost;
     InputError where the extra `cluster` is not installed, no scheduler answers, or a worker has other versions.
     """
-    queue = _longest_first(tasks, kinds, done)
+    queue, third_party = _longest_first(tasks, kinds, done)
     saved = saved or (lambda index: Saved())
     if scheduler is not None:
         yield from _on_cluster(tasks, kinds, queue, scheduler, begun)
-    elif any(tasks[index].is_third_party for index in queue):
+    elif third_party:
         from heavytop.suite.limited import in_limited_processes
 
         yield from in_limited_processes(tasks, kinds, queue, workers, saved, begun, row_timeout)
@@ -92,9 +92,15 @@ def rows(
             yield index, measure(kinds[tasks[index].key.kind], tasks[index], saved(index))
 
 
-def _longest_first(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> deque[int]:
-    costs = {index: kinds[task.key.kind].cost(task) for index, task in enumerate(tasks) if index not in done}
-    return deque(sorted(costs, key=lambda index: -costs[index]))
+def _longest_first(tasks: Sequence[Task], kinds: Kinds, done: Container[int]) -> tuple[deque[int], bool]:
+    """The tasks that are left, and whether one of them has a third-party integrator."""
+    costs: dict[int, float] = {}
+    third_party = False
+    for index, task in enumerate(tasks):
+        if index not in done:
+            costs[index] = kinds[task.key.kind].cost(task)
+            third_party = third_party or task.is_third_party
+    return deque(sorted(costs, key=lambda index: -costs[index])), third_party
 
 
 def _in_processes(

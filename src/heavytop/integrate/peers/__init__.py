@@ -21,12 +21,13 @@ from fractions import Fraction
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
-from heavytop.integrate.peers.source import Source
+from heavytop.integrate.peers.source import PythonFile, Source
 from heavytop.integrate.trajectory import Outcome, Trajectory
 from heavytop.processes import ChildContext
 
@@ -118,8 +119,10 @@ def peer(which: str | Source) -> Peer:
 def require(which: str | Source) -> None:
     """Raises InputError for an unknown integrator, and for one of this program's that cannot be imported.
 
-    One of another package is not imported: how that goes is for the rows to say.
+    One of another package is not imported: how that goes is for the rows to say.  A Python file has to be there.
     """
+    if isinstance(which, PythonFile) and not Path(which.path).is_file():
+        raise InputError(f"There is no file {which.path}.", "Give FILE.py:FUNCTION.")
     if isinstance(which, str) and (which not in known() or which in BUILT_IN):
         peer(which)
 

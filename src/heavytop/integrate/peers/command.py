@@ -21,7 +21,7 @@ from itertools import pairwise
 from math import ceil, inf, isfinite
 from pathlib import Path
 from threading import Lock
-from time import monotonic, perf_counter
+from time import monotonic, perf_counter, sleep
 from typing import Any, Literal
 
 import msgspec
@@ -44,6 +44,11 @@ NOT_COUNTED = {"steps": "not counted"}
 _MOST_LINE = 1 << 20
 _MOST_ERRORS = 2000
 _CHUNK = 1 << 16
+_GREETING = 20.0
+_MANY = 4
+"""States still due, from which on they are read several at a time: each waking of the reader slows the program."""
+_NAP, _NAP_SHARE = 1e-3, 1 / 32
+"""Seconds, and part of the seconds so far, between two readings of such states."""
 _LOOK = 0.1
 """Seconds between two looks whether a silent program is still there."""
 _FAREWELL = 0.3
@@ -244,14 +249,23 @@ class Reply:
         self.counts: dict[str, Any] = {}
         self.failure = ""
         self.wall = 0.0
-        self._due = [float(time) for time in request.times] if self.precision == DOUBLE else []
+        self._doubles = [float(time) for time in request.times] if self.precision == DOUBLE else []
         self._pattern = _STATE_OF_DOUBLES[request.width]
+
+    @property
+    def due(self) -> int:
+        """How many states are still to come."""
+        return len(self.request.times) - len(self.states)
 
     def take(self, line: bytes) -> bool:
         """Takes a line, and says whether it was the last; raises PeerFailed for one that breaks the protocol."""
-        if self._due and self._pattern.fullmatch(line):
+        if self._doubles and self._pattern.fullmatch(line):
             time, *values = map(float, line.split()[1:])
-            if len(self.states) < len(self._due) and time == self._due[len(self.states)] and isfinite(sum(values)):
+            if (
+                len(self.states) < len(self._doubles)
+                and time == self._doubles[len(self.states)]
+                and isfinite(sum(values))
+            ):
                 self.states.append(numpy.array(values))
                 return False
         words = self._words(line)
@@ -264,8 +278,7 @@ class Reply:
         if words[0] != "done":
             raise PeerFailed(f"{self.name} wrote {said(repr(' '.join(words)))}, which is no line of the protocol")
         self._take_counts(words[1:])
-        missing = len(self.request.times) - len(self.states)
-        if missing:
+        if self.due:
             raise PeerFailed(f"{self.name} said done after {len(self.states)} of {len(self.request.times)} states")
         return True
 
@@ -387,13 +400,19 @@ class Session:
         reply = Reply(self.name, request)
         text = request.text(self.requests)
         began = perf_counter()
-        self._exchange(text, reply.take, "done")
+        self._exchange(text, reply.take, "done", lambda: reply.due)
         reply.wall = perf_counter() - began
         return reply
 
-    def _exchange(self, text: bytes, take: Callable[[bytes], bool], awaited: str) -> None:
-        """Writes ``text`` and hands over line after line until ``take`` has its last; nothing may be left then."""
-        deadline = monotonic() + self.command.seconds
+    def _exchange(
+        self, text: bytes, take: Callable[[bytes], bool], awaited: str, due: Callable[[], int] = lambda: 0
+    ) -> None:
+        """Writes ``text`` and hands over line after line until ``take`` has its last; nothing may be left then.
+
+        due: how many states are still to come.
+        """
+        began = monotonic()
+        deadline = began + self.command.seconds
         waiting = memoryview(text)
         self._poll.register(self._in, select.POLLOUT)
         while True:
@@ -407,6 +426,8 @@ class Session:
             events = self._poll.poll(1000 * min(left, _LOOK))
             if not events and self.process.poll() is not None and not self._drained():
                 raise self._failed(f"{self._end()} before it said {awaited}")
+            if events and not waiting and due() >= _MANY:
+                sleep(min(_NAP, _NAP_SHARE * (monotonic() - began)))
             self._receive([descriptor for descriptor, _ in events], awaited)
 
     def _write(self, waiting: memoryview) -> memoryview:
@@ -550,9 +571,10 @@ atexit.register(close_all)
 
 
 def greeting(command: Command) -> str:
-    """Name and version as the program says them, or why it cannot be started."""
+    """Name and version as the program says them within 20 s, or why it cannot be started."""
+    seconds = str(min(command.seconds, _GREETING))
     try:
-        program = Session(command)
+        program = Session(msgspec.structs.replace(command, timeout=seconds))
     except PeerFailed as error:
         return f"not started: {error.cause}"
     program.close(_FAREWELL)

@@ -202,7 +202,7 @@ class Contained:
         """
         problem = Problem.of(top, start, precision, system)
         asked = [exact(number(time, precision)) for time in times]
-        if self.declared is not None:
+        if self.declared is not None and asked:
             self.declared.require(self.name, system, asked[-1], precision)
         # copies, so that what a peer does to its arguments is its own affair
         given = deepcopy((top, start, tuple(times), precision))

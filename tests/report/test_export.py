@@ -1,0 +1,134 @@
+"""Reports in the formats of other tools, read as these read them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import msgspec
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.kinds import KINDS
+from heavytop.records import Report
+from heavytop.report.export import FORMATS, LOST, export
+from heavytop.report.names import row_name
+from reports import store
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def report() -> Report:
+    """The report that ships, with a row of each end that a row can have."""
+    found = store.read(ROOT / "results" / "growth")
+    drift = store.read(ROOT / "results" / "default")
+    rows = [row for row in (*found.rows, *drift.rows) if row.outcome == "success"]
+    first = next(row for row in rows if row.key.kind == "drift")
+    for outcome in ("failed", "out_of_time", "unsupported", "out_of_reach"):
+        key = msgspec.structs.replace(first.key, case=f"{outcome}-case")
+        rows.append(msgspec.structs.replace(first, key=key, case=f"{outcome}-case", outcome=outcome, metrics={}))
+    return Report(found.schema, found.plan, found.environment, rows)
+
+
+def test_every_format_holds_the_same_numbers(report: Report) -> None:
+    bencher = json.loads(export(report, "bencher", KINDS))
+    github = json.loads(export(report, "github-action-benchmark", KINDS))
+    asv = json.loads(export(report, "asv", KINDS))["results"]
+    count = sum(len(each) for each in bencher.values())
+    assert count == len(github) == sum(value != [None] for value, *_ in asv.values()) > 100
+    assert sorted(each["value"] for each in github) == sorted(n["value"] for b in bencher.values() for n in b.values())
+    assert {each["name"]: each["value"] for each in github} == {
+        name: value[0] for name, (value, *_) in asv.items() if value != [None]
+    }
+    assert bencher["heavytop"] == {"rows-without-a-number": {"value": 3.0}}
+    assert f"heavytop: {LOST}" in asv
+    assert not any("failed-case" in each["name"] for each in github)
+
+
+def test_numbers_are_those_of_the_report_and_smaller_is_better(report: Report) -> None:
+    github = {each["name"]: each for each in json.loads(export(report, "github-action-benchmark", KINDS))}
+    row = next(row for row in report.rows if row.key.kind == "drift" and row.precision == "double" and row.metrics)
+    name = row_name(row.identity)
+    error = row.metrics["solution_error_relative_max"].log10
+    assert abs(github[f"{name}: log10 of the error"]["value"] - error) < 0.006
+    energy = row.metrics["drift_energy_max"].log10
+    assert github[f"{name}: log10 of the drift of energy"]["value"] == max(energy, -52 * math.log10(2))
+    law_row, law_name = next((r, n) for r in report.rows for n, law in r.laws.items() if law.exponent and law.low)
+    law = law_row.laws[law_name]
+    entry = github[f"{row_name(law_row.identity)}: exponent of {law_name}"]
+    assert (entry["value"], entry["unit"]) == (law.exponent, "exponent")
+    assert entry["range"] == f"{law.low:.3f} to {law.high:.3f}"
+    eps = {row_name(row.identity): (1 - row.bits) * math.log10(2) for row in report.rows}
+    for name, entry in github.items():
+        if "drift of" in name:
+            assert (
+                entry["value"]
+                >= eps[name.partition(":")[0] if name.partition(":")[0] in eps else name.rpartition(":")[0]]
+            )
+
+
+def test_bencher_and_github_take_their_keys(report: Report) -> None:
+    for name, found in json.loads(export(report, "bencher", KINDS)).items():
+        assert 0 < len(name) <= 1024
+        for slug, entry in found.items():
+            assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", slug)
+            assert len(slug) <= 64
+            assert {"value"} <= entry.keys() <= {"value", "lower_value", "upper_value"}
+            assert all(isinstance(each, float) and math.isfinite(each) for each in entry.values())
+            assert entry.get("lower_value", -math.inf) <= entry["value"] <= entry.get("upper_value", math.inf)
+    names = [each["name"] for each in json.loads(export(report, "github-action-benchmark", KINDS))]
+    assert len(set(names)) == len(names)
+    for each in json.loads(export(report, "github-action-benchmark", KINDS)):
+        assert {"name", "unit", "value"} <= each.keys() <= {"name", "unit", "value", "range", "extra"}
+
+
+def test_asv_reads_its_results(report: Report, tmp_path: Path) -> None:
+    results = pytest.importorskip("asv.results")
+    file = tmp_path / "machine" / "commit-heavytop.json"
+    file.parent.mkdir()
+    file.write_text(export(report, "asv", KINDS))
+    found = results.Results.load(str(file))
+    assert found.env_name == "heavytop"
+    names = list(found.get_all_result_keys())
+    assert len(names) > 100
+    values = [found.get_result_value(name, []) for name in names]
+    assert sum(value == [None] for value in values) == 3
+    assert found.get_result_value(f"heavytop: {LOST}", []) == [3.0]
+
+
+def test_junit_has_a_case_a_row(report: Report) -> None:
+    suite = ElementTree.fromstring(export(report, "junit", KINDS).encode())
+    assert len(suite.findall("testcase")) == len(report.rows) == int(suite.get("tests"))
+    assert (suite.get("errors"), suite.get("skipped")) == ("3", "1")
+    assert [each.get("type") for each in suite.iter("error")] == ["failed", "out_of_time", "out_of_reach"]
+    assert len(list(suite.iter("skipped"))) == 1
+
+
+def test_csv_has_a_line_a_metric(report: Report) -> None:
+    lines = list(csv.DictReader(export(report, "csv", KINDS).splitlines()))
+    assert len(lines) == sum(len(row.metrics) + len(row.laws) or 1 for row in report.rows)
+    assert {line["outcome"] for line in lines} == {"success", "failed", "out_of_time", "unsupported", "out_of_reach"}
+
+
+def test_the_command_writes_a_file_or_standard_output_and_refuses_another_format(tmp_path: Path) -> None:
+    def heavytop(*words: object) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-m", "heavytop", "export", str(ROOT / "results" / "growth"), *map(str, words)]
+        return subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
+
+    done = heavytop("--to", "csv", "--out", tmp_path / "rows.csv")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (tmp_path / "rows.csv").stat().st_size > 1000
+    refused = heavytop("--to", "excel")
+    assert refused.returncode == 2
+    assert "bencher, github-action-benchmark, asv, junit, csv" in refused.stderr
+    with pytest.raises(InputError):
+        export(Report("heavytop-report/2", {}, {}, []), "", KINDS)
+    assert json.loads(export(Report("heavytop-report/2", {}, {}, []), "bencher", KINDS))
+    assert len(FORMATS) == 5
