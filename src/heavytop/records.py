@@ -239,7 +239,9 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """The exact data of a motion, as text; omega and gamma, of its start, are empty for an ensemble of starts."""
+    """The exact data of a motion, as text; omega and gamma are its start, or for an ensemble that by which its random
+    starts are drawn, empty in older reports.
+    """
 
     inertia: tuple[str, ...]
     weight: str

@@ -14,6 +14,7 @@ from heavytop.report.against import weaker
 from heavytop.report.consistency import contradictions
 from heavytop.report.kind import Kinds, kind_of
 from heavytop.report.laws import judge_law, law_text
+from heavytop.report.motion_data import other_data
 from heavytop.report.noise import allowed_loss, noisier
 from heavytop.report.policy import BITS, Limits, Lookup, Policy
 from heavytop.report.series import judge_series
@@ -22,6 +23,7 @@ from heavytop.report.verdicts import Judged, Verdict, judge, judge_seconds
 _STEPS = 2
 """The same method with the same setting takes as many steps, and evaluates the field as often: a factor beyond this is
 another method."""
+_ANOTHER: Judged = (Verdict.INCOMPARABLE, "it says that it is another quantity")
 
 
 class Finding(msgspec.Struct, frozen=True, gc=False):
@@ -134,7 +136,7 @@ class RowComparison:
         if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
             return judged
         if judged[0] is Verdict.SAME and metric.quantity != match.quantity:
-            return Verdict.INCOMPARABLE, "it says that it is another quantity"
+            return _ANOTHER
         if metric.band is not None and match.band is None and match.log10 is not None:
             return Verdict.INCOMPARABLE, f"its noise is not measured, which was {metric.band:.2g} decades"
         if noisier(kind, metric, match):
@@ -153,6 +155,8 @@ class RowComparison:
                 judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
             else:
                 judged = judge_law(a, b, self._noise(name, old, limits))
+                if judged[0] is Verdict.SAME and a.quantity != b.quantity:
+                    judged = _ANOTHER
             before, after = (None if law is None else law_text(law) for law in (a, b))
             yield Finding(key, metric, judged[0], before, after, judged[1])
 
@@ -170,6 +174,8 @@ class RowComparison:
             exactly = any(metric.kind == "value" for metric in _of_series(name, old, "max", "final"))
             allowed = limits.value if exactly else max(limits.loss, self._noise(name, old, limits))
             judged = judge_series(series, match, allowed, limits.floor + self._eps(series.quantity, old), exactly)
+            if judged[0] is Verdict.SAME and series.quantity != match.quantity:
+                judged = _ANOTHER
             if judged[0] is not Verdict.SAME:
                 before, after = (f"{len(each.values)} samples" for each in (series, match))
                 yield Finding(key, metric, judged[0], before, after, judged[1])
@@ -222,6 +228,8 @@ class RowComparison:
             return f"{old.bits} bits against {new.bits}"
         if old.starts != new.starts:
             return f"{old.starts} starts against {new.starts}"
+        if reason := other_data(old.data, new.data, old.starts):
+            return reason
         if (old.steps == 0) != (new.steps == 0):
             return f"{old.steps} steps against {new.steps}"
         if old.flags != new.flags and self.policy.flags != "ignore":

@@ -180,7 +180,7 @@ def _measure(kind: Kind, task: Task, saved: Saved) -> Row:
 
     try:
         row = kind.measure(task, saved)
-        row.data = data_of(task, row.starts)
+        row.data = data_of(task.case)
         return row
     except PeerFailed as error:
         return failed(task, error.cause)
