@@ -154,7 +154,9 @@ class RowComparison:
             if a is None or b is None:
                 judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
             else:
-                judged = judge_law(a, b, self._noise(name, old, limits))
+                # the same series again has no other roundings, so that another law of it is no chance
+                rerun = name in old.series and name in new.series and old.series[name] != new.series[name]
+                judged = judge_law(a, b, self._noise(name, old, limits), rerun)
                 if judged[0] is Verdict.SAME and a.quantity != b.quantity:
                     judged = _ANOTHER
             before, after = (None if law is None else law_text(law) for law in (a, b))
