@@ -132,6 +132,8 @@ class RowComparison:
         known, kind = metric, kind_of(old, self.kinds)
         if metric.band is None and (noise := kind.assumed_band(old.key.subject)):
             known = msgspec.structs.replace(metric, band=noise)
+        elif metric.band is not None and metric.band < (noise := kind.least_band(old.starts)):
+            known = msgspec.structs.replace(metric, band=noise)
         judged = judge(known, match, limits, self._eps(metric.quantity, old), self.policy.suspicious_digits, least_of)
         if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
             return judged
