@@ -1,19 +1,23 @@
 """Rows of another top or another start are never the same, nor better; numbers written otherwise are."""
 
-import json
 from dataclasses import replace as change
+from fractions import Fraction
+from operator import itemgetter
 from pathlib import Path
 
 import msgspec
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.precision import exact
+from heavytop.integrate.taylor import propagate
+from heavytop.precision import DOUBLE, exact
 from heavytop.records import Data, Law, Quantity, Row, Series
 from heavytop.report.policy import Policy
 from heavytop.suite.cases import CASES
+from heavytop.suite.given import of_arrays
 from heavytop.suite.rows import data_of
-from reports import compare, expand, load, measure, replace, store
+from heavytop.suite.score import score
+from reports import compare, expand, load, measure, replace, rows, store
 from small_reports import report, row
 
 DATA = Data(("3", "2", "1/3"), "3/2", ("0", "1/5", "-1"), ("1/10", "0", "9/10"), ("3/5", "0", "-4/5"))
@@ -58,7 +62,7 @@ def test_a_smaller_error_of_another_top_is_not_better() -> None:
     less = {"drift_energy_max": msgspec.structs.replace(row().metrics["drift_energy_max"], value="1e-15", log10=-15.0)}
     assert judged(row(data=DATA), row(data=DATA, metrics=less))[0] == "incomparable"  # the time of escape is missing
     other = replace(DATA, weight="2")
-    assert judged(row(data=DATA), row(data=other, metrics=less))[1] == "other data: weight 3/2, not 2"
+    assert judged(row(data=DATA), row(data=other, metrics=less))[1] == "other data: weight 3/2 against 2"
 
 
 def test_the_same_numbers_written_otherwise_are_the_same() -> None:
@@ -81,7 +85,7 @@ def test_a_baseline_from_before_ensembles_named_their_start_is_compared_by_its_t
     older = replace(DATA, omega=(), gamma=())
     old, new = row(data=older, starts=16), row(data=DATA, starts=16)
     assert judged(old, new)[0] == judged(old, old)[0] == "same"
-    assert judged(new, old)[1].startswith("other data: omega 1/10, 0, 9/10, not not said")
+    assert judged(new, old)[1].startswith("other data: omega 1/10, 0, 9/10 against none")
     assert judged(old, row(data=replace(DATA, weight="2"), starts=16))[0] == "incomparable"
 
 
@@ -153,7 +157,7 @@ def test_two_tops_of_one_name_in_two_plans_are_two(tmp_path: Path) -> None:
 
     mine = ran("1/2", "9/10")
     assert judged(mine, ran("0.5", "0.90"))[0] == "same"
-    assert judged(mine, ran("1/3", "9/10")) == ("incomparable", "other data: centre 0, 0, 1/2, not 0, 0, 1/3")
+    assert judged(mine, ran("1/3", "9/10")) == ("incomparable", "other data: centre 0, 0, 1/2 against 0, 0, 1/3")
     assert judged(mine, ran("1/2", "4/5"))[0] == "incomparable"
 
 
@@ -164,7 +168,32 @@ def test_numbers_of_any_length_are_written_and_read(tmp_path: Path) -> None:
     assert store.read(store.write(report(made), tmp_path)).rows[0].data == made.data
 
 
-def test_every_row_of_a_run_that_measures_a_motion_has_data() -> None:
-    for file in (Path(__file__).parents[2] / "results").glob("*/report.json"):
-        for each in json.loads(file.read_bytes())["rows"]:
-            assert (each["data"] is None) == (each["measure"] in ("audit", "break_away_law"))
+ENSEMBLE = """[[measure]]
+kind = "growth"
+cases = ["mine"]
+runs = [{ precision = "double", horizon = "1", samples = 4, decades = 1, starts = 8 }]
+"""
+
+
+def test_every_row_of_a_motion_has_its_data_those_of_ensembles_too(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(PLAN.format(centre="1/2", omega="9/10") + ENSEMBLE)
+    found = [each for _, each in sorted(rows(expand(load(str(tmp_path / "plan.toml"))[0]), 1), key=itemgetter(0))]
+    assert [(each.starts, each.data) for each in found] == [
+        (starts, Data(("3", "2", "1"), "1", ("0", "0", "1/2"), ("1/10", "0", "9/10"), ("3/5", "0", "4/5")))
+        for starts in (1, 8)
+    ]
+    assert judged(found[1], found[1])[0] == "same"
+
+
+def test_a_scored_trajectory_has_its_data(tmp_path: Path) -> None:
+    case = CASES["lagrange"]
+    run = propagate(case.top, case.start, [Fraction(1), Fraction(2)], DOUBLE)
+    other = change(case.top, weight=case.top.weight * 2)
+    two = [
+        score(of_arrays(top, case.start, case.system, list(run.times), list(run.states), DOUBLE, "mine", "rk4"))
+        for top in (case.top, other)
+    ]
+    assert two[0].data == data_of(case)
+    assert judged(two[0], two[0])[0] == "same"
+    for pair in (two, two[::-1]):
+        assert judged(*pair)[1].startswith("other data: weight")

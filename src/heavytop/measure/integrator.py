@@ -12,6 +12,7 @@ from heavytop.integrate import peers, registry, taylor
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
+from heavytop.integrate.peers.contract import require_equal
 from heavytop.integrate.taylor import Observer
 from heavytop.integrate.trajectory import Problem, TaylorStep, Trajectory
 from heavytop.precision import Precision
@@ -19,6 +20,8 @@ from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 HEYOKA, WORDS = "heyoka", "words"
+_AGAIN_SECONDS = 1.0
+"""A longer call of an integrator of another package is made once."""
 
 
 def require(name: str) -> None:
@@ -56,12 +59,15 @@ class Integrator:
         precision: Precision,
         system: System,
         observer: Observer | None = None,
+        *,
+        again: bool = True,
         **going_on: Any,
     ) -> Trajectory:
         """The motion of an exact top and start; every state goes to ``observer``, where there is one.
 
         going_on: place and mark as in :func:`heavytop.integrate.taylor.propagate`, of no use to an integrator that
-        knows no places.  Raises PeerFailed for whatever an integrator of others does wrong.
+        knows no places.  again: whether a quick call of an integrator of another package is made twice, to see whether
+        it is the same.  Raises PeerFailed for whatever an integrator of others does wrong.
         """
         if self.fault:
             watch = observer or (lambda time, state: None)
@@ -71,7 +77,10 @@ class Integrator:
             run: Trajectory = call(top, start, times, precision, system=system, observer=observer, **going_on)
             return run
         try:
-            run = peers.ready(self.name, self.setting)(top, start, times, precision, system=system)
+            peer = peers.ready(self.name, self.setting)
+            run = peer(top, start, times, precision, system=system)
+            if again and not peer.own and run.seconds["run"] < _AGAIN_SECONDS:
+                require_equal(self.name, run, peer(top, start, times, precision, system=system))
         except InputError as error:  # what a peer of this program cannot be asked for is one row's failure too
             raise PeerFailed(error.cause.removesuffix(".")) from None
         if observer is not None:
@@ -103,7 +112,8 @@ class Integrator:
         runs = []
         for index, problem in enumerate(problems):
             watch = None if observer is None else _watching(observer, index)
-            runs.append(self.propagate(*_given(problem), times, problem.precision, problem.system, watch))
+            first = index == 0
+            runs.append(self.propagate(*_given(problem), times, problem.precision, problem.system, watch, again=first))
             if finished is not None:
                 finished(index, runs[-1])
         return runs

@@ -33,7 +33,7 @@ def contradictions(row: Row, kind: Kind) -> Iterator[str]:
         for name, law in row.laws.items():
             if reason := inconsistent(law):
                 yield f"growth {name}: {reason}"
-            if law.starts > row.starts:
+            if law.starts > row.starts > 1:
                 yield f"growth {name}: a law of {law.starts} starts in a row of {row.starts}"
     if row.data is not None and (reason := impossible(row.data, row.starts)):
         yield f"data: {reason}"

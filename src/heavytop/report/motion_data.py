@@ -24,10 +24,8 @@ def other_data(old: Data | None, new: Data | None, starts: int) -> str:
         return ""
     if old is None or new is None:
         return f"only the {'candidate' if old is None else 'baseline'} says of which top and start it is"
-    names = ("inertia", "weight", "centre", "omega", "gamma")
-    if starts > 1 and not old.omega:
-        names = names[:3]
-    for name in names:
+    of_top, of_start = ("inertia", "weight", "centre"), ("omega", "gamma")
+    for name in of_top if starts > 1 and not old.omega else of_top + of_start:
         before, after = (getattr(data, name) for data in (old, new))
         if before != after and _numbers(before) != _numbers(after):
             return f"other data: {name} {_text(before)} against {_text(after)}"

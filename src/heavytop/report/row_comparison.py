@@ -18,6 +18,7 @@ from heavytop.report.motion_data import other_data
 from heavytop.report.noise import allowed_loss, noisier
 from heavytop.report.policy import BITS, Limits, Lookup, Policy
 from heavytop.report.series import judge_series
+from heavytop.report.timings import BAND, judge_repeated
 from heavytop.report.verdicts import Judged, Verdict, judge, judge_seconds
 
 _STEPS = 2
@@ -54,12 +55,19 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 class RowComparison:
     """Compares rows under one policy.
 
-    timed: whether seconds are compared.  list_same: False to count what plainly stayed the same, in :attr:`same`.
+    timed: whether seconds are compared; repeated: whether those of runs that were repeated for it are.
+    list_same: False to count what plainly stayed the same, in :attr:`same`.
     checked: of the baseline and of the candidate, whether each row was found consistent as it was read.
     """
 
     def __init__(
-        self, policy: Policy, kinds: Kinds, timed: bool, list_same: bool, checked: tuple[bool, bool] = (False, False)
+        self,
+        policy: Policy,
+        kinds: Kinds,
+        timed: bool,
+        list_same: bool,
+        checked: tuple[bool, bool] = (False, False),
+        repeated: bool = False,
     ) -> None:
         self.policy = policy
         self.kinds = kinds
@@ -68,6 +76,7 @@ class RowComparison:
         self.same = 0
         self.lookup = Lookup(policy)
         self.timed = timed
+        self.repeated = repeated
 
     def ignores(self, row: Row) -> bool:
         """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
@@ -88,7 +97,9 @@ class RowComparison:
             found += self._series(key, rules, old, new)
         if not self.ignores(old):
             found += self._row(key, old, new)
-        if self.timed:
+        if self.repeated and BAND in old.seconds:
+            found += self._repeated(key, rules, old, new)
+        elif self.timed:
             found += self._seconds(key, rules, old, new)
         return found
 
@@ -130,9 +141,8 @@ class RowComparison:
         """The values first; then the noise of the candidate, which is worse where it is more than chance."""
         least_of = least(old.metrics, metric), least(new.metrics, match)
         known, kind = metric, kind_of(old, self.kinds)
-        if metric.band is None and (noise := kind.assumed_band(old.key.subject)):
-            known = msgspec.structs.replace(metric, band=noise)
-        elif metric.band is not None and metric.band < (noise := kind.least_band(old.starts)):
+        noise = kind.assumed_band(old.key.subject) if metric.band is None else kind.least_band(old.starts)
+        if noise > (metric.band or 0.0):
             known = msgspec.structs.replace(metric, band=noise)
         judged = judge(known, match, limits, self._eps(metric.quantity, old), self.policy.suspicious_digits, least_of)
         if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
@@ -217,6 +227,14 @@ class RowComparison:
                 verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
                 before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
                 yield Finding(key, f"seconds {name}", verdict, before, after, why, timing=True)
+
+    def _repeated(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
+        """The seconds of runs that were repeated for a comparison; all count as one metric in a rule for ``run``."""
+        limits = self.lookup.metric(rules, "seconds run")
+        if not limits.ignore:
+            for name, judged in judge_repeated(old.seconds, new.seconds, self.policy.timings.ratio, limits.noise):
+                before, after = (f"{row.seconds[name]:.3g} s" if name in row.seconds else None for row in (old, new))
+                yield Finding(key, f"seconds {name}", judged[0], before, after, judged[1], timing=True)
 
     def _incomparable(self, old: Row, new: Row) -> str:
         """Why two rows cannot be compared; empty where they can."""

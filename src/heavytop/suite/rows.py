@@ -30,7 +30,7 @@ def time_metric(time: Fraction | None, kind: MetricKind) -> Metric:
 
 
 def data_of(case: Case | None) -> Data | None:
-    """The exact data of the motion that is measured; of an ensemble the start by which those of the others are drawn."""
+    """The exact data of the motion that is measured; of an ensemble the start by which the others are drawn."""
     if case is None:
         return None
     top, start = case.top, case.start

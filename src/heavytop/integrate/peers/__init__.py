@@ -18,7 +18,6 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from fractions import Fraction
-from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from typing import Any, NamedTuple
@@ -121,7 +120,7 @@ def ready(name: str, setting: tuple[str, Fraction] | None = None) -> Contained:
         raise InputError(f"The integrator {name} has no {setting[0]}.", "Fixed steps take a step, others a tolerance.")
     if not takes:
         raise PeerFailed(f"{name} has no {setting[0]}")
-    return Contained(name, partial(chosen, **dict([setting])), own)
+    return Contained(name, chosen, own, dict([setting]))
 
 
 def knob(name: str) -> str:
