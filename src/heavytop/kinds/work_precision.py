@@ -181,8 +181,10 @@ class WorkPrecision(Kind):
         """Seconds, and a run to the end alone; of another package's integrator tried and checked."""
         end, how = task.times[-1:], _repeats(task)
         if not peer.own and sampled.outcome is Outcome.SUCCESS:
-            require_counts(peer.name, sampled, _setting(task.key.subject), error)
-            return tried(peer.name, sampled.problem, integrate, sampled, error, how)
+            seconds, alone = tried(peer.name, sampled.problem, integrate, sampled, error, how)
+            counted = replace(alone, times=sampled.times, states=sampled.states)
+            require_counts(peer.name, counted, _setting(task.key.subject), error)
+            return seconds, alone
         alone = integrate(end)
         warm = alone.seconds["run"] < TOO_LONG and alone.outcome is Outcome.SUCCESS
         figures, runs = timed(lambda number: integrate(end) if warm or number > 1 else alone, how)

@@ -47,6 +47,11 @@ class Integrator:
         return not self.fault and self.name in registry.INTEGRATORS
 
     @property
+    def of_another_package(self) -> bool:
+        """Whether it is believed nothing that can be measured."""
+        return not self.fault and self.name not in registry.INTEGRATORS and self.name not in peers.BUILT_IN
+
+    @property
     def hands_over_steps(self) -> bool:
         """Whether its single steps can be looked at, as heyoka's."""
         return self.name == HEYOKA

@@ -30,7 +30,9 @@ _FURTHER = 10
 """Times the error of a run and what a change of its start in the last places makes, which the end of another may be
 off."""
 _KEPT = 5.0
-"""Times as fast: an equal call that is so much quicker than one from another start was not computed."""
+"""Times as fast: calls that are so much quicker than those from starts further away were not computed."""
+_AFAR = 512
+"""A start is far from those of the other calls that is off by this part of itself."""
 _KEPT_SECONDS = 1e-3
 """Shorter calls are not looked at for that: a pause of the machine is as long."""
 _ANGLE_OF_ORDER = 4
@@ -110,10 +112,14 @@ def tried(
 
 
 def _nudged(problem: Problem, count: int) -> State:
-    """A start ``count`` units in the last place away, for which no run has been kept; its γ stays parallel to its M."""
+    """A start ``count`` units in the last place away, for which no run has been kept."""
+    return _moved(problem, count * problem.precision.eps)
+
+
+def _moved(problem: Problem, part: Fraction) -> State:
+    """A start with Ω and γ larger by a part of them: where γ is parallel to M, it stays so."""
     start = problem.start if problem.given is None else problem.given[1]
-    by = 1 + count * problem.precision.eps
-    return State([by * value for value in start.omega], [by * value for value in start.gamma])
+    return State([(1 + part) * value for value in start.omega], [(1 + part) * value for value in start.gamma])
 
 
 def _allowed(problem: Problem, judged: Trajectory, count: int, error: Fraction | None) -> Fraction | None:
@@ -148,16 +154,19 @@ def _require_near(name: str, run: Trajectory, judged: Trajectory, most: Fraction
 
 
 def _require_computed(name: str, integrate: Integrate, problem: Problem, runs: Sequence[Trajectory]) -> None:
-    """Raises PeerFailed where a call is answered otherwise, or much sooner, when it is made again."""
-    equal = [integrate(runs[0].times, _nudged(problem, 1)) for _ in range(2)]
+    """Raises PeerFailed where a call is answered otherwise when it is made again, or much sooner than from afar."""
+    times = runs[0].times
+    equal = [integrate(times, _nudged(problem, 1)) for _ in range(2)]
     for run in equal:
         require_equal(name, runs[0], run)
-    slowest, fastest = max(run.seconds["run"] for run in equal), min(run.seconds["run"] for run in runs[1:])
-    if fastest > _KEPT_SECONDS and slowest * _KEPT < fastest:
-        raise PeerFailed(
-            f"{name} took {fastest:.2g} s or more from a start that it had not seen, and {slowest:.2g} s when it was "
-            "asked again: it keeps results between calls"
-        )
+    afar = min(integrate(times, _moved(problem, Fraction(step, _AFAR))).seconds["run"] for step in (1, 2))
+    for group, what in ((equal, "it was asked again"), (runs[1:], "it was asked from starts next to one that it knew")):
+        slowest = max(run.seconds["run"] for run in group)
+        if afar > _KEPT_SECONDS and slowest * _KEPT < afar:
+            raise PeerFailed(
+                f"{name} took {afar:.2g} s or more from starts that it did not know, and {slowest:.2g} s or less when "
+                f"{what}: it keeps results between calls"
+            )
 
 
 def require_counts(name: str, run: Trajectory, setting: tuple[str, Fraction] | None, error: Fraction | None) -> None:
