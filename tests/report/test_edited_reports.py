@@ -1,10 +1,12 @@
 """A report that was weakened is never the same, or better: a few edits of `benchmarks/edited_reports.py`, and edges."""
 
+from copy import deepcopy
 from pathlib import Path
+from random import Random
 
 import pytest
 
-from edited_reports import EDITS, trials
+from edited_reports import EDITS, document_of, trials
 from heavytop.errors import InputError
 from heavytop.records import Against, Certified, Law, Metric, Row, Series
 from heavytop.report.laws import judge_law
@@ -21,6 +23,19 @@ def test_no_edit_passes(tmp_path: Path, name: str) -> None:
     found = list(trials(RESULTS / name, tmp_path, 5, 50))
     assert {verdict for _, verdict in found} <= {"worse", "incomparable", "refused"}, found
     assert len({edit for edit, _ in found}) > len(EDITS) / 3
+
+
+def test_every_edit_has_something_to_edit() -> None:
+    """An edit of a field that rows no longer have would never be tried, and never be the same."""
+    left, random = dict(EDITS), Random(1)
+    for name in ("growth", "default", "peers"):
+        for row in document_of(RESULTS / name)["rows"]:
+            for edit, change in list(left.items()) if row["outcome"] == "success" else ():
+                changed = deepcopy(row)
+                if change(changed, random):
+                    assert changed != row, edit
+                    del left[edit]
+    assert not left
 
 
 def one(band: float | None = 0.3, value: str = "1e-12", **changes) -> Row:
