@@ -427,7 +427,7 @@ def _interval_by_itself(law: Document, random: Random) -> None:
 
 def _next_class(law: Document, random: Random) -> None:
     names = ["bounded", "t^0.5", "t", "t^1.5", "t^2", "exponential"]
-    at = names.index(law["growth"])
+    at = names.index(law["growth"]) if law["growth"] in names else 5
     if at < 5:
         law["growth"] = names[random.randint(at + 1, 5)]
         if random.random() < 0.5:
