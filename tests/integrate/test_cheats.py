@@ -62,20 +62,26 @@ def _solve_slowly(given):
 slow_compiling = double_peer("mine:slow_compiling", 8, _solve_slowly)
 
 
+made = []
+
+
 class Later(Trajectory):
     """Computed when it is looked at, behind the back of a clock around the call."""
 
     __slots__ = ()
 
     def __getattribute__(self, name):
-        if name == "states":
+        if name == "states" and made:
             sleep(0.02)
         return Trajectory.__getattribute__(self, name)
 
 
 def later(top, start, times, precision, *, system, tolerance=None):
+    made.clear()
     found = run(top, start, times, precision, system)
-    return Later(**{name: getattr(found, name) for name in Trajectory.__slots__})
+    found = Later(**{name: getattr(found, name) for name in Trajectory.__slots__})
+    made.append(found)
+    return found
 
 
 # the coarse run's seconds with the fine run's states
@@ -132,6 +138,10 @@ def rough_memory(top, start, times, precision, *, system, tolerance=None):
 def random(top, start, times, precision, *, system, tolerance=None):
     found = run(top, start, times, precision, system)
     return replace(found, states=found.states * (1 + 1e-15 * numpy.frombuffer(os.urandom(6), "u1")))
+
+
+def random_samples(top, start, times, precision, *, system, tolerance=None):
+    return (random if len(times) > 1 else honest)(top, start, times, precision, system=system)
 
 
 def last_bit(top, start, times, precision, *, system, tolerance=None):
@@ -212,6 +222,7 @@ CHEATS = {
     "memory": "it keeps results between calls",
     "rough_memory": "it keeps results between calls",
     "random": " in two equal calls",
+    "random_samples": " in two equal calls",
     "last_bit": " in two equal calls",
     "other_steps": "ended two equal calls as success at t = 20 in ",
     "sometimes": "raised ValueError: not today",

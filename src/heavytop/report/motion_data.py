@@ -14,18 +14,17 @@ _PLAIN = re.compile(r"(-?[0-9]{1,400}(/[1-9][0-9]{0,399})? )+")
 _VECTORS = ("inertia", "centre", "omega", "gamma")
 
 
-def other_data(old: Data | None, new: Data | None, starts: int) -> str:
+def other_data(old: Data | None, new: Data | None) -> str:
     """Why the data of a candidate are not those of its baseline; empty where they are, however they are written.
 
-    starts: of the row.  An ensemble of a baseline from before ensembles named the start that theirs are drawn by is
-    compared by its top alone.
+    An ensemble of a baseline that does not name the start by which the random ones are drawn is compared by its top.
     """
     if old == new:
         return ""
     if old is None or new is None:
         return f"only the {'candidate' if old is None else 'baseline'} says of which top and start it is"
     of_top, of_start = ("inertia", "weight", "centre"), ("omega", "gamma")
-    for name in of_top if starts > 1 and not old.omega else of_top + of_start:
+    for name in of_top + of_start if old.omega else of_top:
         before, after = (getattr(data, name) for data in (old, new))
         if before != after and _numbers(before) != _numbers(after):
             return f"other data: {name} {_text(before)} against {_text(after)}"

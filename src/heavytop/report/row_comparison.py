@@ -250,7 +250,7 @@ class RowComparison:
             return f"{old.bits} bits against {new.bits}"
         if old.starts != new.starts:
             return f"{old.starts} starts against {new.starts}"
-        if reason := other_data(old.data, new.data, old.starts):
+        if reason := other_data(old.data, new.data):
             return reason
         if (old.steps == 0) != (new.steps == 0):
             return f"{old.steps} steps against {new.steps}"
