@@ -281,8 +281,9 @@ def _certificates(**changes: Any) -> Edit:
     return _reference(change)
 
 
-def _checked(**changes: Any) -> Edit:
-    return _reference(lambda reference: reference["checked"].update(changes) if reference.get("checked") else None)
+def _computed(change: Callable[[Document], Document]) -> Edit:
+    """Edits what is said of two computed runs that are the reference."""
+    return _reference(lambda it: it.update(change(it)) if it["how"] == "computed" and it.get("until") else None)
 
 
 def _radius(change: Callable[[str], str]) -> Edit:
@@ -325,6 +326,74 @@ def subject(row: Document, _: Random) -> bool:
     return bool(was)
 
 
+def data_number(row: Document, random: Random) -> bool:
+    """Another top or start under the same name: by a lot, or in a place that no format holds."""
+    data = row["data"]
+    if data is None:
+        return False
+    name = random.choice([name for name in ("inertia", "weight", "centre", "omega", "gamma") if data.get(name)])
+    factor = random.choice([Fraction(2), Fraction(-1), 1 + Fraction(1, 10**40)])
+    numbers = [data[name]] if name == "weight" else data[name]
+    at = random.choice([place for place, text in enumerate(numbers) if exact(text) != 0] or [0])
+    changed = [str(exact(text) * factor or 1) if place == at else text for place, text in enumerate(numbers)]
+    data[name] = changed[0] if name == "weight" else changed
+    return True
+
+
+def data_permuted(row: Document, random: Random) -> bool:
+    """The axes renamed in one of them alone."""
+    data = row["data"] or {}
+    name = random.choice([name for name in ("inertia", "centre", "omega", "gamma") if data.get(name)] or [""])
+    if name:
+        before, data[name] = data[name], [*data[name][1:], data[name][0]]
+        return bool(before != data[name])
+    return False
+
+
+def data_dropped(row: Document, random: Random) -> bool:
+    was, row["data"] = row["data"], None
+    return was is not None
+
+
+def data_without_a_start(row: Document, random: Random) -> bool:
+    data = row["data"] or {}
+    return bool([data.pop(name) for name in ("omega", "gamma") if data.get(name)])
+
+
+def data_not_numbers(row: Document, random: Random) -> bool:
+    if row["data"] is not None:
+        row["data"]["inertia"][random.randrange(3)] = random.choice(["nan", "", "one", "1/0", "-2", "0"])
+    return row["data"] is not None
+
+
+def quantity_of_a_series(row: Document, random: Random) -> bool:
+    series = _one_series(row, random)
+    if series and series["quantity"]:
+        series["quantity"]["name"] += "_of_another"
+    return bool(series and series["quantity"])
+
+
+def quantity_of_a_law(row: Document, random: Random) -> bool:
+    law = random.choice(list(row["laws"].values())) if row["laws"] else None
+    if law and law["quantity"]:
+        law["quantity"]["component"] = "another"
+    return bool(law and law["quantity"])
+
+
+def _seconds(*names: str, factors: tuple[float, ...]) -> Edit:
+    """Seconds of runs that were repeated for a comparison, times a factor; dropped for 0."""
+
+    def edit(row: Document, random: Random) -> bool:
+        factor, repeated = random.choice(factors), "band" in row["seconds"]
+        for name in names if repeated else ():
+            seconds = row["seconds"].pop(name)
+            if factor:
+                row["seconds"][name] = seconds * factor
+        return repeated
+
+    return edit
+
+
 def _law(change: Callable[[Document, Random], Any]) -> Edit:
     def edit(row: Document, random: Random) -> bool:
         laws = [law for law in row["laws"].values() if law["low"] is not None]
@@ -358,7 +427,7 @@ def _interval_by_itself(law: Document, random: Random) -> None:
 
 def _next_class(law: Document, random: Random) -> None:
     names = ["bounded", "t^0.5", "t", "t^1.5", "t^2", "exponential"]
-    at = names.index(law["growth"])
+    at = names.index(law["growth"]) if law["growth"] in names else 5
     if at < 5:
         law["growth"] = names[random.randint(at + 1, 5)]
         if random.random() < 0.5:
@@ -374,9 +443,16 @@ EDITS: dict[str, Edit] = {
         value_changed, verdict_turned, metric_dropped, series_dropped, law_dropped, series_shorter, series_larger,
         series_without_its_end, not_finite_hidden, outcome, not_finite, horizon_shorter, reached_less, no_steps,
         more_steps, more_evaluations, bits, precision, starts_fewer, samples_fewer, start_failed, flags, order,
-        rounding, subject, words_about_the_reference,
+        rounding, subject, words_about_the_reference, data_number, data_permuted, data_dropped, data_without_a_start,
+        data_not_numbers, quantity_of_a_series, quantity_of_a_law,
     )
 } | {
+    "slower": _seconds("run", "least", factors=(2.0, 5.0, 100.0, 1e6)),
+    "median slower": _seconds("run", factors=(2.0, 100.0)),
+    "fastest run slower": _seconds("least", factors=(2.0, 100.0)),
+    "seconds dropped": _seconds("run", "least", "band", factors=(0.0,)),
+    "scatter of the runs dropped": _seconds("band", factors=(0.0,)),
+    "scatter of the runs wider": _seconds("band", factors=(30.0, 1000.0)),
     "reference computed": _reference(lambda it: it.update(how="computed") if it["how"] == "proven" else None),
     "reference not proven": _reference(_not_proven),
     "radius larger": _radius(lambda radius: f"{10**9 * float(radius)}"),
@@ -385,9 +461,9 @@ EDITS: dict[str, Edit] = {
     "no certificate": _reference(lambda it: it.pop("certificates", None)),
     "certified at an earlier time": _certificates(time="1/99"),
     "starts not certified": _certificates(starts=3),
-    "computed reference checked on fewer starts": _checked(starts=1),
-    "computed reference checked up to an earlier time": _checked(until="0.3"),
-    "computed reference worse": _checked(part="2"),
+    "computed reference agrees less": _computed(lambda it: {"radius": f"{1e4 * float(it['radius'])}"}),
+    "computed reference ends earlier": _computed(lambda it: {"until": f"{0.3 * float(it['until'])}"}),
+    "computed reference is none": _computed(lambda it: dict.fromkeys(it, "") | {"how": "none", "reason": "lost"}),
     "exponent larger in a wide interval": _law(
         lambda law, _: law.update(exponent=law["exponent"] + 5, low=-50.0, high=50.0)
     ),
@@ -425,6 +501,7 @@ def edited(document: Document, random: Random) -> tuple[str, Document]:
         at = random.randrange(len(changed["rows"]))
         changed["rows"][at] = deepcopy(changed["rows"][at])
         if EDITS[name](changed["rows"][at], random):
+            assert changed["rows"][at] != document["rows"][at], f"{name} edits nothing"
             return name, changed
 
 
@@ -437,9 +514,18 @@ def verdict(baseline: Path, folder: Path, changed: Document) -> str:
         return "refused"
 
 
+def document_of(baseline: Path) -> Document:
+    """The report at ``baseline``, with seconds as of a plan with ``timings = true``."""
+    document: Document = msgspec.json.decode((baseline / store.FILE).read_bytes())
+    for row in document["rows"]:
+        if row["measure"] == "work_precision" and row["seconds"].get("run"):
+            row["seconds"]["band"] = 0.03
+    return document
+
+
 def trials(baseline: Path, folder: Path, seed: int, count: int) -> Iterator[tuple[str, str]]:
     """``count`` edits, each of three rows of the report at ``baseline``, and what a comparison says of each."""
-    random, document = Random(seed), msgspec.json.decode((baseline / store.FILE).read_bytes())
+    random, document = Random(seed), document_of(baseline)
     kept = [row for row in document["rows"] if row["outcome"] == "success"]
     start = folder / "baseline"
     start.mkdir()

@@ -242,7 +242,9 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """The exact data of a motion, as text; omega and gamma, of its start, are empty for an ensemble of starts."""
+    """The exact data of a motion, as text; omega and gamma are its start, or for an ensemble that by which its random
+    starts are drawn, empty in older reports.
+    """
 
     inertia: tuple[str, ...]
     weight: str
@@ -257,7 +259,7 @@ class Row(msgspec.Struct, gc=False):
     key: what is measured, of what, how, over which time; case, system, integrator, precision, horizon and measure are
     what other programs read of it.  reference: what it was compared with; measured and against say both in words, which
     nothing reads.
-    outcome, time_reached, steps, finite travel with every number.  seconds: timings, not compared.
+    outcome, time_reached, steps, finite travel with every number.  seconds: timings, compared where they have a band.
     evaluations: of the field, where the integrator counts them.
     samples: how many times the largest values are over; 0 where that is not said.
     data: of the top and its start, before any rounding; null where no motion is measured.

@@ -1,10 +1,12 @@
 """A report that was weakened is never the same, or better: a few edits of `benchmarks/edited_reports.py`, and edges."""
 
+from copy import deepcopy
 from pathlib import Path
+from random import Random
 
 import pytest
 
-from edited_reports import EDITS, trials
+from edited_reports import EDITS, document_of, trials
 from heavytop.errors import InputError
 from heavytop.records import Against, Certified, Law, Metric, Row, Series
 from heavytop.report.laws import judge_law
@@ -21,6 +23,19 @@ def test_no_edit_passes(tmp_path: Path, name: str) -> None:
     found = list(trials(RESULTS / name, tmp_path, 5, 50))
     assert {verdict for _, verdict in found} <= {"worse", "incomparable", "refused"}, found
     assert len({edit for edit, _ in found}) > len(EDITS) / 3
+
+
+def test_every_edit_has_something_to_edit() -> None:
+    """An edit of a field that rows no longer have would never be tried, and never be the same."""
+    left, random = dict(EDITS), Random(1)
+    for name in ("growth", "default", "peers"):
+        for each in document_of(RESULTS / name)["rows"]:
+            for edit, change in list(left.items()) if each["outcome"] == "success" else ():
+                changed = deepcopy(each)
+                if change(changed, random):
+                    assert changed != each, edit
+                    del left[edit]
+    assert not left
 
 
 def one(band: float | None = 0.3, value: str = "1e-12", **changes) -> Row:
@@ -230,6 +245,59 @@ def test_a_law_that_is_resolved_in_one_report_only_is_judged_by_its_intervals(ch
     assert judged(one(laws={"drift_area": STRAIGHT}), one(laws={"drift_area": new}))[0] == verdict
     if verdict == "same":
         assert judged(one(laws={"drift_area": new}), one(laws={"drift_area": STRAIGHT}))[0] == "same"
+
+
+HALF_WAY = Law("t", 16, 1.22, 1.06, 1.38, "100", "1e5", "1e-19", "1e20", (-0.1, 0.4))
+
+
+@pytest.mark.parametrize(
+    ("old", "change", "rerun", "once"),
+    [
+        # a tenth of the width of the interval, 0.06, between two that do not meet: from 0.53 to 0.536
+        (LAW, {"exponent": 0.563, "low": 0.533, "high": 0.593}, "same", "worse"),
+        (LAW, {"exponent": 0.5655, "low": 0.5355, "high": 0.5955}, "same", "worse"),
+        (LAW, {"exponent": 0.5665, "low": 0.5365, "high": 0.5965}, "worse", "worse"),
+        (LAW, {"exponent": 0.4345, "low": 0.4045, "high": 0.4645}, "same", "better"),
+        (LAW, {"exponent": 0.4335, "low": 0.4035, "high": 0.4635}, "better", "better"),
+        # an interval twice as wide counts as 1.4 times as wide: to 0.042 below the exponent
+        (LAW, {"exponent": 0.577, "low": 0.517, "high": 0.637}, "same", "worse"),
+        (LAW, {"exponent": 0.579, "low": 0.519, "high": 0.639}, "worse", "worse"),
+        # two classes, exponents 0.25 apart at most
+        (HALF_WAY, {"growth": "t^1.5", "exponent": 1.3, "low": 1.2, "high": 1.4}, "same", "worse"),
+        (HALF_WAY, {"growth": "t^1.5", "exponent": 1.46, "low": 1.3, "high": 1.6}, "same", "worse"),
+        (HALF_WAY, {"growth": "t^1.5", "exponent": 1.48, "low": 1.3, "high": 1.6}, "worse", "worse"),
+        (HALF_WAY, {"growth": "t^1.5", "exponent": 1.46, "low": 1.44, "high": 1.5}, "worse", "worse"),
+        (HALF_WAY, {"growth": "exponential", "exponent": 1.3, "low": 1.2, "high": 1.4, "bend": None}, "worse", "worse"),
+        # extrapolated by two powers, the time of the last digit is not compared
+        (HALF_WAY, {"growth": "t^1.5", "exponent": 1.3, "low": 1.2, "high": 1.4, "lost_at": "1e15"}, "same", "worse"),
+        (HALF_WAY, {"lost_at": "1e15"}, "worse", "worse"),
+        # bends: half of the width of the interval, 0.5
+        (HALF_WAY, {"growth": "unresolved", "bend": (0.64, 1.14), "lost_at": None}, "same", "worse"),
+        (HALF_WAY, {"growth": "unresolved", "bend": (0.66, 1.16), "lost_at": None}, "worse", "worse"),
+    ],
+)
+def test_chance_is_allowed_for_between_two_runs_and_not_in_one_series(old: Law, change, rerun: str, once: str) -> None:
+    new = replace(old, **change)
+    assert judge_law(old, new, rerun=True)[0].value == rerun
+    assert judge_law(old, new)[0].value == once
+    one_series = Series(TIMES, ["1e-13", "1e-12", "1e-12"])
+    for other, expected in ((one_series, once), (Series(TIMES, ["1.1e-13", "1e-12", "1e-12"]), rerun)):
+        two = [
+            row(metrics={}, starts=64, laws={"drift_area": law}, series={"drift_area": series}, samples=3)
+            for law, series in ((old, one_series), (new, other))
+        ]
+        assert judged(*two)[0] == expected
+        assert judged(*(replace(each, series={}) for each in two))[0] == once
+
+
+@pytest.mark.parametrize(("starts", "same", "worse"), [(12, "5.4e-12", "5.6e-12"), (64, "3.9e-12", "4.1e-12")])
+def test_of_a_few_starts_the_noise_has_a_least(starts: int, same: str, worse: str) -> None:
+    # 2 · √(0.2165² + 0.3²) = 0.74 decades, 0.2165 being 0.75/√12; of 64 starts 0.26, less than two bits
+    def of(value: str, band: float, count: int) -> Row:
+        return row(measure="growth", starts=count, metrics={"drift_area_max": replace(error(value), band=band)})
+
+    assert judged(of("1e-12", 0.06, starts), of(same, 0.3 if starts < 24 else 0.1, starts))[0] == "same"
+    assert judged(of("1e-12", 0.06, starts), of(worse, 0.3 if starts < 24 else 0.1, starts))[0] == "worse"
 
 
 def test_an_exponential_has_a_rate_and_no_power_has_one_to_compare_with_it() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -40,6 +41,9 @@ NAME = "growth"
 FAILED = Quantity("starts_failed")
 _MOST_BITS = 900
 """Errors of more bits underflow in the floats that laws of growth are fitted with."""
+_BAND_OF_ONE = 0.75
+"""Decades, times 1/√n for n starts: 1.96/(√2 ln 10) = 0.60 for errors that are normal, and more for longer tails.  From
+24 starts on it is below the 2 bits that every error may grow by."""
 _LIMITS = {"starts": range(1, 100_001), "samples": range(4, 1001), "decades": range(1, 13)}
 
 
@@ -125,6 +129,10 @@ class Growth(Kind):
     def carries_band(self, metric: Metric) -> bool:
         """Every error; how many starts failed is none."""
         return super().carries_band(metric) and metric.quantity != FAILED
+
+    def least_band(self, starts: int) -> float:
+        """Of a root mean square over a few starts, of which none may have drawn the tail that those of a rerun do."""
+        return _BAND_OF_ONE / math.sqrt(starts)
 
     def cost(self, task: Task) -> float:
         """Of all starts, a few of them side by side."""

@@ -14,7 +14,7 @@ from heavytop.integrate.trajectory import Outcome, TaylorStep
 from heavytop.kinds.base import Kind
 from heavytop.measure import local_error
 from heavytop.measure.integrator import HEYOKA
-from heavytop.measure.single_calls import single_calls
+from heavytop.measure.single_calls import require_sum, single_calls
 from heavytop.precision import parse, time_text
 from heavytop.records import Against, Row, RowKey
 from heavytop.report.brief import wrapped
@@ -115,6 +115,8 @@ class LocalError(Kind):
         error = local_error.LocalError(run.problem)
         for time, step in steps:
             error(time, step)
+        if run.outcome is Outcome.SUCCESS and error.running.count:
+            require_sum(task.integrator, run, error.largest)
         if run.outcome is Outcome.SUCCESS and not error.running.count:
             raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)

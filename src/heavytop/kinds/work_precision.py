@@ -7,8 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
-from statistics import median
-from time import perf_counter, sleep
 from typing import Any
 
 import msgspec
@@ -16,6 +14,7 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from heavytop.errors import InputError
+from heavytop.exact.balls import midpoint, radius
 from heavytop.integrate import peers
 from heavytop.integrate.peers.source import Source
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -24,6 +23,7 @@ from heavytop.measure.drift import DRIFT
 from heavytop.measure.scalar import metric, of_fraction
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
+from heavytop.measure.timed_calls import TOO_LONG, Repeats, require_counts, timed, tried
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text, usable_tolerance
 from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
@@ -46,10 +46,7 @@ from heavytop.top.heavy_top import State
 NAME = "work_precision"
 _ENOUGH_SECONDS = 0.3
 _RUNS = range(3, 101)
-_REST = 0.002
-"""Seconds of sleep before a run: it then starts on a fresh slice of the processor's time."""
-_TOO_LONG = 3.0
-"""A run of so many seconds is timed once."""
+_FOR_COMPARISON = Repeats(11, 201, 1.0, 3, band=True)
 ERROR_MAX, ERROR_FINAL = ERRORS
 RETURN = Quantity("return_error")
 _RUNGS = {"tolerance": ["1e-6", "1e-9", "1e-12", FINEST], "step": ["1/10", "1/30", "1/100", "1/300"], "": [FINEST]}
@@ -84,12 +81,16 @@ class Ladder(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class WorkPrecisionTable(Table, tag=NAME):
-    """Each rung of each ladder over the same horizon; ``samples`` uniform samples."""
+    """Each rung of each ladder over the same horizon; ``samples`` uniform samples.
+
+    timings: whether runs are repeated so often that two reports of one machine can be compared by their seconds.
+    """
 
     cases: list[str]
     horizon: str
     ladders: list[Ladder]
     samples: int = 100
+    timings: bool = False
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
@@ -103,6 +104,7 @@ class WorkPrecisionTable(Table, tag=NAME):
                 f"{subject.name} {subject.setting}",
                 case,
                 *times,
+                self.timings,
             )
             for case in map(find, self.cases)
             for precision, subject in rungs
@@ -126,6 +128,7 @@ class WorkPrecision(Kind):
     """error_final and error_max (largest component, at the end and over the samples), return_error, and drift.
 
     seconds: ``run`` is the median and ``least`` the fastest of ``repeats`` runs to the end alone; ``compile`` is apart.
+    ``band``: with ``timings``, half-width in decades of the interval that holds the middle 95 % of the runs.
     """
 
     name = NAME
@@ -157,10 +160,10 @@ class WorkPrecision(Kind):
             top = case.top if start is case.start else problem.top
             return peer(top, start, times, precision, system=case.system)
 
-        seconds, alone = _timed(lambda: integrate(task.times[-1:]))
         sampled = integrate(task.times)
         scorer = _scored(task, problem, sampled)
         metrics = _metrics(scorer, bool(sampled.times))
+        seconds, alone = self._timed(task, integrate, sampled, _error(scorer))
         done = alone.outcome is Outcome.SUCCESS and sampled.outcome is Outcome.SUCCESS
         if case.system is HEAVY_TOP:
             metrics[RETURN] = _returned(problem, alone, integrate) if done else _missing()
@@ -172,8 +175,28 @@ class WorkPrecision(Kind):
         row = computed_row(task, run, by_name(metrics), scorer.series(time_text), scorer.against)
         return msgspec.structs.replace(row, integrator=task.subject, evaluations=run.evaluations)
 
+    def _timed(
+        self, task: Task, integrate: Any, sampled: Trajectory, error: Fraction | None
+    ) -> tuple[dict[str, float], Trajectory]:
+        """Seconds, and a run to the end alone; of another package's integrator tried and checked."""
+        end, how = task.times[-1:], _repeats(task)
+        name = task.integrator.name
+        if task.integrator.of_another_package and sampled.outcome is Outcome.SUCCESS:
+            seconds, alone = tried(name, sampled.problem, integrate, sampled, error, how)
+            counted = replace(alone, times=sampled.times, states=sampled.states)
+            require_counts(name, counted, _setting(task.key.subject), error)
+            return seconds, alone
+        alone = integrate(end)
+        warm = alone.seconds["run"] < TOO_LONG and alone.outcome is Outcome.SUCCESS
+        figures, runs = timed(lambda number: integrate(end) if warm or number > 1 else alone, how)
+        alone = runs[-1]
+        compiling = max(run.seconds["compile"] for run in (sampled, alone))
+        return {"compile": compiling} | figures, alone
+
     def contradictions(self, row: Row) -> Iterator[str]:
-        """The errors are the largest of Ω and γ."""
+        """The errors are the largest of Ω and γ; the median of the seconds is no less than the least of them."""
+        if row.seconds.get("least", 0.0) > row.seconds.get("run", math.inf):
+            yield "seconds: the fastest run is slower than the median"
         names = (Quantity(SOLUTION_ERROR, part).text for part in ("omega", "gamma"))
         both = [row.series[name] for name in names if name in row.series]
         largest, last = (row.metrics.get(quantity.text) for quantity in (ERROR_MAX, ERROR_FINAL))
@@ -229,19 +252,19 @@ def _setting(subject: Subject) -> tuple[str, Fraction] | None:
     return ("tolerance", exact(subject.tolerance)) if subject.tolerance else ("step", exact(subject.step))
 
 
-def _timed(integrate: Any) -> tuple[dict[str, float], Trajectory]:
-    """Median seconds of several runs after one to warm up, and one of the runs."""
-    run: Trajectory = integrate()
-    compile_seconds = run.seconds["compile"]
-    began, spent = perf_counter(), [run.seconds["run"]]
-    if spent[0] < _TOO_LONG and run.outcome is Outcome.SUCCESS:
-        spent = []
-        while len(spent) < _RUNS[-1] and (len(spent) < _RUNS[0] or perf_counter() - began < _ENOUGH_SECONDS):
-            sleep(_REST)
-            run = integrate()
-            spent.append(run.seconds["run"])
-    figures = {"compile": compile_seconds, "run": median(spent), "least": min(spent), "repeats": float(len(spent))}
-    return figures, run
+def _repeats(task: Task) -> Repeats:
+    """More of them where seconds are to be compared."""
+    if task.options:
+        return _FOR_COMPARISON
+    return Repeats(_RUNS[0], _RUNS[-1], _ENOUGH_SECONDS)
+
+
+def _error(scorer: Scorer) -> Fraction | None:
+    """The largest error over the samples, or what it is below; None without a reference."""
+    if scorer.error is None:
+        return None
+    parts = [scorer.error.running[part].maximum for part in ("omega", "gamma")]
+    return max(midpoint(part) + radius(part) for part in parts) if all(part.is_finite() for part in parts) else None
 
 
 def _scored(task: Task, problem: Problem, run: Trajectory) -> Scorer:

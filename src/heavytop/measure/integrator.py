@@ -12,6 +12,7 @@ from heavytop.integrate import peers, registry, taylor
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
+from heavytop.integrate.peers.contract import require_equal
 from heavytop.integrate.peers.source import Source
 from heavytop.integrate.taylor import Observer
 from heavytop.integrate.trajectory import Problem, TaylorStep, Trajectory
@@ -20,6 +21,8 @@ from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 HEYOKA, WORDS = "heyoka", "words"
+_AGAIN_SECONDS = 1.0
+"""A longer call of an integrator of another package is made once."""
 
 
 def require(which: str | Source) -> None:
@@ -52,6 +55,11 @@ class Integrator:
         return not self.fault and self.name in registry.INTEGRATORS
 
     @property
+    def of_another_package(self) -> bool:
+        """Whether it is believed nothing that can be measured."""
+        return not self.fault and self.name not in registry.INTEGRATORS and self.name not in peers.BUILT_IN
+
+    @property
     def hands_over_steps(self) -> bool:
         """Whether its single steps can be looked at, as heyoka's."""
         return self.name == HEYOKA
@@ -64,12 +72,15 @@ class Integrator:
         precision: Precision,
         system: System,
         observer: Observer | None = None,
+        *,
+        again: bool = True,
         **going_on: Any,
     ) -> Trajectory:
         """The motion of an exact top and start; every state goes to ``observer``, where there is one.
 
         going_on: place and mark as in :func:`heavytop.integrate.taylor.propagate`, of no use to an integrator that
-        knows no places.  Raises PeerFailed for whatever an integrator of others does wrong.
+        knows no places.  again: whether a quick call of an integrator of another package is made twice, to see whether
+        it is the same.  Raises PeerFailed for whatever an integrator of others does wrong.
         """
         if self.fault:
             watch = observer or (lambda time, state: None)
@@ -79,7 +90,10 @@ class Integrator:
             run: Trajectory = call(top, start, times, precision, system=system, observer=observer, **going_on)
             return run
         try:
-            run = peers.ready(self.which, self.setting)(top, start, times, precision, system=system)
+            peer = peers.ready(self.which, self.setting)
+            run = peer(top, start, times, precision, system=system)
+            if again and self.of_another_package and run.seconds["run"] < _AGAIN_SECONDS:
+                require_equal(self.name, run, peer(top, start, times, precision, system=system))
         except Unsupported:
             raise
         except InputError as error:  # what a peer of this program cannot be asked for is one row's failure too
@@ -116,7 +130,8 @@ class Integrator:
         runs = []
         for index, problem in enumerate(problems):
             watch = None if observer is None else _watching(observer, index)
-            runs.append(self.propagate(*_given(problem), times, problem.precision, problem.system, watch))
+            first = index == 0
+            runs.append(self.propagate(*_given(problem), times, problem.precision, problem.system, watch, again=first))
             if finished is not None:
                 finished(index, runs[-1])
         return runs

@@ -17,7 +17,7 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.validated import Validated
 from heavytop.integrate.trajectory import Problem, TaylorStep
@@ -85,6 +85,12 @@ class LocalError:
                 near, far = seen
                 order = (float((gaps[far] / gaps[near]).log()) / log(far / near) - 1,)
             return self.running.following(gaps[1] / scale), order
+
+    @property
+    def largest(self) -> Fraction:
+        """The largest error of a step so far."""
+        size = max(map(abs, self.problem.start.flat))
+        return (midpoint(self.running.maximum) + radius(self.running.maximum)) * self.problem.precision.eps * size
 
     @whole_evaluation
     def metrics(self) -> dict[str, Metric]:

@@ -8,12 +8,15 @@ from fractions import Fraction
 from typing import Any
 
 from heavytop.errors import PeerFailed, Unsupported
-from heavytop.integrate import peers, registry
+from heavytop.exact.balls import midpoint
+from heavytop.exact.validated import Validated
+from heavytop.integrate import peers, registry, taylor
 from heavytop.integrate.peers.command import NOT_COUNTED
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.integrator import Integrator
 from heavytop.measure.local_error import Call
-from heavytop.precision import Precision, exact, number
+from heavytop.measure.scalar import GUARD_BITS
+from heavytop.precision import Precision, decimal_text, exact, number
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -22,6 +25,10 @@ _LONGER = (2, 4, 8, 16, 32, 64)
 """Lengths, in steps, of the single steps in which the order of a method with fixed steps shows."""
 _LONGEST = 2
 """Radians: in longer steps no order shows."""
+_UNSEEN = 10
+"""Times as large as the largest error of 16 steps may be that of another."""
+_ROUNDINGS = 32
+"""Of one step, in eps of the state: 17 stages of a splitting method come to 16."""
 _MOST_STEPS = 64
 """Steps in one call over the mean step: CVODE and LSODA, which begin with order 1 and small steps, take 18."""
 
@@ -78,6 +85,45 @@ def _require_count(integrator: Integrator, runs: Sequence[Trajectory], most: int
             raise PeerFailed(
                 f"{integrator.name} counts its steps wrongly: {run.steps} in a call over the mean step of its own run"
             )
+
+
+def require_sum(integrator: Integrator, whole: Trajectory, step: Fraction) -> None:
+    """Raises PeerFailed where an integrator of another package ends further off than its steps can have taken it.
+
+    step: the largest error of a step over the mean step, which follows from its count of steps; one too large makes
+    every step short, and its error small.  Errors add up, roundings as a random walk, and grow along the motion as its
+    neighbours part, or with the angle that it turns by.
+    """
+    if not integrator.of_another_package:
+        return
+    p, until = whole.problem, whole.times[-1]
+    growth = 1 + until * exact(float(_rate_squared(p)) ** 0.5) + _parting(p, until)
+    bits = p.precision.bits + GUARD_BITS
+    truth = Validated(p.top, p.start, p.system, p.parameters.rotor).state(until, bits)
+    off = max(abs(exact(value) - midpoint(true)) for value, true in zip(whole.states[-1], truth, strict=True))
+    rounding = p.precision.eps * max(map(abs, p.start.flat))
+    at_random = step <= _ROUNDINGS * rounding
+    added = exact(whole.steps**0.5) if at_random else whole.steps
+    most = _UNSEEN * growth * added * (step + rounding)
+    if off > most:
+        raise PeerFailed(
+            f"{integrator.name} counts its steps wrongly: {whole.steps}, each off by {decimal_text(step, 2)} at most, "
+            f"and its run to t = {decimal_text(until, 6)} is off by {decimal_text(off, 2)}"
+        )
+
+
+def _parting(problem: Problem, until: Fraction) -> Fraction:
+    """How many times as far apart two neighbouring motions are in the end, by heyoka."""
+    top, start = problem.given or (problem.top, problem.start)
+    by = Fraction(1, 1 << problem.precision.bits // 2)
+    near = State(*([(1 + by) * value for value in part] for part in (start.omega, start.gamma)))
+    one, other = (
+        taylor.propagate(top, each, [until], problem.precision, system=problem.system) for each in (start, near)
+    )
+    if Outcome.SUCCESS is not one.outcome or one.outcome is not other.outcome:
+        return Fraction(0)
+    apart: Fraction = max(abs(exact(a) - exact(b)) for a, b in zip(one.states[0], other.states[0], strict=True))
+    return apart / by / max(map(abs, start.flat))
 
 
 def _rate_squared(problem: Problem) -> Fraction:

@@ -18,6 +18,7 @@ from heavytop.report.verdicts import Verdict
 __all__ = ["Comparison", "Finding", "compare"]
 
 _MACHINE = ("system", "machine", "processor", "simd_width_double", "cpu_features")
+_VERSIONS = ("python", "implementation", "flint", "llvm", "cpu_target")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +86,9 @@ def compare(
     missing: list[tuple[int, Row]] = []
     changes = Changes()
     timed = _timed(policy, baseline.environment, candidate.environment)
+    repeated = _alike(baseline.environment, candidate.environment)
     checked = isinstance(baseline, Brief), isinstance(candidate, Brief)
-    rows = RowComparison(policy, kinds, timed, list_same, checked)
+    rows = RowComparison(policy, kinds, timed, list_same, checked, repeated)
     others = _Others(candidate.rows)
     for row in baseline.rows:
         match = others.take(row.identity)
@@ -158,6 +160,16 @@ def _timed(policy: Policy, old: dict[str, Any], new: dict[str, Any]) -> bool:
     return when == "always" or (
         when == "same-machine" and all(name in old and old[name] == new.get(name) for name in _MACHINE)
     )
+
+
+def _alike(old: dict[str, Any], new: dict[str, Any]) -> bool:
+    """Whether processor and versions agree, that of this program apart, which is what is compared."""
+    first, second = (
+        {name: version for name, version in each.get("packages", {}).items() if name != "heavytop"}
+        for each in (old, new)
+    )
+    known = (*_MACHINE, *_VERSIONS)
+    return first == second and all(name in old and old[name] == new.get(name) for name in known)
 
 
 def _differences(old: dict[str, Any], new: dict[str, Any]) -> list[tuple[str, str, str]]:

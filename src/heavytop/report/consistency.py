@@ -16,6 +16,7 @@ from heavytop.precision import exact, log10, parse
 from heavytop.records import Metric, Quantity, Row, Series
 from heavytop.report.kind import Kind
 from heavytop.report.laws import inconsistent
+from heavytop.report.motion_data import impossible
 
 CLOSE = 1e-5
 """Decades: how far two logarithms of the same number may be apart, for numbers have six digits at least."""
@@ -32,6 +33,10 @@ def contradictions(row: Row, kind: Kind) -> Iterator[str]:
         for name, law in row.laws.items():
             if reason := inconsistent(law):
                 yield f"growth {name}: {reason}"
+            if law.starts > row.starts > 1:
+                yield f"growth {name}: a law of {law.starts} starts in a row of {row.starts}"
+    if row.data is not None and (reason := impossible(row.data, row.starts)):
+        yield f"data: {reason}"
     if row.outcome != _SUCCESS:
         return
     if row.against != row.reference.text:

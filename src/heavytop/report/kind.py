@@ -47,6 +47,10 @@ class Kind(Protocol):
         """Half-width in decades of the rounding noise of a row that has no bands."""
         return 0.0
 
+    def least_band(self, starts: int) -> float:
+        """Half-width in decades of the noise of a row of so many starts, where its band is narrower by chance."""
+        return 0.0
+
     def roundings(self, quantity: Quantity | None, steps: int) -> float:
         """log10 of how many eps the roundings of ``steps`` steps add up to, where the row has no bands."""
         return 0.0

@@ -67,6 +67,8 @@ class Rule(Allowance, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class Timings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Seconds compare never, between runs of one machine, or always.  They may grow by ``ratio``; below ``floor``
     seconds all are the same.
+
+    Those of a plan with ``timings = true`` compare wherever processor and versions agree, without a floor.
     """
 
     compare: Literal["never", "same-machine", "always"] = "never"

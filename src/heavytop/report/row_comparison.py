@@ -14,14 +14,17 @@ from heavytop.report.against import weaker
 from heavytop.report.consistency import contradictions
 from heavytop.report.kind import Kinds, kind_of
 from heavytop.report.laws import judge_law, law_text
+from heavytop.report.motion_data import other_data
 from heavytop.report.noise import allowed_loss, noisier
 from heavytop.report.policy import BITS, Limits, Lookup, Policy
 from heavytop.report.series import judge_series
+from heavytop.report.timings import BAND, judge_repeated
 from heavytop.report.verdicts import Judged, Verdict, judge, judge_seconds
 
 _STEPS = 2
 """The same method with the same setting takes as many steps, and evaluates the field as often: a factor beyond this is
 another method."""
+_ANOTHER: Judged = (Verdict.INCOMPARABLE, "it says that it is another quantity")
 
 
 class Finding(msgspec.Struct, frozen=True, gc=False):
@@ -52,12 +55,19 @@ class Finding(msgspec.Struct, frozen=True, gc=False):
 class RowComparison:
     """Compares rows under one policy.
 
-    timed: whether seconds are compared.  list_same: False to count what plainly stayed the same, in :attr:`same`.
+    timed: whether seconds are compared; repeated: whether those of runs that were repeated for it are.
+    list_same: False to count what plainly stayed the same, in :attr:`same`.
     checked: of the baseline and of the candidate, whether each row was found consistent as it was read.
     """
 
     def __init__(
-        self, policy: Policy, kinds: Kinds, timed: bool, list_same: bool, checked: tuple[bool, bool] = (False, False)
+        self,
+        policy: Policy,
+        kinds: Kinds,
+        timed: bool,
+        list_same: bool,
+        checked: tuple[bool, bool] = (False, False),
+        repeated: bool = False,
     ) -> None:
         self.policy = policy
         self.kinds = kinds
@@ -66,6 +76,7 @@ class RowComparison:
         self.same = 0
         self.lookup = Lookup(policy)
         self.timed = timed
+        self.repeated = repeated
 
     def ignores(self, row: Row) -> bool:
         """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
@@ -88,7 +99,9 @@ class RowComparison:
             found += self._series(key, rules, old, new)
         if not self.ignores(old):
             found += self._row(key, old, new)
-        if self.timed:
+        if self.repeated and BAND in old.seconds:
+            found += self._repeated(key, rules, old, new)
+        elif self.timed:
             found += self._seconds(key, rules, old, new)
         return found
 
@@ -136,13 +149,14 @@ class RowComparison:
         """The values first; then the noise of the candidate, which is worse where it is more than chance."""
         least_of = least(old.metrics, metric), least(new.metrics, match)
         known, kind = metric, kind_of(old, self.kinds)
-        if metric.band is None and (noise := kind.assumed_band(old.key.subject)):
+        noise = kind.assumed_band(old.key.subject) if metric.band is None else kind.least_band(old.starts)
+        if noise > (metric.band or 0.0):
             known = msgspec.structs.replace(metric, band=noise)
         judged = judge(known, match, limits, self._eps(metric.quantity, old), self.policy.suspicious_digits, least_of)
         if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
             return judged
         if judged[0] is Verdict.SAME and metric.quantity != match.quantity:
-            return Verdict.INCOMPARABLE, "it says that it is another quantity"
+            return _ANOTHER
         if metric.band is not None and match.band is None and match.log10 is not None:
             return Verdict.INCOMPARABLE, f"its noise is not measured, which was {metric.band:.2g} decades"
         if noisier(kind, metric, match):
@@ -160,7 +174,11 @@ class RowComparison:
             if a is None or b is None:
                 judged = (Verdict.MISSING, "the law is missing") if b is None else (Verdict.NEW, "")
             else:
-                judged = judge_law(a, b, self._noise(name, old, limits))
+                # the same series again has no other roundings, so that another law of it is no chance
+                rerun = name in old.series and name in new.series and old.series[name] != new.series[name]
+                judged = judge_law(a, b, self._noise(name, old, limits), rerun)
+                if judged[0] is Verdict.SAME and a.quantity != b.quantity:
+                    judged = _ANOTHER
             before, after = (None if law is None else law_text(law) for law in (a, b))
             yield Finding(key, metric, judged[0], before, after, judged[1])
 
@@ -178,6 +196,8 @@ class RowComparison:
             exactly = any(metric.kind == "value" for metric in _of_series(name, old, "max", "final"))
             allowed = limits.value if exactly else max(limits.loss, self._noise(name, old, limits))
             judged = judge_series(series, match, allowed, limits.floor + self._eps(series.quantity, old), exactly)
+            if judged[0] is Verdict.SAME and series.quantity != match.quantity:
+                judged = _ANOTHER
             if judged[0] is not Verdict.SAME:
                 before, after = (f"{len(each.values)} samples" for each in (series, match))
                 yield Finding(key, metric, judged[0], before, after, judged[1])
@@ -216,6 +236,14 @@ class RowComparison:
                 before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
                 yield Finding(key, f"seconds {name}", verdict, before, after, why, timing=True)
 
+    def _repeated(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
+        """The seconds of runs that were repeated for a comparison; all count as one metric in a rule for ``run``."""
+        limits = self.lookup.metric(rules, "seconds run")
+        if not limits.ignore:
+            for name, judged in judge_repeated(old.seconds, new.seconds, self.policy.timings.ratio, limits.noise):
+                before, after = (f"{row.seconds[name]:.3g} s" if name in row.seconds else None for row in (old, new))
+                yield Finding(key, f"seconds {name}", judged[0], before, after, judged[1], timing=True)
+
     def _incomparable(self, old: Row, new: Row) -> str:
         """Why two rows cannot be compared; empty where they can."""
         for row, which, checked in zip((old, new), ("baseline", "candidate"), self.checked, strict=True):
@@ -230,6 +258,8 @@ class RowComparison:
             return f"{old.bits} bits against {new.bits}"
         if old.starts != new.starts:
             return f"{old.starts} starts against {new.starts}"
+        if reason := other_data(old.data, new.data):
+            return reason
         if (old.steps == 0) != (new.steps == 0):
             return f"{old.steps} steps against {new.steps}"
         if old.flags != new.flags and self.policy.flags != "ignore":

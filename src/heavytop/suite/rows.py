@@ -7,7 +7,7 @@ from fractions import Fraction
 from heavytop.errors import Contradiction, HeavyTopError, OutOfTime, PeerFailed, Unsupported
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.scalar import of_fraction
-from heavytop.precision import decimal_text, time_text
+from heavytop.precision import decimal_text, exact_text, time_text
 from heavytop.records import (
     CONTRADICTION,
     FAILED,
@@ -21,6 +21,7 @@ from heavytop.records import (
     Row,
     Series,
 )
+from heavytop.suite.cases import Case
 from heavytop.suite.task import Task
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -30,13 +31,15 @@ def time_metric(time: Fraction | None, kind: MetricKind) -> Metric:
     return Metric("never", None, kind) if time is None else of_fraction(abs(time), kind, time_text(abs(time)))
 
 
-def data_of(task: Task, starts: int) -> Data | None:
-    """The exact data of what the task measures."""
-    if task.case is None:
+def data_of(case: Case | None) -> Data | None:
+    """The exact data of the motion that is measured; of an ensemble the start by which the others are drawn."""
+    if case is None:
         return None
-    top, start = task.case.top, task.case.start
-    alone = (tuple(map(str, part)) for part in ((start.omega, start.gamma) if starts == 1 else ()))
-    return Data(tuple(map(str, top.inertia)), str(top.weight), tuple(map(str, top.centre)), *alone)
+    top, start = case.top, case.start
+    inertia, centre, omega, gamma = (
+        tuple(map(exact_text, part)) for part in (top.inertia, top.centre, start.omega, start.gamma)
+    )
+    return Data(inertia, exact_text(top.weight), centre, omega, gamma)
 
 
 def exact_row(

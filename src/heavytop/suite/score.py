@@ -23,7 +23,7 @@ from heavytop.precision import DOUBLE_DOUBLE, exact, round_to, time_text
 from heavytop.records import Against, Metric, Row, RowKey, Subject
 from heavytop.suite.cases import Case
 from heavytop.suite.given import Given
-from heavytop.suite.rows import computed_row
+from heavytop.suite.rows import computed_row, data_of
 from heavytop.suite.sampling import log_spaced
 from heavytop.suite.task import Task, seconds_a_step
 
@@ -148,9 +148,8 @@ def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Score
     key = RowKey("score", given.name, given.system.name, subject, precision.name, horizon=time_text(times[-1]))
     task = Task(key, given.name, given.integrator, case, tuple(times), tuple(keep))
     row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
-    reached = time_text(run.time_reached)
-    row = msgspec.structs.replace(row, measured=f"given: {given.integrator}", order=None, time_reached=reached)
-    return row, scorer, errors
+    said = {"measured": f"given: {given.integrator}", "order": None, "time_reached": time_text(run.time_reached)}
+    return msgspec.structs.replace(row, **said, data=data_of(case)), scorer, errors
 
 
 def _finite(given: Given) -> list[tuple[Fraction, ...]]:

@@ -214,7 +214,7 @@ def measure(kind: Kind, task: Task, saved: Saved) -> Row:
     begin_row()
     try:
         row = kind.measure(task, saved)
-        row.data = data_of(task, row.starts)
+        row.data = data_of(task.case)
         return row
     except PeerFailed as error:
         return failed(task, error.cause)

@@ -18,7 +18,6 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from fractions import Fraction
-from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -159,7 +158,7 @@ def ready(which: str | Source, setting: tuple[str, Fraction] | None = None) -> P
                 raise PeerFailed(f"{name} has no {knob}")
         if "step_limit" in arguments and not own:
             given["step_limit"] = STEP_LIMIT
-    return Contained(name, partial(chosen, **given) if given else chosen, own, declared)
+    return Contained(name, chosen, own, declared, given)
 
 
 def _program(command: Command, setting: tuple[str, Fraction] | None) -> Peer:

@@ -8,25 +8,27 @@ from __future__ import annotations
 
 import io
 import os
+import pickle
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
-from copy import deepcopy
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isfinite
 from numbers import Real
 from threading import RLock
+from time import perf_counter
+from types import SimpleNamespace
 from typing import Any
 
 import numpy
 
 from heavytop.errors import HeavyTopError, PeerFailed, Unsupported
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, Precision, exact, number
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
+from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 _MOST_SAID = 200
@@ -179,12 +181,20 @@ def with_tolerance(run: Run) -> Callable[..., Trajectory]:
 class Contained:
     """A peer that keeps the contract: the call of :mod:`heavytop.integrate.peers`, or PeerFailed.
 
-    own: whether it is one of this program's: these say in words what they cannot be asked, and end as ``non_finite``
-    where a state is not finite, which is a finding about them and no failure.  declared: what it says that it can do.
+    own: whether it is one of this program's: these say in words what they cannot be asked, end as ``non_finite``
+    where a state is not finite, which is a finding about them and no failure, and are believed their clock.
+    declared: what it says that it can do.  setting: what every call is given beside a problem, such as a tolerance.
     """
 
-    def __init__(self, name: str, call: Any, own: bool, declared: Declared | None = None) -> None:
-        self.name, self.call, self.own, self.declared = name, call, own, declared
+    def __init__(
+        self,
+        name: str,
+        call: Any,
+        own: bool,
+        declared: Declared | None = None,
+        setting: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.name, self.call, self.own, self.declared, self.setting = name, call, own, declared, setting or {}
 
     def __call__(
         self,
@@ -198,24 +208,38 @@ class Contained:
     ) -> Trajectory:
         """The run; raises PeerFailed for one that breaks the contract, and what an own peer raises for bad input.
 
+        ``run`` of the seconds of one that is not own is that of the call and of reading its states, by the clock here.
         Raises Unsupported, and calls nothing, for what the peer declares that it cannot do.
         """
         problem = Problem.of(top, start, precision, system)
         asked = [exact(number(time, precision)) for time in times]
         if self.declared is not None and asked:
             self.declared.require(self.name, system, asked[-1], precision)
-        # copies, so that what a peer does to its arguments is its own affair
-        given = deepcopy((top, start, tuple(times), precision))
+        # copies, so that what a peer does to its arguments is its own affair; fractions are shared by deepcopy
+        *given, own = pickle.loads(pickle.dumps((top, start, tuple(times), precision, {**self.setting, **setting})))
+        parts = {name: getattr(system, name) for name in system.__slots__}
         with contained(self.name, own=self.own):
-            run = self.call(*given, system=system, **setting)
+            began = perf_counter()
+            try:
+                run = self.call(*given, system=system, **own)
+                spent = perf_counter() - began
+            finally:
+                changed = [name for name, part in parts.items() if getattr(system, name) is not part]
+                for name in changed:
+                    object.__setattr__(system, name, parts[name])
+        if changed:
+            raise PeerFailed(f"{self.name} changed the {', '.join(changed)} of the system {system.name}")
         with contained(self.name, " in what it returned"):
-            return self._kept(run, problem, asked)
+            return self._kept(run, problem, asked, spent)
 
-    def _kept(self, run: Any, problem: Problem, asked: list[Fraction]) -> Trajectory:
-        """A plain Trajectory of what was returned."""
-        self._require(issubclass(type(run), Trajectory), f"a {type(run).__name__} instead of a Trajectory")
+    def _kept(self, returned: Any, problem: Problem, asked: list[Fraction], spent: float) -> Trajectory:
+        """A plain Trajectory of what was returned after ``spent`` seconds; every part of it is asked for once."""
+        self._require(issubclass(type(returned), Trajectory), f"a {type(returned).__name__} instead of a Trajectory")
+        began = perf_counter()
+        run = SimpleNamespace(**{name: getattr(returned, name) for name in Trajectory.__slots__ if name != "problem"})
         self._require(isinstance(run.outcome, Outcome), f"the outcome {said(repr(run.outcome))}, which is none")
         states = tuple(self._state(state, problem.precision) for state in run.states)
+        spent += perf_counter() - began
         self._require(len(states) <= len(asked), f"{len(states)} states for {len(asked)} times")
         done = len(states) == len(asked)
         self._require(
@@ -235,6 +259,7 @@ class Contained:
             self._require(last <= abs(reached) < following, what)
         named = type(run.integrator) is str and 0 < len(run.integrator) <= _MOST_SAID and run.integrator.isprintable()
         self._require(named, "no name of an integrator")
+        seconds = {name: self._seconds(run.seconds[name]) for name in ("compile", "run")}
         return Trajectory(
             problem,
             run.integrator if self.own else self.name,
@@ -244,7 +269,7 @@ class Contained:
             reached,
             self._count(run.steps, "steps"),
             self._count(run.order, "order"),
-            {name: self._seconds(run.seconds[name]) for name in ("compile", "run")},
+            seconds if self.own else {"compile": 0.0, "run": spent},
             self._flags(run.flags),
             None if run.evaluations is None else self._count(run.evaluations, "evaluations"),
         )
@@ -282,3 +307,16 @@ class Contained:
         plain = all(type(word) is str and len(word) <= _MOST_SAID and word.isprintable() for word in words)
         self._require(plain and len(words) <= 2 * _MOST_FLAGS, "flags that are not short texts")
         return dict(flags)
+
+
+def require_equal(name: str, one: Trajectory, other: Trajectory) -> None:
+    """Raises PeerFailed where two runs of one and the same call are not the same, bit for bit."""
+    if (one.outcome, one.time_reached, one.steps) != (other.outcome, other.time_reached, other.steps):
+        ends = (f"{run.outcome.value} at t = {said(run.time_reached)} in {run.steps} steps" for run in (one, other))
+        raise PeerFailed(f"{name} ended two equal calls as {' and as '.join(ends)}")
+    for time, *states in zip(one.times, one.states, other.states, strict=True):
+        for component, *values in zip(NAMES, *(map(exact, state) for state in states), strict=True):
+            if values[0] != values[1]:
+                first, second = (decimal_text(value, 17) for value in values)
+                where = f"{component} at t = {decimal_text(time, 6)}"
+                raise PeerFailed(f"{name} returned {first} and {second} as {where} in two equal calls")

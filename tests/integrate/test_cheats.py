@@ -1,0 +1,328 @@
+"""Integrators of another package that cheat: what they say of themselves is measured, and their row fails with why."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+
+import pytest
+
+from heavytop.kinds import KINDS, work_precision
+from heavytop.records import Row
+from heavytop.suite.cases import CASES
+from heavytop.suite.workers import rows as measured
+from reports import expand, load
+
+MODULE = '''
+import os
+from dataclasses import replace
+from fractions import Fraction
+from time import perf_counter, sleep
+
+import numpy
+from heavytop.integrate.peers.double import Solved, double_peer
+from heavytop.integrate.peers.splitting import _solver
+from heavytop.integrate.taylor import propagate
+from heavytop.integrate.trajectory import Trajectory
+
+COARSE, FINE = Fraction(1, 10**4), Fraction(1, 10**10)
+
+
+def run(top, start, times, precision, system, tolerance=FINE):
+    return propagate(top, start, times, precision, system=system, tolerance=tolerance)
+
+
+def honest(top, start, times, precision, *, system, tolerance=None):
+    return run(top, start, times, precision, system)
+
+
+def changed(**changes):
+    def peer(top, start, times, precision, *, system, tolerance=None):
+        found = run(top, start, times, precision, system)
+        return replace(found, **{name: change(found) for name, change in changes.items()})
+    return peer
+
+
+# the clock
+no_time = changed(seconds=lambda found: {"compile": 0.0, "run": 1e-12})
+all_compiling = changed(seconds=lambda found: {"compile": sum(found.seconds.values()), "run": 0.0})
+
+
+def slow(top, start, times, precision, *, system, tolerance=None):
+    sleep(0.02)
+    return replace(run(top, start, times, precision, system), seconds={"compile": 0.0, "run": 1e-9})
+
+
+def _solve_slowly(given):
+    sleep(0.02)
+    found = _solver(8)(replace(given, setting=1 / 32))
+    return Solved(found.states, found.reached, found.steps, None, 0.02)
+
+
+slow_compiling = double_peer("mine:slow_compiling", 8, _solve_slowly)
+
+
+made = []
+
+
+class Later(Trajectory):
+    """Computed when it is looked at, behind the back of a clock around the call."""
+
+    __slots__ = ()
+
+    def __getattribute__(self, name):
+        if name == "states" and made:
+            sleep(0.02)
+        return Trajectory.__getattribute__(self, name)
+
+
+def later(top, start, times, precision, *, system, tolerance=None):
+    made.clear()
+    found = run(top, start, times, precision, system)
+    found = Later(**{name: getattr(found, name) for name in Trajectory.__slots__})
+    made.append(found)
+    return found
+
+
+# the coarse run's seconds with the fine run's states
+def one_time_coarse(top, start, times, precision, *, system, tolerance=None):
+    return run(top, start, times, precision, system, COARSE if len(times) == 1 else FINE)
+
+
+def many_times_coarse(top, start, times, precision, *, system, tolerance=None):
+    return run(top, start, times, precision, system, FINE if len(times) == 1 else COARSE)
+
+
+counts = {}
+
+
+def counted(name):
+    counts[name] = counts.get(name, 0) + 1
+    return counts[name]
+
+
+def every_other_coarse(top, start, times, precision, *, system, tolerance=None):
+    return run(top, start, times, precision, system, COARSE if counted("other") % 2 else FINE)
+
+
+def first_fine(top, start, times, precision, *, system, tolerance=None):
+    return run(top, start, times, precision, system, FINE if counted("first") < 4 else COARSE)
+
+
+def known_start_fine(top, start, times, precision, *, system, tolerance=None):
+    simple = start.omega[0].denominator < 1000
+    return run(top, start, times, precision, system, FINE if simple else COARSE)
+
+
+# from memory
+seen = {}
+
+
+def memory(top, start, times, precision, *, system, tolerance=None):
+    key = top, start, tuple(times)
+    if key not in seen:
+        sleep(0.01)
+        seen[key] = run(top, start, times, precision, system)
+    return seen[key]
+
+
+def rough_memory(top, start, times, precision, *, system, tolerance=None):
+    key = tuple(round(float(value), 9) for value in start.flat), tuple(times)
+    if key not in seen:
+        sleep(0.01)
+        seen[key] = run(top, start, times, precision, system)
+    return seen[key]
+
+
+# two equal calls
+def random(top, start, times, precision, *, system, tolerance=None):
+    found = run(top, start, times, precision, system)
+    return replace(found, states=found.states * (1 + 1e-15 * numpy.frombuffer(os.urandom(6), "u1")))
+
+
+def random_samples(top, start, times, precision, *, system, tolerance=None):
+    return (random if len(times) > 1 else honest)(top, start, times, precision, system=system)
+
+
+def last_bit(top, start, times, precision, *, system, tolerance=None):
+    found = run(top, start, times, precision, system)
+    states = found.states.copy()
+    if counted("bit") % 2:
+        states[0, 4] = numpy.nextafter(states[0, 4], 9)
+    return replace(found, states=states)
+
+
+def other_steps(top, start, times, precision, *, system, tolerance=None):
+    found = run(top, start, times, precision, system)
+    return replace(found, steps=found.steps + counted("steps"))
+
+
+gives_up = 0
+
+
+def sometimes(top, start, times, precision, *, system, tolerance=None):
+    found = run(top, start, times, precision, system)
+    if counted("sometimes") == 2:
+        raise ValueError("not today")
+    return found
+
+
+# counts
+one_step = changed(steps=lambda found: 1)
+no_step = changed(steps=lambda found: 0)
+few_evaluations = changed(evaluations=lambda found: 1)
+few_steps = changed(steps=lambda found: max(1, found.steps // 30), order=lambda found: 8)
+
+
+def _fixed(factor):
+    def solve(given):
+        found = _solver(2)(given)
+        return Solved(found.states, found.reached, found.steps if found.steps < 9 else int(found.steps * factor), None)
+    return solve
+
+
+fixed = double_peer("mine:fixed", 2, _fixed(1), "step")
+fixed_few = double_peer("mine:fixed_few", 2, _fixed(1 / 50), "step")
+fixed_many = double_peer("mine:fixed_many", 2, _fixed(50), "step")
+
+
+# its arguments
+def field_of_its_own(top, start, times, precision, *, system, tolerance=None):
+    object.__setattr__(system, "field", lambda p, y: (0, 0, 0, 0, 0, 0))
+    return run(top, start, times, precision, system)
+
+
+def fractions(top, start, times, precision, *, system, tolerance=None):
+    found = run(top, start, times, precision, system)
+    for value in (*top.inertia, *start.flat, *times, *([tolerance] if tolerance else [])):
+        value._numerator = 17
+    return found
+
+
+# another at every look
+class Two(Trajectory):
+    __slots__ = ()
+
+    def __getattribute__(self, name):
+        found = Trajectory.__getattribute__(self, name)
+        if name in ("states", "times", "steps") and counted(name + "look") % 2 == 0:
+            return {"states": found * 2, "times": found[:1], "steps": 1}[name] if name != "times" else found[:1]
+        return found
+
+
+def somebody(top, start, times, precision, *, system, tolerance=None):
+    return replace(run(top, start, times, precision, system), integrator="heyoka")
+'''
+CHEATS = {
+    "one_time_coarse": "asked for its last time alone, ended ",
+    "many_times_coarse": "",
+    "every_other_coarse": " two equal calls as success at t = 20 in ",
+    "first_fine": "the seconds are those of another run",
+    "known_start_fine": "from a start units in the last place away, ended ",
+    "memory": "it keeps results between calls",
+    "rough_memory": "it keeps results between calls",
+    "random": " in two equal calls",
+    "random_samples": " in two equal calls",
+    "last_bit": " in two equal calls",
+    "other_steps": "ended two equal calls as success at t = 20 in ",
+    "sometimes": "raised ValueError: not today",
+    "one_step": "counts its steps wrongly: 1 of order ",
+    "no_step": "counts its steps wrongly: it moved, and says that it took no step",
+    "few_evaluations": "and 1 evaluations of the field",
+    "few_steps": "counts its steps wrongly",
+    "fixed_few": "where each is 0.01",
+    "field_of_its_own": "changed the field of the system heavy_top",
+}
+"""What the row of each says, or "" where nothing is hidden by it: its error and seconds are the ones of such a run."""
+TIMED = ("no_time", "all_compiling", "slow", "slow_compiling", "later", "fractions", "somebody", "honest")
+STEPPED = ("fixed", "fixed_few", "fixed_many")
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Another package with all of them."""
+    (tmp_path / "cheats.py").write_text(MODULE)
+    info = tmp_path / "cheats-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: cheats\nVersion: 1.0\n")
+    lines = [f"mine:{name} = cheats:{name}" for name in {*CHEATS, *TIMED, *STEPPED}]
+    (info / "entry_points.txt").write_text("[heavytop.peers]\n" + "\n".join(lines))
+    monkeypatch.syspath_prepend(tmp_path)
+    importlib.invalidate_caches()
+    monkeypatch.setattr(work_precision, "_ENOUGH_SECONDS", 0.0)
+    monkeypatch.setattr(work_precision, "_RUNS", range(3, 4))
+    return tmp_path
+
+
+def rows(folder: Path, *names: str, case: str = "euler", kind: str = "") -> list[Row]:
+    (folder / "plan.toml").write_text(f'name = "p"\n{kind or work(case, *names)}', "utf-8")
+    tasks = expand(load(str(folder / "plan.toml"))[0])
+    return [row for _, row in sorted(measured(tasks, KINDS, 1, None), key=lambda found: found[0])]
+
+
+def work(case: str, *names: str) -> str:
+    rungs = {name: 'steps = ["1/100"]' if name in STEPPED else 'tolerances = ["1e-9"]' for name in names}
+    ladders = ", ".join(f'{{ integrator = "mine:{name}", {rung} }}' for name, rung in rungs.items())
+    head = f'[[measure]]\nkind = "work_precision"\ncases = ["{case}"]\nhorizon = "20"\nsamples = 5\n'
+    return f"{head}ladders = [{ladders}]\n"
+
+
+def single_steps(name: str) -> str:
+    head = '[[measure]]\nkind = "local_error"\ncases = ["lagrange"]\nprecisions = ["double"]\nhorizon = "4"\n'
+    return f'{head}integrator = "mine:{name}"\n'
+
+
+@pytest.mark.parametrize("name", CHEATS)
+def test_a_cheat_is_a_row_that_fails_with_what_was_observed_and_the_others_go_on(package: Path, name: str) -> None:
+    cheat, honest = rows(package, name, "honest")
+    assert honest.outcome == "success"
+    if not CHEATS[name]:
+        assert float(cheat.metrics["error_max"].value) > 1e3 * float(honest.metrics["error_max"].value)
+        return
+    assert (cheat.outcome, cheat.metrics, cheat.seconds) == ("failed", {}, {})
+    assert CHEATS[name] in cheat.reference.reason
+    assert cheat.reference.reason.startswith(f"mine:{name}")
+    assert cheat.reference.reason.isprintable()
+    assert len(cheat.reference.reason) < 400
+
+
+def test_seconds_are_those_of_the_clock_here(package: Path) -> None:
+    found = dict(zip(TIMED, rows(package, *TIMED), strict=True))
+    assert {name: row.reference.reason for name, row in found.items() if row.outcome != "success"} == {}
+    for name, row in found.items():
+        least = 0.02 if name in ("slow", "slow_compiling", "later") else 1e-4
+        assert least <= row.seconds["least"] <= row.seconds["run"] < 10 * least + 0.1, name
+        assert row.seconds["compile"] < 5, name
+
+
+def test_whatever_is_done_to_the_arguments_and_whoever_it_says_it_is_the_row_is_its_own(package: Path) -> None:
+    before = repr(CASES["euler"])
+    honest, *others = rows(package, "honest", "fractions", "somebody")
+    assert repr(CASES["euler"]) == before
+    for row in others:
+        assert row.metrics["error_max"] == honest.metrics["error_max"]
+        assert row.measured.startswith("computed: mine:")
+
+
+@pytest.mark.parametrize("case", ["lagrange", "generic", "gyrostat", "hess"])
+def test_an_honest_one_is_measured_on_every_kind_of_motion(package: Path, case: str) -> None:
+    assert [row.outcome for row in rows(package, "honest", "fixed", case=case)] == ["success"] * 2
+
+
+def test_a_count_of_steps_that_makes_steps_short_contradicts_the_run_as_a_whole(package: Path) -> None:
+    (honest,), (many,) = (rows(package, kind=single_steps(name)) for name in ("fixed", "fixed_many"))
+    assert honest.outcome == "success"
+    assert many.outcome == "failed"
+    assert "mine:fixed_many counts its steps wrongly: 20000, each off by " in many.reference.reason
+    assert "and its run to t = 4 is off by" in many.reference.reason
+
+
+@pytest.mark.parametrize("name", ["random", "last_bit", "other_steps", "every_other_coarse"])
+@pytest.mark.parametrize("kind", ["drift", "local_error", "growth"])
+def test_two_equal_calls_that_differ_are_said_so_in_every_kind(package: Path, name: str, kind: str) -> None:
+    run = {"drift": 'horizon = "2", samples = 4', "growth": 'horizon = "2", samples = 4, decades = 1, starts = 8'}
+    table = f'[[measure]]\nkind = "{kind}"\ncases = ["lagrange"]\nintegrator = "mine:{name}"\n'
+    table += f'runs = [{{ precision = "double", {run[kind]} }}]\n' if kind in run else ""
+    (row,) = rows(package, kind=single_steps(name) if kind == "local_error" else table)
+    assert row.outcome == "failed"
+    assert "two equal calls" in row.reference.reason

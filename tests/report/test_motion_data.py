@@ -1,0 +1,199 @@
+"""Rows of another top or another start are never the same, nor better; numbers written otherwise are."""
+
+from dataclasses import replace as change
+from fractions import Fraction
+from operator import itemgetter
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.integrate.taylor import propagate
+from heavytop.precision import DOUBLE, exact
+from heavytop.records import Data, Law, Quantity, Row, Series
+from heavytop.report.policy import Policy
+from heavytop.suite.cases import CASES
+from heavytop.suite.given import of_arrays
+from heavytop.suite.rows import data_of
+from heavytop.suite.score import score
+from reports import compare, expand, load, measure, replace, rows, store
+from small_reports import report, row
+
+DATA = Data(("3", "2", "1/3"), "3/2", ("0", "1/5", "-1"), ("1/10", "0", "9/10"), ("3/5", "0", "-4/5"))
+NAMES = ("inertia", "weight", "centre", "omega", "gamma")
+LAW = Law("t^0.5", 16, 0.5, 0.47, 0.53, "100", "1e5", "1e-19", "1e30")
+
+
+def judged(old: Row, new: Row) -> tuple[str, str]:
+    result = compare(report(old), report(new), Policy())
+    return result.verdict, "; ".join(finding.reason for finding in result.changed)
+
+
+def changes(text: str) -> set[str]:
+    number = exact(text)
+    return {str(number + 1), str(number * (1 + exact("1e-60"))), str(number * exact("1e100"))} - {text}
+
+
+def every_change() -> list[tuple[str, Data]]:
+    found = []
+    for name in NAMES:
+        value = getattr(DATA, name)
+        for place, text in enumerate([value] if isinstance(value, str) else value):
+            for other in changes(text):
+                new = other if isinstance(value, str) else (*value[:place], other, *value[place + 1 :])
+                found.append((name, replace(DATA, **{name: new})))
+        if not isinstance(value, str):
+            found.append((name, replace(DATA, **{name: value[::-1]})))
+    return found
+
+
+@pytest.mark.parametrize("starts", [1, 16])
+def test_another_number_anywhere_is_another_motion(starts: int) -> None:
+    found = every_change()
+    assert len(found) > 35
+    for name, other in found:
+        for old, new in ((DATA, other), (other, DATA)):
+            verdict, why = judged(*(row(data=each, starts=starts) for each in (old, new)))
+            assert (verdict, why.startswith(f"other data: {name} ")) == ("incomparable", True), (name, other, why)
+
+
+def test_a_smaller_error_of_another_top_is_not_better() -> None:
+    less = {"drift_energy_max": msgspec.structs.replace(row().metrics["drift_energy_max"], value="1e-15", log10=-15.0)}
+    assert judged(row(data=DATA), row(data=DATA, metrics=less))[0] == "incomparable"  # the time of escape is missing
+    other = replace(DATA, weight="2")
+    assert judged(row(data=DATA), row(data=other, metrics=less))[1] == "other data: weight 3/2 against 2"
+
+
+def test_the_same_numbers_written_otherwise_are_the_same() -> None:
+    same = Data(("3.0", "2e0", "2/6"), "1.5", ("-0", "0.2", "-10e-1"), ("0.1", "0/7", "0.90"), ("0.6", "0", " -8/10"))
+    assert judged(row(data=DATA), row(data=same)) == ("same", "")
+    assert judged(row(data=same), row(data=DATA)) == ("same", "")
+
+
+@pytest.mark.parametrize(("old", "new"), [(None, DATA), (DATA, None)])
+def test_data_in_one_report_only_are_incomparable(old: Data | None, new: Data | None) -> None:
+    who = "candidate" if old is None else "baseline"
+    assert judged(row(data=old), row(data=new)) == (
+        "incomparable",
+        f"only the {who} says of which top and start it is",
+    )
+    assert judged(row(), row())[0] == "same"
+
+
+def test_a_baseline_from_before_ensembles_named_their_start_is_compared_by_its_top() -> None:
+    older = replace(DATA, omega=(), gamma=())
+    old, new = row(data=older, starts=16), row(data=DATA, starts=16)
+    assert judged(old, new)[0] == judged(old, old)[0] == "same"
+    assert judged(new, old)[1].startswith("other data: omega 1/10, 0, 9/10 against none")
+    assert judged(old, row(data=replace(DATA, weight="2"), starts=16))[0] == "incomparable"
+
+
+@pytest.mark.parametrize(
+    ("data", "starts", "field"),
+    [
+        (replace(DATA, inertia=("3", "2")), 1, "2 components of inertia"),
+        (replace(DATA, centre=()), 1, "0 components of centre"),
+        (replace(DATA, omega=(), gamma=()), 1, "0 components of omega"),
+        (replace(DATA, gamma=("1", "0")), 16, "2 components of gamma"),
+        (replace(DATA, gamma=()), 16, "half a start"),
+        (replace(DATA, weight="much"), 1, "much"),
+        (replace(DATA, weight="1/0"), 1, "divides by zero"),
+        (replace(DATA, centre=("nan", "0", "0")), 16, "nan"),
+        (replace(DATA, inertia=("3", "0", "1")), 1, "not positive"),
+        (replace(DATA, inertia=("3", "-2", "1")), 16, "not positive"),
+        (replace(DATA, inertia=(" -3", "2", "1")), 1, "not positive"),
+    ],
+)
+def test_data_that_no_run_writes_are_refused(tmp_path: Path, data: Data, starts: int, field: str) -> None:
+    bad = row(data=data, starts=starts)
+    file = store.write(report(row(case="lagrange"), bad), tmp_path)
+    for read in (store.read, lambda path: list(store.read_brief(path).rows)):
+        with pytest.raises(InputError, match=rf"row euler .*data: .*{field}"):
+            read(file)
+    assert judged(bad, bad)[0] == "incomparable"
+
+
+@pytest.mark.parametrize("outcome", ["success", "step_limit"])
+def test_a_law_stands_on_no_more_starts_than_its_row(tmp_path: Path, outcome: str) -> None:
+    more = row(starts=16, outcome=outcome, laws={"drift_energy": replace(LAW, starts=17)})
+    with pytest.raises(InputError, match="a law of 17 starts in a row of 16"):
+        store.read(store.write(report(more), tmp_path))
+
+
+@pytest.mark.parametrize("part", ["series", "laws"])
+def test_a_series_and_a_law_are_of_the_quantity_that_they_were(part: str) -> None:
+    found = {"series": Series(["1", "2"], ["1e-13", "1e-12"]), "laws": LAW}[part]
+    two = [
+        row(starts=16, **{part: {"drift_energy": replace(found, quantity=quantity)}})
+        for quantity in (Quantity("drift", "energy"), Quantity("drift", "area"))
+    ]
+    assert judged(two[0], two[0])[0] == "same"
+    assert judged(*two) == ("incomparable", "it says that it is another quantity")
+
+
+PLAN = """name = "own"
+[[top]]
+name = "mine"
+inertia = ["3", "2", "1"]
+weight = "1"
+centre = ["0", "0", "{centre}"]
+omega = ["1/10", "0", "{omega}"]
+gamma = ["3/5", "0", "4/5"]
+[[measure]]
+kind = "drift"
+cases = ["mine"]
+runs = [{{ precision = "double", horizon = "1", samples = 4 }}]
+"""
+
+
+def test_two_tops_of_one_name_in_two_plans_are_two(tmp_path: Path) -> None:
+    def ran(centre: str, omega: str) -> Row:
+        (tmp_path / "plan.toml").write_text(PLAN.format(centre=centre, omega=omega))
+        (task,) = expand(load(str(tmp_path / "plan.toml"))[0])
+        found = measure(task)
+        found.data = data_of(task.case)
+        return found
+
+    mine = ran("1/2", "9/10")
+    assert judged(mine, ran("0.5", "0.90"))[0] == "same"
+    assert judged(mine, ran("1/3", "9/10")) == ("incomparable", "other data: centre 0, 0, 1/2 against 0, 0, 1/3")
+    assert judged(mine, ran("1/2", "4/5"))[0] == "incomparable"
+
+
+def test_numbers_of_any_length_are_written_and_read(tmp_path: Path) -> None:
+    case = CASES["euler"]
+    long = change(case, start=change(case.start, omega=(exact("1e-4900") + 1, exact("0"), exact("1/3"))))
+    made = row(data=data_of(long))
+    assert store.read(store.write(report(made), tmp_path)).rows[0].data == made.data
+
+
+ENSEMBLE = """[[measure]]
+kind = "growth"
+cases = ["mine"]
+runs = [{ precision = "double", horizon = "1", samples = 4, decades = 1, starts = 8 }]
+"""
+
+
+def test_every_row_of_a_motion_has_its_data_those_of_ensembles_too(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(PLAN.format(centre="1/2", omega="9/10") + ENSEMBLE)
+    found = [each for _, each in sorted(rows(expand(load(str(tmp_path / "plan.toml"))[0]), 1), key=itemgetter(0))]
+    assert [(each.starts, each.data) for each in found] == [
+        (starts, Data(("3", "2", "1"), "1", ("0", "0", "1/2"), ("1/10", "0", "9/10"), ("3/5", "0", "4/5")))
+        for starts in (1, 8)
+    ]
+    assert judged(found[1], found[1])[0] == "same"
+
+
+def test_a_scored_trajectory_has_its_data(tmp_path: Path) -> None:
+    case = CASES["lagrange"]
+    run = propagate(case.top, case.start, [Fraction(1), Fraction(2)], DOUBLE)
+    other = change(case.top, weight=case.top.weight * 2)
+    two = [
+        score(of_arrays(top, case.start, case.system, list(run.times), list(run.states), DOUBLE, "mine", "rk4"))
+        for top in (case.top, other)
+    ]
+    assert two[0].data == data_of(case)
+    assert judged(two[0], two[0])[0] == "same"
+    for pair in (two, two[::-1]):
+        assert judged(*pair)[1].startswith("other data: weight")

@@ -1,0 +1,154 @@
+"""Seconds of a plan with `timings = true`: compared on one machine with one set of versions, beyond their scatter."""
+
+from pathlib import Path
+
+import pytest
+
+from heavytop.errors import InputError
+from heavytop.kinds import work_precision
+from heavytop.measure.timed_calls import Repeats
+from heavytop.records import Row
+from heavytop.report.policy import Policy, Rule, Timings
+from reports import compare, expand, load, measure, replace, store
+from small_reports import report, row
+
+ENVIRONMENT = {
+    "packages": {"heavytop": "1", "heyoka": "7"},
+    "flint": "3",
+    "python": "3.12",
+    "implementation": "CPython",
+    "system": "Linux",
+    "machine": "x86_64",
+    "processor": "A",
+    "simd_width_double": 4,
+    "cpu_features": ["avx"],
+    "cpu_target": "a",
+    "llvm": "20",
+}
+SECONDS = {"compile": 0.1, "run": 1.1e-4, "least": 1e-4, "repeats": 11.0, "band": 0.02}
+
+
+def judged(new: dict, old: dict = SECONDS, environment: dict = ENVIRONMENT, **policy) -> tuple[str, str]:
+    two = [replace(report(row(seconds=each)), environment=ENVIRONMENT) for each in (old, new)]
+    two[1].environment = environment
+    result = compare(*two, Policy(**policy))
+    return result.verdict, "; ".join(f"{finding.metric}: {finding.reason}" for finding in result.changed)
+
+
+def slower(factor: float, *names: str) -> dict:
+    return SECONDS | {name: SECONDS[name] * factor for name in names or ("run", "least")}
+
+
+def test_a_hundred_times_slower_is_worse_however_short_and_five_per_cent_are_the_same() -> None:
+    assert judged(slower(100))[0] == "worse"
+    assert "seconds run: 100 times as long, where 1.5 is allowed" in judged(slower(100))[1]
+    for factor in (1.05, 1.49, 0.95, 0.68):
+        assert judged(slower(factor)) == ("same", "")
+    assert judged(slower(1.51))[0] == "worse"
+    assert judged(slower(0.66))[0] == "better"
+    assert judged(slower(1.51), timings=Timings(ratio=2.0))[0] == "same"
+
+
+@pytest.mark.parametrize("name", ["run", "least"])
+def test_the_median_and_the_fastest_run_are_both_compared(name: str) -> None:
+    assert judged(slower(100, name))[0] == "worse"
+
+
+def test_what_runs_of_the_baseline_scatter_by_is_allowed_and_what_the_candidate_s_do_is_not() -> None:
+    # twice √2 · 0.1 decades: 1.918
+    assert judged(slower(1.90), SECONDS | {"band": 0.1})[0] == "same"
+    assert judged(slower(1.94), SECONDS | {"band": 0.1})[0] == "worse"
+    assert judged(slower(1.90) | {"band": 0.1})[0] == "worse"
+    assert judged(slower(1.94), SECONDS | {"band": 0.1}, noise=2.1)[0] == "same"
+
+
+@pytest.mark.parametrize(("band", "verdict"), [(0.249, "same"), (0.251, "incomparable")])
+def test_runs_that_scatter_widely_say_nothing(band: float, verdict: str) -> None:
+    assert judged(SECONDS, SECONDS | {"band": band})[0] == verdict
+    assert judged(SECONDS | {"band": band})[0] == verdict
+
+
+@pytest.mark.parametrize("name", ["run", "least", "band"])
+def test_what_is_no_longer_measured_is_incomparable(name: str) -> None:
+    without = {key: value for key, value in SECONDS.items() if key != name}
+    assert judged(without) == ("incomparable", f"seconds {name}: its runs are no longer repeated for a comparison")
+    assert judged({})[0] == "incomparable"
+    # those of a baseline that was not timed for it say nothing
+    assert judged(slower(100), {key: value for key, value in SECONDS.items() if key != "band"})[0] == "same"
+
+
+@pytest.mark.parametrize("value", [0.0, float("inf"), float("nan")])
+def test_a_run_that_took_no_time_is_none(value: float) -> None:
+    assert judged(SECONDS | {"least": value})[0] == "incomparable"
+
+
+@pytest.mark.parametrize("name", [*ENVIRONMENT, "heyoka"])
+def test_another_processor_or_version_leaves_seconds_out(name: str) -> None:
+    other = ENVIRONMENT | ({"packages": {"heavytop": "1", "heyoka": "8"}} if name == "heyoka" else {name: "other"})
+    if name == "packages":
+        other = ENVIRONMENT | {"packages": {"heavytop": "2", "heyoka": "7"}}
+        assert judged(slower(100), environment=other)[0] == "worse", (
+            "another version of this program is what is compared"
+        )
+        return
+    assert judged(slower(100), environment=other) == ("same", "")
+    lacking = {key: value for key, value in ENVIRONMENT.items() if key != name}
+    if name != "heyoka":
+        assert judged(slower(100), environment=lacking) == ("same", "")
+
+
+def test_a_rule_leaves_them_out() -> None:
+    assert judged(slower(100), rule=(Rule(metric="seconds *", ignore=True),)) == ("same", "")
+
+
+def test_a_fastest_run_slower_than_the_median_is_refused(tmp_path: Path) -> None:
+    bad = row(measure="work_precision", seconds=SECONDS | {"least": 1.2e-4})
+    with pytest.raises(InputError, match="the fastest run is slower than the median"):
+        store.read(store.write(report(bad), tmp_path))
+
+
+PLAN = """name = "t"
+[[measure]]
+kind = "work_precision"
+cases = ["euler"]
+horizon = "20"
+samples = 4
+ladders = [{ integrator = "heyoka", tolerances = ["1e-6"] }]
+"""
+
+
+def ran(folder: Path, more: str) -> Row:
+    (folder / "t.toml").write_text(PLAN + more)
+    (task,) = expand(load(str(folder / "t.toml"))[0])
+    return measure(task)
+
+
+def test_a_plan_asks_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work_precision, "_ENOUGH_SECONDS", 0.0)
+    monkeypatch.setattr(work_precision, "_FOR_COMPARISON", Repeats(11, 20, 0.0, 3, band=True))
+    plain, timed = ran(tmp_path, ""), ran(tmp_path, "timings = true\n")
+    assert plain.seconds.keys() == {"compile", "run", "least", "repeats"}
+    assert timed.seconds.keys() == {*plain.seconds, "band"}
+    assert timed.seconds["repeats"] == 11
+    assert 0 <= timed.seconds["band"] < 2
+    with pytest.raises(InputError, match="bool"):
+        ran(tmp_path, "timings = 1\n")
+
+
+def test_the_band_holds_the_middle_of_the_runs() -> None:
+    class Run:
+        outcome = work_precision.Outcome.SUCCESS
+
+        def __init__(self, seconds: float) -> None:
+            self.seconds = {"run": seconds}
+
+    def spent(how: Repeats, *seconds: float) -> dict[str, float]:
+        return work_precision.timed(lambda number: Run(seconds[number - 1]), how)[0]
+
+    ten = spent(Repeats(11, 11, 0.0, 3, band=True), 1e-3, *[2e-3] * 9, 4e-3)
+    assert (ten["run"], ten["least"], ten["repeats"]) == (2e-3, 1e-3, 11)
+    assert ten["band"] == pytest.approx(0.2258, abs=1e-4)
+    # a run that takes long is timed once, or three times where it is for a comparison
+    assert spent(Repeats(11, 11, 0.0), 3.1)["repeats"] == 1
+    assert spent(Repeats(11, 11, 0.0, 3, band=True), 3.1, 3.2, 3.3)["repeats"] == 3
+    assert "band" not in spent(Repeats(11, 11, 0.0), *[1.0] * 11)
