@@ -227,8 +227,8 @@ class Contained:
                 changed = [name for name, part in parts.items() if getattr(system, name) is not part]
                 for name in changed:
                     object.__setattr__(system, name, parts[name])
-        if changed:
-            raise PeerFailed(f"{self.name} changed the {', '.join(changed)} of the system {system.name}")
+                if changed:  # whatever else it raised follows from that
+                    raise PeerFailed(f"{self.name} changed the {', '.join(changed)} of the system {system.name}")
         with contained(self.name, " in what it returned"):
             return self._kept(run, problem, asked, spent)
 
