@@ -131,11 +131,13 @@ def exact(value: Any) -> Fraction:
     A float is the exact binary number it is, not the decimal that it prints as.  Raises InputError for text that is
     no number, for bools, NaN and infinities, and for text beyond 100,000 characters or an exponent beyond that size.
     """
-    if isinstance(value, Fraction):
+    if type(value) is Fraction and type(value.numerator) is int is type(value.denominator):
         return value
     if isinstance(value, str):
         return _from_text(value)
     kind = type(value).__name__
+    if kind == "mpfr":
+        return _from_mpfr(value)
     if kind in ("real", "real128"):
         return _from_quad(value) if kind == "real128" else round_to(_from_text(str(value)), int(value.prec))
     if isinstance(value, Decimal) and value.is_finite() and abs(value.adjusted()) > _MAX_TEXT:
@@ -146,7 +148,7 @@ def exact(value: Any) -> Fraction:
             if isinstance(value, Rational):
                 return Fraction(int(value.numerator), int(value.denominator))
             if hasattr(value, "as_integer_ratio"):
-                return Fraction(*value.as_integer_ratio())
+                return Fraction(*map(int, value.as_integer_ratio()))
             return Fraction(index(value))
         except Exception:  # NaN, infinities, and whatever a foreign number does
             pass
@@ -171,6 +173,17 @@ def _from_quad(value: Any) -> Fraction:
 
 def _binary(significand: int, exponent: int) -> Fraction:
     return Fraction(significand << exponent) if exponent >= 0 else Fraction(significand, 1 << -exponent)
+
+
+def _from_mpfr(value: Any) -> Fraction:
+    """The exact value of gmpy2's mpfr, whose exponent may have nine digits."""
+    try:
+        mantissa, exponent = map(int, value.as_mantissa_exp())
+    except (OverflowError, ValueError):
+        raise InputError(f"{quoted(value)} is not a finite number.", _REMEDY) from None
+    if abs(exponent) > 4 * _MAX_TEXT:
+        raise _too_large(value)
+    return _binary(mantissa, exponent)
 
 
 def _from_mantissa(value: Any) -> Fraction:

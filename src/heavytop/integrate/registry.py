@@ -8,13 +8,18 @@ asked for, so no integrator needs to take options that mean nothing to it.  Peer
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from importlib.metadata import EntryPoint
 from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, quoted
 from heavytop.integrate import peers
+from heavytop.integrate.reach import require_reach
+from heavytop.integrate.trajectory import Problem
+from heavytop.precision import Precision, exact
+from heavytop.top.equations import System
+from heavytop.top.heavy_top import HeavyTop, State
 
 HERE = "heavytop.integrate"
 
@@ -33,11 +38,23 @@ INTEGRATORS = {
 
 
 def propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:
-    """What propagates one motion with the integrator of that name; raises InputError for an unknown name or option."""
+    """What propagates one motion with the integrator of that name; raises InputError for an unknown name or option.
+
+    Its calls raise OutOfReach as :func:`heavytop.integrate.reach.require_reach` does.
+    """
     if isinstance(name, str) and name not in INTEGRATORS and name in peers.known():
         _with(peers.peer(name), name, options)
-        return _with(peers.ready(name), name, options)
-    return _with(_load(_find(name).propagate), name, options)
+        run = _with(peers.ready(name), name, options)
+    else:
+        run = _with(_load(_find(name).propagate), name, options)
+
+    def call(
+        top: HeavyTop, start: State, times: Sequence[Any], precision: Precision, *, system: System, **more: Any
+    ) -> Any:
+        require_reach(Problem.of(top, start, precision, system), exact(times[-1]), options.get("step_limit"))
+        return run(top, start, times, precision, system=system, **more)
+
+    return call
 
 
 def watched(name: str, options: dict[str, Any], observer: Callable[[Fraction, Any], None]) -> Callable[..., Any]:
@@ -56,12 +73,22 @@ def watched(name: str, options: dict[str, Any], observer: Callable[[Fraction, An
 
 
 def ensemble_propagator(name: str, options: dict[str, Any]) -> Callable[..., Any]:
-    """What propagates many motions; raises InputError also for an integrator that runs one at a time."""
+    """What propagates many motions; raises InputError also for an integrator that runs one at a time.
+
+    Its calls raise OutOfReach as those of :func:`propagator`.
+    """
     one_at_a_time = isinstance(name, str) and name not in INTEGRATORS and name in peers.known()
     place = "" if one_at_a_time else _find(name).ensemble
     if not place:
         raise InputError(f"The integrator {name} runs one motion at a time.", "Call propagate for each.")
-    return _with(_load(place), name, options)
+    run = _with(_load(place), name, options)
+
+    def call(problems: Sequence[Problem], times: Sequence[Any], **more: Any) -> Any:
+        for problem in problems:
+            require_reach(problem, exact(times[-1]), options.get("step_limit"))
+        return run(problems, times, **more)
+
+    return call
 
 
 def _find(name: str) -> Integrator:

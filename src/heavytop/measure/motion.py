@@ -10,10 +10,8 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import OutOfReach
 from heavytop.exact.balls import FUNCTIONS, working_precision
 from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.scales import least_rate
 from heavytop.integrate import registry
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
@@ -25,8 +23,6 @@ from heavytop.top.angles import euler_angles, perpendicular
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, data_texts
 from heavytop.top.integrals import Integral, holding
-
-_MOST_TURNS = 10**13
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +104,6 @@ def compute(
     """
     xi = perpendicular(start.gamma) if attitude else None
     problem = Problem.of(top, start, precision, system, xi)
-    _require_reach(problem, times[-1])
     wanted = frozenset(exact(number(time, precision)) for time in times)
     watcher = _Watcher(problem, holding(top, start, system), wanted)
     samples = times if watcher.angles is None else watcher.angles.samples(times)
@@ -124,18 +119,6 @@ def compute(
         attitudes = [line[6:] for line in texts]
         angles = [_angles(state, followed[time], precision) for time, state in watcher.kept]
     return Motion(top, start, run, [line[:6] for line in texts], watcher.drift.metrics(), attitudes, angles)
-
-
-def _require_reach(problem: Problem, end: Fraction) -> None:
-    """Raises OutOfReach where the motion turns more often until ``end`` than any integrator can follow."""
-    p, start = problem.parameters, problem.start.flat
-    turns = abs(end) * least_rate(p, start)
-    if turns > _MOST_TURNS and any(problem.system.field(p, start)):
-        raise OutOfReach(
-            f"Until t = {decimal_text(end, 6)} the motion turns about {decimal_text(turns, 2)} times.",
-            f"Integrators take several steps for each: up to {_MOST_TURNS:.0e} are tried; `heavytop reference` needs "
-            "none where there is a closed form.",
-        )
 
 
 @whole_evaluation

@@ -179,6 +179,7 @@ def _measure(kind: Kind, task: Task, saved: Saved) -> Row:
     from heavytop.suite.rows import data_of, failed, unmeasured
 
     try:
+        task.require_reach()
         row = kind.measure(task, saved)
         row.data = data_of(task, row.starts)
         return row
