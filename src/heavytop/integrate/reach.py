@@ -14,20 +14,29 @@ MOST_STEPS = 10**11
 """In double a step takes a microsecond: these take days."""
 
 
-def require_reach(problem: Problem, end: Fraction, step_limit: int | None = None, step: Fraction | None = None) -> None:
-    """Raises OutOfReach where a run to the time ``end`` takes more than :data:`MOST_STEPS` steps.
+def expected_steps(problem: Problem, end: Fraction, step: Fraction | None = None) -> int:
+    """How many steps a run to the time ``end`` takes, within a factor of ten; 0 for a motion that rests.
 
-    Their number is the time over the step: over the fixed ``step`` of the method, else over the time in which the
-    motion changes.  A motion that rests is always in reach, and so is a run that ``step_limit`` ends early.
+    The time over the step: over the fixed ``step`` of the method, else over the time in which the motion changes.
+    """
+    p, start = problem.parameters, problem.start.flat
+    if not any(problem.system.field(p, start)):
+        return 0
+    square = end**2 * (square_of_rate(problem.system, p, start) if step is None else 1 / step**2)
+    return math.isqrt(square.numerator // square.denominator)
+
+
+def require_reach(problem: Problem, end: Fraction, step_limit: int | None = None, step: Fraction | None = None) -> None:
+    """Raises OutOfReach where a run to the time ``end`` takes more than :data:`MOST_STEPS` :func:`expected_steps`.
+
+    A run that ``step_limit`` ends early is in reach.
     """
     if step_limit is not None and step_limit <= MOST_STEPS:
         return
-    p, start = problem.parameters, problem.start.flat
-    square = end**2 * (square_of_rate(problem.system, p, start) if step is None else 1 / step**2)
-    if square > MOST_STEPS**2 and any(problem.system.field(p, start)):
-        decades = math.floor((log10(square) or 0.0) / 2)
+    steps = expected_steps(problem, end, step)
+    if steps > MOST_STEPS:
         raise OutOfReach(
-            f"A run to t = {decimal_text(end, 6)} takes some 1e{decades} steps.",
+            f"A run to t = {decimal_text(end, 6)} takes some 1e{math.floor(log10(Fraction(steps)) or 0.0)} steps.",
             f"Up to {MOST_STEPS:.0e} are tried: ask for an earlier time, or for a proven state, which needs no steps "
             "where there is a closed form (`heavytop reference`).",
         )
