@@ -61,7 +61,7 @@ def propagate(
 
     Raises:
         InputError: for what is no motion, time, format or option.
-        OutOfReach: where the run would take more than 1e11 steps, unless ``step_limit`` ends it before.
+        OutOfReach: where the run would take more than 1e12 steps, unless ``step_limit`` ends it before.
 
     Source:
         (1.1) and (1.2), as in :mod:`heavytop.top.equations`; the Taylor method is heyoka's (Biscani and Izzo, 2021).

@@ -10,7 +10,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.precision import decimal_text, log10
 from heavytop.top.rates import square_of_rate
 
-MOST_STEPS = 10**11
+MOST_STEPS = 10**12
 """In double a step takes a microsecond: these take days."""
 
 

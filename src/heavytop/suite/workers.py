@@ -22,6 +22,7 @@ from threading import Lock, Thread
 from typing import Any
 
 from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, PeerFailed
+from heavytop.integrate.trajectory import OtherFlags
 from heavytop.processes import ChildContext
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
@@ -180,7 +181,7 @@ def _measure(kind: Kind, task: Task, saved: Saved) -> Row:
 
     try:
         task.require_reach()
-        row = kind.measure(task, saved)
+        row = _taken_up(kind, task, saved)
         row.data = data_of(task, row.starts)
         return row
     except PeerFailed as error:
@@ -189,6 +190,19 @@ def _measure(kind: Kind, task: Task, saved: Saved) -> Row:
         return unmeasured(task, error)
     except InputError as error:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
+
+
+def _taken_up(kind: Kind, task: Task, saved: Saved) -> Row:
+    """The row, from its saved place on where that is a place of it: else it is measured from the beginning."""
+    try:
+        return kind.measure(task, saved)
+    except (OtherFlags, OutOfReach, Contradiction, PeerFailed):
+        raise
+    except Exception:
+        if not saved.taken:
+            raise
+    saved.forget()
+    return kind.measure(task, saved)
 
 
 def _ended_by_peer(task: Task, times: int) -> Row | None:
