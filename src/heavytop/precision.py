@@ -203,7 +203,8 @@ def _too_large(value: object) -> InputError:
 def shown(value: Fraction) -> str:
     """An exact number for a message: as it is where that is short, else to six digits."""
     short = max(value.numerator.bit_length(), value.denominator.bit_length()) < 100
-    return str(value) if short else decimal_text(value, 6)
+    # rounded first: a fraction of a million digits takes seconds to write, in however few of them
+    return str(value) if short else decimal_text(round_to(value, 64), 6)
 
 
 def time_text(time: Fraction) -> str:

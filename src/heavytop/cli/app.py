@@ -104,9 +104,15 @@ def show_on_terminal(renderable: Any) -> None:
 
 def print_json(document: Any) -> None:
     """Print one JSON document."""
+    import json
+
     import msgspec
 
-    print(printable(msgspec.json.format(msgspec.json.encode(document), indent=1).decode()))
+    try:
+        text = msgspec.json.format(msgspec.json.encode(document), indent=1).decode()
+    except UnicodeEncodeError:  # the name of a file that is no text
+        text = json.dumps(msgspec.to_builtins(document), indent=1)
+    print(printable(text))
 
 
 def require_new(folder: Path) -> None:
