@@ -88,9 +88,11 @@ loss = "3"
 """
 ODD_TEXT = (
     "", " ", "0", "-0", "1", "-1", "1/0", "0/1", "nan", "inf", "-inf", "1e150", "1e151", "-1e150", "1e-150", "1e-400",
-    "1e400", "1e9999", "1e99999", "1e-99999", "1e999999999", "9" * 500, "1/" + "7" * 300, "0x1p3", "1_000", "٣", "½", "1e",
+    "1e400", "1e9999", "1e99999", "1e-99999", "1e999999999", "9" * 500, "1/" + "7" * 300, "0x1p3", "1_000", "٣", "½",
+    "1e",
     "1,2", "a", "\0", "\n", "'", '"', "Ω", "\ud800", "double", "../..", "/dev/zero", "1e14", "1e-12", "3/5", "0.1" * 3,
-    "--help", "-", "true", "1.5", "1e3", "real:100", "quad", "x" * 3000, "1e16", "-7/3", "1e-30", "é", "%s", "{}", "[", "*",
+    "--help", "-", "true", "1.5", "1e3", "real:100", "quad", "x" * 3000, "1e16", "-7/3", "1e-30", "é", "%s", "{}",
+    "[", "*",
 )  # fmt: skip
 ODD_JSON = (
     None, True, False, 0, -1, 1, 2**70, -(2**70), 0.5, 1e308, -1e308, [], {}, "", "nan", "x", "1e-3", "-1", "1/0",
@@ -102,7 +104,8 @@ ODD_PYTHON = (
     *ODD_TEXT, *ODD_JSON, gmpy2.mpz(3), gmpy2.mpq(1, 3), gmpy2.mpfr("0.1"), gmpy2.mpfr("nan"), gmpy2.mpfr("inf"),
     gmpy2.mpfr("1e300000000"), gmpy2.mpc(1), Decimal("0.1"), Decimal("NaN"), Decimal("1e999999"), Fraction(1, 3),
     Fraction(gmpy2.mpz(1), gmpy2.mpz(3)), Fraction(10) ** 200, mpmath.mpf("0.3"), mpmath.inf, np.float64(0.5),
-    np.longdouble(1) / 3, np.float32("nan"), np.int8(3), np.array([1.0, 2.0]), np.array([]), np.zeros((2, 6)), np.array(1.0),
+    np.longdouble(1) / 3, np.float32("nan"), np.int8(3), np.array([1.0, 2.0]), np.array([]), np.zeros((2, 6)),
+    np.array(1.0),
     math.nan, math.inf, 1j, b"1", object(), range(3), (1, 2, 3), (0, 0, 1), ("3/5", 0, "4/5"), TOP, START, ht.QUAD,
     ht.DOUBLE_DOUBLE, ht.EXTENDED, len, Path("/nowhere"), 10**400, [1, "2", Fraction(3)], [3, 2, 1], [-1, -2],
 )  # fmt: skip
@@ -183,7 +186,8 @@ class Inputs:
         run = ht.propagate(TOP, START, ["1/2", 1, 2, 3])
         self.trajectory = {
             "name": "mine", "integrator": "mine", "precision": "double", "system": "heavy_top",
-            "inertia": ["3", "2", "1"], "weight": "1", "centre": ["1/2", "1/3", "1/5"], "omega": ["1/10", "2/5", "9/10"],
+            "inertia": ["3", "2", "1"], "weight": "1", "centre": ["1/2", "1/3", "1/5"], "omega": ["1/10", "2/5",
+            "9/10"],
             "gamma": ["3/5", "0", "4/5"], "times": ["1/2", "1", "2", "3"], "states": run.texts(),
         }  # fmt: skip
         head = (
@@ -251,7 +255,8 @@ class Inputs:
             parts[random_.randrange(len(parts))] = random_.choice(ODD_TEXT)
             options[name] = random_.choice((",".join(parts), ",".join(parts), random_.choice(ODD_TEXT)))
         more = {
-            "propagate": (["--precision", random_.choice(("double", "quad", "extended", "double-double", "real:40", *ODD_TEXT))],
+            "propagate": (["--precision", random_.choice(("double", "quad", "extended", "double-double", "real:40",
+            *ODD_TEXT))],
                           ["--integrator", random_.choice(("words", "splitting:2", "scipy:LSODA", *ODD_TEXT))],
                           ["--max-steps", random_.choice(("3", "0", *ODD_TEXT))], ["--attitude"]),
             "reference": (["--digits", random_.choice(("1", "30", "200", "0", "x", "1e3", "-1"))], ["--attitude"]),
@@ -268,15 +273,18 @@ class Inputs:
             "HeavyTop": (ht.HeavyTop, {"inertia": (3, 2, 1), "weight": 1, "centre": (0, 0, 1)}),
             "State": (ht.State, {"omega": (1, 2, 3), "gamma": (0, 0, 1)}),
             "propagate": (ht.propagate, {"top": TOP, "start": START, "times": times, "precision": "double",
-                          "integrator": "heyoka", "system": "heavy_top", "step_limit": 50, "tolerance": None, "xi": None}),
+                          "integrator": "heyoka", "system": "heavy_top", "step_limit": 50, "tolerance": None,
+                          "xi": None}),
             "ensemble": (ht.ensemble, {"tops": [TOP, TOP], "starts": START, "times": times, "precision": "double",
                          "integrator": "words", "threads": 2, "step_limit": 50, "system": "heavy_top"}),
-            "reference": (ht.reference, {"top": TOP, "start": START, "times": times, "digits": 20, "system": "heavy_top",
+            "reference": (ht.reference, {"top": TOP, "start": START, "times": times, "digits": 20,
+            "system": "heavy_top",
                           "attitude": False}),
             "score": (ht.score, {"times": times, "states": states, "top": TOP, "start": START, "precision": None,
                       "system": "heavy_top", "name": "a", "integrator": "b"}),
             "drift": (ht.drift, {"run": ht.propagate(TOP, START, [1])}),
-            "compare": (ht.compare, {"baseline": self.folder / "report", "candidate": self.folder / "report", "policy": None,
+            "compare": (ht.compare, {"baseline": self.folder / "report", "candidate": self.folder / "report",
+            "policy": None,
                         "floor": None, "loss": None}),
             "read_report": (ht.read_report, {"path": self.folder / "report"}),
             "real": (ht.real, {"bits": 60}),
@@ -314,7 +322,8 @@ class Inputs:
         page = f"--html={self.folder / 'page.html'}"
         return self.command(
             *random_.choice(
-                (("compare", good, out), ("compare", out, good, "--json"), ("compare", out, out, page), ("show", out, "--full"),
+                (("compare", good, out), ("compare", out, good, "--json"), ("compare", out, out, page), ("show", out,
+                "--full"),
                  ("show", out), ("show", out, page), ("history", good, out, "--json"), ("history", out, good, page),
                  ("show", out, f"--parquet={self.folder / 'rows.parquet'}"))
             )
