@@ -360,19 +360,7 @@ class Inputs:
 
     def options(self, random_: random.Random):
         """Any command with any words."""
-        commands = (
-            "run",
-            "compare",
-            "history",
-            "show",
-            "propagate",
-            "reference",
-            "score",
-            "audit",
-            "list",
-            "figures",
-            "--version",
-        )
+        commands = ("compare", "history", "show", "propagate", "reference", "score", "audit", "list", "--version")
         words = random_.choices((*ODD_TEXT, "--json", "--case", "--out", "--help", "--plan"), k=random_.randrange(4))
         return self.command(*random_.choice(commands).split(), *words)
 

@@ -201,13 +201,19 @@ def test_a_number_with_too_large_an_exponent_is_called_that(text: str) -> None:
 
 def test_numbers_of_other_packages_are_exact_and_plain() -> None:
     third = Fraction(1, 3)
-    numbers = {
-        gmpy2.mpz(3): Fraction(3), gmpy2.mpq(1, 3): third, gmpy2.mpfr("0.5"): Fraction(1, 2),
-        Fraction(gmpy2.mpz(1), gmpy2.mpz(3)): third, Fraction(numpy.int64(1), numpy.int64(3)): third,
-        numpy.int8(-3): Fraction(-3), numpy.float32(0.25): Fraction(1, 4), numpy.longdouble(2): Fraction(2),
-        Decimal("0.1"): Fraction(1, 10), gmpy2.mpfr(0): Fraction(0),
-    }  # fmt: skip
-    for odd, value in numbers.items():
+    numbers = [
+        (gmpy2.mpz(3), Fraction(3)),
+        (gmpy2.mpq(1, 3), third),
+        (gmpy2.mpfr("0.5"), Fraction(1, 2)),
+        (Fraction(gmpy2.mpz(1), gmpy2.mpz(3)), third),
+        (Fraction(numpy.int64(1), numpy.int64(3)), third),
+        (numpy.int8(-3), Fraction(-3)),
+        (numpy.float32(0.25), Fraction(1, 4)),
+        (numpy.longdouble(2), Fraction(2)),
+        (Decimal("0.1"), Fraction(1, 10)),
+        (gmpy2.mpfr(0), Fraction(0)),
+    ]
+    for odd, value in numbers:
         found = exact(odd)
         assert found == value
         assert type(found) is Fraction
@@ -222,5 +228,5 @@ def test_numbers_of_other_packages_are_exact_and_plain() -> None:
 
 def test_a_message_about_a_fraction_of_many_digits_takes_no_time() -> None:
     began = time.process_time()
-    assert shown(1 - Fraction(1, 3**600_000)) == "1.00000"
+    assert shown(1 - Fraction(1, 3**600_000)) == "1"
     assert time.process_time() - began < 1  # a minute if all digits are written first
