@@ -362,7 +362,7 @@ class Inputs:
         """Any command with any words."""
         commands = ("compare", "history", "show", "propagate", "reference", "score", "audit", "list", "--version")
         words = random_.choices((*ODD_TEXT, "--json", "--case", "--out", "--help", "--plan"), k=random_.randrange(4))
-        return self.command(*random_.choice(commands).split(), *words)
+        return self.command(random_.choice(commands), *words)
 
     def resumed(self, random_: random.Random):
         """A run that goes on from mutated files whose checksums are right."""
@@ -428,6 +428,8 @@ def main(count: int = 10_000, seed: int = 1, first: int = 0) -> int:
             problem = tried(call)
             longest = max(longest, perf_counter() - at)
             kinds[re.split(r"[ (]", text)[0]] += 1
+            if (number + 1) % 500 == 0:
+                print(f"{number + 1}: {perf_counter() - began:.0f} s", flush=True)
             if problem:
                 found["hangs" if problem.startswith("hang") else "tracebacks"] += 1
                 print(f"{number}: {problem}\n    {ascii(text)[:300]}", flush=True)
