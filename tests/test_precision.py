@@ -1,9 +1,11 @@
 """Rounding at the wall: exact in, exact out, and no false number."""
 
+import time
 from decimal import Decimal
 from fractions import Fraction
 from random import Random
 
+import gmpy2
 import numpy
 import pytest
 from hypothesis import given
@@ -24,6 +26,7 @@ from heavytop.precision import (
     real,
     round_to,
     rounded,
+    shown,
 )
 
 FORMATS = [DOUBLE, EXTENDED, QUAD, real(24), real(237), real(1024)]
@@ -194,3 +197,36 @@ def test_a_number_with_too_large_an_exponent_is_called_that(text: str) -> None:
     with pytest.raises(InputError, match=r"exponent of .* is too large"):
         exact(text)
     assert exact("1e0000000002") == 100
+
+
+def test_numbers_of_other_packages_are_exact_and_plain() -> None:
+    third = Fraction(1, 3)
+    numbers = [
+        (gmpy2.mpz(3), Fraction(3)),
+        (gmpy2.mpq(1, 3), third),
+        (gmpy2.mpfr("0.5"), Fraction(1, 2)),
+        (Fraction(gmpy2.mpz(1), gmpy2.mpz(3)), third),
+        (Fraction(numpy.int64(1), numpy.int64(3)), third),
+        (numpy.int8(-3), Fraction(-3)),
+        (numpy.float32(0.25), Fraction(1, 4)),
+        (numpy.longdouble(2), Fraction(2)),
+        (Decimal("0.1"), Fraction(1, 10)),
+        (gmpy2.mpfr(0), Fraction(0)),
+    ]
+    for odd, value in numbers:
+        found = exact(odd)
+        assert found == value
+        assert type(found) is Fraction
+        assert type(found.numerator) is int is type(found.denominator)
+    with gmpy2.context(precision=400):
+        assert exact(gmpy2.sqrt(gmpy2.mpfr(2))) ** 2 != 2
+        assert abs(exact(gmpy2.sqrt(gmpy2.mpfr(2))) ** 2 - 2) < Fraction(1, 2**395)
+    for odd in (gmpy2.mpfr("nan"), gmpy2.mpfr("inf"), gmpy2.mpfr("-inf"), gmpy2.mpc(1), gmpy2.mpfr("1e300000000")):
+        with pytest.raises(InputError):
+            exact(odd)
+
+
+def test_a_message_about_a_fraction_of_many_digits_takes_no_time() -> None:
+    began = time.process_time()
+    assert shown(1 - Fraction(1, 3**600_000)) == "1"
+    assert time.process_time() - began < 1  # a minute if all digits are written first

@@ -3,16 +3,39 @@
 import os
 import pty
 import random
+import re
 import subprocess
 import sys
+import time
 from dataclasses import dataclass
+from fractions import Fraction
 from io import StringIO
+from itertools import pairwise
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
+from typer.testing import CliRunner
 
-from heavytop.cli.progress import Bar, Estimator, Progress, counted, duration, watched
+from heavytop.cli import app, progress
+from heavytop.cli.progress import (
+    Bar,
+    Estimator,
+    Progress,
+    counted,
+    duration,
+    reaching,
+    told_when_slow,
+    waiting,
+    watched,
+)
+from heavytop.measure.motion import compute
+from heavytop.precision import DOUBLE
+from heavytop.records import SCHEMA, Report
+from heavytop.report import store
+from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State
 
 
 class Clock:
@@ -144,3 +167,84 @@ def test_a_reference_reports_on_a_terminal_and_its_output_stays_clean() -> None:
     assert done.stdout.lstrip().startswith(b"{")
     assert b" %" in written
     assert b"left" in written
+
+
+def test_every_command_says_once_where_it_is_when_it_takes_long(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(progress, "SILENCE", 0.0)
+    said = set()
+    data = ["--inertia", "3,2,1", "--weight", "1", "--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10"]
+    data += ["--gamma", "3/5,0,4/5", "--times"]
+    folder = tmp_path / "report"
+    report = Report(SCHEMA, {"name": "empty"}, {"packages": {}}, [])
+    folder.mkdir()
+    store.write(report, folder)
+    for words in (
+        ["propagate", *data, "3e4"],
+        ["reference", *data, "3", "--digits", "300"],
+        ["list"],
+        ["show", folder],
+    ):
+        done = CliRunner().invoke(app, list(map(str, words)))
+        assert done.exit_code == 0, done.output
+        (line,) = done.stderr.splitlines()
+        assert re.match(rf"heavytop: {words[0]}: \d+ s so far, ", line)
+        said.add(words[0])
+    assert said <= {each.name for each in app.registered_commands}
+    for each in app.registered_commands:  # and all the others pass the same door
+        assert each.callback.__code__ is app.registered_commands[0].callback.__code__
+
+
+def test_the_line_says_what_is_done_and_how_far(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    monkeypatch.setattr(progress, "SILENCE", 0.1)
+    with told_when_slow("score"), counted("comparison", 8, "states", 1.0) as advance:
+        advance()
+        advance()
+        time.sleep(0.4)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(r"heavytop: score: 1 s so far, comparison: 2/8 states, 25 %, about \d+ s left", line)
+    with told_when_slow("audit"), waiting("audit of x", 0.4):
+        time.sleep(0.2)
+    assert re.search(r"so far, audit of x, 1 s at most: [2-9]\d %", capsys.readouterr().err)
+    with told_when_slow("propagate"), reaching("integration", 1.0) as reach:
+        reach(0.004)
+        time.sleep(0.2)
+    assert re.search(r"integration: 0\.4 %, about \d+ s left", capsys.readouterr().err)
+    with told_when_slow("propagate"), reaching("integration", 0.01):
+        time.sleep(0.2)
+    assert "integration: how far is not known" in capsys.readouterr().err
+    with told_when_slow("compare"):
+        pass
+    assert capsys.readouterr().err == ""
+
+
+def test_a_third_party_integrator_cannot_silence_it() -> None:
+    """Its descriptors are shut while it runs: the line goes out all the same."""
+    script = """if True:
+        import time
+        from heavytop.cli import output, progress
+        from heavytop.integrate.peers.contract import quiet
+        output.prepare()
+        progress.SILENCE = 0.1
+        with progress.told_when_slow("run"), quiet():
+            time.sleep(0.5)
+    """
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stderr == "heavytop: run: 1 s so far, going on\n"
+
+
+def test_an_integration_reports_often_enough_and_its_states_stay_the_same() -> None:
+    top, start = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+    for integrator in ("heyoka", "words"):
+        heard: list[Fraction] = []
+        times = [Fraction(7), Fraction(2000)]
+        plain, told = (
+            compute(top, start, times, DOUBLE, HEAVY_TOP, integrator=integrator, reached=each)
+            for each in (None, heard.append)
+        )
+        assert (told.states, told.drift, told.trajectory.steps) == (plain.states, plain.drift, plain.trajectory.steps)
+        assert told.trajectory.times == plain.trajectory.times
+        assert heard == sorted(heard)
+        assert heard[0] <= 2
+        assert max(b / a for a, b in pairwise(heard)) <= 2

@@ -132,11 +132,13 @@ def exact(value: Any) -> Fraction:
     A float is the exact binary number it is, not the decimal that it prints as.  Raises InputError for text that is
     no number, for bools, NaN and infinities, and for text beyond 100,000 characters or an exponent beyond that size.
     """
-    if isinstance(value, Fraction):
+    if type(value) is Fraction and type(value.numerator) is int is type(value.denominator):
         return value
     if isinstance(value, str):
         return _from_text(value)
     kind = type(value).__name__
+    if kind == "mpfr":
+        return _from_mpfr(value)
     if kind in ("real", "real128"):
         return _from_quad(value) if kind == "real128" else round_to(_from_text(str(value)), int(value.prec))
     if isinstance(value, Decimal) and value.is_finite() and abs(value.adjusted()) > _MAX_TEXT:
@@ -147,7 +149,7 @@ def exact(value: Any) -> Fraction:
             if isinstance(value, Rational):
                 return Fraction(int(value.numerator), int(value.denominator))
             if hasattr(value, "as_integer_ratio"):
-                return Fraction(*value.as_integer_ratio())
+                return Fraction(*map(int, value.as_integer_ratio()))
             return Fraction(index(value))
         except Exception:  # NaN, infinities, and whatever a foreign number does
             pass
@@ -174,6 +176,17 @@ def _binary(significand: int, exponent: int) -> Fraction:
     return Fraction(significand << exponent) if exponent >= 0 else Fraction(significand, 1 << -exponent)
 
 
+def _from_mpfr(value: Any) -> Fraction:
+    """The exact value of gmpy2's mpfr, whose exponent may have nine digits."""
+    try:
+        mantissa, exponent = map(int, value.as_mantissa_exp())
+    except (OverflowError, ValueError):
+        raise InputError(f"{quoted(value)} is not a finite number.", _REMEDY) from None
+    if abs(exponent) > 4 * _MAX_TEXT:
+        raise _too_large(value)
+    return _binary(mantissa, exponent)
+
+
 def _from_mantissa(value: Any) -> Fraction:
     """The exact value of mpmath's mpf."""
     sign, mantissa, exponent, _ = value._mpf_
@@ -191,7 +204,8 @@ def _too_large(value: object) -> InputError:
 def shown(value: Fraction) -> str:
     """An exact number for a message: as it is where that is short, else to six digits."""
     short = max(value.numerator.bit_length(), value.denominator.bit_length()) < 100
-    return str(value) if short else decimal_text(value, 6)
+    # rounded first: a fraction of a million digits takes seconds to write, in however few of them
+    return str(value) if short else decimal_text(round_to(value, 64), 6)
 
 
 def time_text(time: Fraction) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import random
 import resource
 import signal
 import subprocess
@@ -13,8 +14,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from heavytop.api.run_folder import prepare
 from heavytop.errors import InputError
+from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Metric, Report
+from heavytop.suite import workers
 from heavytop.suite.checkpoint import Checkpoint, Saved, locked
 from heavytop.suite.files import line
 from reports import Row, expand, load, measure, replace, store
@@ -166,6 +170,102 @@ def test_a_forged_line_with_its_checksum_is_measured_again_or_refused(tmp_path: 
     file.write_bytes(line(forged) + b"".join(lines[1:]))
     with pytest.raises(InputError, match="damaged in its first line"), checkpoint(tmp_path / "out"):
         pass
+
+
+def spots(content: object, path: tuple = ()) -> list[tuple]:
+    """Where anything stands in a document: a path of keys and places each."""
+    inner = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
+    return [path] * bool(path) + [found for key, value in inner for found in spots(value, (*path, key))]
+
+
+def forged(content: object, path: tuple, value: object) -> object:
+    """The document with another value at that place; without it where that is ``...``."""
+    copy = json.loads(json.dumps(content))
+    inner = copy
+    for key in path[:-1]:
+        inner = inner[key]
+    if value is ...:
+        del inner[path[-1]]
+    else:
+        inner[path[-1]] = value
+    return copy
+
+
+@pytest.mark.parametrize("which", ["heyoka", "words"])
+def test_a_forged_place_with_its_checksum_is_measured_from_the_beginning(tmp_path: Path, which: str) -> None:
+    (tmp_path / "plan.toml").write_text(
+        f'name = "p"\n[[measure]]\nkind = "drift"\ncases = ["euler"]\nintegrator = "{which}"\n'
+        'runs = [{ precision = "double", horizon = "6", samples = 4 }]\n'
+    )
+    (task,) = expand(load(str(tmp_path / "plan.toml"))[0])
+    notes = Notes(None, 2)
+    expected = measured_again(task, notes)
+    place = msgspec.json.decode(notes.notes[0])
+    place["run"]["seconds"] = 1.0
+    source = random.Random(which)
+    everywhere = [(path, value) for path in spots(place) for value in (..., None, "x", [], {"": 0}, -1)]
+    # another number in the place of a number may be what was saved
+    wrong = [(path, value) for path, value in everywhere if not (value == -1 and path[-1] not in ("samples", "steps"))]
+    wrong = [(path, value) for path, value in wrong if "flags" not in path and path != ("run", "words", 0)]
+    counts = ("samples", "count")
+    wrong = source.sample(wrong, 24) + [(path, n) for path in spots(place) for n in (1, 3, 999) if path[-1] in counts]
+    saved = tmp_path / "row-0.partial"
+    taken = 0
+    for path, value in wrong:
+        content = forged(place, path, value)
+        if content == place or (path == ("run", "words") and which == "heyoka"):
+            continue
+        saved.write_bytes(line(msgspec.json.encode(("this", content))))
+        found = measured_again(task, Saved(saved, "this", 1e9))
+        assert found == expected, (path, value)
+        taken += 1
+    assert taken > 24
+
+
+def measured_again(task, saved: Saved) -> bytes:
+    found = workers._measure(KINDS[task.key.kind], task, saved)
+    found.seconds = {}
+    return msgspec.json.encode(found)
+
+
+def test_a_forged_row_with_its_checksum_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(
+        'name = "p"\n[[measure]]\nkind = "drift"\ncases = ["euler", "lagrange", "gyrostat"]\n'
+        'runs = [{ precision = "double", horizon = "2", samples = 3 }]\n'
+    )
+    out, heard = tmp_path / "out", []
+
+    def stop(task: object) -> None:
+        heard.append(task)
+        if len(heard) == 2:
+            raise KeyboardInterrupt
+
+    def run(progress, resume: bool = False):
+        return prepare(str(tmp_path / "plan.toml"), out, workers=1, resume=resume).measure(progress)
+
+    with pytest.raises(KeyboardInterrupt):
+        run(stop)
+    whole = (out / "rows.jsonl").read_bytes().splitlines(keepends=True)
+    kept = [json.loads(each.split(b" ", 1)[1]) for each in whole[1:]]
+    assert len(kept) == 2
+    (first, one), (second, other) = kept
+    wrong = [[number, one] for number in (-1, 3, 10**30)] + [[first, other], [second, one]]
+    wrong += [[first, forged(one, path, value)] for path, value in [
+        (("outcome",), "fine"), (("horizon",), "x"), (("key", "case"), "lagrange2"), (("key",), None),
+        (("metrics", "drift_energy_max", "value"), "x"), (("metrics", "drift_energy_max", "log10"), 7.0),
+        (("time_reached",), "1"), (("finite",), "yes"), (("metrics",), []),
+    ]]  # fmt: skip
+    for each in wrong:
+        (out / "rows.jsonl").write_bytes(whole[0] + line(json.dumps(each).encode()))
+        measured = []
+        if each[0] == 10**30:  # no index at all: it is as if the line were not there
+            continue
+        with suppress(InputError):
+            run(measured.append, resume=True)
+            pytest.fail(f"taken: {str(each)[:200]}")
+        assert not measured
+    (out / "rows.jsonl").write_bytes(b"".join(whole))
+    assert run(lambda task: None, resume=True).good
 
 
 def test_what_was_cut_short_is_gone_before_a_shorter_row_is_added(tmp_path: Path) -> None:

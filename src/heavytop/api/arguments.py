@@ -35,14 +35,18 @@ def is_a(value: object, kind: type[_Kind], what: str) -> _Kind:
     return value
 
 
-def motion(top: object, start: object, precision: Precision = DOUBLE) -> tuple[HeavyTop, State]:
+def motion(
+    top: object, start: object, precision: Precision = DOUBLE, *, of_any_size: bool = False
+) -> tuple[HeavyTop, State]:
     """A top and a start that a body can have.
 
+    of_any_size: for what computes with exact numbers alone, which no format bounds.
     Raises InputError for other types, data beyond 1e150, and a γ off the unit sphere by more than rounding to
     ``precision`` explains.
     """
     body, state = is_a(top, HeavyTop, "top"), is_a(start, State, "start")
-    require_physical(body, state)
+    if not of_any_size:
+        require_physical(body, state)
     remedy = 'Give rational components such as ("3/5", 0, "4/5"), or use start.normalized().'
     return body, state.require_unit_gamma(slack_of(precision), remedy)
 

@@ -63,6 +63,7 @@ def propagate(
 
     Raises:
         InputError: for what is no motion, time, format or option.
+        OutOfReach: where the run would take more than 1e12 steps, unless ``step_limit`` ends it before.
 
     Source:
         (1.1) and (1.2), as in :mod:`heavytop.top.equations`; the Taylor method is heyoka's (Biscani and Izzo, 2021).
@@ -106,6 +107,7 @@ def ensemble(
 
     Raises:
         InputError: as :func:`propagate`, naming the motion; for no motions, and for counts that differ.
+        OutOfReach: as :func:`propagate`.
     """
     form, about = arguments.precision(precision), arguments.system(system)
     bodies = arguments.listed(tops, HeavyTop, "tops")
@@ -142,9 +144,9 @@ def reference(
 
     Raises:
         InputError: for what is no motion or time, and for other digits.
-        OutOfReach: where the digits cannot be proven.
+        OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
-    body, state = arguments.motion(top, start)
+    body, state = arguments.motion(top, start, of_any_size=True)
     about, instants = arguments.system(system), arguments.any_times(times)
     return proven(
         body, state, instants, whole(digits, "digits"), about, attitude=bool(arguments.flag(attitude, "attitude"))

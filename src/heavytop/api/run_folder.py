@@ -22,7 +22,10 @@ from heavytop.precision import whole
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report import html, overview, parquet, store
 from heavytop.report.brief import brief
+from heavytop.report.checks import check_rows
 from heavytop.report.environment import environment
+from heavytop.report.names import row_name
+from heavytop.report.printable import printable
 from heavytop.suite import checkpoint
 from heavytop.suite.checkpoint import Checkpoint, identity_of
 from heavytop.suite.plan import read, warnings
@@ -31,6 +34,7 @@ from heavytop.suite.run import run as run_tasks
 from heavytop.suite.task import Task
 
 PAGE = "report.html"
+_ANOTHER = "Give another --out."
 MOST_ON_A_PAGE = 5000
 """Beyond so many rows a run makes no page: it would hold them all."""
 
@@ -87,6 +91,7 @@ class Run:
         fit = partial(require_fit, self.directory, self.resume)
         try:
             with Checkpoint(self.directory, identity_of(report), fit, self.save_every) as rows:
+                self._require_own(rows)
                 laws = run_tasks(
                     self.tasks, KINDS, rows, progress, self.workers, self.scheduler, begun, self.row_timeout
                 )
@@ -96,6 +101,15 @@ class Run:
                 f"{self.directory} cannot be written: {error}.",
                 "Make space, or choose a writable --out; finished rows are kept for --resume.",
             ) from None
+
+    def _require_own(self, rows: Checkpoint) -> None:
+        """Raises InputError where the checkpoint holds a row that no run of this plan wrote, whatever its checksum."""
+        indices = sorted(rows.offsets)
+        for index, row in zip(indices, rows.rows(indices), strict=True):
+            if index not in range(len(self.tasks)) or row.key != self.tasks[index].key:
+                name = printable(row_name(row.identity))[:60]
+                raise InputError(f"{rows.path} holds the row {name}, which is not row {index} of this plan.", _ANOTHER)
+            check_rows(rows.path, [row], KINDS)
 
     def _write(self, report: Report, rows: Callable[[], Iterator[Row]]) -> Ended:
         """Write all that a finished run leaves.  rows: a new stream of all rows at each call."""

@@ -1,7 +1,7 @@
 """The command line.  Only this room prints; each command is a few lines that join the other rooms.
 
-Exit codes: 0 good, 1 a finding, 2 usage or bad input, 3 incomplete, undecided or incomparable, 130 interrupted,
-143 terminated.
+Exit codes: 0 good, 1 a finding, 2 usage, bad input, or an output that cannot be written, 3 incomplete, undecided,
+incomparable or out of reach, 130 interrupted, 141 nobody reads the output any more, 143 terminated.
 """
 
 # ruff: noqa: I001
@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import sys
 
+from heavytop.cli import output
 from heavytop.cli.app import app
 from heavytop.errors import HeavyTopError
 
@@ -27,12 +28,36 @@ def run_command_line() -> int:
         from typer import completion
 
         completion.completion_init()  # type: ignore[attr-defined]
+    output.prepare()
+    try:
+        code = _run()
+        sys.stdout.flush()
+    except output.ReaderGone:
+        output.drop_output()
+        return output.READER_GONE
+    except HeavyTopError as error:
+        return _failed(str(error), error.exit_code)
+    except MemoryError:
+        return _failed("There is not enough memory.\n  Ask for less at once, or use a machine with more.")
+    except OSError as error:
+        return _failed(f"{error}\n  The surroundings of the program do not allow what it needs.")
+    return code
+
+
+def _run() -> int:
+    """The exit code of the command; what it raises but for exits passes."""
     try:
         app(prog_name="heavytop")
-    except HeavyTopError as error:
-        print(f"heavytop: {error}", file=sys.stderr)
-        return error.exit_code
-    except BrokenPipeError:
-        # whoever read our output has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except SystemExit as ended:
+        return ended.code if isinstance(ended.code, int) else 0 if ended.code is None else 2
     return 0
+
+
+def _failed(message: str, code: int = 2) -> int:
+    """Say why; what standard output holds so far is still written where that is possible."""
+    output.say(message)
+    try:
+        sys.stdout.flush()
+    except (output.OutputError, output.ReaderGone):
+        output.drop_output()
+    return code

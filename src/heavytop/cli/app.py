@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
+from heavytop.cli.output import printable
 from heavytop.errors import InputError, quoted
 
 app = typer.Typer(
@@ -84,9 +85,14 @@ def command(function: Callable[..., int]) -> Callable[..., None]:
 
     @wraps(function)
     def with_exit_code(*args: Any, **options: Any) -> None:
-        raise typer.Exit(function(*args, **options))
+        from heavytop.cli.progress import told_when_slow
 
-    return app.command(name=function.__name__.rstrip("_"))(with_exit_code)
+        with told_when_slow(name):
+            code = function(*args, **options)
+        raise typer.Exit(code)
+
+    name = function.__name__.rstrip("_")
+    return app.command(name=name)(with_exit_code)
 
 
 def show_on_terminal(renderable: Any) -> None:
@@ -101,15 +107,31 @@ def show_on_terminal(renderable: Any) -> None:
 
 def print_json(document: Any) -> None:
     """Print one JSON document."""
+    import json
+
     import msgspec
 
-    print(msgspec.json.format(msgspec.json.encode(document), indent=1).decode())
+    try:
+        text = msgspec.json.format(msgspec.json.encode(document), indent=1).decode()
+    except UnicodeEncodeError:  # the name of a file that is no text
+        text = json.dumps(msgspec.to_builtins(document), indent=1)
+    print(printable(text))
 
 
 def require_new(folder: Path) -> None:
     """Raises InputError for a folder that holds anything already."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} already holds other content.", "Give a new folder with --out.")
+
+
+def absolute(path: Path) -> Path:
+    """The path from the root, whatever anyone does to the working directory; raises InputError where that is gone."""
+    try:
+        return path.absolute()
+    except OSError:
+        raise InputError(
+            f"{path} is relative to a working directory that does not exist any more.", "Change to one that does."
+        ) from None
 
 
 @contextmanager

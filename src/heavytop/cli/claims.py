@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from heavytop.cli.app import Json, command, print_json, require_new, show_on_terminal
+from heavytop.cli.app import Json, absolute, command, print_json, require_new, show_on_terminal
 from heavytop.cli.progress import counted, followed, waiting
 from heavytop.errors import InputError
 
@@ -57,7 +57,7 @@ def figures(
 
     The true motion beside the claim, all as SVG and PNG.  Takes about 10 seconds.
     """
-    out = out.absolute()
+    out = absolute(out)
     require_new(out)
     try:
         for file in _drawn(out, report):

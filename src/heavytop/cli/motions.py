@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated, Any
 
 import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal
-from heavytop.cli.progress import watched
+from heavytop.cli.output import say
+from heavytop.cli.progress import reaching, watched
 from heavytop.errors import InputError
 
 Inertia = Annotated[str, typer.Option(help="Principal moments A,B,C at the fixed point.")]
@@ -20,8 +20,8 @@ Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly
 SystemName = Annotated[str, typer.Option(help="heavy_top or gyrostat.")]
 Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]
 
-_REFERENCE_SECONDS = 3.0
-"""Expected of an enclosure, before anything is known of it."""
+_PROPAGATE_SECONDS, _REFERENCE_SECONDS = 1.0, 3.0
+"""Expected of a run and of an enclosure, before anything is known of them."""
 _SLOW_BITS = 2000
 """From here on a single step takes seconds, and about 20 times as long with twice the bits."""
 
@@ -59,17 +59,20 @@ def propagate(
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top, start)
     if form.bits >= _SLOW_BITS and integrator == "heyoka":
-        print(
-            f"heavytop: warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
+        say(
+            f"warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
             f"seconds at real:{_SLOW_BITS}, 20 times as long with twice the bits; Ctrl-C waits for it.\n"
-            "  `heavytop reference` proves as many digits, at once where there is a closed form.",
-            file=sys.stderr,
+            "  `heavytop reference` proves as many digits, at once where there is a closed form."
         )
 
     from heavytop.integrate.peers.source import named
     from heavytop.measure.motion import compute
 
-    motion = compute(top, start, instants, form, which, attitude, max_steps, named(integrator))
+    end, which_one = instants[-1] or 1, named(integrator)
+    with reaching("integration", _PROPAGATE_SECONDS) as reach:
+        motion = compute(
+            top, start, instants, form, which, attitude, max_steps, which_one, lambda time: reach(float(time / end))
+        )
     if json:
         print_json(motion.to_json())
     else:
@@ -151,5 +154,5 @@ def _motion(
         require_physical(top, start)
     start = (start.normalized() if normalize else start).require_unit_gamma()
     for warning in top.warnings():
-        print(f"heavytop: warning: {warning}", file=sys.stderr)
+        say(f"warning: {warning}")
     return top, start

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,7 +10,11 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, command, print_json, show_on_terminal, writing
+from heavytop.cli.progress import counted
 from heavytop.errors import InputError
+
+_REPORT_SECONDS = 0.1
+"""Expected of reading one."""
 
 
 @command
@@ -38,12 +43,12 @@ def compare(
     if html is not None:
         from heavytop.report.html import comparison_page
 
-        old, new = store.read(baseline, KINDS), store.read(candidate, KINDS)
+        old, new = _read([baseline, candidate], store.read)
         result = compare_reports(old, new, rules, KINDS)
         files.append((html, comparison_page(old, new, result, KINDS)))
     else:
         all_of_them = json or junit is not None
-        before, after = (store.read_brief(path, KINDS) for path in (baseline, candidate))
+        before, after = _read([baseline, candidate], store.read_brief)
         result = compare_reports(before, after, rules, KINDS, list_same=all_of_them)
     if markdown is not None:
         from heavytop.report.markdown import comparison_markdown
@@ -81,7 +86,7 @@ def history(
     if len(reports) < 2:
         raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")
     rules, cases, metrics = _policy(policy, None, None), glob(case), glob(metric or "*")
-    read = [store.read_brief(path, KINDS) for path in reports]
+    read = _read(reports, store.read_brief)
     tracks = over.history(read, rules, KINDS)
     tracks = [t for t in tracks if cases.fullmatch(t.row.case) and metrics.fullmatch(t.metric)]
     if not metric:
@@ -96,6 +101,18 @@ def history(
     else:
         show_on_terminal(over.history_text(names, tracks))
     return 0
+
+
+def _read(paths: list[Path], reader: Callable[..., Any]) -> list[Any]:
+    """What ``reader`` makes of each report."""
+    from heavytop.kinds import KINDS
+
+    found = []
+    with counted("reading", len(paths), "reports", _REPORT_SECONDS) as advance:
+        for path in paths:
+            found.append(reader(path, KINDS))
+            advance()
+    return found
 
 
 def _policy(file: Path | None, floor: str | None, loss: str | None) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import command, plans
+from heavytop.cli.app import absolute, command, plans
+from heavytop.cli.output import say
 from heavytop.cli.progress import Progress
 
 
@@ -46,7 +46,7 @@ def run(
     asked = prepare(
         plan,
         # whatever an integrator does to the working directory
-        None if out is None else out.absolute(),
+        None if out is None else absolute(out),
         resume=resume,
         workers=workers,
         scheduler=scheduler,
@@ -58,7 +58,7 @@ def run(
     )
     directory = asked.directory
     for warning in asked.warnings:
-        print(f"heavytop: warning: {warning}", file=sys.stderr)
+        say(f"warning: {warning}")
     if asked.is_finished:
         ended = asked.finished()
         print(ended.summary)
@@ -71,7 +71,7 @@ def run(
     except KeyboardInterrupt as stop:
         kept = f"finished rows are kept: --out {directory} --resume goes on"
         said = kept if (directory / ROWS).exists() else "no row was finished"
-        print(f"heavytop: interrupted; {said}", file=sys.stderr)
+        say(f"interrupted; {said}")
         return 143 if isinstance(stop, _Terminated) else 130
     print(ended.summary)
     page = directory / PAGE

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, cases, command, print_json, require_new, show_on_terminal, writing
+from heavytop.cli.app import Json, absolute, cases, command, print_json, require_new, show_on_terminal, writing
+from heavytop.cli.output import say
 from heavytop.cli.progress import counted
 from heavytop.errors import InputError
 
@@ -34,17 +34,17 @@ def score(
     from heavytop.suite.trajectory_file import read
 
     if out is not None:
-        out = out.absolute()
+        out = absolute(out)
         require_new(out)
     given = read(trajectory, None if case is None else case_named(case))
     for warning in given.warnings():
-        print(f"heavytop: warning: {warning}", file=sys.stderr)
+        say(f"warning: {warning}")
     with counted("score", 2 * len(given.times), "states", _STATE_SECONDS) as advance:
         found = assess(given, advance)
     if out is not None:
         _write_report(found.row, given.sha256, out)
     if html is not None:
-        _write_page(found, html.absolute())
+        _write_page(found, absolute(html))
     if json:
         from heavytop.report.score_text import to_json
 

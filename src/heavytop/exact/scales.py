@@ -33,20 +33,11 @@ def unit_of_time(parameters: Parameters, start: tuple[Fraction, ...]) -> int:
 
     The rates are |Ω|, |λ| and the root of |P r||γ|/I, whichever is largest.
     """
-    largest = _exponent_of_rate(parameters, start, min(parameters.inertia))
-    return 0 if largest is None or -_ORDINARY <= largest <= _ORDINARY else largest
-
-
-def least_rate(parameters: Parameters, start: tuple[Fraction, ...]) -> Fraction:
-    """A rate that the motion has, but for a factor: of :func:`unit_of_time`, with the largest moment I; 0 at rest."""
-    largest = _exponent_of_rate(parameters, start, max(parameters.inertia))
-    return Fraction(0) if largest is None else Fraction(2) ** largest
-
-
-def _exponent_of_rate(parameters: Parameters, start: tuple[Fraction, ...], inertia: Fraction) -> int | None:
     turning = max(*map(abs, start[:3]), abs(Fraction(parameters.rotor)))
-    weight = max(map(abs, parameters.moment)) * max(map(abs, start[3:6])) / inertia
-    return max([exponent(turning)] * (turning > 0) + [exponent(weight) // 2] * (weight > 0), default=None)
+    weight = max(map(abs, parameters.moment)) * max(map(abs, start[3:6])) / min(parameters.inertia)
+    rates = [exponent(turning)] * (turning > 0) + [exponent(weight) // 2] * (weight > 0)
+    largest = max(rates, default=None)
+    return 0 if largest is None or -_ORDINARY <= largest <= _ORDINARY else largest
 
 
 def exponent(value: Fraction) -> int:

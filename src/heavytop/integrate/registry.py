@@ -8,7 +8,7 @@ asked for, so no integrator needs to take options that mean nothing to it.  Peer
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from importlib.metadata import EntryPoint
 from typing import Any, NamedTuple
@@ -17,6 +17,11 @@ from heavytop.errors import InputError, quoted
 from heavytop.integrate import peers
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.source import Source
+from heavytop.integrate.reach import require_reach
+from heavytop.integrate.trajectory import Problem
+from heavytop.precision import Precision, exact
+from heavytop.top.equations import System
+from heavytop.top.heavy_top import HeavyTop, State
 
 HERE = "heavytop.integrate"
 
@@ -35,7 +40,22 @@ INTEGRATORS = {
 
 
 def propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
-    """What propagates one motion with that integrator; raises InputError for an unknown name or option."""
+    """What propagates one motion with that integrator; raises InputError for an unknown name or option.
+
+    Its calls raise OutOfReach as :func:`heavytop.integrate.reach.require_reach` does.
+    """
+    run = _unguarded(which, options)
+
+    def call(
+        top: HeavyTop, start: State, times: Sequence[Any], precision: Precision, *, system: System, **more: Any
+    ) -> Any:
+        require_reach(Problem.of(top, start, precision, system), exact(times[-1]), options.get("step_limit"))
+        return run(top, start, times, precision, system=system, **more)
+
+    return call
+
+
+def _unguarded(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
     if isinstance(which, Command):
         return _with(CommandIntegrator(which), which.name, options)
     if not isinstance(which, str) or (which not in INTEGRATORS and which in peers.known()):
@@ -62,14 +82,23 @@ def watched(
 
 
 def ensemble_propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
-    """What propagates many motions; raises InputError also for an integrator that runs one at a time."""
-    if not isinstance(which, str) or (which not in INTEGRATORS and which in peers.known()):
+    """What propagates many motions; raises InputError also for an integrator that runs one at a time.
+
+    Its calls raise OutOfReach as those of :func:`propagator`.
+    """
+    one_at_a_time = not isinstance(which, str) or (which not in INTEGRATORS and which in peers.known())
+    place = "" if one_at_a_time else _find(peers.name_of(which)).ensemble
+    if not place:
         name = peers.name_of(which)
         raise InputError(f"The integrator {name} runs one motion at a time.", "Call propagate for each.")
-    place = _find(which).ensemble
-    if not place:
-        raise InputError(f"The integrator {which} runs one motion at a time.", "Call propagate for each.")
-    return _with(_load(place), which, options)
+    run = _with(_load(place), peers.name_of(which), options)
+
+    def call(problems: Sequence[Problem], times: Sequence[Any], **more: Any) -> Any:
+        for problem in problems:
+            require_reach(problem, exact(times[-1]), options.get("step_limit"))
+        return run(problems, times, **more)
+
+    return call
 
 
 def _find(name: str) -> Integrator:

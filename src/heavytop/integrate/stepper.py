@@ -128,7 +128,9 @@ class Stepper:
         return self.engine.tc.copy()
 
     def begin(self, place: Place) -> None:
-        """Go on from there."""
+        """Go on from there; raises ValueError for a state of another length."""
+        if len(place.state) != len(self.engine.state):
+            raise ValueError(f"a state of {len(place.state)} numbers")
         self.engine.state[:] = numpy.array(place.state)
         self.engine.dtime = place.time
         self.steps, self.time = place.steps, self.engine.time

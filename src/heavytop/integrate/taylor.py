@@ -96,6 +96,8 @@ def follow(
         done, began = place.samples, began - place.seconds
         kept_times = [exact(target) for target in targets[:done]]
         stepper.reach(targets[done - 1])
+        if stepper.rest is None:
+            place.require_covered(stepper.steps)
     for target in targets[done:]:
         if target == 0:
             state = engine.state.copy()

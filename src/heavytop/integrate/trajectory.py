@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from heavytop.display import Lines, Table, Tabular
@@ -103,6 +104,10 @@ class Problem:
         return [number(exact(value), self.precision) for value in values]
 
 
+class OtherFlags(InputError):
+    """A place that was reached with other flags than the run that is to go on from it; names them."""
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """Where a run is: all that it needs to go on with the same bits, in native numbers.
@@ -121,11 +126,11 @@ class Place:
     words: tuple[str, ...] = ()
 
     def require_same(self, flags: dict[str, str]) -> None:
-        """Raises InputError where the run that goes on has other flags."""
+        """Raises OtherFlags where the run that goes on has others."""
         names = sorted(self.flags.keys() | flags.keys())
         different = [name for name in names if self.flags.get(name) != flags.get(name)]
         if different:
-            raise InputError(
+            raise OtherFlags(
                 "The run that is to go on was integrated with "
                 + ", ".join(f"{name} = {self.flags.get(name)} (now {flags.get(name)})" for name in different)
                 + ".",
@@ -154,7 +159,15 @@ class Place:
         """The place with that :meth:`content`."""
         state, time = (tuple(native(text, precision) for text in content[name]) for name in ("state", "time"))
         samples, steps, seconds, flags = (content[name] for name in ("samples", "steps", "seconds", "flags"))
-        return cls(samples, state, time, steps, seconds, flags, tuple(content.get("words", ())))
+        place = cls(samples, state, time, steps, float(seconds), dict(flags), tuple(content.get("words", ())))
+        if not (type(samples) is int is type(steps) and samples > 0 <= steps and 0 <= place.seconds < inf):
+            raise ValueError(f"no run was ever at {content!r}")
+        return place
+
+    def require_covered(self, steps: int) -> None:
+        """Raises ValueError unless one step from here covers the last sample: else the two are not of one run."""
+        if steps != self.steps + 1:
+            raise ValueError(f"{steps - self.steps} steps from a place to its sample")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -271,3 +271,6 @@ class _Pace:
         if place.words:
             self.run.restore(place.words, place.steps)
             self.reach(covered)
+            place.require_covered(self.run.steps)
+            if self.run.place() != place.words:
+                raise ValueError("words that are no state of this arithmetic")

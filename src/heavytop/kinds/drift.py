@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 import msgspec
@@ -91,6 +92,7 @@ class Drift(Kind):
         before = saved.load()
         if before is not None:
             scorer.restore(before["measures"])
+            _require_same_samples(scorer, [exact(number(t, precision)) for t in task.times], before["run"]["samples"])
 
         def mark(place: Place) -> None:
             if saved.due():
@@ -125,3 +127,13 @@ class Drift(Kind):
     def brief(self, rows: Sequence[Row]) -> list[str]:
         """Digits right, a line a motion."""
         return digits_lines(rows, "Digits right, to |t|")
+
+
+def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:
+    """Raises ValueError unless the scorer has taken in the first so many of the samples."""
+    known = scorer.truth
+    for each in scorer.running().values():
+        error = scorer.error is not None and each in scorer.error.running.values()
+        seen = [time for time in times[:samples] if not error or isinstance(known, str) or known.covers(time)]
+        if each.count != len(seen) or list(each.kept) != [time for time in seen if time in scorer.drift.keep]:
+            raise ValueError("the place of the run is not that of what was measured of it")

@@ -79,6 +79,8 @@ class Running:
         """Become what had that :meth:`content`."""
         self.maximum, self.squares, self.final = (ball_from(content[k]) for k in ("maximum", "squares", "final"))
         self.count = content["count"]
+        if type(self.count) is not int or self.count < 0:
+            raise ValueError(f"{self.count!r} samples")
         self.kept = {Fraction(time): ball_from(value) for time, value in content["kept"].items()}
 
 

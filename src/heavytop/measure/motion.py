@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 from flint import arb
 
-from heavytop.errors import OutOfReach
 from heavytop.exact.balls import FUNCTIONS, working_precision
 from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.scales import least_rate
 from heavytop.integrate import registry
 from heavytop.integrate.peers.source import Source
+from heavytop.integrate.reach import expected_steps
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
 from heavytop.measure.followed_angles import FollowedAngles
@@ -27,7 +26,9 @@ from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, data_texts
 from heavytop.top.integrals import Integral, holding
 
-_MOST_TURNS = 10**13
+Reached = Callable[[Fraction], None]
+_PARTS = 50
+_STEPS_A_PART = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,15 +74,21 @@ class Motion:
 
 
 class _Watcher:
-    """Keeps the states at the times asked for, their drift, and the angles at every sample."""
+    """Keeps the states at the times asked for, their drift, and the angles at every sample, whose times ``reached``
+    hears of.
+    """
 
-    def __init__(self, problem: Problem, integrals: Sequence[Integral], wanted: frozenset[Fraction]) -> None:
+    def __init__(
+        self, problem: Problem, integrals: Sequence[Integral], wanted: frozenset[Fraction], reached: Reached
+    ) -> None:
+        self.reached = reached
         self.drift = Drift(problem, integrals)
         self.wanted = wanted
         self.kept: list[tuple[Fraction, Any]] = []
         self.angles = FollowedAngles(problem) if problem.xi is not None else None
 
     def __call__(self, time: Fraction, state: Any) -> None:
+        self.reached(time)
         if self.angles is not None:
             self.angles.see(time, state)
         if time in self.wanted:
@@ -98,21 +105,26 @@ def compute(
     attitude: bool = False,
     step_limit: int | None = None,
     integrator: str | Source = "heyoka",
+    reached: Reached | None = None,
 ) -> Motion:
     """The motion at ``times`` (exact, checked), with the drift of every integral that holds.
 
     attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
     integrator: a name that `heavytop list` shows, or a source.
+    reached: called with the times on the way, some fifty and one for each doubling; by others than heyoka and words at
+    the end.
 
     Raises InputError for another integrator, OutOfReach where the run would take more steps than anyone waits for.
     """
     xi = perpendicular(start.gamma) if attitude else None
     problem = Problem.of(top, start, precision, system, xi)
-    _require_reach(problem, times[-1])
     wanted = frozenset(exact(number(time, precision)) for time in times)
-    watcher = _Watcher(problem, holding(top, start, system), wanted)
+    watcher = _Watcher(problem, holding(top, start, system), wanted, reached or (lambda time: None))
     samples = times if watcher.angles is None else watcher.angles.samples(times)
+    if reached is not None and integrator in registry.INTEGRATORS:
+        on_the_way = {exact(number(time, precision)) for time in _on_the_way(problem, times[-1])}
+        samples = sorted({*samples, *(on_the_way - wanted)}, key=abs)
     options = {name: value for name, value in (("xi", xi), ("step_limit", step_limit)) if value is not None}
     propagate = registry.watched(integrator, options, watcher)
     run = propagate(top, start, samples, precision, system=system)
@@ -127,16 +139,11 @@ def compute(
     return Motion(top, start, run, [line[:6] for line in texts], watcher.drift.metrics(), attitudes, angles)
 
 
-def _require_reach(problem: Problem, end: Fraction) -> None:
-    """Raises OutOfReach where the motion turns more often until ``end`` than any integrator can follow."""
-    p, start = problem.parameters, problem.start.flat
-    turns = abs(end) * least_rate(p, start)
-    if turns > _MOST_TURNS and any(problem.system.field(p, start)):
-        raise OutOfReach(
-            f"Until t = {decimal_text(end, 6)} the motion turns about {decimal_text(turns, 2)} times.",
-            f"Integrators take several steps for each: up to {_MOST_TURNS:.0e} are tried; `heavytop reference` needs "
-            "none where there is a closed form.",
-        )
+def _on_the_way(problem: Problem, end: Fraction) -> list[Fraction]:
+    """Times that say how far a run has come; samples change no bit of it, and there are far fewer than steps."""
+    steps = expected_steps(problem, end)
+    evenly = [end * i / _PARTS for i in range(1, _PARTS)] if steps > _STEPS_A_PART * _PARTS else []
+    return [*evenly, *(end / 2**n for n in range(1, steps.bit_length()))]
 
 
 @whole_evaluation

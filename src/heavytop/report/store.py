@@ -20,6 +20,7 @@ from heavytop.suite.files import read_whole, replace, without_repeats
 
 FILE = "report.json"
 DIGEST = "report.json.sha256"
+_UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _NAME = 200
 _CHUNK = 100
 """Rows of a brief report that are checked at once: few, so that they are still in the cache when compared."""
@@ -84,7 +85,7 @@ class _Rows:
             rows: list[Row] = []
             try:
                 rows.extend(map(self._decode, self._rows[start : start + _CHUNK]))
-            except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            except _UNREADABLE as error:
                 place = f"row {start + len(rows) + 1}: {error}"
                 raise InputError(f"{self._file} is not a whole report: {place}.", REMEDY) from None
             check_rows(self._file, rows, self._kinds)
@@ -129,11 +130,11 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
         try:
             report = msgspec.json.decode(content, type=kind)
             problem = ""
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        except _UNREADABLE as error:
             problem = str(error)
         as_written = digest.result()
     if problem or report.schema != SCHEMA:
-        with suppress(msgspec.DecodeError, UnicodeDecodeError):
+        with suppress(*_UNREADABLE):
             schema = msgspec.json.decode(content, type=_Schema).schema
             if schema != SCHEMA:
                 raise InputError(f"{file} has the schema {schema[:60]!r}, not {SCHEMA!r}.", REMEDY)
@@ -155,6 +156,8 @@ def _check_repeats(file: Path, content: bytes) -> None:
         json.loads(content, object_pairs_hook=without_repeats)
     except InputError as error:
         raise InputError(f"{file}: {error.cause}", REMEDY) from None
+    except RecursionError as error:
+        raise InputError(f"{file} is not a whole report: {error}.", REMEDY) from None
 
 
 def _has_its_digest(file: Path, content: bytes) -> bool:

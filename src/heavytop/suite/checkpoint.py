@@ -36,16 +36,27 @@ class Saved:
     """The place of one row in progress, in a file of its own; nowhere where ``path`` is None.
 
     A measurement asks :meth:`load` once, and where :meth:`due` says so hands plain text and integers to :meth:`save`.
+    taken: whether something was loaded.
     """
 
     def __init__(self, path: Path | None = None, identity: str = "", every: float = EVERY) -> None:
         self.path = path
         self.identity = identity
         self.every = every
+        self.taken = False
         self._last = monotonic()
 
+    def forget(self) -> None:
+        """What was saved before is of no use: nothing is loaded any more, and the next save replaces it."""
+        self.taken = False
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
+
     def load(self) -> dict[str, Any] | None:
-        """What was saved last by the same plan and program; None where nothing was."""
+        """What was saved last by the same plan and program; None where nothing was.
+
+        Its checksum is right, but not that of a secret: anything may stand in it.
+        """
         if self.path is None or not self.path.exists():
             return None
         content = verified(self.path.read_bytes().removesuffix(b"\n"))
@@ -53,7 +64,8 @@ class Saved:
             return None
         with suppress(msgspec.MsgspecError):
             identity, saved = msgspec.json.decode(content, type=tuple[str, dict[str, Any]])
-            return saved if identity == self.identity else None
+            self.taken = identity == self.identity
+            return saved if self.taken else None
         return None
 
     def due(self) -> bool:

@@ -10,10 +10,12 @@ import msgspec
 
 from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers.source import Source
+from heavytop.integrate.reach import require_reach
+from heavytop.integrate.trajectory import Problem
 from heavytop.measure.computed_reference import seconds_a_step as words_seconds
 from heavytop.measure.integrator import HEYOKA, WORDS, Integrator
 from heavytop.measure.rounding_noise import factor, scaled
-from heavytop.precision import Precision, parse
+from heavytop.precision import Precision, exact, parse
 from heavytop.records import EXACT, RowKey, Subject
 from heavytop.suite.cases import Case
 
@@ -75,6 +77,14 @@ class Task:
         """The case, with the roundings of the seed."""
         assert self.case is not None
         return replace(self.case, top=scaled(self.case.top, factor(self.seed))) if self.seed else self.case
+
+    def require_reach(self) -> None:
+        """Raises OutOfReach where what is measured is a run of too many steps."""
+        subject, case = self.key.subject, self.case
+        if subject.what == "computed" and case is not None and self.times:
+            problem = Problem.of(case.top, case.start, self.precision, case.system)
+            step = exact(subject.step) if subject.step not in ("", FINEST) else None
+            require_reach(problem, self.times[-1], step=step)
 
     @property
     def label(self) -> str:

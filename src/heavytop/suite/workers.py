@@ -23,6 +23,7 @@ from typing import Any
 
 from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported
 from heavytop.integrate.peers.command import begin_row
+from heavytop.integrate.trajectory import OtherFlags
 from heavytop.processes import ChildContext
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
@@ -213,7 +214,8 @@ def measure(kind: Kind, task: Task, saved: Saved) -> Row:
 
     begin_row()
     try:
-        row = kind.measure(task, saved)
+        task.require_reach()
+        row = _taken_up(kind, task, saved)
         row.data = data_of(task.case)
         return row
     except PeerFailed as error:
@@ -224,6 +226,19 @@ def measure(kind: Kind, task: Task, saved: Saved) -> Row:
         return unmeasured(task, error)
     except InputError as error:
         raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
+
+
+def _taken_up(kind: Kind, task: Task, saved: Saved) -> Row:
+    """The row, from its saved place on where that is a place of it: else it is measured from the beginning."""
+    try:
+        return kind.measure(task, saved)
+    except (OtherFlags, OutOfReach, Contradiction, PeerFailed, Unsupported):
+        raise
+    except Exception:
+        if not saved.taken:
+            raise
+    saved.forget()
+    return kind.measure(task, saved)
 
 
 def ended_its_process(task: Task, times: int) -> Row:

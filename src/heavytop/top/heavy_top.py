@@ -10,9 +10,10 @@ from math import isqrt
 from typing import Any
 
 from heavytop.errors import HeavyTopError, InputError, quoted
-from heavytop.precision import decimal_text, exact, exact_text, physical, shown
+from heavytop.precision import decimal_text, exact, exact_text, physical, round_to, shown
 
 Vector = tuple[Fraction, Fraction, Fraction]
+_SHOWN_BITS = 64
 _NEAR_BITS = 10
 """Bits of the unit vector that an error suggests: enough to show which one was meant."""
 _NORMALIZE = (
@@ -157,7 +158,8 @@ class State:
         """This state; raises InputError with that remedy unless | |γ|² − 1 | ≤ ``slack``."""
         off = dot(self.gamma, self.gamma) - 1
         if abs(off) > slack:
-            raise InputError(f"gamma is not a unit vector: |gamma|^2 - 1 = {decimal_text(off, 6)}.", remedy)
+            size = decimal_text(round_to(off, _SHOWN_BITS), 6)  # of a million digits else
+            raise InputError(f"gamma is not a unit vector: |gamma|^2 - 1 = {size}.", remedy)
         return self
 
     def unit_gamma_nearby(self) -> str:

@@ -1,0 +1,240 @@
+"""Hostile surroundings: each ends with an answer, or with the cause and its exit code, and never with a traceback.
+
+Every start of the program costs a second, so each is asked several things at once.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+PYTHON = [sys.executable, "-m", "heavytop"]
+DATA = [
+    "--inertia", "3,2,1", "--weight", "1", "--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10",
+    "--gamma", "3/5,0,4/5", "--times", "1",
+]  # fmt: skip
+PROPAGATE = ["propagate", *DATA]
+TRAJECTORY = """# inertia: 2, 2, 1
+# weight: 1
+# centre: 0, 0, 1
+# omega: 0, 0, 1
+# gamma: 0, 0, 1
+t,omega1,omega2,omega3,gamma1,gamma2,gamma3
+1,0,0,1,0,0,1
+"""
+PLAN = """name = "tiny"
+[[measure]]
+kind = "drift"
+cases = ["euler"]
+runs = [{ precision = "double", horizon = "2", samples = 3 }]
+"""
+
+
+def shell(command: str, *, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[bytes]:
+    """The command line by a shell, where ``heavytop`` stands for it."""
+    script = command.replace("heavytop", " ".join(PYTHON))
+    return subprocess.run(
+        ["bash", "-c", script], capture_output=True, cwd=cwd, env=os.environ | environment, timeout=120, check=False
+    )
+
+
+def limited(
+    arguments: list[str], limit: Callable[[], None], python: tuple[str, ...] = (), **environment: str
+) -> subprocess.CompletedProcess[bytes]:
+    command = [sys.executable, *python, *PYTHON[1:], *arguments]
+    return subprocess.run(
+        command, capture_output=True, env=os.environ | environment, preexec_fn=limit, timeout=120, check=False
+    )
+
+
+def assert_said(done: subprocess.CompletedProcess[bytes], *codes: int) -> None:
+    errors = done.stderr.decode(errors="replace")
+    assert done.returncode in codes, errors
+    assert "Traceback" not in errors
+    assert "Error:" not in errors
+    if done.returncode:
+        assert "heavytop: " in errors
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "utf-16"])
+def test_characters_that_an_encoding_lacks_are_replaced(encoding: str) -> None:
+    name = encoding.partition(":")[0]
+    text = shell("heavytop " + " ".join(PROPAGATE), PYTHONIOENCODING=encoding)
+    assert_said(text, 0)
+    known = text.stdout.decode(name)
+    assert "3  0.96912566428666425" in known
+    assert ("γ3" in known) == (encoding == "utf-16")
+
+
+def test_json_loses_nothing_in_any_encoding(tmp_path: Path) -> None:
+    (tmp_path / "Ω é.csv").write_text(TRAJECTORY, "utf-8")
+    for encoding in ("ascii", "utf-8"):
+        done = shell("heavytop score 'Ω é.csv' --json", cwd=tmp_path, PYTHONIOENCODING=encoding)
+        assert_said(done, 0)
+        assert json.loads(done.stdout)["case"] == "Ω é"
+
+
+@pytest.mark.parametrize(
+    ("what", "where"),
+    [([*PROPAGATE, "--json"], ">&-"), (PROPAGATE, "> /dev/full"), (["list"], "> /dev/full"), (["--help"], ">&- 2>&-")],
+    ids=["json closed", "table full", "lines full", "all closed"],
+)
+def test_an_output_that_cannot_be_written_is_exit_2_with_its_cause(what: list[str], where: str) -> None:
+    done = shell(f"heavytop {' '.join(what)} {where}")
+    assert done.returncode == 2
+    if "2>" not in where:
+        assert_said(done, 2)
+        assert b"Standard output cannot be written: " in done.stderr
+        assert {">&-": b"closed", "> /dev/full": b"No space"}[where] in done.stderr
+
+
+def test_an_error_that_cannot_be_said_changes_nothing_else() -> None:
+    for where in ("2>&-", "2> /dev/full <&-"):
+        done = shell(f"heavytop {' '.join(PROPAGATE)} --inertia 9,2,1 --json {where}")  # no body has these: a warning
+        assert done.returncode == 0
+        assert json.loads(done.stdout)["outcome"] == "success"
+    assert shell("heavytop propagate --nonsense 2> /dev/full").returncode == 2
+
+
+def test_a_reader_that_went_away_is_silence_and_the_code_of_other_tools() -> None:
+    done = shell(f"heavytop {' '.join(PROPAGATE)} --json | true; echo ${{PIPESTATUS[0]}}")
+    assert (done.stdout, done.stderr) == (b"141\n", b"")
+
+
+def test_a_removed_folder_is_an_answer_or_exit_2(tmp_path: Path) -> None:
+    outputs = [f"{' '.join(PROPAGATE)} --json", "run --plan smoke --out x", "figures --out x"]
+    gone = tmp_path / "gone"
+
+    def tried(which: int) -> subprocess.CompletedProcess[bytes]:
+        folder = gone / str(which)
+        folder.mkdir(parents=True)
+        return shell(f"rmdir {folder}; heavytop {outputs[which]}", cwd=folder)
+
+    with ThreadPoolExecutor(2) as at_once:
+        found = list(at_once.map(tried, range(len(outputs))))
+    for done, code in zip(found, (0, 2, 2), strict=True):
+        assert_said(done, code)
+
+
+def test_a_home_and_a_cache_that_cannot_be_written_are_no_matter(tmp_path: Path) -> None:
+    nowhere = "/proc/nowhere"
+    everywhere = {"HOME": nowhere, "XDG_CACHE_HOME": nowhere, "XDG_CONFIG_HOME": nowhere, "NUMBA_CACHE_DIR": nowhere}
+    for what in (f"{' '.join(PROPAGATE)} --json", f"show {results()} --html {tmp_path / 'page.html'}"):
+        assert_said(shell(f"heavytop {what}", **everywhere), 0)
+
+
+def results() -> Path:
+    return Path(__file__).parents[1] / "results" / "long"
+
+
+@pytest.mark.parametrize("name", ["a b", "new\nline", "Ω é 漢", "-dash", "quote'\""], ids=ascii)
+def test_any_name_of_a_path_is_taken(tmp_path: Path, name: str) -> None:
+    from typer.testing import CliRunner
+
+    from heavytop.cli import app
+
+    folder = tmp_path / name
+    folder.mkdir()
+    (folder / "mine.csv").write_text(TRAJECTORY)
+    (folder / "plan.toml").write_text(PLAN)
+    out, page = folder / "out", folder / "page.html"
+    for words in (
+        ["score", folder / "mine.csv", "--html", page],
+        ["score", folder / "mine.csv", "--json"],
+        ["run", "--plan", folder / "plan.toml", "--out", out, "--workers", "1"],
+        ["compare", out, out, "--json"],
+        ["compare", out, out, "--html", page],
+        ["history", out, out, "--json"],
+        ["show", out],
+    ):
+        done = CliRunner().invoke(app, list(map(str, words)))
+        assert done.exit_code == 0, (words, done.output, done.exception)
+    assert page.exists()
+
+
+def test_a_name_that_is_no_text_is_taken(tmp_path: Path) -> None:
+    folder = tmp_path / os.fsdecode(b"\xff\xfe")
+    folder.mkdir()
+    (folder / "mine.csv").write_text(TRAJECTORY)
+    done = shell('heavytop score mine.csv --out out && heavytop history "$PWD/out" "$PWD/out" --json', cwd=folder)
+    assert_said(done, 0)
+    assert b"\\udcff" in done.stdout
+
+
+def test_little_memory_is_an_answer_or_exit_2() -> None:
+    def little(megabytes: int) -> subprocess.CompletedProcess[bytes]:
+        size = megabytes << 20
+        limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (size, size))  # noqa: E731
+        return limited([*PROPAGATE, "--json"], limit, OPENBLAS_NUM_THREADS="1")
+
+    for megabytes in (600, 1500):
+        assert_said(little(megabytes), 0, 2)
+
+
+def test_few_file_descriptors_are_an_answer_or_exit_2(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(PLAN)
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (12, 12))
+
+    for what in ([*PROPAGATE, "--json"], ["run", "--plan", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "out"),
+                                          "--workers", "2"]):  # fmt: skip
+        assert_said(limited(what, limit), 0, 2)
+
+
+STRICT = """
+import json, sys, threading, time, warnings
+import numpy
+import heavytop as ht
+
+clock = time.time
+jumps = iter(range(10**9))
+time.time = lambda: clock() + 1e9 * (-1) ** next(jumps)  # the wall clock jumps by decades at every look
+top = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
+start = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+expected = ht.propagate(top, start, [1, 2]).to_numpy()
+exact = ht.reference(top, start, [1], 20).texts()
+wrong = []
+
+def work():
+    if not (ht.propagate(top, start, [1, 2]).to_numpy() == expected).all():
+        wrong.append("propagate")
+    if ht.reference(top, start, [1], 20).texts() != exact:
+        wrong.append("reference")
+
+for count in (2, 64):
+    threads = [threading.Thread(target=work) for _ in range(count)]
+    for each in threads: each.start()
+    for each in threads: each.join()
+for count in (2, 64):
+    many = ht.ensemble(top, [start] * 8, [1, 2], threads=count)
+    assert_ = [numpy.allclose(run.to_numpy(), expected, atol=1e-13, rtol=0) for run in many]
+    if not all(assert_):
+        wrong.append(f"ensemble by {count} threads")
+try:
+    ht.propagate(top, start, ["x"])
+    wrong.append("a number that is none")
+except ht.InputError:
+    pass
+if wrong:
+    sys.exit(", ".join(wrong))
+"""
+
+
+@pytest.mark.parametrize("options", [["-W", "error"], ["-OO"]], ids=" ".join)
+def test_threads_and_jumps_of_the_clock_under_strict_and_stripped_python(options: list[str]) -> None:
+    done = subprocess.run([sys.executable, *options, "-c", STRICT], capture_output=True, timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize("options", [("-W", "error"), ("-O",)], ids=" ".join)
+def test_the_command_line_under_strict_and_stripped_python(options: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(PLAN)
+    run = ["run", "--plan", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "out"), "--workers", "1"]
+    assert_said(limited(run, lambda: None, options), 0)
