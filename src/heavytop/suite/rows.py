@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 from heavytop.errors import Contradiction, HeavyTopError, PeerFailed
@@ -20,6 +21,7 @@ from heavytop.records import (
     Series,
 )
 from heavytop.suite.task import Task
+from heavytop.top.amplification import amplification
 from heavytop.top.heavy_top import HeavyTop, State
 
 
@@ -106,7 +108,14 @@ def computed_row(
         series=series,
         samples=len(run.times),
         seconds=run.seconds,
+        amplification=_amplification(run.problem, horizon),
     )
+
+
+def _amplification(problem: Problem, horizon: Fraction) -> float | None:
+    """That of the motion of a problem, to three digits; None for data beyond double."""
+    found = amplification(problem.system, problem.parameters, tuple(problem.start.flat), horizon)
+    return float(f"{found:.3g}") if math.isfinite(found) else None
 
 
 def unmeasured(task: Task, reason: HeavyTopError) -> Row:
