@@ -1,13 +1,13 @@
 """The largest error that rounding explains in a row, from the row's own body, start and horizon.
 
-Roundings of n steps walk at random, the body turns on meanwhile, and the motion amplifies what there is: in units of
-each quantity an error is rounding noise up to
+The roundings of n steps walk at random, the body turns on meanwhile, and the motion amplifies what there is.  So in
+units of the quantity an error is rounding noise up to
 
     100 · eps · √max(n, τ) · max(τ, A),    τ = 1 + rate · |horizon|,
 
-which is 100 · eps · τ^1.5 on a regular motion followed with one step per unit of its own time.  A is that of
-:mod:`heavytop.top.amplification`, computed here from the data of the row, and only where the rest does not suffice.  A
-first integral is not amplified: A is left out for its drift.
+which is 100 · eps · τ^1.5 on a regular motion followed with one step per unit of its own time, and more by the
+amplification A (:mod:`heavytop.top.amplification`) beyond τ.  A is computed from the data of the row, only where the
+rest does not suffice.  The drift of a first integral neither turns on nor is amplified: 100 · eps · √max(n, τ).
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ class RoundingBound:
 
     def explains(self, quantity: Quantity | None, size: float) -> bool:
         """Whether rounding makes an error of that quantity, or a difference of two, as large as 10^size."""
-        plain = MARGIN + (1 - self.row.bits) * BITS + math.log10(self._turns * math.sqrt(self._roundings))
-        plain += self._unit(quantity)
-        if size <= plain:
-            return True
+        found = MARGIN + (1 - self.row.bits) * BITS + math.log10(self._roundings) / 2 + self._unit(quantity)
         if quantity is not None and quantity.name == _DRIFT and quantity.component not in _RELATIONS:
-            return False
+            return size <= found
+        found += math.log10(self._turns)
+        if size <= found:
+            return True
         amplified = min(self._amplified(self.row.horizon), math.log10(self.kind.largest_amplification))
-        return size <= plain + max(0.0, amplified - math.log10(self._turns))
+        return size <= found + max(0.0, amplified - math.log10(self._turns))
 
     def explains_times(self, time: str, part: float) -> bool:
         """Whether rounding moves an escape at ``time`` by that part of it.
