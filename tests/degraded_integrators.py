@@ -192,6 +192,12 @@ def pairs(seed: int) -> Iterator[tuple[str, Report, Report]]:
             yield name, one, two
 
 
+def repaired(better: Report, worse: Report) -> bool:
+    """Whether the first is a repair of the second: no error of it is larger, beyond two bits above 4 eps."""
+    pairs = zip(better.rows[0].metrics.values(), worse.rows[0].metrics.values(), strict=False)
+    return all(float(a) <= 4 * max(float(b), 4 * 2.0**-52) for a, b in pairs if a.kind == "error")
+
+
 def scaled(found: Report, factor: str, band: float | None = None) -> Report:
     """Every error larger by a factor, its series too; with that band, where one is given."""
     rows = [_scaled(row, factor, band) for row in found.rows]

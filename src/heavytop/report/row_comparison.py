@@ -132,7 +132,7 @@ class RowComparison:
         """
         least_of = least(old.metrics, metric), least(new.metrics, match)
         kind = kind_of(old, self.kinds)
-        bound = RoundingBound(old, kind) if metric.band is not None and kind.noise_is_reruns(metric) else None
+        bound = RoundingBound(old, kind) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
         if why := irreproducible(metric, least_of[0], bound):
             return beyond_limit(match, limits) or (Verdict.INCOMPARABLE, f"the baseline is {why}")
         known, found = of_starts(metric, old), of_starts(match, new)
