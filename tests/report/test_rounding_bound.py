@@ -114,7 +114,8 @@ def test_a_candidate_whose_reruns_part_is_worse_where_it_reaches_further() -> No
     why = "not reproducible within rounding: 10 decades between reruns"
     assert judged(one("1.6e-14", 0.3), one("1.6e-14", 7.1)) == ("worse", why)
     assert judged(one("1.6e-14", None), one("1.6e-14", 7.1)) == ("worse", why)
-    assert judged(one("1e-3", 0.0), one("1e-14", 7.1))[0] == "better"
+    assert judged(one("1e-3", 0.0), one("1e-14", 7.1))[0] == "same"
+    assert judged(one("1e-3", 0.0), one("1e-14", 4.0))[0] == "better"
 
 
 def test_reruns_within_what_step_control_does_are_reproducible_and_excuse_no_more() -> None:
