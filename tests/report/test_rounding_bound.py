@@ -12,7 +12,7 @@ import degraded_integrators as degraded
 from degraded_integrators import HEALTHY, Method, marked_worse, report_of, verdict
 from heavytop.kinds import KINDS
 from heavytop.measure.reruns import some_of
-from heavytop.records import Data, Metric, Quantity, Row
+from heavytop.records import Against, Data, Metric, Quantity, Row, Series
 from heavytop.report.noise import apart, irreproducible, noisier, of_starts, reaches_further
 from heavytop.report.policy import Policy, Rule
 from heavytop.report.rounding_bound import RoundingBound
@@ -52,6 +52,8 @@ def test_the_bound_is_what_it_says_in_the_units_of_each_quantity() -> None:
     assert edge(bound(), "drift", "area") == pytest.approx(drift + log((4 + 2 + 1) * 4), abs=1e-6)
     for component, unit in (("omega", 4), ("gamma", 1), ("along", 4), ("relative", 4)):
         assert edge(bound(), "solution_error", component) == pytest.approx(turned + log(unit) + amplified, abs=1e-5)
+    # an invariant relation is amplified as a state is
+    assert edge(bound(), "drift", "hess") == pytest.approx(turned + amplified, abs=1e-5)
     # more steps than turns round more often
     assert edge(bound(steps=40100), "drift", "gamma_squared") == pytest.approx(drift + 1 + log(3), abs=1e-6)
     assert edge(bound(bits=113), "drift", "gamma_squared") == pytest.approx(drift + log(3) - 60 * log(2), abs=1e-6)
@@ -63,11 +65,16 @@ def flat(data: Data) -> tuple[Fraction, ...]:
     return tuple(map(Fraction, (*data.omega, *data.gamma)))
 
 
-def test_a_row_without_body_and_start_has_the_rate_1_and_amplifies_nothing() -> None:
+def test_a_row_without_body_and_start_has_the_rate_1_and_the_amplification_that_it_says() -> None:
     for data in (None, replace(FREE, omega=()), replace(FREE, inertia=("0", "1", "x"))):
         assert edge(bound(data=data), "drift", "energy") == pytest.approx(2 + EPS + math.log10(101) / 2, abs=1e-6)
         expected = 2 + EPS + math.log10(101) * 1.5
         assert edge(bound(data=data), "solution_error", "gamma") == pytest.approx(expected, abs=1e-6)
+        said = bound(data=data, amplification=101e3)
+        assert edge(said, "solution_error", "gamma") == pytest.approx(expected + 3, abs=1e-6)
+        assert edge(said, "drift", "energy") == edge(bound(data=data), "drift", "energy")
+    # with both, what the row says of itself counts for nothing
+    assert edge(bound(amplification=1e9), "solution_error", "gamma") == edge(bound(), "solution_error", "gamma")
 
 
 def test_a_saddle_explains_errors_as_far_as_they_count_but_no_drift() -> None:
@@ -80,6 +87,25 @@ def test_a_saddle_explains_errors_as_far_as_they_count_but_no_drift() -> None:
     assert edge(bound(**far), "solution_error", "gamma") > edge(near, "solution_error", "gamma") + 8
     counted = 2 + EPS + 0.5 * math.log10(61) + math.log10(10 * math.exp(10))
     assert edge(bound("homoclinic", **far), "solution_error", "gamma") == pytest.approx(counted, abs=1e-6)
+
+
+def test_beyond_what_double_follows_a_chaotic_motion_may_be_amplified_faster_by_half() -> None:
+    far = {"data": UPRIGHT, "horizon": "60", "time_reached": "60", "bits": 237}
+    found = math.log10(
+        amplification(HEAVY_TOP, Parameters((1, 1, Fraction(1, 2)), (0, 0, 1), 0), flat(UPRIGHT), Fraction(60))
+    )
+    expected = 2 + EPS - 184 * math.log10(2) + math.log10(121) / 2 + found + 0.5 * (found - 14)
+    assert found > 25
+    assert edge(bound(**far), "solution_error", "gamma") == pytest.approx(expected, abs=1e-5)
+
+
+def test_slow_turning_has_small_errors_of_omega_and_a_last_value_counts_as_its_rms() -> None:
+    slow = replace(FREE, omega=("1/300", "1/400", "1/500"))
+    apart_by = edge(bound(data=slow), "solution_error", "gamma") - edge(bound(data=slow), "solution_error", "omega")
+    assert apart_by == pytest.approx(math.log10(128), abs=1e-5)
+    last = Metric("1e-20", -20.0, band=5.0, quantity=Quantity("solution_error", "gamma", "final"))
+    assert irreproducible(last, -math.inf, bound()) == ""
+    assert irreproducible(last, -12.0, bound()) != ""
 
 
 def test_an_escape_time_moves_by_two_decades_of_noise_either_way() -> None:
@@ -182,6 +208,25 @@ def test_the_starts_of_an_ensemble_widen_a_band_by_no_more_than_one_of_them_can(
     # 2 · 0.602 · √2 decades where both are as wide
     assert judged(one("1e-6", 5.0, **few), one("4.9e-5", 5.0, **few))[0] == "same"
     assert judged(one("1e-6", 5.0, **few), one("5.1e-5", 5.0, **few))[0] == "worse"
+
+
+def test_the_series_of_an_ensemble_may_move_by_no_more_than_its_metrics() -> None:
+    def sampled(size: str) -> Row:
+        series = {"solution_error_gamma": Series(["1", "2"], [size, size])}
+        return one("1e-5", 5.0, measure="growth", starts=16, series=series)
+
+    # 2 · 0.602 · √2 decades
+    assert judged(sampled("1e-9"), sampled("4.9e-8"))[0] == "same"
+    assert judged(sampled("1e-9"), sampled("5.1e-8"))[0] == "worse"
+
+
+def test_where_all_digits_are_lost_a_narrow_band_is_chance() -> None:
+    lost = Against("computed", "words", until="90")
+    for reference, near, far in ((lost, 0.49, 0.51), (Against("computed", "words"), 0.24, 0.26)):
+        said = {"reference": reference, "against": reference.text, "data": UPRIGHT}
+        old, name = one("0.5", 0.041, **said), "noise: {:.2g} decades, not 0.041"
+        assert judged(old, one("0.5", near, **said))[0] == "same"
+        assert judged(old, one("0.5", far, **said)) == ("worse", name.format(far))
 
 
 @pytest.mark.parametrize(

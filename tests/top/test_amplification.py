@@ -78,6 +78,12 @@ def test_near_a_saddle_it_grows_with_its_rate(weight: object) -> None:
     assert of(hanging(-1, weight), STILL, Fraction(20 / saddle)) < 5
 
 
+def test_on_a_homoclinic_motion_it_goes_on_where_double_has_left_the_saddle() -> None:
+    case = CASES["delone"]
+    early, late = (math.log(of(case.top, case.start, time)) for time in (25, 100))
+    assert late - early == pytest.approx(75 * case.rate, rel=0.1)
+
+
 def test_on_a_regular_motion_it_grows_like_the_time_and_is_extrapolated_so() -> None:
     case = CASES["euler"]
     short, long = (of(case.top, case.start, time) for time in (200, 400))

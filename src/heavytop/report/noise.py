@@ -22,6 +22,8 @@ _BY_CHANCE = 1.4
 """One rerun in ten has a band wider by more than that: further, a candidate's own band is not allowed for."""
 _LEAST = 0.05
 """Decades.  A band below this excuses nothing that the allowed loss does not; its own scatter is of no interest."""
+_LEAST_LOST = 0.1
+"""The same where the motion loses all digits before the end: how near to that its last sample is makes the band."""
 STEP_CONTROL = 1.2
 """Decades.  A rounding may turn a step of a method with step control into another one, which moves its truncation error
 by that at most; reruns that are no further apart are reproducible, whatever their size."""
@@ -89,13 +91,16 @@ def reaches_further(old: Metric, new: Metric, least: tuple[float, float], loss: 
     return after + (new.band or 0.0) > before + (old.band or 0.0) + spared
 
 
-def noisier(kind: Kind, old: Metric, new: Metric) -> bool:
-    """Whether the candidate's band is wider than the baseline's by more than chance."""
+def noisier(kind: Kind, old: Metric, new: Metric, lost: bool = False) -> bool:
+    """Whether the candidate's band is wider than the baseline's by more than chance.
+
+    lost: whether the motion has no digit left before the end.
+    """
     if old.band is None or new.band is None or new.band <= old.band:
         return False
     factor = kind.noise_factor or 1.0
     if not kind.noise_is_added(old):
-        return new.band > factor * max(old.band, _LEAST)
+        return new.band > factor * max(old.band, _LEAST_LOST if lost else _LEAST)
     # in decades such noise is as much wider as the number is smaller
     return _added(new) > _added(old) + math.log10(factor)
 

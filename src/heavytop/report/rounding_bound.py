@@ -40,8 +40,8 @@ _RELATIONS = ("hess", "goryachev_chaplygin")
 class RoundingBound:
     """How large rounding can make the errors of a row, each as log10.
 
-    row: of the side of a comparison that is trusted.  Without body and start a motion of unit rate without
-    amplification.
+    row: of the side of a comparison that is trusted.  Without body and start its rate counts as 1, and its
+    amplification as what the row itself says.
     """
 
     def __init__(self, row: Row, kind: Kind) -> None:
@@ -103,7 +103,7 @@ class RoundingBound:
     def _amplified(self, horizon: str) -> float:
         """log10 of A up to a time."""
         if self._motion is None:
-            return 0.0
+            return math.log10(self.row.amplification or 1.0)
         found = math.log10(amplification(*self._motion, exact(horizon)))
         return found + _FASTER * max(0.0, found - math.log10(FOLLOWED))
 

@@ -150,7 +150,7 @@ class RowComparison:
             return judged
         if why := irreproducible(match, least_of[1], bound):
             return Verdict.WORSE, why
-        if noisier(kind, metric, match):
+        if noisier(kind, metric, match, bool(old.reference.until)):
             return Verdict.WORSE, f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
         return judged
 
