@@ -146,12 +146,11 @@ class RowComparison:
             return Verdict.INCOMPARABLE, "it says that it is another quantity"
         if metric.band is not None and match.band is None and match.log10 is not None:
             return Verdict.INCOMPARABLE, f"its noise is not measured, which was {metric.band:.2g} decades"
-        if not reaches_further(metric, match, least_of, limits.loss):
-            return judged
-        if why := irreproducible(match, least_of[1], bound):
+        why = irreproducible(match, least_of[1], bound)
+        if not why and noisier(kind, metric, match, bool(old.reference.until)):
+            why = f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
+        if why and reaches_further(metric, match, least_of, limits.loss):
             return Verdict.WORSE, why
-        if noisier(kind, metric, match, bool(old.reference.until)):
-            return Verdict.WORSE, f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
         return judged
 
     def _laws(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
