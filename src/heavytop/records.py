@@ -263,6 +263,8 @@ class Row(msgspec.Struct, gc=False):
     evaluations: of the field, where the integrator counts them.
     samples: how many times the largest values are over; 0 where that is not said.
     data: of the top and its start, before any rounding; null where no motion is measured.
+    amplification: the largest factor by which the motion itself has amplified a change of its start up to the horizon,
+    an estimate; null where no single motion is integrated.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
     """
 
@@ -292,6 +294,7 @@ class Row(msgspec.Struct, gc=False):
     seconds: dict[str, Seconds] = {}
     evaluations: Count | None = None
     data: Data | None = None
+    amplification: Annotated[float, msgspec.Meta(ge=1)] | None = None
 
     @property
     def identity(self) -> Identity:

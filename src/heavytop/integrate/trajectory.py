@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -16,6 +17,8 @@ from heavytop.top.equations import HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import Integral, holding
 
+_FEW_DIGITS = 3.0
+"""An amplification that costs fewer digits is not mentioned."""
 _SHOWN = 15
 """Digits of a number in a table for people; all of them are in :meth:`Trajectory.texts`."""
 
@@ -218,6 +221,28 @@ class Trajectory(Tabular):
 
         return numpy.array([[float(value) for value in state] for state in self.states]).reshape(self.states.shape)
 
+    @property
+    def amplification(self) -> float:
+        """The largest factor by which the motion itself has amplified a change of its start up to ``time_reached``.
+
+        An estimate, computed when it is asked for: :mod:`heavytop.top.amplification`.
+        """
+        from heavytop.top.amplification import amplification
+
+        problem = self.problem
+        return amplification(problem.system, problem.parameters, tuple(problem.start.flat), self.time_reached)
+
+    def amplification_text(self) -> str:
+        """What the amplification costs, in a sentence; "" where it costs fewer than three digits."""
+        lost, digits = math.log10(self.amplification), round(self.problem.precision.bits * math.log10(2))
+        if lost < _FEW_DIGITS:
+            return ""
+        until = decimal_text(self.time_reached, 6)
+        if lost >= digits:
+            return f"the motion itself amplifies roundings: all {digits} digits are lost before t = {until}"
+        by = f"by 1e{lost:.0f} until t = {until}: {lost:.0f} of {digits} digits are lost"
+        return f"the motion itself amplifies roundings {by}"
+
     def _table(self) -> Table:
         precision = self.problem.precision
         digits = min(_SHOWN, precision.digits)
@@ -234,6 +259,8 @@ class Trajectory(Tabular):
             notes.append(f"{len(self.times)} states went to the observer")
         if self.outcome is not Outcome.SUCCESS:
             notes.append(f"reached t = {decimal_text(self.time_reached, 6)} only")
+        if lost := self.amplification_text():
+            notes.append(lost)
         return Table(title, ("t", *names), rows, notes)
 
 

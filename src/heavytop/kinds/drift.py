@@ -17,7 +17,7 @@ from heavytop.measure.reruns import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact, number, parse, time_text
-from heavytop.records import Row, RowKey
+from heavytop.records import Metric, Row, RowKey
 from heavytop.report.answers import digits_headline
 from heavytop.report.brief import digits_lines
 from heavytop.report.digits_chart import digits
@@ -76,6 +76,10 @@ class Drift(Kind):
     sections = (digits, growth)
     place = 30
 
+    def noise_is_reruns(self, metric: Metric) -> bool:
+        """All bands."""
+        return True
+
     def cost(self, task: Task) -> float:
         """The reruns that tell the rounding noise and the truth take about a second."""
         return 0.8 + task.run_seconds
@@ -105,7 +109,7 @@ class Drift(Kind):
         assert task.case is not None
         plain = Problem.of(task.case.top, case.start, DOUBLE, case.system)
         reruns = Reruns(plain, task.integrator, task.seed)
-        metrics = reruns.drift_bands(run, task.times[-1], scorer.metrics(), scorer.truth)
+        metrics = reruns.drift_bands(run, task.times, scorer.metrics(), scorer.truth)
         return computed_row(task, run, metrics, scorer.series(time_text), scorer.against)
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:

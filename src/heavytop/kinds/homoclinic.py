@@ -86,6 +86,7 @@ class Homoclinic(Kind):
     table = HomoclinicTable
     needed = (ESCAPE.text,)
     noise_factor = 8.0
+    largest_amplification = 10 * math.exp(WINDOW)
     concludes = True
     sections = (claim_error, escape_times)
     place = 60
@@ -93,6 +94,10 @@ class Homoclinic(Kind):
     def carries_band(self, metric: Metric) -> bool:
         """Every error, and the time."""
         return super().carries_band(metric) or metric.quantity == ESCAPE
+
+    def noise_is_reruns(self, metric: Metric) -> bool:
+        """All bands."""
+        return True
 
     def series_has_more(self, quantity: Quantity | None) -> bool:
         """Near a saddle, errors are taken early, and the series goes on."""

@@ -65,6 +65,7 @@ class Motion:
             "integrator": run.integrator,
             "flags": run.flags,
             "seconds": run.seconds,
+            "amplification": run.amplification if math.isfinite(run.amplification) else None,
             "metrics": {name: {"value": m.value, "log10": m.log10} for name, m in self.drift.items()},
         }
         if self.attitude is not None:

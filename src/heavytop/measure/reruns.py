@@ -47,20 +47,20 @@ class Reruns:
         """Whether the integrator can be given the same motion with other roundings."""
         return self.problem.system is not GYROSTAT or self.integrator.takes_many
 
-    def drift_bands(self, run: Trajectory, horizon: Fraction, metrics: Metrics, true: Truth | str) -> Metrics:
+    def drift_bands(self, run: Trajectory, asked: Sequence[Fraction], metrics: Metrics, true: Truth | str) -> Metrics:
         """``metrics`` of a run with their bands; as they are where it failed, or cannot be computed again.
 
-        true: what its states were compared with, or why with nothing.
+        asked: the times of the run.  true: what its states were compared with, or why with nothing.
         """
         if run.outcome is not Outcome.SUCCESS or not self.possible:
             return metrics
         most = _STEPS if self.integrator.takes_many else _STEPS_SINGLY
-        end = horizon if run.steps <= most else horizon * most / run.steps
+        end = asked[-1] if run.steps <= most else asked[-1] * most / run.steps
         if not isinstance(true, str) and not true.covers(end):
             end = true.ends or end
         problem = _short(self.problem)
         samples = _SAMPLES if closed_form(problem) else _SAMPLES_OF_CHAOS
-        times = [exact(number(end * i / samples, DOUBLE)) for i in range(1, samples + 1)]
+        times = [exact(number(time, DOUBLE)) for time in some_of(asked, end, samples)]
         truth: Truth | str = true if isinstance(true, str) else uncertified(problem, times)
         reruns = self._of(problem, times, lambda given: Scorer(given, truth))
         return banded(run, metrics, [scorer.metrics() for scorer in reruns])
@@ -80,6 +80,17 @@ class Reruns:
         scorers = [scorer(given) for given in problems]
         self.integrator.propagate_many(problems, times, lambda i, time, state: scorers[i](time, state), threads=1)
         return scorers
+
+
+def some_of(times: Sequence[Fraction], end: Fraction, most: int) -> list[Fraction]:
+    """At most so many of ``times``, evenly through those up to ``end``, with the last of them.
+
+    The run's own times and no others: between its steps an integrator may have another error than at their ends.
+    Where the first of them is beyond ``end``, as many times as there are in the same proportions.
+    """
+    early = [time for time in times if abs(time) <= abs(end)] or [time * end / times[-1] for time in times]
+    count = min(most, len(early))
+    return [early[len(early) * i // count - 1] for i in range(1, count + 1)]
 
 
 def escape_band(own: Fraction, escapes: Sequence[Fraction], rate: float, bits: int) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
@@ -19,6 +20,7 @@ class Kind(Protocol):
 
     needed: the metrics that its summary cannot do without.
     noise_factor: by how much the noise band of a rerun may be wider by chance; None where its rows carry none.
+    largest_amplification: of rounding, within the times at which its errors count.
     samples_are_steps: so these may be fewer as the steps may.
     may_give_up: what its runs are called, where that one does not reach its horizon is what the rows are there to show.
     may_overflow: the same of values that are not finite.
@@ -29,6 +31,7 @@ class Kind(Protocol):
     name: str
     needed: tuple[str, ...] = ()
     noise_factor: float | None = None
+    largest_amplification: float = math.inf
     samples_are_steps: bool = False
     may_give_up: str = ""
     may_overflow: bool = False
@@ -42,6 +45,10 @@ class Kind(Protocol):
     def noise_is_added(self, metric: Metric) -> bool:
         """Whether noise is added to the number, and does not multiply it."""
         return metric.kind != "error"
+
+    def noise_is_reruns(self, metric: Metric) -> bool:
+        """Whether the noise band of such a metric comes from runs of one motion with other roundings."""
+        return False
 
     def assumed_band(self, subject: Subject) -> float:
         """Half-width in decades of the rounding noise of a row that has no bands."""

@@ -37,6 +37,8 @@ def motion_text(motion: Motion) -> RenderableType:
         worst = [(quantity.component, metric) for quantity, metric in found if quantity and quantity.statistic == "max"]
         drifts = ", ".join(f"{name} {short(metric.value, 2)}" for name, metric in worst)
         parts += [Text(), Text(f"Largest drift of the first integrals at these times: {drifts}")]
+    if lost := run.amplification_text():
+        parts += [Text(), Text(f"{lost[:1].upper()}{lost[1:]}.")]
     return Group(*parts)
 
 

@@ -15,11 +15,12 @@ from heavytop.report.consistency import contradictions
 from heavytop.report.kind import Kinds, kind_of
 from heavytop.report.laws import judge_law, law_text
 from heavytop.report.motion_data import other_data
-from heavytop.report.noise import allowed_loss, noisier
+from heavytop.report.noise import allowed_loss, irreproducible, noisier, of_starts, reaches_further, seldom_apart
 from heavytop.report.policy import BITS, Limits, Lookup, Policy
+from heavytop.report.rounding_bound import RoundingBound
 from heavytop.report.series import judge_series
 from heavytop.report.timings import BAND, judge_repeated
-from heavytop.report.verdicts import Judged, Verdict, judge, judge_seconds
+from heavytop.report.verdicts import Judged, Verdict, beyond_limit, judge, judge_seconds
 
 _STEPS = 2
 """The same method with the same setting takes as many steps, and evaluates the field as often: a factor beyond this is
@@ -126,6 +127,7 @@ class RowComparison:
                 and -loss <= metric.log10 - match.log10 <= loss
                 and metric.quantity == match.quantity
                 and (match.band == metric.band or (match.band or 9e9) < (metric.band or 0.0))
+                and seldom_apart(metric.band)
             ):
                 if self.list_same:
                     found.append(Finding(key, name, Verdict.SAME, metric.value, match.value))
@@ -146,21 +148,31 @@ class RowComparison:
         return found
 
     def _metric(self, metric: Metric, match: Metric, limits: Limits, old: Row, new: Row) -> Judged:
-        """The values first; then the noise of the candidate, which is worse where it is more than chance."""
+        """The noise of the baseline first, then the values, then the noise of the candidate, which is worse where it is
+        more than chance and reaches further than that of the baseline.
+        """
         least_of = least(old.metrics, metric), least(new.metrics, match)
-        known, kind = metric, kind_of(old, self.kinds)
+        kind = kind_of(old, self.kinds)
+        bound = RoundingBound(old, kind) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
+        if why := irreproducible(metric, least_of[0], bound):
+            return beyond_limit(match, limits) or (Verdict.INCOMPARABLE, f"the baseline is {why}")
+        known, found = of_starts(metric, old), of_starts(match, new)
         noise = kind.assumed_band(old.key.subject) if metric.band is None else kind.least_band(old.starts)
-        if noise > (metric.band or 0.0):
-            known = msgspec.structs.replace(metric, band=noise)
-        judged = judge(known, match, limits, self._eps(metric.quantity, old), self.policy.suspicious_digits, least_of)
+        if noise > (known.band or 0.0):
+            known = msgspec.structs.replace(known, band=noise)
+        eps = self._eps(metric.quantity, old)
+        judged = judge(known, found, limits, eps, self.policy.suspicious_digits, least_of, bound)
         if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
             return judged
         if judged[0] is Verdict.SAME and metric.quantity != match.quantity:
             return _ANOTHER
         if metric.band is not None and match.band is None and match.log10 is not None:
             return Verdict.INCOMPARABLE, f"its noise is not measured, which was {metric.band:.2g} decades"
-        if noisier(kind, metric, match):
-            return Verdict.WORSE, f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
+        why = irreproducible(match, least_of[1], bound)
+        if not why and noisier(kind, metric, match, bool(old.reference.until)):
+            why = f"noise: {match.band:.2g} decades, not {metric.band:.2g}"
+        if why and reaches_further(metric, match, least_of, limits.loss):
+            return Verdict.WORSE, why
         return judged
 
     def _laws(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
@@ -275,7 +287,7 @@ class RowComparison:
 
     def _noise(self, name: str, row: Row, limits: Limits) -> float:
         """Decades by which noise may move what a series or a law is about: as the metrics of its quantity."""
-        bands = [metric for metric in _of_series(name, row, "final", "rms", "max") if metric.band]
+        bands = [of_starts(metric, row) for metric in _of_series(name, row, "final", "rms", "max") if metric.band]
         widest = max((allowed_loss(metric, metric) for metric in bands), default=0.0)
         return limits.noise * max(widest, kind_of(row, self.kinds).assumed_band(row.key.subject))
 

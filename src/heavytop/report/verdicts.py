@@ -10,8 +10,9 @@ from heavytop.errors import InputError
 from heavytop.measure.scalar import RESOLVED_RADII, UNRESOLVED
 from heavytop.precision import exact, log10
 from heavytop.records import Metric
-from heavytop.report.noise import allowed_gain, allowed_loss
+from heavytop.report.noise import STEP_CONTROL, allowed_gain, allowed_loss, apart
 from heavytop.report.policy import BITS, Limits, Timings
+from heavytop.report.rounding_bound import RoundingBound
 
 _ROUNDED = 2e-6
 """Two logarithms of six decimals cannot tell a smaller difference."""
@@ -37,12 +38,18 @@ SAME: Judged = (Verdict.SAME, "")
 
 
 def judge(
-    old: Metric, new: Metric, limits: Limits, eps: float, suspicious: float, least: tuple[float, float]
+    old: Metric,
+    new: Metric,
+    limits: Limits,
+    eps: float,
+    suspicious: float,
+    least: tuple[float, float],
+    bound: RoundingBound | None = None,
 ) -> Judged:
     """Two values of one metric.
 
     eps: log10 of the format's, or of what its roundings add up to.  suspicious: digits.  least: what an error counts as
-    at least, as log10, in each row.
+    at least, as log10, in each row.  bound: the most that noise makes of it; None where its band says so by itself.
     """
     if old.kind != new.kind:
         return Verdict.INCOMPARABLE, f"kind {old.kind} against {new.kind}"
@@ -52,9 +59,9 @@ def judge(
         ):
             return Verdict.INCOMPARABLE, f"the value is {metric.value}"
     if old.kind == "error":
-        return _errors(old, new, limits, limits.floor + eps, suspicious, least)
+        return _errors(old, new, limits, limits.floor + eps, suspicious, least, bound)
     if old.kind == "duration":
-        return _durations(old, new, limits)
+        return _durations(old, new, limits, bound)
     return _values(old, new, limits)
 
 
@@ -70,17 +77,24 @@ def size(metric: Metric) -> float:
 
 
 def _errors(
-    old: Metric, new: Metric, limits: Limits, floor: float, suspicious: float, least: tuple[float, float]
+    old: Metric,
+    new: Metric,
+    limits: Limits,
+    floor: float,
+    suspicious: float,
+    least: tuple[float, float],
+    bound: RoundingBound | None,
 ) -> Judged:
     """Smaller is better; below the floor all errors are the same.  What its reference does not resolve is at most its
     bound: never better, and incomparable where the bound itself would be worse, or where it has fallen so far that it
     is another error or another reference.
     """
     a, b = max(size(old), floor, least[0]), max(size(new), floor, least[1])
-    if limits.limit is not None and size(new) > limits.limit:
-        known = new.value != UNRESOLVED
-        return (Verdict.WORSE if known else Verdict.INCOMPARABLE), "above its limit" if known else "limit not resolved"
+    if limited := beyond_limit(new, limits):
+        return limited
     noise = limits.noise * (allowed_loss(old, new) if b > a else allowed_gain(old, new))
+    if noise > STEP_CONTROL and b - a > max(limits.loss, STEP_CONTROL) and bound is not None:
+        noise = noise if bound.explains(old.quantity, apart(a, b - a)) else STEP_CONTROL
     allowed = max(limits.loss, noise) + _ROUNDED
     if new.value == UNRESOLVED:
         return _unresolved(old, new, b - a, allowed)
@@ -109,10 +123,23 @@ def _unresolved(old: Metric, new: Metric, lost: float, allowed: float) -> Judged
     return SAME
 
 
-def _durations(old: Metric, new: Metric, limits: Limits) -> Judged:
+def beyond_limit(new: Metric, limits: Limits) -> Judged | None:
+    """The verdict of a number beyond the limit of a policy, whatever the baseline was; None of any other."""
+    if limits.limit is None or new.value == "never" or new.kind == "value":
+        return None
+    if new.kind == "duration":
+        return (Verdict.WORSE, "below its limit") if size(new) < limits.limit else None
+    if size(new) <= limits.limit:
+        return None
+    if new.value == UNRESOLVED:
+        return Verdict.INCOMPARABLE, "limit not resolved"
+    return Verdict.WORSE, "above its limit"
+
+
+def _durations(old: Metric, new: Metric, limits: Limits, bound: RoundingBound | None) -> Judged:
     """Longer is better; never is longest."""
-    if limits.limit is not None and new.value != "never" and size(new) < limits.limit:
-        return Verdict.WORSE, "below its limit"
+    if limited := beyond_limit(new, limits):
+        return limited
     if old.value == new.value:
         return SAME
     if old.value == "never":
@@ -125,7 +152,8 @@ def _durations(old: Metric, new: Metric, limits: Limits) -> Judged:
     shorter, longer = (
         10 ** min(limits.noise * band, 300.0) for band in (allowed_loss(old, new), allowed_gain(old, new))
     )
-    if ratio * shorter < 1 and ratio < 1 - limits.duration:
+    by_noise = ratio * shorter >= 1 and (bound is None or bound.explains_times(old.value, 1 - ratio))
+    if ratio < 1 - limits.duration and not by_noise:
         return Verdict.WORSE, f"{1 - ratio:.0%} earlier"
     if ratio > longer and ratio > 1 + limits.duration:
         return Verdict.BETTER, f"{ratio - 1:.0%} later"

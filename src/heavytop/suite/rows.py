@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 from heavytop.errors import Contradiction, HeavyTopError, OutOfTime, PeerFailed, Unsupported
@@ -23,6 +24,7 @@ from heavytop.records import (
 )
 from heavytop.suite.cases import Case
 from heavytop.suite.task import Task
+from heavytop.top.amplification import amplification
 from heavytop.top.heavy_top import HeavyTop, State
 
 
@@ -111,6 +113,7 @@ def computed_row(
         series=series,
         samples=len(run.times),
         seconds=run.seconds,
+        amplification=_amplification(run.problem, horizon),
     )
 
 
@@ -120,6 +123,12 @@ _OUTCOMES: dict[type[HeavyTopError], str] = {
     Unsupported: UNSUPPORTED,
     OutOfTime: OUT_OF_TIME,
 }
+
+
+def _amplification(problem: Problem, horizon: Fraction) -> float | None:
+    """That of the motion of a problem, to three digits; None for data beyond double."""
+    found = amplification(problem.system, problem.parameters, tuple(problem.start.flat), horizon)
+    return float(f"{found:.3g}") if math.isfinite(found) else None
 
 
 def unmeasured(task: Task, reason: HeavyTopError) -> Row:

@@ -25,7 +25,7 @@ from heavytop.top.times import check_times
 _FLAGS = ("language", "tolerance", "step")
 _KEYS = {*VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
 _KEYS |= {"outcome", "steps"}
-_NOT_READ = {"time_reached", "order", "flags", "seconds", "metrics", "attitude", "angles"}
+_NOT_READ = {"time_reached", "order", "flags", "seconds", "amplification", "metrics", "attitude", "angles"}
 """What else `heavytop propagate --json` writes."""
 _SLACK = 8
 """γ may be off the unit sphere by so many bits of rounding."""

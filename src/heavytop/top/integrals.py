@@ -102,6 +102,31 @@ def moment_along_centre(p: Parameters, y: Any) -> Any:
     return dot(momentum(p, y), p.moment)
 
 
+class _Magnitude:
+    """A bound of |x| in a ring: that of a difference is a sum, so that no terms cancel."""
+
+    def __init__(self, size: Any) -> None:
+        self.size: Any = size.size if isinstance(size, _Magnitude) else abs(size)
+
+    def __add__(self, other: Any) -> _Magnitude:
+        return _Magnitude(self.size + _Magnitude(other).size)
+
+    def __mul__(self, other: Any) -> _Magnitude:
+        return _Magnitude(self.size * _Magnitude(other).size)
+
+    def __truediv__(self, other: Any) -> _Magnitude:
+        return _Magnitude(self.size / _Magnitude(other).size)
+
+    __sub__ = __radd__ = __add__
+    __rmul__ = __mul__
+
+
+def largest(integral: Integral, p: Parameters, omega: Any) -> Any:
+    """The sum of the absolute terms of a first integral where every |Ω_i| is ``omega`` and every |γ_i| is 1."""
+    bounds = Parameters(tuple(map(_Magnitude, p.inertia)), tuple(map(_Magnitude, p.moment)), _Magnitude(p.rotor))
+    return integral.value(bounds, [*map(_Magnitude, (omega,) * 3), *map(_Magnitude, (1, 1, 1))]).size
+
+
 def holding(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> tuple[Integral, ...]:
     """Every integral that holds for this top and start, found by exact rational tests on the exact data.
 

@@ -1,0 +1,146 @@
+"""How much a motion itself amplifies a rounding error, whatever integrator follows it.
+
+A change δ of the start is Φ(t) δ at t, with the variational equation Φ' = J(y) Φ, Φ(0) = 1.  Motion and Φ are computed
+together by Taylor series in double; components of Ω are measured in units of the motion's :func:`rate`, so that neither
+the units of the data nor a renaming of the axes matters.  An estimate, not a bound.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from heavytop.top.equations import Parameters, System
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_ORDER = 20
+_TOLERANCE = 2.0**-52
+_STEPS = 1000
+"""Beyond so many steps the amplification is extrapolated."""
+FOLLOWED = 1e14
+"""Beyond this amplification a motion computed in double is another one: it goes on as it has grown until there."""
+_STEEPER = 100.0
+"""Amplification grows like t along a regular motion; so many times more than that is taken as exponential growth."""
+_LARGEST = 1e300
+
+
+def rate(system: System, parameters: Parameters, start: Sequence[Fraction]) -> Fraction:
+    """The largest of |Ω_i|, |λ| and √(|P r|/I_min), of the start, rounded up to a power of 2; 0 of a top at rest.
+
+    start: six exact numbers.  One over this is the motion's own unit of time.
+    """
+    fastest = max(*(abs(Fraction(value)) for value in start[:3]), abs(Fraction(parameters.rotor)))
+    pull = Fraction(0) if system.name == "gyrostat" else max(abs(Fraction(n)) for n in parameters.moment)
+    square = max(fastest**2, pull / min(Fraction(value) for value in parameters.inertia))
+    if not square:
+        return Fraction(0)
+    bits = square.numerator.bit_length() - square.denominator.bit_length()
+    return Fraction(2) ** (bits // 2 + 1)
+
+
+@lru_cache(maxsize=256)
+def amplification(
+    system: System, parameters: Parameters, start: tuple[Fraction, ...], horizon: Fraction, steps: int = _STEPS
+) -> float:
+    """The largest factor, up to the time ``horizon``, by which the motion has amplified a change of its start.
+
+    The root mean square over the six directions, with Ω in units of :func:`rate`; 1 at t = 0, at least 1.
+    start: six exact numbers.  About (rate·t) on a regular motion, e^(rate t) near a saddle and on a chaotic one.
+    After ``steps`` steps, or where all digits of double are lost, it is extrapolated: in proportion to t, or
+    exponentially where it has grown 100 times more than that.  At most 1e300; infinite for data beyond double.
+    """
+    scale = rate(system, parameters, start)
+    if not scale or not horizon:
+        return 1.0
+    try:
+        span = float(scale * abs(horizon))
+        # backwards in time is forwards with the field reversed
+        linear, products = _taken_apart(system, parameters, scale if horizon > 0 else -scale)
+        state = [float(value / unit) for value, unit in zip(start, _units(scale), strict=True)]
+    except OverflowError:
+        return math.inf
+    largest, done = _followed(linear, products, state, span, steps)
+    if done >= span or not done:
+        return min(largest, _LARGEST)
+    further = span / done
+    if largest <= _STEEPER * (1 + done):
+        return min(largest * further, _LARGEST)
+    return 10 ** min(math.log10(largest) * further, math.log10(_LARGEST))
+
+
+def _units(scale: Fraction) -> list[Fraction]:
+    return [abs(scale)] * 3 + [Fraction(1)] * 3
+
+
+def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[NDArray[Any], NDArray[Any]]:
+    """L, shape (6, 6), and symmetric B, shape (6, 6, 6), of the field L y + B(y, y) in units of ``scale``."""
+    import numpy
+
+    units = _units(scale)
+    exactly = Parameters(tuple(map(Fraction, p.inertia)), tuple(map(Fraction, p.moment)), Fraction(p.rotor))
+
+    def field(*places: int) -> NDArray[Any]:
+        y = [places.count(k) * unit for k, unit in enumerate(units)]
+        there, opposite = system.field(exactly, y), system.field(exactly, [-value for value in y])
+        both = [((a + b) / 2, (a - b) / 2) for a, b in zip(there, opposite, strict=True)]
+        return numpy.array([[part / unit / scale for part in parts] for parts, unit in zip(both, units, strict=True)])
+
+    single = [field(j) for j in range(6)]
+    linear = numpy.array([part[:, 1] for part in single]).T.astype(float)
+    products = numpy.empty((6, 6, 6))
+    for j in range(6):
+        for k in range(j, 6):
+            mixed = (field(j, k) - single[j] - single[k])[:, 0] / 2 if j != k else single[j][:, 0]
+            products[:, j, k] = products[:, k, j] = mixed.astype(float)
+    return linear, products
+
+
+def _followed(
+    linear: NDArray[Any], products: NDArray[Any], start: Sequence[float], span: float, steps: int
+) -> tuple[float, float]:
+    """The largest amplification up to ``span``, or as far as ``steps`` steps go, and how far that is."""
+    import numpy
+
+    state, carried, time, largest = numpy.array(start), numpy.eye(6), 0.0, 1.0
+    flat = products.reshape(36, 6)
+    for _ in range(steps):
+        series = _series(linear, flat, state)
+        last = max(float(numpy.abs(series[order]).max()) ** (1 / order) for order in (_ORDER - 1, _ORDER))
+        step = min(span - time, _TOLERANCE ** (1 / _ORDER) / last if last else span)
+        powers = step ** numpy.arange(_ORDER + 1)
+        there = numpy.tensordot(powers, series, 1)
+        state, carried = there[:, 0], there[:, 1:] @ carried
+        size = math.sqrt(float((carried * carried).sum()) / 6)
+        if not math.isfinite(size) or time + step == time:
+            break
+        time, largest = time + step, max(largest, size)
+        if time >= span or largest > FOLLOWED:
+            break
+    return largest, time
+
+
+def _series(linear: NDArray[Any], flat: NDArray[Any], state: NDArray[Any]) -> NDArray[Any]:
+    """Taylor coefficients of (y, Φ) from y and Φ = 1, shape (order + 1, 6, 7).
+
+    (n + 1) Φ_(n+1) = Σ_m J_m Φ_(n−m) with J_m = 2 B(y_m, ·), and L in J_0; of y itself half of the products.
+    """
+    import numpy
+
+    found, jacobians = numpy.empty((_ORDER + 1, 6, 7)), numpy.empty((6, _ORDER, 6))
+    found[0, :, 0], found[0, :, 1:] = state, numpy.eye(6)
+    for n in range(_ORDER):
+        jacobians[:, n] = 2 * (flat @ found[n, :, 0]).reshape(6, 6)
+        sums = jacobians[:, n::-1].reshape(6, -1) @ found[: n + 1].reshape(-1, 7)
+        sums[:, 0] /= 2
+        found[n + 1] = (sums + linear @ found[n]) / (n + 1)
+    return found
+
+
+def digits_eaten(factor: float) -> float:
+    """Decimal digits that a format loses to an amplification."""
+    return math.log10(factor) if factor > 1 else 0.0
