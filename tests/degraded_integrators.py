@@ -141,7 +141,7 @@ def report_of(method: Method, case: str, samples: int = SAMPLES) -> Report:
     plan = plan_of({"name": "p", "measure": [{"kind": "drift", "cases": [case], "integrator": NAME, "runs": runs}]})
     (task,) = expand(plan)
     row = measure(task)
-    row.data = data_of(task, row.starts)
+    row.data = data_of(task.case)
     return Report(SCHEMA, {"name": "p"}, {}, [row])
 
 

@@ -171,13 +171,14 @@ def named(integrator: Any, folder: Path | None = None) -> str | Source:
     """
     if not isinstance(integrator, str):
         return of_callable(integrator)
+    python, toml = _PYTHON.fullmatch(integrator), _TOML.fullmatch(integrator)
+    if python is None and toml is None:
+        return integrator  # the working directory may be gone
     base = (folder or Path()).absolute()
-    if match := _PYTHON.fullmatch(integrator):
-        return PythonFile(str((base / match[1]).resolve()), match[2])
-    match = _TOML.fullmatch(integrator)
-    if match is None:
-        return integrator
-    path, wanted = base / match[1], match[2]
+    if python is not None:
+        return PythonFile(str((base / python[1]).resolve()), python[2])
+    assert toml is not None
+    match, path, wanted = toml, base / toml[1], toml[2]
     found = [each for each in commands_in(path) if wanted in (None, each.name)]
     if len(found) != 1:
         known = ", ".join(each.name for each in commands_in(path))
