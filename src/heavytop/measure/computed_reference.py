@@ -99,15 +99,18 @@ def agreement(found: Sequence[ComputedReference]) -> Against:
     return Against("computed", f"words of {coarse} and {fine} bits", agreed, until=until)
 
 
-def of_rounded(problems: Sequence[Problem], times: Sequence[Fraction], least: int = 0) -> list[ComputedReference]:
+def of_rounded(
+    problems: Sequence[Problem], times: Sequence[Fraction], least: int = 0, effort: float | None = None
+) -> list[ComputedReference]:
     """The motions of problems of one format, from the very numbers that they are, in 30 bits more and 60 more.
 
-    least: bits of the first run at least.  All end where one has no digit left in the format, as laws of growth do.
+    least: bits of the first run at least.  effort: as in :func:`compute`.
+    All end where one has no digit left in the format, as laws of growth do.
     Raises OutOfReach as :func:`compute` does, and InputError for more bits than there are.
     """
     bits = problems[0].precision.bits
     given = [partial(_in_format, problem) for problem in problems]
-    return compute(given, times, max(least, bits + MORE_BITS), bits)
+    return compute(given, times, max(least, bits + MORE_BITS), bits, effort)
 
 
 def _in_format(problem: Problem, precision: Precision) -> Problem:
@@ -115,12 +118,17 @@ def _in_format(problem: Problem, precision: Precision) -> Problem:
 
 
 def compute(
-    given: Sequence[Given], times: Sequence[Fraction], bits: int, format_bits: int | None = None
+    given: Sequence[Given],
+    times: Sequence[Fraction],
+    bits: int,
+    format_bits: int | None = None,
+    effort: float | None = None,
 ) -> list[ComputedReference]:
     """The motions at ``times``, from runs in about ``bits`` bits and in at least :data:`MORE_BITS` more.
 
     times: as for :func:`heavytop.integrate.words.propagate_words`.
     format_bits: those of the format that is measured, in which the motions may lose all digits; None for no format.
+    effort: seconds of the model of the cost that each run may take; None for 60, or the 600 of an ensemble shared out.
     Raises OutOfReach if a run does not reach the last time within the effort.
     """
     first = [_Served.of(each, bits) for each in given]
@@ -128,10 +136,11 @@ def compute(
     second = [_Served.of(each, finer) for each in given]
     words = [(one.bits, two.bits) for one, two in zip(first, second, strict=True)]
     balls: list[dict[Fraction, list[arb]]] = [{} for _ in given]
+    seconds = effort or (EFFORT if len(given) == 1 else EFFORT_OF_MANY / len(given))
     for early in _stages(times, _STAGES if format_bits is not None else 0):
         # no bit of a run depends on the samples taken: what a shorter stage had is not taken again
         more = [time for time in early if time not in balls[0]]
-        for index, pair in enumerate(zip(_states(first, more), _states(second, more), strict=True)):
+        for index, pair in enumerate(zip(_states(first, more, seconds), _states(second, more, seconds), strict=True)):
             known = balls[index] | dict(zip(more, _around(*pair, bits), strict=True))
             balls[index] = {time: known[time] for time in early}
         found = [ComputedReference(*each) for each in zip(words, balls, strict=True)]
@@ -191,11 +200,10 @@ def _last_digit(found: Sequence[ComputedReference], fewer: Sequence[int]) -> Fra
     return next((time for time in found[0].balls if any(time in each for each in lost)), None)
 
 
-def _states(served: Sequence[_Served], times: Sequence[Fraction]) -> list[Sequence[Any]]:
+def _states(served: Sequence[_Served], times: Sequence[Fraction], effort: float) -> list[Sequence[Any]]:
     """The states of each motion at ``times``."""
     problems = [each.problem for each in served]
     words = max(each.bits for each in served)
-    effort = EFFORT if len(problems) == 1 else EFFORT_OF_MANY / len(problems)
     limit = int(effort / seconds_a_step(words))
     runs = _followed(problems, times, min(limit, _PILOT_STEPS))
     states: list[Sequence[Any]] = [run.states for run in runs]

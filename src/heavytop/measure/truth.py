@@ -93,16 +93,17 @@ class Known:
         return Truth(self.against, self.solution.state)
 
 
-def truth(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
+def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = None) -> Truth | str:
     """The true motion of a rounded problem at ``times``, exact numbers in the order of a run; why not, where it is
     neither proven nor computed.
 
+    effort: of a computed one, :func:`heavytop.measure.computed_reference.compute`.
     Raises Contradiction where a second source excludes a proven one: then something is wrong with this program.
     """
     known = known_motion(problem, max(times, key=abs))
     if isinstance(known, Known):
         return known.truth
-    found = _computed(problem, times)
+    found = _computed(problem, times, effort)
     if isinstance(found, str):
         return f"{known}; {found}"
     return replace(found, against=replace_struct(found.against, reason=known))
@@ -116,9 +117,9 @@ def uncertified(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
     return _computed(problem, times)
 
 
-def _computed(problem: Problem, times: Sequence[Fraction]) -> Truth | str:
+def _computed(problem: Problem, times: Sequence[Fraction], effort: float | None = None) -> Truth | str:
     try:
-        (found,) = of_rounded([problem], times)
+        (found,) = of_rounded([problem], times, effort=effort)
     except (InputError, OutOfReach) as error:
         return _clause(error)
     if found.ends == times[0]:

@@ -31,6 +31,8 @@ __all__ = ["Assessment", "Peer", "assess", "complete", "digits_kept", "score"]
 
 Progress = Callable[[], None]
 PEER = "heyoka"
+_REFERENCE_EFFORT = 10.0
+"""Seconds of the model of its cost that a computed reference may take."""
 _EFFORT = 20.0
 """Seconds that the run of heyoka beside the scored one may take, roughly."""
 
@@ -123,7 +125,7 @@ def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Score
     count = len(states)
     times = [round_to(time, precision.bits) for time in given.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
-    true = truth(problem, times)
+    true = truth(problem, times, _REFERENCE_EFFORT)
     scorer = Scorer(problem, true if isinstance(true, str) else true.remembered(), keep)
     errors: list[float] = []
     rate = turning_rate(given.top, given.start)
