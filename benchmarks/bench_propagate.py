@@ -5,7 +5,7 @@ Run: python -m pytest benchmarks/bench_propagate.py --benchmark-enable
 
 from fractions import Fraction
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 
 import heyoka
 import numpy
@@ -14,6 +14,7 @@ import pytest
 from heavytop.integrate.engines import compiled, expressions
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Problem
+from heavytop.integrate.words import propagate_words
 from heavytop.measure.drift import Drift
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.suite.cases import CASES
@@ -92,3 +93,28 @@ def test_samples_do_not_change_the_end(benchmark) -> None:
     benchmark.extra_info["difference_at_the_end"] = str(difference)
     assert numpy.isfinite(run.states[-1]).all()
     assert number(times[-1], DOUBLE) == 10000
+
+
+@pytest.mark.parametrize("integrator", [propagate, propagate_words], ids=["heyoka", "words"])
+def test_twenty_thousand_samples_against_one(benchmark, integrator) -> None:
+    """T = 1000 in double: 20,000 regular samples, and the last alone, interleaved; processor seconds, least of 15."""
+    times = [Fraction(k, 20) for k in range(1, 20001)]
+
+    def seconds(asked: list[Fraction]) -> float:
+        began = process_time()
+        integrator(TOP, START, asked, DOUBLE)
+        return process_time() - began
+
+    seconds(times), seconds(times[-1:])
+    pairs = [(seconds(times), seconds(times[-1:])) for _ in range(15)]
+    many, one = (min(each) for each in zip(*pairs, strict=True))
+    benchmark.extra_info["ratio"] = f"{many / one:.2f}"
+    benchmark.extra_info["microseconds_per_sample"] = f"{(many - one) / len(times) * 1e6:.3f}"
+    benchmark.extra_info["milliseconds_of_one"] = f"{one * 1e3:.2f}"
+    benchmark.pedantic(integrator, (TOP, START, times, DOUBLE), rounds=3)
+
+
+def test_repr_of_many_rows(benchmark) -> None:
+    """The text of a run of 200,000 samples, of which it shows ten."""
+    run = propagate(TOP, START, [Fraction(k, 200) for k in range(1, 200001)], DOUBLE)
+    benchmark.pedantic(repr, (run,), rounds=5)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import Any
 
 _MOST = 12
 _ENDS = 5
@@ -23,6 +24,26 @@ class Tabular:
 
     def _repr_html_(self) -> str:
         return self._table().html()
+
+
+class Lines(Sequence[Sequence[str]]):
+    """The lines of a long table, each made when it is shown.
+
+    count: how many.  line: the texts of one of them.
+    """
+
+    def __init__(self, count: int, line: Callable[[int], Sequence[str]]) -> None:
+        self.places, self.line = range(count), line
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def __getitem__(self, place: Any) -> Any:
+        found = self.places[place]
+        return self.line(found) if isinstance(found, int) else [self.line(each) for each in found]
+
+    def __iter__(self) -> Iterator[Sequence[str]]:
+        return map(self.line, self.places)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 import re
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import MAX_EMAX, MIN_EMIN, ROUND_HALF_EVEN, Context, Decimal, Overflow
 from fractions import Fraction
 from numbers import Rational
 from operator import index
-from typing import Any
+from typing import Any, cast
 
 from heavytop.errors import InputError, quoted
 
@@ -285,6 +286,17 @@ def number(value: Fraction, precision: Precision) -> Any:
             "Choose other units, or a format with a wider range such as real:237.",
         )
     return result
+
+
+def numbers(values: Sequence[Fraction], precision: Precision) -> Sequence[Any]:
+    """:func:`number` of each: in double an array; InputError as there."""
+    if precision.family == "double":
+        import numpy
+
+        nearest = getattr(values, "doubles", None)
+        if nearest:
+            return cast(Sequence[Any], numpy.array(nearest))
+    return [number(value, precision) for value in values]
 
 
 def _wide(significand: int, exponent: int, precision: Precision) -> Any:

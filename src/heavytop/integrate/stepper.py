@@ -6,7 +6,7 @@ steps and all later bits do not depend on which samples were asked for, nor on h
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from time import perf_counter
@@ -19,6 +19,9 @@ from heavytop.integrate.trajectory import Outcome, Place
 from heavytop.precision import Precision, number
 
 CHUNK_SECONDS = 0.25
+_ON_A_GRID = ("double", "extended", "quad")
+_MANY, _CLOSE = 256, 20
+"""States at so many times, of which so many steps lie between two at most, are computed in one call of heyoka."""
 
 
 @dataclass(slots=True)
@@ -141,6 +144,37 @@ class Stepper:
         if self.rest is not None:
             return self.rest.copy()
         return self.engine.update_d_output(target).copy()
+
+
+def dense(engine: Any, targets: Sequence[Any], precision: Precision) -> bool:
+    """Whether there are many targets and few steps between them; takes the first step of ``engine`` to see."""
+    if len(targets) < _MANY or precision.family not in _ON_A_GRID:
+        return False
+    engine.propagate_until(far(bool(targets[-1] >= 0), precision), max_steps=1)
+    return abs(float(targets[-1])) <= _CLOSE * len(targets) * abs(float(engine.time))
+
+
+def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: int | None) -> tuple[int, Any] | None:
+    """Steps taken from t = 0 to the last of ``targets``, and the states at all of them, an array of shape (n, 6 or 9).
+
+    The same bits as :class:`Stepper`, in one call of heyoka.  The grid goes on to a time beyond every other, so that no
+    step is cut; the run is stopped behind the step that covers the last target.  None for a run that ends otherwise, or
+    takes more than ``most`` steps: then the engine is anywhere.
+    """
+    sign, end = (1 if targets[-1] >= 0 else -1), far(bool(targets[-1] >= 0), precision)
+    reached, last = sign * engine.time, sign * targets[-1]
+
+    def goes_on(stepped: Any) -> bool:
+        nonlocal reached
+        before, reached = reached, sign * stepped.time
+        return bool(before < reached < last)
+
+    start = [] if targets[0] == 0 else [engine.time]
+    grid = numpy.concatenate([numpy.array([*start, targets[0]]), numpy.array(targets[1:]), numpy.array([end])])
+    _, _, _, steps, _, states = engine.propagate_grid(grid, callback=goes_on, max_steps=most or 0)
+    if len(states) != len(grid) - 1 or not numpy.isfinite(states[-1]).all():
+        return None
+    return steps, states[len(start) :]
 
 
 def far(forwards: bool, precision: Precision) -> Any:

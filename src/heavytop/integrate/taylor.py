@@ -8,12 +8,12 @@ from time import perf_counter
 from typing import Any
 
 from heavytop.integrate.engines import Compiled, compiled, load
-from heavytop.integrate.stepper import Stepper, far
+from heavytop.integrate.stepper import Stepper, dense, far, on_a_grid
 from heavytop.integrate.trajectory import Outcome, Place, Problem, TaylorStep, Trajectory
-from heavytop.precision import Precision, exact, number
+from heavytop.precision import Precision, exact, number, numbers
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import check_times
+from heavytop.top.times import RoundedTimes, check_times
 
 Observer = Callable[[Fraction, Any], None]
 
@@ -52,7 +52,7 @@ def propagate(
     exception.
     """
     problem = Problem.of(top, start, precision, system, xi)
-    targets = [number(time, precision) for time in check_times(times)]
+    targets = numbers(check_times(times), precision)
     tool = compiled(
         system,
         precision,
@@ -80,6 +80,10 @@ def follow(
     mark: Callable[[Place], None] | None = None,
 ) -> Trajectory:
     """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
+    if stepping is Stepper and all(each is None for each in (observer, between, place, mark)):
+        found = _in_one_call(tool, engine, problem, targets, step_limit)
+        if found is not None:
+            return found
     load(engine, problem)
     forwards = bool(targets[-1] >= 0)
     stepper = stepping(engine, forwards, step_limit, far(forwards, problem.precision), between)
@@ -108,16 +112,48 @@ def follow(
             observer(kept_times[-1], state)
         if mark is not None and target != 0:
             mark(stepper.place(done, perf_counter() - began, tool.flags))
+    return _trajectory(
+        tool, engine, problem, stepper, tuple(kept_times), tuple(kept_states), outcome, perf_counter() - began
+    )
+
+
+def _in_one_call(
+    tool: Compiled, engine: Any, problem: Problem, targets: Sequence[Any], step_limit: int | None
+) -> Trajectory | None:
+    """The motion at many targets close to each other, by heyoka alone; None where there are few, or where it fails."""
+    began = perf_counter()
+    load(engine, problem)
+    if not dense(engine, targets, problem.precision):
+        return None
+    load(engine, problem)
+    found = on_a_grid(engine, targets, problem.precision, step_limit)
+    if found is None:
+        return None
+    stepper = Stepper(engine, bool(targets[-1] >= 0), None, None, steps=found[0])
+    seconds = perf_counter() - began
+    return _trajectory(tool, engine, problem, stepper, RoundedTimes(targets), found[1], Outcome.SUCCESS, seconds)
+
+
+def _trajectory(
+    tool: Compiled,
+    engine: Any,
+    problem: Problem,
+    stepper: Stepper,
+    times: Sequence[Fraction],
+    states: Any,
+    outcome: Outcome,
+    seconds: float,
+) -> Trajectory:
     return Trajectory(
         problem,
         "heyoka",
-        tuple(kept_times),
-        tuple(kept_states),
+        times,
+        states,
         outcome,
-        kept_times[-1] if outcome is Outcome.SUCCESS and kept_times else exact(stepper.time),
+        times[-1] if outcome is Outcome.SUCCESS and times else exact(stepper.time),
         stepper.steps,
         engine.order,
-        {"compile": tool.seconds, "run": perf_counter() - began},
+        {"compile": tool.seconds, "run": seconds},
         tool.flags,
     )
 

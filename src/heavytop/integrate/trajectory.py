@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from heavytop.display import Table, Tabular
+from heavytop.display import Lines, Table, Tabular
 from heavytop.errors import InputError
 from heavytop.precision import Precision, decimal_text, exact, native, native_text, number, rounded
 from heavytop.top.equations import HEAVY_TOP, NAMES, Parameters, System
@@ -160,7 +161,8 @@ class Place:
 class Trajectory(Tabular):
     """A computed motion at the times that were reached.
 
-    times: exact values of the rounded times, shape (n,).
+    times: exact values of the rounded times, shape (n,): a tuple, or of many a sequence that makes each when it is
+    asked for.
     states: native numbers, an array of shape (n, 6), order Ω1 Ω2 Ω3 γ1 γ2 γ3; or (n, 9) with the attitude vector ξ
     behind.  It may be given as rows; it has no row where an observer took the states.
     time_reached: exact time of the last finite step end, or the last time asked for.
@@ -171,7 +173,7 @@ class Trajectory(Tabular):
 
     problem: Problem
     integrator: str
-    times: tuple[Fraction, ...]
+    times: Sequence[Fraction]
     states: Any
     outcome: Outcome
     time_reached: Fraction
@@ -185,7 +187,12 @@ class Trajectory(Tabular):
         import numpy
 
         width = 6 if self.problem.xi is None else 9
-        states = numpy.array(self.states) if len(self.states) else numpy.empty((0, width))
+        given = self.states
+        states = (
+            (given if isinstance(given, numpy.ndarray) else numpy.array(given))
+            if len(given)
+            else numpy.empty((0, width))
+        )
         object.__setattr__(self, "states", states)
 
     def texts(self) -> list[list[str]]:
@@ -201,10 +208,11 @@ class Trajectory(Tabular):
     def _table(self) -> Table:
         precision = self.problem.precision
         digits = min(_SHOWN, precision.digits)
-        rows = [
-            [decimal_text(time, _SHOWN), *(_shown(value, digits) for value in state)]
-            for time, state in zip(self.times, self.states, strict=False)
-        ]
+
+        def line(place: int) -> list[str]:
+            return [decimal_text(self.times[place], _SHOWN), *(_shown(value, digits) for value in self.states[place])]
+
+        rows = Lines(min(len(self.times), len(self.states)), line)
         steps = f"{self.steps} steps" + (f" of order {self.order}" if self.order else "")
         title = f"{self.problem.system.name} in {precision.name} by {self.integrator}: {self.outcome.message}, {steps}"
         names = NAMES if self.problem.xi is None else (*NAMES, "ξ1", "ξ2", "ξ3")

@@ -12,10 +12,11 @@ from typing import Any
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
 from heavytop.integrate.words_engines import choose, compiled
-from heavytop.precision import DOUBLE, Precision, exact, number, require
+from heavytop.precision import DOUBLE, Precision, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.times import check_times
+from heavytop.top.times import RoundedTimes, check_times
+from heavytop.words.floating import Floating
 from heavytop.words.run import Run, Status
 from heavytop.words.scaled import Scaled
 
@@ -24,6 +25,8 @@ Observer = Callable[[Fraction, Any], None]
 CHUNK_SECONDS = 0.25
 _FIRST_CHUNK = 16
 _LARGE_EXPONENT = 500
+_MANY = 64
+"""States at so many times are sampled in few calls."""
 _LARGE = 2.0**_LARGE_EXPONENT
 OUTCOMES = {
     Status.FINE: Outcome.SUCCESS,
@@ -55,7 +58,7 @@ def propagate_words(
     Raises InputError for a tolerance that is not positive and below 1.  A failed run is an outcome, not an exception.
     """
     problem = Problem.of(top, start, require(precision), system, xi)
-    targets = [number(time, precision) for time in check_times(times)]
+    targets = numbers(check_times(times), precision)
     return follow(problem, targets, tolerance, step_limit, observer, place=place, mark=mark)
 
 
@@ -83,6 +86,11 @@ def follow(
     kept_times: list[Fraction] = []
     kept_states: list[Any] = []
     outcome, done = Outcome.SUCCESS, 0
+    if all(each is None for each in (step_limit, observer, between, place, mark)) and _are_many(pace, targets, problem):
+        outcome, states = pace.sampled(targets, problem.precision)
+        seconds = {"compile": compiling, "run": perf_counter() - began}
+        times = RoundedTimes(targets[: len(states)])
+        return _trajectory(problem, pace, flags, times, states, outcome, seconds)
     if place is not None:
         place.require_same(flags)
         done, began = place.samples, began - place.seconds
@@ -113,8 +121,8 @@ def _trajectory(
     problem: Problem,
     pace: _Pace,
     flags: dict[str, str],
-    times: list[Fraction],
-    states: list[Any],
+    times: Sequence[Fraction],
+    states: Any,
     outcome: Outcome,
     seconds: dict[str, float],
 ) -> Trajectory:
@@ -122,8 +130,8 @@ def _trajectory(
     return Trajectory(
         problem,
         "words",
-        tuple(times),
-        tuple(states),
+        times if isinstance(times, RoundedTimes) else tuple(times),
+        states,
         outcome,
         reached,
         pace.run.steps,
@@ -131,6 +139,17 @@ def _trajectory(
         seconds,
         flags,
     )
+
+
+def _are_many(pace: _Pace, targets: Sequence[Any], problem: Problem) -> bool:
+    """Whether the states at many doubles are asked for, far from the ends of their exponents."""
+    if len(targets) < _MANY or problem.precision != DOUBLE or not isinstance(pace.run, Floating):
+        return False
+    far = all(
+        1 / _LARGE < abs(float(time) * float(pace.scaled.rate)) < _LARGE
+        for time in (targets[int(targets[0] == 0)], targets[-1])
+    )
+    return far and not pace.scaled.rest and max(map(abs, pace.scaled.exponents)) <= _LARGE_EXPONENT
 
 
 def native_state(state: tuple[Fraction, ...], precision: Precision) -> Any:
@@ -212,6 +231,29 @@ class _Pace:
             a_step = (perf_counter() - began) / max(1, self.run.steps - before)
             self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
         return Outcome.SUCCESS
+
+    def sampled(self, targets: Any, precision: Precision) -> tuple[Outcome, Any]:
+        """The states at many doubles that are reached, as from :meth:`reach` and :meth:`sample`, in few calls."""
+        import numpy
+
+        assert isinstance(self.run, Floating)
+        if targets[0] == 0:
+            outcome, states = self.sampled(targets[1:], precision)
+            start = native_state(self.scaled.back(self.scaled.state), precision)
+            return outcome, numpy.concatenate([[start], states])
+        status, words = self.run.sampled(numpy.abs(numpy.array(targets, dtype=float)) * float(self.scaled.rate))
+        width = len(self.scaled.sizes)
+        places = [*range(6), *range(19, 22)][:width]
+        total = words[:, places] + words[:, [place + 8 for place in places]]
+        states = (total + 0.0) * numpy.array([float(size) for size in self.scaled.sizes])
+        sizes = abs(total)
+        odd = ((sizes <= 1 / _LARGE) & (sizes > 0)) | ~(sizes < _LARGE)
+        for row in numpy.flatnonzero(odd.any(axis=1)):
+            state = native_state(self.scaled.back(self.run.exact_state(words[row])), precision)
+            if state is None:
+                return Outcome.NON_FINITE, states[:row]
+            states[row] = state
+        return OUTCOMES[status], states
 
     def sample(self, target: Fraction) -> tuple[Fraction, ...] | None:
         """The state at ``target``, inside the last step; None where the numbers outgrow their words there."""

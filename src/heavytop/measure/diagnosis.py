@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from sys import float_info
 
 import numpy
 
 from heavytop.measure import mistaken_data, mistaken_equations, mistaken_states, mistaken_times
 from heavytop.measure.suspects import ALIKE, DROP, FITTED_DROP, FLOOR, Array, Suspect, Units, suspect
-from heavytop.measure.written import explains, rounding
+from heavytop.measure.written import EXPLAINS, Rounding, explains, rounding
 from heavytop.precision import Precision, decimal_text
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -27,13 +28,21 @@ _WRONG = 1e-3
 _TOO_FAR = 1.0
 """Taken for the error where heyoka does not get to the times."""
 _CONSTANT = 100.0
-"""Integrals are constant but off if they are off by so many times what they vary by."""
+"""Integrals are constant but off if they are off by so many times what they vary by, ..."""
 _OFF = 1e-3
-"""... and by so much of what they may be."""
+"""... and by so much of what they may be; they vary if they vary by as much."""
+VARIES, AS_AT_START = "varies", "that of the start"
+"""What is said of first integrals that do not keep another value."""
 _FEWEST_ROWS = 4
-_FEWEST_FROZEN = 3
+_FEWEST_STILL = 3
 _ALONE = 1000.0
-"""A state is alone in being off if it is off by so many times as much as any other."""
+"""States are alone in being off if they are off by so many times as much as any other, ..."""
+_RIGHT = 1e-2
+"""... which is off by no more than that, ..."""
+_FEW_OF, _MOST_ALONE = 4, 8
+"""... and if they are at most one in four of all, and so many."""
+_LONG = 1.5
+"""The last interval between times is no measure of a state if it is so many times the longest other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,56 +70,124 @@ def diagnose(
     states: Sequence[Sequence[Fraction]],
     precision: Precision,
     relative_error: float | None,
+    errors: Sequence[float] = (),
 ) -> list[Diagnosis]:
-    """What explains the states of a motion, at most one mistake and what their digits say; empty where nothing does.
+    """What explains the states of a motion: one mistake, or the digits they are written with; empty where nothing does.
 
     relative_error: the largest |error|/max(1, |value|) that was measured; None without a reference.
+    errors: that of each state relative to the size of Ω and γ, up to where the reference ends; empty without one.
     """
-    found: list[Diagnosis] = []
-    if relative_error is None or relative_error > _WRONG:
-        found += _frozen(times, states)
-    if found:
-        return found
-    given = suspect(top, start, system, times, states)
-    if given is not None:
-        truth = given.supposed(given.times)
-        error = _TOO_FAR if truth is None else given.error(truth)
-        with numpy.errstate(all="ignore"):  # what overflows explains nothing
-            mistake = _mistake(given, truth, error, states) if error > _WORTH_ASKING else None
-        found += [mistake] if mistake else []
-    written = rounding(states, precision)
-    if written is not None and relative_error is not None and not found and explains(written, relative_error):
-        found.append(Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)}))
-    return found
+    measured, written = numpy.array(errors, dtype=float), rounding(states, precision)
+    if len(measured) == len(states) and max(relative_error or 0.0, *measured, 0.0) <= _WORTH_ASKING:
+        return _rounded(written, relative_error)
+    with numpy.errstate(all="ignore"):  # what overflows explains nothing
+        given = suspect(top, start, system, times, states, int(measured.argmax()) if len(measured) else None)
+        truth = None if given is None else given.supposed(given.times)
+        if _only_rounded(rounding(states, precision, 1), relative_error, None if given is None else given.trusted()):
+            return _rounded(written, relative_error)
+        mistake = _still(given, states, relative_error) or _off_alone(given, times, measured)
+        if mistake is None and given is not None and given.rows:
+            error = _TOO_FAR if truth is None else given.error(truth)
+            mistake = _mistake(given, truth, error) if error > _WORTH_ASKING else None
+    return [mistake] if mistake else []
 
 
-def _mistake(
-    given: Suspect, truth: Array | None, error: float, states: Sequence[Sequence[Fraction]]
-) -> Diagnosis | None:
+def _rounded(written: Rounding | None, error: float | None) -> list[Diagnosis]:
+    """That the digits written explain the error, which is neither larger than they make it nor far smaller."""
+    if written is None or error is None or not explains(written, error):
+        return []
+    return [Diagnosis("rounded", {"to": written.kind, "digits": str(written.digits)})]
+
+
+def _only_rounded(written: Rounding | None, error: float | None, given: Suspect | None) -> bool:
+    """Whether every component that is looked at is the true one, rounded as it is written."""
+    if written is None or (error is not None and error > EXPLAINS * written.error):
+        return False
+    truth = None if given is None or not given.rows else given.supposed(given.times)
+    if given is None or truth is None:
+        return error is not None
+    units, sizes = (numpy.repeat([value, 1.0], 3) for value in (float(given.units.time), given.rate))
+    allowed = EXPLAINS * written.spacing(given.states / units) / 2 * units + 10 * _WORTH_ASKING * sizes
+    return bool((numpy.abs(given.states - truth) <= allowed).all())
+
+
+def _mistake(given: Suspect, truth: Array | None, error: float) -> Diagnosis | None:
     """The simplest mistake among those that explain the states about as well as the best."""
-    if len(states) > 2 and all(list(state) == list(states[0]) for state in states):
-        return Diagnosis("constant")
     explained = [each for each in _suppositions(given, truth) if each[2] * each[3] <= error]
     if not explained and error > _WRONG:
         others = mistaken_equations.suppositions(given, truth)
         explained = [(*each, FITTED_DROP) for each in others if each[2] * FITTED_DROP <= error]
     if not explained:
-        return _of_many(given.widened()) or _looked_at(given, _integrals_off(given, error))
+        every = given.widened()
+        return _looked_at(every, _lost_row(every)) or _looked_at(given, _integrals_off(given, error))
     best = min(max(left, FLOOR) for *_, left, _ in explained)
     kind, numbers, left, _ = next(each for each in explained if each[2] <= ALIKE * best)
     return _looked_at(given, Diagnosis(kind, numbers, error, left))
 
 
-def _frozen(times: Sequence[Fraction], states: Sequence[Sequence[Fraction]]) -> list[Diagnosis]:
-    """From some time on every state is the same, which are three at least, and not all."""
+def _still(
+    given: Suspect | None, states: Sequence[Sequence[Fraction]], relative_error: float | None
+) -> Diagnosis | None:
+    """From some time on every state is the same, which are three at least, though the motion moves there."""
     same = next((n for n, state in enumerate(reversed(states)) if list(state) != list(states[-1])), len(states))
-    if same < _FEWEST_FROZEN or same == len(states):
-        return []
-    return [Diagnosis("frozen", {"t": decimal_text(times[-same], 6), "states": f"{same} of {len(states)}"})]
+    right = relative_error is not None and relative_error <= _WRONG
+    if given is None or right or same < _FEWEST_STILL or not _moves(given, len(states) - same):
+        return None
+    if same == len(states):
+        return Diagnosis("constant")
+    first = _text(given.all_times[-same], given.units.time)
+    return Diagnosis("frozen", {"t": first, "states": f"{same} of {len(states)}"})
 
 
-def _of_many(every: Suspect) -> Diagnosis | None:
-    return _looked_at(every, _lone_state(every) or _lost_row(every))
+def _moves(given: Suspect, row: int) -> bool:
+    """Whether the motion from the start, or that from the state of ``row``, moves from there to the next sample."""
+    sizes = numpy.repeat([given.rate, 1.0], 3)
+    true, here = given.supposed(given.all_times[row : row + 2]), given.all_states[row]
+    pairs = [(here, given.follows(row))] + ([] if true is None else [(true[0], true[1])])
+    return any(
+        after is not None and float((numpy.abs(after - before) / sizes).max()) > _WRONG for before, after in pairs
+    )
+
+
+def _off_alone(given: Suspect | None, times: Sequence[Fraction], errors: Array) -> Diagnosis | None:
+    """A few states that are off while all others are right.
+
+    errors: as far as they were measured; where there are none, those of what heyoka reaches.
+    """
+    every = given.widened() if given is not None and not len(errors) else None
+    truth = None if every is None or not every.rows else every.supposed(every.times)
+    if every is not None and truth is not None:
+        errors = every.errors(truth)
+    order = numpy.argsort(-errors, kind="stable")
+    most = max(1, min(_MOST_ALONE, len(errors) // _FEW_OF)) if len(errors) > 2 else 0
+    found = [n for n in range(1, most + 1) if _gap(errors[order[n - 1]], errors[order[n]])]
+    off = sorted(map(int, order[: found[-1]])) if found else []
+    last = len(errors) - 1
+    if not off or (last in off and (len(off) > 1 or not _jumps(given, times, last, errors))):
+        return None
+    error, left = (min(float(errors[row]), float_info.max) for row in (order[0], order[len(off)]))
+    where = ", ".join(decimal_text(times[row], 6) for row in off)
+    which = ", ".join(str(row + 1) for row in off)
+    looked_at = None if len(errors) == len(times) else (len(errors), len(times), decimal_text(times[last], 6))
+    numbers = {"t": where, "state": f"{which} of {len(errors)}"}
+    return Diagnosis("one_state" if len(off) == 1 else "some_states", numbers, error, left, looked_at)
+
+
+def _gap(error: float, other: float) -> bool:
+    """Whether an error is that of a state that is off, and the other that of one that is right."""
+    return bool(error > _WORTH_ASKING and error >= _ALONE * other and other <= _RIGHT)
+
+
+def _jumps(given: Suspect | None, times: Sequence[Fraction], last: int, errors: Array) -> bool:
+    """Whether the last state is not that of the motion through the one before, nor much later than that."""
+    spans = [abs(b - a) for a, b in zip([Fraction(0), *times[: last - 1]], times[:last], strict=True)]
+    if given is None or abs(times[last] - times[last - 1]) > _LONG * max(spans):
+        return False
+    expected = given.follows(last - 1)
+    if expected is None:
+        return False
+    off = numpy.abs(given.all_states[last] - expected) / numpy.repeat([given.rate, 1.0], 3)
+    return bool(off.max() >= errors[last] / 2)
 
 
 def _looked_at(given: Suspect, found: Diagnosis | None) -> Diagnosis | None:
@@ -137,9 +214,17 @@ def _suppositions(given: Suspect, truth: Array | None) -> Iterator[Supposition]:
         yield _of_clock(*clock, given.units)
     if reading is not None and reading[0].changes > 1:
         yield _of_reading(*reading)
+    if truth is not None:
+        yield from ((*each, FITTED_DROP) for each in mistaken_states.scaled(given, truth))
     if clock is not None and clock[0].fitted:
         yield _of_clock(*clock, given.units)
-    for supposed in (mistaken_data.another_weight, mistaken_data.another_start, mistaken_data.another_top):
+    fits = (
+        mistaken_data.all_scaled,
+        mistaken_data.another_weight,
+        mistaken_data.another_start,
+        mistaken_data.another_top,
+    )
+    for supposed in fits:
         found = supposed(given)
         if found is not None:
             data, left = found
@@ -167,19 +252,6 @@ def _of_clock(clock: mistaken_times.Clock, left: float, units: Units) -> Supposi
     return clock.kind, numbers, left, FITTED_DROP if clock.fitted else DROP
 
 
-def _lone_state(every: Suspect) -> Diagnosis | None:
-    """One state, neither the first nor the last, that is off while all others are right."""
-    truth = every.supposed(every.times)
-    if truth is None:
-        return None
-    errors = every.errors(truth)
-    worst = int(numpy.argmax(errors))
-    left = float(numpy.delete(errors, worst).max(initial=0.0))
-    if not 0 < worst < len(errors) - 1 or left * _ALONE > errors[worst]:
-        return None
-    return Diagnosis("one_state", {"t": _text(every.times[worst], every.units.time)}, float(errors[worst]), left)
-
-
 def _lost_row(every: Suspect) -> Diagnosis | None:
     """States that are right up to a time, and from there on those of the next sample, or of the one before."""
     times = every.times
@@ -203,23 +275,43 @@ def _lost_row(every: Suspect) -> Diagnosis | None:
 
 
 def _integrals_off(given: Suspect, error: float) -> Diagnosis | None:
-    """First integrals that keep their values from the first sample on, but not those of the start."""
+    """First integrals that keep a value from the first sample on which is not that of the start, and what others do."""
     if len(given.rows) < 3:
         return None
     p = given.system.parameters(given.top, given.start)
-    inertia, moment = max(map(float, p.inertia)), max(abs(float(value)) for value in p.moment)
-    sizes = {"gamma_squared": 1.0, "area": inertia * given.rate, "energy": inertia * given.rate**2 + moment}
-    units = {"gamma_squared": Fraction(1), "area": given.units.moment * given.units.time, "energy": given.units.moment}
     start = [float(value) for value in given.start.flat]
     numbers: dict[str, str] = {}
     for integral in holding(given.top, given.start, given.system):
+        if integral.name not in (sizes := _sizes(given)):
+            continue
+        size, unit = sizes[integral.name]
         values = numpy.array([float(integral.value(p, list(state))) for state in given.states])
         at_start = float(integral.value(p, start))
         off, varies = abs(float(values.mean()) - at_start), float(values.max() - values.min())
-        if off > max(_CONSTANT * varies, _OFF * sizes.get(integral.name, float("inf"))):
-            unit = units[integral.name]
+        if not varies <= _OFF * size:
+            numbers[integral.name] = VARIES
+        elif off > max(_CONSTANT * varies, _OFF * size):
             numbers[integral.name] = f"{_text(values.mean(), unit)}, not {_text(at_start, unit)}"
-    return Diagnosis("integrals_off", numbers, error) if numbers else None
+        elif off <= _OFF * size:
+            numbers[integral.name] = AS_AT_START
+    told = set(numbers.values()) - {VARIES, AS_AT_START}
+    return Diagnosis("integrals_off", numbers, error) if told else None
+
+
+def _sizes(given: Suspect) -> dict[str, tuple[float, Fraction]]:
+    """What the integrals that are looked at may be, and their units."""
+    p = given.system.parameters(given.top, given.start)
+    inertia, moment = max(map(float, p.inertia)), max(abs(float(value)) for value in p.moment)
+    area, energy = inertia * given.rate, inertia * given.rate**2 + moment
+    area_unit, energy_unit = given.units.moment * given.units.time, given.units.moment
+    return {
+        "gamma_squared": (1.0, Fraction(1)),
+        "area": (area, area_unit),
+        "energy": (energy, energy_unit),
+        "gyrostat_energy": (energy, energy_unit),
+        "momentum_squared": (area**2, area_unit**2),
+        "spin": (given.rate, 1 / given.units.time),
+    }
 
 
 def _text(value: float | Fraction, unit: Fraction) -> str:

@@ -11,12 +11,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import permutations, product
+from math import isfinite
 from typing import TypeVar
 
 import numpy
 
 from heavytop.errors import InputError
-from heavytop.measure.suspects import ALIKE, Array, Suspect, motion
+from heavytop.measure.mistaken_states import UNITS_OF_OMEGA
+from heavytop.measure.suspects import ALIKE, FLOOR, SHORT, SMALL, Array, Suspect, motion, named, notable
 from heavytop.precision import decimal_text
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
@@ -26,15 +28,9 @@ _SINGULAR = 1e-4
 _NEAR = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10)
 """Widths, relative to the data, within which a fitted number may be rounded; the first that does no harm is taken."""
 _MOST_CHANGED = 3
-_NOTABLE = 0.02
-"""A fitted number must be off by this part or be a short decimal: methods have small biases of their own."""
 _MARGIN = 30.0
 """How many errors of the samples a fitted number may be off."""
-_SHORT = 4
-_DIGITS = range(1, _SHORT + 1), range(_SHORT + 1, 13)
-"""Digits of a short decimal, and of a longer one."""
-_SMALL = 100
-"""Denominators of small fractions."""
+_AT_ONCE = 1e-3
 _LATER = 2
 """The last sample must be so many times as late as the first for a start to be told from the method's own errors."""
 
@@ -64,7 +60,8 @@ def without_numbers(given: Suspect) -> Iterator[Found]:
     momentum = State([w / i for w, i in zip(start.omega, top.inertia, strict=True)], start.gamma)
     yield _tried(given, "start_momentum", start=momentum)
     yield _as_momentum(given, momentum)
-    yield _in_degrees(given)
+    for unit, factor in UNITS_OF_OMEGA.items():
+        yield Data(f"all_in_{unit}"), _all_times(given, factor)
     other = HEAVY_TOP if given.system is GYROSTAT else GYROSTAT
     yield _tried(replace(given, system=other), "system")
     for a, b, c in list(permutations(range(3)))[1:]:
@@ -101,28 +98,47 @@ def _as_momentum(given: Suspect, start: State) -> Found:
     return Data("all_momentum"), given.error(truth)
 
 
-def _in_degrees(given: Suspect) -> Found:
-    """Start and states give Ω in degrees."""
-    degrees = 180 / numpy.pi
-    start = State([w / Fraction(degrees) for w in given.start.omega], given.start.gamma)
+def _all_times(given: Suspect, factor: float) -> float:
+    """The error where start and states give Ω times ``factor``."""
+    start = State([w / Fraction(factor) for w in given.start.omega], given.start.gamma)
     truth = given.supposed(given.times, start=start)
-    return Data("all_in_degrees"), given.error(None if truth is None else truth * ([degrees] * 3 + [1.0] * 3))
+    return given.error(None if truth is None else truth * ([factor] * 3 + [1.0] * 3))
 
 
-def another_weight(given: Suspect) -> Found | None:
-    """P from the energy: ½ Ω·M may change only by what P r·γ loses."""
+def all_scaled(given: Suspect) -> Found | None:
+    """A constant factor of Ω in start and states: its square is that of the weight that the energy asks for."""
+    square = _weight_ratio(given)
+    if square is None or square <= 0:
+        return None
+    fitted = square**0.5
+    left = _all_times(given, fitted)
+    factor = named(fitted, _MARGIN * max(left, FLOOR) * fitted)
+    if not factor or not notable(factor, Fraction(1)):
+        return None
+    return Data("all_scaled", (("factor", decimal_text(factor, 8)),), fitted=True), _all_times(given, float(factor))
+
+
+def _weight_ratio(given: Suspect) -> float | None:
+    """P over the given one, from the energy: ½ Ω·M may change only by what P r·γ loses.  None where neither moves."""
     inertia, moment = _floats(given.top.inertia), _floats(given.top.moment)
-    start, old = _floats(given.start.flat), given.top.weight
+    start = _floats(given.start.flat)
     kinetic = 0.5 * ((given.states[:, :3] ** 2 - start[:3] ** 2) @ inertia)
     height = (given.states[:, 3:] - start[3:]) @ moment
     square = float(height @ height)
-    if not square:
+    ratio = -float(kinetic @ height) / square if square else float("nan")
+    return ratio if isfinite(ratio) else None
+
+
+def another_weight(given: Suspect) -> Found | None:
+    """P from the energy."""
+    ratio, old = _weight_ratio(given), given.top.weight
+    if ratio is None or not isfinite(ratio * float(old)):
         return None
-    fitted = -float(kinetic @ height) / square * float(old)
-    candidates = [_named(fitted, near * abs(float(old))) for near in _NEAR]
+    fitted = ratio * float(old)
+    candidates = [named(fitted, near * abs(float(old))) for near in _NEAR]
     tried = [(weight, _with(given, given.top.inertia, [weight * r for r in given.top.centre])) for weight in candidates]
     weight, error = _roundest(tried)
-    if not _notable(weight, old):
+    if not notable(weight, old):
         return None
     return Data("weight", (("P", _text(weight * given.units.moment)),), fitted=True), error
 
@@ -139,7 +155,7 @@ def another_start(given: Suspect) -> Found | None:
     first = _as_state(given.states[0])
     back = motion(given.top, first, given.system, [-times[0]])
     truth = given.supposed(times[:1])
-    if back is None or truth is None:
+    if back is None or truth is None or not _shows_at_once(given, truth):
         return None
     start = _as_state(back[0])
     error = given.error(given.supposed(times, start=start))
@@ -150,27 +166,35 @@ def another_start(given: Suspect) -> Found | None:
     units = [given.units.time] * 3 + [Fraction(1)] * 3
     noise = _MARGIN * max(error, 1e-12)
     numbers = tuple(
-        (name, _text(_named(float(value), noise * size) / unit))
+        (name, _text(named(float(value), noise * size) / unit))
         for name, value, change, size, unit in zip(names, back[0], off, sizes, units, strict=True)
         if change > noise * size
     )
-    return Data("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error
+    return (Data("start", numbers, fitted=True, required=1000 * max(1.0, magnified)), error) if numbers else None
+
+
+def _shows_at_once(given: Suspect, first: Array) -> bool:
+    """Whether the first sample is off by a notable part of the largest error: a motion that magnifies the errors of a
+    method may look like one from another start.
+    """
+    early, largest = given.at(given.rows[:1]).error(first), given.error(given.supposed(given.times))
+    return early >= _AT_ONCE * largest
 
 
 def another_top(given: Suspect) -> Found | None:
     """The moments and n = P r, up to a common factor, that keep both integrals from the start to every sample."""
     direction = _conserving(given) if given.system is HEAVY_TOP and len(given.rows) >= 3 else None
-    if direction is None:
-        return None
     before = [*given.top.inertia, *given.top.moment]
+    if direction is None or not (direction * _floats(before)).any():
+        return None
     scaled = [_scaled(direction, before, near) for near in _NEAR]
     tried = [(numbers, _with(given, numbers[:3], numbers[3:])) for numbers in scaled]
     numbers, error = _roundest(tried)
     units = [given.units.inertia] * 3 + [given.units.moment] * 3
-    named = zip(_NAMES, before, numbers, units, strict=True)
-    changed = [(name, _text(new * unit)) for name, old, new, unit in named if new != old]
-    notable = any(_notable(new, old) for old, new in zip(before, numbers, strict=True) if new != old)
-    if not notable or len(changed) > _MOST_CHANGED:
+    entries = zip(_NAMES, before, numbers, units, strict=True)
+    changed = [(name, _text(new * unit)) for name, old, new, unit in entries if new != old]
+    told = any(notable(new, old) for old, new in zip(before, numbers, strict=True) if new != old)
+    if not told or len(changed) > _MOST_CHANGED:
         return None
     return Data("top", tuple(changed), fitted=True), error
 
@@ -187,6 +211,8 @@ def _conserving(given: Suspect) -> Array | None:
     size = given.rate or 1.0
     units = numpy.array([size**2] * 3 + [1.0] * 3)
     rows = numpy.vstack([numpy.hstack([area * size, numpy.zeros_like(area)]), energy]) / units
+    if not numpy.isfinite(rows).all():
+        return None
     _, values, directions = numpy.linalg.svd(rows)
     if len(values) < 6 or values[5] > _SINGULAR * values[4]:
         return None
@@ -201,7 +227,7 @@ def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[F
     factors = [o / d for o, d in zip(old, direction, strict=True) if o and d]
     scaled = max((direction * f for f in factors), key=lambda new: int((numpy.abs(new - old) <= near * sizes).sum()))
     return [
-        o if abs(value - float(o)) <= near * size else _named(float(value), near * size)
+        o if abs(value - float(o)) <= near * size else named(float(value), near * size)
         for value, o, size in zip(scaled, before, sizes, strict=True)
     ]
 
@@ -224,23 +250,6 @@ def _roundest(tried: Sequence[tuple[_Numbers, float]]) -> tuple[_Numbers, float]
     return next(pair for pair in tried if pair[1] <= ALIKE * best)
 
 
-def _named(value: float, near: float) -> Fraction:
-    """0, a short decimal, a small fraction or the shortest decimal within ``near``, or the value itself."""
-    if abs(value) <= near:
-        return Fraction(0)
-    short, longer = ([Fraction(decimal_text(Fraction(value), digits)) for digits in some] for some in _DIGITS)
-    for candidate in (*short, Fraction(value).limit_denominator(_SMALL), *longer):
-        if abs(float(candidate) - value) <= near:
-            return candidate
-    return Fraction(value)
-
-
-def _notable(new: Fraction, old: Fraction) -> bool:
-    """Whether a number is off by much, or is a short decimal or a small fraction: neither is the bias of a method."""
-    off = abs(new - old) > Fraction(_NOTABLE) * max(abs(new), abs(old))
-    return off or new.denominator <= _SMALL or new == Fraction(decimal_text(new, _SHORT))
-
-
 def _as_state(values: Array) -> State:
     return State([Fraction(v) for v in values[:3]], [Fraction(v) for v in values[3:]])
 
@@ -251,7 +260,7 @@ def _floats(values: object) -> Array:
 
 def _text(value: Fraction) -> str:
     """A short decimal, a small fraction, or eight digits."""
-    decimal = decimal_text(value, _SHORT + 2)
-    if Fraction(decimal) == value or value.denominator > _SMALL:
+    decimal = decimal_text(value, SHORT + 2)
+    if Fraction(decimal) == value or value.denominator > SMALL:
         return decimal if Fraction(decimal) == value else decimal_text(value, 8)
     return str(value)

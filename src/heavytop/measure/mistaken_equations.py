@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy
 
+from heavytop.measure.mistaken_states import constant_column
 from heavytop.measure.suspects import Array, Suspect
 from heavytop.top.equations import HEAVY_TOP, NAMES, Parameters, System, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State, cross
@@ -33,6 +34,7 @@ def suppositions(given: Suspect, truth: Array | None) -> Iterator[Found]:
     if truth is not None:
         yield _any_order(given, truth)
         yield from _axes_of_space(given, truth)
+        yield from constant_column(given, truth)
     if given.system is HEAVY_TOP:
         yield from _signs(given)
 

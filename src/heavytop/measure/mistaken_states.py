@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from itertools import permutations, product
 
 import numpy
 
-from heavytop.measure.suspects import ALIKE, FLOOR, Array, Suspect
+from heavytop.measure.suspects import ALIKE, FLOOR, Array, Suspect, named, notable
+from heavytop.precision import decimal_text
+from heavytop.top.equations import NAMES
 
 _DEGREES = 180 / numpy.pi
 _TURNS = 1 / (2 * numpy.pi)
+_RPM = 60 * _TURNS
+UNITS_OF_OMEGA = {"degrees": _DEGREES, "turns": _TURNS, "rpm": _RPM}
+"""Of angular velocity, each as a multiple of radians per time unit; rpm where times are in seconds."""
+_FEWEST = 3
+"""Numbers of which one factor may be told."""
+_PRESENT = 1e-6
+"""A column of the true states counts as 0 below this part of its vector."""
 _MEANINGS: dict[str, tuple[float, float, bool]] = {
     "": (1, 1, False),
     "gamma_down": (1, -1, False),
@@ -21,6 +31,7 @@ _MEANINGS: dict[str, tuple[float, float, bool]] = {
     "momentum_gamma_down": (1, -1, True),
     "omega_in_degrees": (_DEGREES, 1, False),
     "omega_in_turns": (_TURNS, 1, False),
+    "omega_in_rpm": (_RPM, 1, False),
 }
 """Factor of Ω, factor of γ, and whether M stands in place of Ω."""
 
@@ -80,3 +91,40 @@ def reading(given: Suspect, truth: Array) -> tuple[Reading, float] | None:
     return next(
         ((each, error) for each, error in zip(READINGS, errors, strict=True) if error <= ALIKE * max(best, FLOOR)), None
     )
+
+
+def scaled(given: Suspect, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
+    """Ω, γ or one column times a constant factor: kind, numbers, and the error of the states divided by the factor."""
+    groups = [("omega_scaled", slice(0, 3)), ("gamma_scaled", slice(3, 6))]
+    groups += [("column_scaled", slice(column, column + 1)) for column in range(6)]
+    for kind, columns in groups:
+        true, whole = truth[:, columns], truth[:, :3] if columns.start < 3 else truth[:, 3:]
+        if true.size < _FEWEST or numpy.abs(true).max() <= _PRESENT * numpy.abs(whole).max():
+            continue
+        fitted = float((given.states[:, columns] * true).sum() / (true * true).sum())
+        if not numpy.isfinite(fitted) or not fitted:
+            continue
+        left = _divided(given, truth, columns, fitted)
+        factor = named(fitted, ALIKE * max(left, FLOOR) * abs(fitted))
+        if factor and factor != -1 and notable(factor, Fraction(1)):
+            numbers = {"column": NAMES[columns.start]} if kind == "column_scaled" else {}
+            text = decimal_text(factor, 8)
+            yield kind, {**numbers, "factor": text}, _divided(given, truth, columns, float(factor))
+
+
+def _divided(given: Suspect, truth: Array, columns: slice, factor: float) -> float:
+    states = given.states.copy()
+    states[:, columns] /= factor
+    return replace(given, states=states).error(truth)
+
+
+def constant_column(given: Suspect, truth: Array) -> Iterator[tuple[str, dict[str, str], float]]:
+    """A column that is the same in every state, and the error of the other five."""
+    if len(given.rows) < _FEWEST:
+        return
+    for column in numpy.flatnonzero((given.all_states == given.all_states[0]).all(axis=0)):
+        states = given.states.copy()
+        states[:, column] = truth[:, column]
+        value = Fraction(float(given.states[0, column])) / (given.units.time if column < 3 else 1)
+        numbers = {"column": NAMES[column], "value": decimal_text(value, 6)}
+        yield "column_constant", numbers, replace(given, states=states).error(truth)

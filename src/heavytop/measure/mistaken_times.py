@@ -9,6 +9,7 @@ from fractions import Fraction
 import numpy
 
 from heavytop.measure.suspects import ALIKE, FARTHEST, FLOOR, Array, Suspect
+from heavytop.precision import decimal_text
 
 _GRID = 1500
 _WITHIN = 0.3
@@ -18,7 +19,9 @@ _REFINED = 6
 _SPAN = Fraction(1, 10)
 """The samples must spread over so much of their time: an integrator's own lag grows with time and is no shift."""
 _NEAR_ONE = 0.05
-"""A clock that is off by less may be an integrator's own lag."""
+"""A clock that is off by less may be an integrator's own lag, unless the factor is a short decimal."""
+_SHORT = 3
+_EXACTLY = 1e-9
 _UNITS = {Fraction(n, d) for n, d in ((1000, 1), (60, 1), (3600, 1), (1, 1000), (1, 60), (1, 3600))}
 _CIRCLE = (2 * numpy.pi, 1 / (2 * numpy.pi), numpy.pi / 180, 180 / numpy.pi)
 
@@ -72,7 +75,9 @@ def _fitted(given: Suspect) -> Iterator[tuple[Clock, float]]:
         return
     sizes = numpy.array([max(orbit[:, :3].max(), -orbit[:, :3].min()) or 1.0] * 3 + [1.0] * 3)
     # a method's own lag explains the samples of an oscillation as well as any clock
-    lag = min((error for _, error in _refined(given, "time_unit", 1.0, times, sizes)), default=float("inf"))
+    slower = list(_refined(given, "time_unit", 1.0, times, sizes))
+    lag = min((error for found, error in slower if abs(found.factor - 1) < _NEAR_ONE), default=float("inf"))
+    yield from (each for each in slower if abs(each[0].factor - 1) >= _NEAR_ONE or _is_short(each[0].factor))
     for kind in ("times_shifted", "time_unit"):
         # a shift is the same for every sample; a unit shows best at the earliest sample away from 0
         tried = []
@@ -84,8 +89,17 @@ def _fitted(given: Suspect) -> Iterator[tuple[Clock, float]]:
         for _, number in sorted(tried)[: _TRIED // 3]:
             for found, error in _refined(given, kind, number, times, sizes):
                 near_one = kind == "time_unit" and abs(found.factor - 1) < _NEAR_ONE
-                if not near_one and ALIKE * error < lag:
+                if _is_short(found.factor) if near_one else ALIKE * error < lag:
                     yield found, error
+
+
+def _is_short(factor: float) -> bool:
+    """Whether the factor, or one over it, is a decimal of three digits, as no integrator's lag is; 1 is none."""
+    near = [Fraction(decimal_text(Fraction(each), _SHORT)) for each in (factor, 1 / factor)]
+    return any(
+        one != 1 and abs(one / Fraction(each) - 1) < _EXACTLY
+        for one, each in zip(near, (factor, 1 / factor), strict=True)
+    )
 
 
 def _near(orbit: Array, state: Array) -> list[int]:

@@ -99,6 +99,13 @@ class SolutionError:
         return sums, self.threshold is not None and bool(omega > rational(self.threshold))
 
     @whole_evaluation
+    def last(self, rate: Fraction) -> float:
+        """The error of the last state that was taken in, at most: of Ω over ``rate``, or of γ, the larger."""
+        with working_precision(self.bits):
+            omega, gamma = (self.running[part].final for part in ("omega", "gamma"))
+            return float(largest((omega / rational(rate), gamma)).abs_upper())
+
+    @whole_evaluation
     def metrics(self) -> dict[str, Metric]:
         """``NAME_omega_max``, ``_rms``, ``_final``; the same for gamma, along, across; ``NAME_relative_max``."""
         with working_precision(self.bits):

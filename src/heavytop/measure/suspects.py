@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import floor
 
 import numpy
 from numpy.typing import NDArray
@@ -16,9 +17,9 @@ from numpy.typing import NDArray
 from heavytop.errors import HeavyTopError
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome
-from heavytop.precision import DOUBLE, log10
+from heavytop.precision import DOUBLE, decimal_text, log10
 from heavytop.top.equations import System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import HeavyTop, State, dot
 
 Array = NDArray[numpy.float64]
 
@@ -26,10 +27,15 @@ MOST_SAMPLES = 24
 _TURNS = 60.0
 """Radians that the body turns until the last sample that is looked at, if there are a few samples before."""
 _FEW = 6
+_FEWEST = 3
 _STEPS = 50_000
 """Of heyoka, for one supposed motion: a tenth of a second."""
 FARTHEST = 3000.0
 """Radians that the body may turn until the last supposed time."""
+_OTHER_UNIT = Fraction(11, 10)
+"""Of time and of moments: all data are rounded otherwise in it."""
+_TRUSTED = 1e-11
+"""heyoka's states are trusted until those in other units part from them by so much, relative to their size."""
 _USUAL = 3.0
 """Decades by which a unit may be off before another is taken."""
 MOST_AT_ONCE = 2000
@@ -37,6 +43,13 @@ ALIKE = 30.0
 """Of suppositions whose errors differ by less, the simplest is meant."""
 FLOOR = 1e-13
 """Relative errors below it are heyoka's own."""
+_NOTABLE = 0.02
+"""A fitted number must be off by this part or be a short decimal: methods have small biases of their own."""
+SHORT = 4
+_DIGITS = range(1, SHORT + 1), range(SHORT + 1, 13)
+"""Digits of a short decimal, and of a longer one."""
+SMALL = 100
+"""Denominators of small fractions."""
 DROP = 100.0
 """Errors must fall by so much for a supposition without a free number, and ..."""
 FITTED_DROP = 1000.0
@@ -91,10 +104,40 @@ class Suspect:
             return None
         return motion(top or self.top, start or self.start, self.system, times)
 
+    def at(self, rows: Sequence[int]) -> Suspect:
+        """The same at other samples."""
+        return replace(self, rows=tuple(rows), states=self.all_states[list(rows)])
+
     def widened(self) -> Suspect:
-        """The same with as many as :data:`MOST_AT_ONCE` samples."""
-        rows = tuple(range(min(len(self.all_times), MOST_AT_ONCE)))
-        return replace(self, rows=rows, states=self.all_states[: len(rows)])
+        """The same with as many as :data:`MOST_AT_ONCE` samples, which heyoka reaches and is trusted at."""
+        reached = [abs(float(time)) * self.rate <= FARTHEST for time in self.all_times[:MOST_AT_ONCE]]
+        return self.at(range(sum(reached))).trusted()
+
+    def trusted(self) -> Suspect:
+        """The same up to where the motion makes more of roundings than an error that is asked about."""
+        truth, unit = self.supposed(self.times) if self.rows else None, _OTHER_UNIT
+        if truth is None:
+            return self
+        top = HeavyTop([i * unit for i in self.top.inertia], self.top.weight / unit, self.top.centre)
+        start = State([w / unit for w in self.start.omega], self.start.gamma)
+        other = motion(top, start, self.system, [time * unit for time in self.times])
+        if other is None:
+            return self
+        states = other * ([float(unit)] * 3 + [1.0] * 3)
+        far = replace(self, states=states).errors(truth) > _TRUSTED
+        return self.at(self.rows[: int(numpy.argmax(far))]) if far.any() else self
+
+    def follows(self, row: int) -> Array | None:
+        """The state at the sample behind ``row`` that the motion through the state given there has; None for none."""
+        span = self.all_times[row + 1] - self.all_times[row]
+        if abs(float(span)) * self.rate > FARTHEST:
+            return None
+        values = [Fraction(value) for value in self.all_states[row]]
+        try:
+            found = motion(self.top, State(values[:3], values[3:]), self.system, [span])
+        except HeavyTopError:  # beyond the numbers that a start may have
+            return None
+        return None if found is None else found[0]
 
     def errors(self, supposed: Array) -> Array:
         """The error of each state relative to the size of Ω and γ in the supposed ones, shape (n,)."""
@@ -119,8 +162,13 @@ def suspect(
     system: System,
     times: Sequence[Fraction],
     states: Sequence[Sequence[Fraction]],
+    worst: int | None = None,
 ) -> Suspect | None:
-    """At most :data:`MOST_SAMPLES` samples, over the first turns of the body; None for numbers that no double holds."""
+    """At most :data:`MOST_SAMPLES` samples, over the first turns of the body, and ``worst`` where it is among these.
+
+    Those where roundings of the start hide the motion are left out if enough remain.  None for numbers that no double
+    holds.
+    """
     units = _units(top, start)
     inertia, force = [i / units.inertia for i in top.inertia], units.inertia / units.time**2
     top = HeavyTop(inertia, top.weight / force, top.centre)
@@ -139,8 +187,23 @@ def suspect(
     rate = float(max(numpy.linalg.norm(array[0, :3]), fall)) or 1.0
     early = sum(abs(time) * rate <= _TURNS for time in ends)
     last = max(early, min(len(ends), _FEW))
-    rows = sorted({round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))})
-    return Suspect(top, start, system, tuple(times), array[1:], tuple(rows), array[1:][rows], rate, units)
+    some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))}
+    rows = sorted(some if worst is None or worst >= last else some | {worst})
+    found = Suspect(top, start, system, tuple(times), array[1:], tuple(rows), array[1:][rows], rate, units)
+    trusted = found.trusted()
+    return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else found
+
+
+def turning_rate(top: HeavyTop, start: State) -> Fraction:
+    """Radians per time unit at which the motion turns, roughly, to two digits: |Ω| at the start, or that of a fall."""
+    squares = Fraction(dot(start.omega, start.omega)), Fraction(dot(top.moment, top.moment)) / max(top.inertia) ** 2
+    powers = [
+        power / over for square, over in zip(squares, (2, 4), strict=True) if (power := log10(square)) is not None
+    ]
+    if not powers:
+        return Fraction(1)
+    whole = floor(max(powers))
+    return Fraction(round(100 * 10 ** (max(powers) - whole)), 100) * Fraction(10) ** whole
 
 
 def _units(top: HeavyTop, start: State) -> Units:
@@ -171,3 +234,20 @@ def motion(top: HeavyTop, start: State, system: System, times: Sequence[Fraction
             found[rows] = state
     found[[row for row, time in enumerate(times) if time == 0]] = [float(value) for value in start.flat]
     return found
+
+
+def named(value: float, near: float) -> Fraction:
+    """0, a short decimal, a small fraction or the shortest decimal within ``near``, or the value itself."""
+    if abs(value) <= near:
+        return Fraction(0)
+    short, longer = ([Fraction(decimal_text(Fraction(value), digits)) for digits in some] for some in _DIGITS)
+    for candidate in (*short, Fraction(value).limit_denominator(SMALL), *longer):
+        if abs(float(candidate) - value) <= near:
+            return candidate
+    return Fraction(value)
+
+
+def notable(new: Fraction, old: Fraction) -> bool:
+    """Whether a number is off by much, or is a short decimal or a small fraction: neither is the bias of a method."""
+    off = abs(new - old) > Fraction(_NOTABLE) * max(abs(new), abs(old))
+    return off or new.denominator <= SMALL or new == Fraction(decimal_text(new, SHORT))

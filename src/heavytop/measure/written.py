@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from sys import float_info
+
+import numpy
+from numpy.typing import NDArray
 
 from heavytop.precision import Precision, decimal_text, round_to
 
@@ -13,8 +17,10 @@ _SPARE = 3
 _LEAST = 12
 """Numbers that must agree."""
 _SINGLE = 24
-_EXPLAINS = 1.5
-"""An error is that of rounding if it is at most so many times the largest rounding."""
+EXPLAINS = 1.5
+"""An error is that of rounding if it is at most so many times the largest rounding, ..."""
+_PART = 0.01
+"""... and at least that part of it: of a short number that is right nothing was rounded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,18 +35,26 @@ class Rounding:
     digits: int
     error: float
 
+    def spacing(self, values: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
+        """Between neighbours of each value among the numbers that are so rounded."""
+        if self.kind == "decimals":
+            return numpy.full_like(values, 10.0**-self.digits)
+        base = 2.0 if self.kind == "single" else 10.0
+        size = numpy.maximum(numpy.abs(values), float_info.min)
+        return numpy.where(values == 0, 0.0, base ** (numpy.floor(numpy.log(size) / numpy.log(base)) + 1 - self.digits))
 
-def rounding(states: Sequence[Sequence[Fraction]], precision: Precision) -> Rounding | None:
-    """The coarsest rounding that all numbers have; None where they are written in full, or too few to tell."""
+
+def rounding(states: Sequence[Sequence[Fraction]], precision: Precision, least: int = _LEAST) -> Rounding | None:
+    """The coarsest rounding that all numbers have; None where they are written in full, or fewer than ``least``."""
     numbers = [value for state in states for value in state if value]
-    if len(numbers) < _LEAST:
+    if len(numbers) < least:
         return None
     return min(_all(numbers, precision), key=lambda each: -each.error, default=None)
 
 
 def explains(found: Rounding, error: float) -> bool:
-    """Whether the rounding is all there is to an error, relative to max(1, |value|)."""
-    return error <= _EXPLAINS * found.error
+    """Whether an error, relative to max(1, |value|), is of the size that the rounding makes it."""
+    return _PART * found.error <= error <= EXPLAINS * found.error
 
 
 def _all(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Rounding]:

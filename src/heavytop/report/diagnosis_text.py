@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heavytop.measure.diagnosis import Diagnosis
+from heavytop.measure.diagnosis import AS_AT_START, VARIES, Diagnosis
 from heavytop.measure.suspects import FLOOR
 from heavytop.report.text import short
 
@@ -14,6 +14,7 @@ _SENTENCES = {
     "momentum_gamma_down": "The first three columns are the angular momentum M, not Ω, and γ points down",
     "omega_in_degrees": "Ω is in degrees per time unit in these states, not in radians",
     "omega_in_turns": "Ω is in turns per time unit in these states, not in radians",
+    "omega_in_rpm": "Ω is in turns per 60 time units in these states (rpm where times are in s), not in radians",
     "columns_swapped": "γ stands before Ω in these states",
     "weight_sign": "The states fit a top whose weight P has the other sign, as where γ points down in start and states",
     "start_gamma_sign": "The states fit a start with −γ: γ of the start has the other sign",
@@ -21,6 +22,8 @@ _SENTENCES = {
     "start_momentum": "The start gives the angular momentum M in place of Ω",
     "all_momentum": "Start and states give the angular momentum M in place of Ω",
     "all_in_degrees": "Start and states give Ω in degrees per time unit, not in radians",
+    "all_in_turns": "Start and states give Ω in turns per time unit, not in radians",
+    "all_in_rpm": "Start and states give Ω in turns per 60 time units (rpm where times are in s), not in radians",
     "time_reversed": "The states are those of the times with the other sign",
     "start_row_missing": "The first state is the start: the states are one row late, and the row t = 0 is missing",
     "rows_off_by_one": "Each state is that of the next time: the states are one row early",
@@ -39,8 +42,9 @@ def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
     said = _scope(found) + _said(found, system)
     if found.left is None or found.error is None:
         return said
-    if found.kind == "one_state":
-        return f"{said}; without it the largest error relative to the size of Ω and γ is {_size(found.left)}."
+    if found.kind in ("one_state", "some_states"):
+        without = "it" if found.kind == "one_state" else "them"
+        return f"{said}; without {without} the largest error relative to the size of Ω and γ is {_size(found.left)}."
     fall = f"the largest error relative to the size of Ω and γ falls from {_size(found.error)} to {_size(found.left)}"
     return f"{said}; {fall}."
 
@@ -82,11 +86,23 @@ def _said(found: Diagnosis, system: str) -> str:
         case "weight":
             return f"The states fit another weight: {named}"
         case "start":
-            return f"The states fit another start: {named or 'one that differs by less than can be told'}"
+            return f"The states fit another start: {named}"
         case "top":
             return f"The states fit another top: {named}"
         case "one_state":
-            return f"Only the state at t = {numbers['t']} is off"
+            return f"Only the state at t = {numbers['t']} is off (state {numbers['state']})"
+        case "some_states":
+            return f"Only the states at t = {numbers['t']} are off (states {numbers['state']})"
+        case "omega_scaled":
+            return f"Ω is {numbers['factor']} times what fits in these states: divided by it they fit"
+        case "gamma_scaled":
+            return f"γ is {numbers['factor']} times what fits in these states: divided by it they fit"
+        case "column_scaled":
+            return f"{numbers['column']} is {numbers['factor']} times what fits in these states: divided by it they fit"
+        case "column_constant":
+            return f"{numbers['column']} is {numbers['value']} in every state: the other five columns fit"
+        case "all_scaled":
+            return f"Start and states give {numbers['factor']}·Ω: with both divided by it they fit"
         case "row_missing":
             return f"A row is missing: from t = {numbers['t']} on, the states are those of the next times"
         case "row_twice":
@@ -132,8 +148,20 @@ def _rounded(numbers: dict[str, str]) -> str:
 
 
 def _integrals_off(numbers: dict[str, str]) -> str:
-    named = ", ".join(f"{name} {value}" for name, value in numbers.items())
-    return (
-        "The first integrals are constant, but not those of the start, from the first sample on "
-        f"({named}): another start or another top, but none that was tried fits."
-    )
+    """What each first integral does, those first that keep another value."""
+    off = [f"{name} ({value})" for name, value in numbers.items() if value not in (VARIES, AS_AT_START)]
+    said = [f"from the first sample on {_listed(off)} {_keep(off)} another value than at the start"]
+    for text, verb in ((AS_AT_START, "{} the value of the start"), (VARIES, "")):
+        names = [name for name, value in numbers.items() if value == text]
+        if names:
+            does = verb.format(_keep(names)) if verb else "vary" if len(names) > 1 else "varies"
+            said.append(f"{_listed(names)} {does}")
+    return f"Of the first integrals, {'; '.join(said)}. Nothing that was tried explains it."
+
+
+def _listed(names: list[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def _keep(names: list[str]) -> str:
+    return "keep" if len(names) > 1 else "keeps"

@@ -16,6 +16,7 @@ from heavytop.measure.diagnosis import Diagnosis, diagnose
 from heavytop.measure.digits import RELATIVE, digits_kept, digits_of
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
+from heavytop.measure.suspects import turning_rate
 from heavytop.measure.truth import truth
 from heavytop.measure.written import rounding
 from heavytop.precision import DOUBLE_DOUBLE, exact, round_to, time_text
@@ -105,16 +106,17 @@ def assess(given: Given, progress: Progress = lambda: None) -> Assessment:
 
     progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
     """
-    row, scorer = _scored(given, progress)
+    row, scorer, errors = _scored(given, progress)
     states = _finite(given)
     times = given.times[: len(states)]
-    diagnoses = diagnose(given.top, given.start, given.system, times, states, given.precision, _size(row))
+    diagnoses = diagnose(given.top, given.start, given.system, times, states, given.precision, _size(row), errors)
     written = rounding(states, given.precision)
     single = written is not None and written.kind == "single"
     return Assessment(row, _peer(given, scorer, len(states), progress), diagnoses, given.format_guessed, single)
 
 
-def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Scorer]:
+def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Scorer, list[float]]:
+    """The row, what made it, and the error of each state relative to the size of Ω and γ where the reference goes."""
     precision = given.precision
     problem = Problem.of(given.top, given.start, precision, given.system)
     states = _finite(given)
@@ -123,8 +125,12 @@ def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Score
     keep = [times[i - 1] for i in log_spaced(len(times))]
     true = truth(problem, times)
     scorer = Scorer(problem, true if isinstance(true, str) else true.remembered(), keep)
+    errors: list[float] = []
+    rate = turning_rate(given.top, given.start)
     for time, state in zip(times, states, strict=False):
         scorer(time, state)
+        if scorer.error is not None and scorer.error.truth.covers(time):
+            errors.append(scorer.error.last(rate))
         progress()
     run = Trajectory(
         problem,
@@ -144,7 +150,7 @@ def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Score
     row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
     reached = time_text(run.time_reached)
     row = msgspec.structs.replace(row, measured=f"given: {given.integrator}", order=None, time_reached=reached)
-    return row, scorer
+    return row, scorer, errors
 
 
 def _finite(given: Given) -> list[tuple[Fraction, ...]]:

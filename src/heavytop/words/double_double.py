@@ -38,41 +38,51 @@ _TOLERATED = 1.0
 
 
 def build(system: System, attitude: bool, processor: Processor | None = None) -> tuple[Machine, Layout]:
-    """``advance`` and ``sample`` for this system.
+    """``advance`` and ``samples`` for this system.
 
     advance(state, clock, counts, table, scratch, steps): at most so many steps, until the time covers the target; gives
     their number.  The scratch holds the coefficients of the last one.
-    sample(scratch, order, time, low, result): the polynomial of the last step at a time after its beginning.
+    samples(scratch, order, times, first, last, began, low, sign, result): the polynomial of the last step at the times
+    from first to before last, a row of the result each.  The step began at began + low; times − began are doubles.
     """
     module = ir.Module("double_double")
     layout = Layout(2 if attitude else 1, len(turned(system)))
     _Step(module, layout, system).write()
-    _write_sample(module, layout, system)
+    _write_samples(module, layout, system)
     integer, double = ctypes.c_int64, ctypes.c_double
     machine = compiled(
         module,
         {
             "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, DOUBLES, DOUBLES, integer]),
-            "sample": (None, [DOUBLES, integer, double, double, DOUBLES]),
+            "samples": (None, [DOUBLES, integer, DOUBLES, integer, integer, double, double, double, DOUBLES]),
         },
         processor,
     )
     return machine, layout
 
 
-def _write_sample(module: ir.Module, layout: Layout, system: System) -> None:
-    made, code = function(module, "sample", ir.VoidType(), [POINTER, INT, DOUBLE, DOUBLE, POINTER])
-    scratch, order, time, low, result = made.args
+def _write_samples(module: ir.Module, layout: Layout, system: System) -> None:
+    arguments = [POINTER, INT, POINTER, INT, INT, DOUBLE, DOUBLE, DOUBLE, POINTER]
+    made, code = function(module, "samples", ir.VoidType(), arguments)
+    scratch, order, times, first, last, began, low, sign, result = made.args
+    b = code.builder
     rows = Recurrence(code, layout, system, None, scratch)
 
     def row(n: Any) -> list[Pair]:
         at = rows.row(n)
         return [rows.pair(at, layout.value(v)) for v in rows.vectors]
 
-    words = polynomial(code, order, (code.spread(time), code.spread(low)), layout.vectors, row)
-    for index, word in enumerate(words):
-        code.store(word, result, 8 * index)
-    code.builder.ret_void()
+    def one(place: Any, _: list[Any]) -> None:
+        behind = b.fsub(b.load(code.address(times, place)), began)
+        pair = code.two_sum(behind, b.fneg(low))
+        at = [code.spread(b.fmul(word, sign)) for word in pair]
+        words = polynomial(code, order, (at[0], at[1]), layout.vectors, row)
+        begin = b.mul(place, code.integer(16 * layout.vectors))
+        for index, word in enumerate(words):
+            code.store(word, result, b.add(begin, code.integer(8 * index)))
+
+    code.loop(first, last, one, [])
+    b.ret_void()
 
 
 class _Step(Stepping):

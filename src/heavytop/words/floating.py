@@ -30,6 +30,7 @@ _USUAL_UNITS = -34.0
 """log2 of the product of two units where the state is about 1."""
 _NEVER = -1000.0
 LARGEST_TIME = Fraction(2) ** 1000
+_STEPS_AT_ONCE = 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,11 +135,52 @@ class Floating(Run):
         return Status(int(self.counts[dd.STATUS]))
 
     def sample(self, time: Fraction) -> tuple[Fraction, ...]:
-        found = doubles(16 * self.layout.vectors)
+        return self.exact_state(self._sample(time))
+
+    def _sample(self, time: Fraction) -> Doubles:
+        """The words of the state at ``time``."""
+        found, at = doubles(16 * self.layout.vectors), doubles(1)
         behind = time - self._time(dd.BEGAN)
-        high, low = split(behind if self.forwards else -behind)
-        self.machine.functions["sample"](pointer(self.scratch), self.order, high, low, pointer(found))
-        return _exact_state(found, len(self.problem.state))
+        at[0], low = split(behind if self.forwards else -behind)
+        samples = self.machine.functions["samples"]
+        samples(pointer(self.scratch), self.order, pointer(at), 0, 1, 0.0, -low, 1.0, pointer(found))
+        return found
+
+    def exact_state(self, words: Doubles) -> tuple[Fraction, ...]:
+        """A state out of its words."""
+        return _exact_state(words, len(self.problem.state))
+
+    def sampled(self, times: Doubles) -> tuple[Status, Doubles]:
+        """Steps until the last of the times |τ| > 0, which are doubles in order; the words of the states that were
+        reached, a row each: the bits of :meth:`advance` and :meth:`sample` one by one.
+        """
+        row, done, status = 16 * self.layout.vectors, 0, Status.FINE
+        found, given = doubles(row * len(times)), times.astype(float)
+        arrays = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
+        advance, samples, sign = *(self.machine.functions[name] for name in ("advance", "samples")), self.clock[dd.SIGN]
+        ends = pointer(given), pointer(found)
+        while done < len(times):
+            covered = self._covered(given)
+            if covered > done:
+                began, low = self.clock[dd.BEGAN], self.clock[dd.BEGAN_LOW]
+                if given[covered - 1] <= 2 * began or not began:  # then the difference is exact (Sterbenz)
+                    samples(arrays[-1], self.order, ends[0], done, covered, began, low, sign, ends[1])
+                else:
+                    for place in range(done, covered):
+                        found[row * place : row * (place + 1)] = self._sample(Fraction(float(given[place])))
+                done = covered
+                continue
+            self.clock[dd.TARGET], self.clock[dd.TARGET_LOW] = given[done], 0.0
+            self.steps += advance(*arrays, _STEPS_AT_ONCE)
+            status = Status(int(self.counts[dd.STATUS]))
+            if status is not Status.FINE:
+                break
+        return status, found[: row * done].reshape(done, row)
+
+    def _covered(self, times: Doubles) -> int:
+        """How many of the times do not lie beyond the last step."""
+        high, low = self.clock[dd.TIME], self.clock[dd.TIME + 1]
+        return int(times.searchsorted(high, "right" if low >= 0 else "left")) if self.steps else 0
 
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
         step = self.time - self._time(dd.BEGAN)

@@ -1,0 +1,187 @@
+"""States at many times in few calls: the bits of one after the other, exact times, and costs that do not grow."""
+
+import cProfile
+import pstats
+import random
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from heavytop.display import Lines, Table
+from heavytop.errors import InputError
+from heavytop.integrate import stepper
+from heavytop.integrate.taylor import first_steps, propagate
+from heavytop.integrate.trajectory import Outcome, Trajectory
+from heavytop.integrate.words import propagate_words
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number
+from heavytop.suite.cases import CASES
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.times import RoundedTimes, check_times
+
+CASE = CASES["kovalevskaya"]
+INTEGRATORS = {"heyoka": propagate, "words": propagate_words}
+
+
+def irregular(count: int, last: int, seed: int) -> list[Fraction]:
+    source = random.Random(seed)
+    early = [Fraction(source.randint(1, 10**9), 10**12) for _ in range(20)]
+    return sorted({*early, *(Fraction(source.randint(1, 10**9), 10**9) * last for _ in range(count)), Fraction(last)})
+
+
+def regular(count: int, last: int) -> list[Fraction]:
+    return [Fraction(last * k, count) for k in range(count + 1)]
+
+
+def one_by_one(integrate, times, precision, case=CASE, **options) -> tuple[Trajectory, list, list]:
+    """The run whose states are observed, which takes one sample after the other."""
+    seen: list = []
+    run = integrate(case.top, case.start, times, precision, system=case.system,
+                    observer=lambda time, state: seen.append((time, state)), **options)  # fmt: skip
+    return run, [time for time, _ in seen], [state for _, state in seen]
+
+
+def require_same(many: Trajectory, single: tuple[Trajectory, list, list]) -> None:
+    run, times, states = single
+    assert tuple(many.times) == tuple(times)
+    assert (many.outcome, many.steps, many.time_reached, many.order) == (
+        run.outcome, run.steps, run.time_reached, run.order)  # fmt: skip
+    assert len(many.states) == len(states)
+    assert all((a == b).all() for a, b in zip(many.states, states, strict=True))
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("times", [regular(800, 60), irregular(800, 60, 1)], ids=["regular", "irregular"])
+@pytest.mark.parametrize(
+    ("name", "precision", "part"),
+    [
+        ("heyoka", DOUBLE, 1),
+        ("heyoka", EXTENDED, 1),
+        ("heyoka", QUAD, 20),
+        ("words", DOUBLE, 1),
+        ("words", EXTENDED, 5),
+    ],
+    ids=lambda value: getattr(value, "name", value),
+)
+def test_many_states_have_the_bits_of_single_ones(name, precision, part, times, sign) -> None:
+    asked = [sign * time / part for time in times[: len(times) if part == 1 else 300]]
+    require_same(
+        INTEGRATORS[name](CASE.top, CASE.start, asked, precision), one_by_one(INTEGRATORS[name], asked, precision)
+    )
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+@pytest.mark.parametrize("case", ["lagrange", "ershkov-partial-6", "hess-pendulum"])
+def test_other_tops_and_systems_too(name: str, case: str) -> None:
+    given, times = CASES[case], irregular(400, 20, 2)
+    many = INTEGRATORS[name](given.top, given.start, times, DOUBLE, system=given.system)
+    require_same(many, one_by_one(INTEGRATORS[name], times, DOUBLE, given))
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_dense_times_within_the_first_steps(name: str) -> None:
+    times = [Fraction(k, 3000) for k in range(1, 3001)]
+    require_same(INTEGRATORS[name](CASE.top, CASE.start, times, DOUBLE), one_by_one(INTEGRATORS[name], times, DOUBLE))
+
+
+def test_a_time_where_a_step_ends_belongs_to_that_step() -> None:
+    run, _ = first_steps(CASE.top, CASE.start, Fraction(40), DOUBLE)
+    ends = {Fraction(float(time)) for time in run.times}
+    times = sorted({*ends, *regular(600, 40)[1:]})
+    require_same(propagate(CASE.top, CASE.start, times, DOUBLE), one_by_one(propagate, times, DOUBLE))
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+@pytest.mark.parametrize("limit", [1, 5, 90])
+def test_a_run_that_stops_early_gives_the_same_states(name: str, limit: int) -> None:
+    times = regular(1000, 50)
+    many = INTEGRATORS[name](CASE.top, CASE.start, times, DOUBLE, step_limit=limit)
+    assert many.outcome is Outcome.STEP_LIMIT
+    require_same(many, one_by_one(INTEGRATORS[name], times, DOUBLE, step_limit=limit))
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_an_equilibrium_and_units_of_any_size(name: str) -> None:
+    times = regular(500, 20)
+    rest = HeavyTop((2, 2, 1), 1, (0, 0, 1)), State((0, 0, 0), (0, 0, 1))
+    run = INTEGRATORS[name](*rest, times, DOUBLE)
+    assert (run.outcome, run.steps) == (Outcome.SUCCESS, one_by_one(INTEGRATORS[name], times, DOUBLE)[0].steps * 0)
+    assert (run.states == [0, 0, 0, 0, 0, 1]).all()
+    for size in (Fraction(10) ** 100, Fraction(10) ** -100):
+        top = HeavyTop([i * size for i in CASE.top.inertia], CASE.top.weight / size, CASE.top.centre)
+        start, late = State([w / size for w in CASE.start.omega], CASE.start.gamma), [time * size for time in times]
+        case = type(CASE)(CASE.name, CASE.about, CASE.system, top, start)
+        require_same(INTEGRATORS[name](top, start, late, DOUBLE), one_by_one(INTEGRATORS[name], late, DOUBLE, case))
+
+
+def test_a_run_of_few_steps_between_many_times_is_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken = []
+    monkeypatch.setattr(stepper.Stepper, "sample", lambda *_: taken.append(1))
+    assert len(propagate(CASE.top, CASE.start, regular(1000, 50), DOUBLE).states) == 1001
+    assert taken == []
+
+
+@pytest.mark.parametrize(("name", "most"), [("heyoka", 5), ("words", 8)])
+def test_a_sample_costs_few_calls_of_python(name: str, most: int) -> None:
+    times = regular(2000, 100)
+    INTEGRATORS[name](CASE.top, CASE.start, times, DOUBLE)
+    profile = cProfile.Profile()
+    profile.runcall(INTEGRATORS[name], CASE.top, CASE.start, times, DOUBLE)
+    assert pstats.Stats(profile).total_calls < most * len(times)
+
+
+def test_rounded_times_are_exact_when_asked_for() -> None:
+    times = regular(300, 7)
+    run = propagate(CASE.top, CASE.start, times, DOUBLE)
+    assert isinstance(run.times, RoundedTimes)
+    expected = tuple(exact(number(time, DOUBLE)) for time in times)
+    assert run.times == expected == tuple(run.times)
+    assert run.times[-1] == expected[-1]
+    assert run.times[5:7] == expected[5:7]
+    assert hash(run.times) == hash(expected)
+    assert run.times != expected[1:]
+
+
+def test_the_first_and_last_rows_alone_are_formatted() -> None:
+    asked: list[int] = []
+
+    def line(place: int) -> list[str]:
+        asked.append(place)
+        return [str(place)]
+
+    text = Table("many", ["n"], Lines(10**6, line)).text()
+    assert asked == [*range(5), *range(10**6 - 5, 10**6)]
+    assert "999990 more" in text
+    run = propagate(CASE.top, CASE.start, regular(3000, 100), DOUBLE)
+    profile = cProfile.Profile()
+    profile.runcall(repr, run)
+    assert pstats.Stats(profile).total_calls < 5000
+    assert repr(run).count("\n") == 12
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [
+        ([1, 1 + Fraction(1, 10**30), 1], "does not come after"),
+        ([1 + Fraction(1, 10**30), 1], "does not come after"),
+        ([1, -2], "different signs"),
+        ([-Fraction(1, 10**400), 1], "different signs"),
+        ([0, 0], "more than once"),
+        ([1, 10**151], "too large"),
+        ([1, 10**400], "too large"),
+        ([], "No times"),
+    ],
+)
+def test_times_that_their_doubles_do_not_tell_apart_are_compared_exactly(times, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        check_times(times)
+
+
+def test_times_are_exact_and_checked_once() -> None:
+    times = [0, "1/3", 0.5, Fraction(2, 3), np.float64(0.75), 1]
+    found = check_times(times)
+    assert found == [Fraction(0), Fraction(1, 3), Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(1)]
+    assert check_times(found) is found
+    close = check_times([1, 1 + Fraction(1, 10**30), 1 + Fraction(2, 10**30)])
+    assert close[2] - close[1] == Fraction(1, 10**30)
+    assert close.doubles == []
