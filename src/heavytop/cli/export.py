@@ -28,9 +28,9 @@ def export(
     to: Annotated[Target, typer.Option(help="The tool that is to read it.")],
     out: Annotated[Path | None, typer.Option(help="File to write; for asv its results folder.")] = None,
 ) -> int:
-    """Write a report in the format of a tool that follows numbers over commits.
+    """Write a report in the format of another tool.
 
-    Every number is one of which smaller is better: minus the digits right, log10 of a drift, exponents of growth laws,
+    For tools that follow numbers over commits.  Every number is one of which smaller is better: minus the digits right, log10 of a drift, exponents of growth laws,
     seconds.  Without --out it is printed.
     """
     from heavytop.kinds import KINDS
