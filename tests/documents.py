@@ -15,7 +15,7 @@ PAGES = [
     *sorted(page for page in (ROOT / "docs").rglob("*.md") if "_build" not in page.parts),
 ]
 _FENCE = re.compile(r" *(```+|~~~+)(.*)")
-_COMMENT = re.compile(r"<!-- (not run|file): (.+) -->")
+_COMMENT = re.compile(r"<!-- (not run|file|printed): (.+) -->")
 _EXIT_CODE = re.compile(r"^(.*\S)\s+# exit code (\d+)\b.*$", re.M)
 
 
@@ -27,6 +27,8 @@ class Block(NamedTuple):
     text: str
     not_run: str
     file: str
+    printed: str = ""
+    """Says of which commands above this is what they print."""
 
 
 def blocks(page: Path) -> list[Block]:
@@ -38,7 +40,8 @@ def blocks(page: Path) -> list[Block]:
         if fence:
             if match and match[1] == fence and not match[2].strip():
                 text = "\n".join(lines) + "\n"
-                found.append(Block(began, language, text, said.get("not run", ""), said.get("file", "")))
+                comments = (said.get(key, "") for key in ("not run", "file", "printed"))
+                found.append(Block(began, language, text, *comments))
                 fence, said, lines = "", {}, []
             else:
                 lines.append(line)

@@ -37,6 +37,13 @@ def test_nothing_is_cut_at_80_columns() -> None:
         assert COMMANDS[name].help.partition("\n\n")[0] in done.stdout
 
 
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_command_fits_80_columns_and_breaks_no_name(name: str) -> None:
+    lines = heavytop(name, "--help", COLUMNS="80", TERMINAL_WIDTH="80").stdout.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert not any(line.rstrip().endswith("-") for line in lines)
+
+
 LONG = {"run": "minutes", "selftest": "minute"} | dict.fromkeys(("figures", "audit", "reference", "score"), "seconds")
 
 

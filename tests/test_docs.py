@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
 import tomllib
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from heavytop.cli import app
 from heavytop.integrate.peers.source import commands_in
 from heavytop.kinds import KINDS
 from heavytop.report import policy
+from heavytop.report.brief import brief
 from heavytop.suite import plan
 
 NOT_CODE = {"text", "{eval-rst}", "{toctree}", "{image}", "{figure}", "{note}", "{include} ../CHANGELOG.md"}
@@ -38,9 +40,17 @@ def test_the_code_of_a_page_runs(
     environment = folder_like_a_checkout(tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
+    if "--language c\n" in page.read_text("utf-8") and any("make -C" in block.text for block in to_run(page)):
+        for program in ("cc", "make"):
+            if shutil.which(program) is None:
+                pytest.skip(f"there is no {program} here")
     names: dict[str, object] = {"__name__": "page"}
+    printed = ""
     for block in to_run(page):
         where = f"{name(page)}:{block.line}"
+        if block.printed:
+            assert block.text in printed, f"{where}\n{printed}"
+            continue
         if block.file:
             (tmp_path / block.file).write_text(block.text, "utf-8")
         if block.language == "python":
@@ -48,6 +58,7 @@ def test_the_code_of_a_page_runs(
         elif block.language == "sh":
             done = run_shell(block.text, tmp_path, environment)
             assert done.returncode == 0, f"{where}\n{done.stdout}\n{done.stderr}"
+            printed = "".join(line.rstrip() + "\n" for line in done.stdout.splitlines())
         elif block.language == "toml":
             read_toml(block.text, tmp_path)
         else:
@@ -66,10 +77,14 @@ TABLES = (ht.Trajectory, ht.Reference, ht.Score, ht.Report, ht.Comparison, ht.Au
 def to_run(page: Path) -> list[Block]:
     """The blocks of code without a reason not to run them.
 
-    Not here: of the README the two commands and the three ways in, which .ci/run runs (the latter from a wheel), and
+    Not here: of the README the two commands and the ways in, which .ci/run runs (the latter from a wheel), and
     cells, which run when the site is built.
     """
-    found = [block for block in blocks(page) if block.language not in NOT_CODE | {CELL} and not block.not_run]
+    found = [
+        block
+        for block in blocks(page)
+        if (block.language not in NOT_CODE | {CELL} or block.printed) and not block.not_run
+    ]
     if page != ROOT / "README.md":
         return found
     doors = tuple(f"heavytop {key}" for key in from_a_wheel.LIMITS)
@@ -177,6 +192,22 @@ def test_the_tutorial_shows_the_example_as_it_is() -> None:
     shown = [block.text for block in blocks(DOCS / "tutorials" / "gate-my-integrator.md")]
     for file in ("mine.py", "gate.toml"):
         assert (ROOT / "examples" / "mine" / file).read_text("utf-8") in shown
+
+
+def test_what_several_pages_say_of_the_peers_is_what_the_report_says() -> None:
+    report = ht.read_report(ROOT / "results" / "peers")
+    said = " ".join(brief(report, report.rows, KINDS).split())
+    ratios = re.findall(r"heyoka double is ([\d.]+) × as fast as cyrk:", said)
+    assert len(ratios) > 2
+    low, high = min(ratios, key=float), max(ratios, key=float)
+    pages = {
+        each: " ".join((ROOT / each).read_text("utf-8").split()) for each in ("docs/choose.md", "results/README.md")
+    }
+    assert f"it is {low} to {high} times as fast" in pages["docs/choose.md"]
+    assert re.search(rf"heyoka is {low} \([^)]+\) to {high} times \([^)]+\) as fast", pages["results/README.md"])
+    minutes = {re.search(r"plan peers\b[^;.]*?, (\w+) minutes", text)[1] for text in pages.values()}
+    minutes |= {re.search(r"peers (\w+),", typer.main.get_command(app).commands["run"].help)[1]}
+    assert len(minutes) == 1
 
 
 def test_every_page_is_in_a_table_of_contents() -> None:

@@ -1,4 +1,8 @@
-"""The example workflow: GitHub reads it, the program understands its commands, and its shell does what it says."""
+"""The workflows for GitHub, step by step: GitHub reads them, their shell does what they say, with a real heavytop once.
+
+What cannot run here are the steps that are GitHub's own: ``checkout`` and ``setup-python`` (a fresh environment is made
+in their place), ``upload-artifact`` and ``download-artifact`` (a folder stands in), and the program ``gh`` (as below).
+"""
 
 from __future__ import annotations
 
@@ -6,8 +10,11 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
+import zipfile
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -15,23 +22,36 @@ import pytest
 import typer
 import yaml
 
+from heavytop.api.integrators import LANGUAGES, new_integrator
 from heavytop.cli import app
+from test_from_wheel import packages
 
 ROOT = Path(__file__).parents[1]
-WORKFLOW = ROOT / "examples" / ".github" / "workflows" / "heavytop.yml"
-SHELL = re.compile(r"\|\||&&|;|>")
+EXAMPLE = ROOT / "examples" / ".github" / "workflows" / "heavytop.yml"
+STARTER = ROOT / "src" / "heavytop" / "api" / "starters" / "common" / "workflow.yml"
+BOTH = pytest.mark.parametrize("workflow", [EXAMPLE, STARTER], ids=("package", "program"))
+SHELL = re.compile(r"\|\||&&|\||;|\d?>")
 MARKER = "<!-- heavytop accuracy -->"
+RUN = "https://forge.example/us/mine/actions/runs/17"
 HEAVYTOP = """#!/bin/sh
-[ "$1" = compare ] && [ -n "$TABLE" ] && echo "$TABLE" > summary.md
-exit "$CODE"
+case $1 in
+run) echo "said by run"; exit "$RUN" ;;
+check-integrator) echo "$CONTRACT" ; exit 0 ;;
+compare) echo "said by compare" ; [ -n "$TABLE" ] && echo "$TABLE" > result/comparison.md ; exit "$COMPARE" ;;
+esac
 """
 GH = '''#!{python}
-"""Comments of pull request 7 in a file: GET through the filter that the workflow asks for, POST, PATCH."""
-import json, re, sys
+"""Comments of pull request 7 in a file: GET through the filter that the workflow asks for, POST, PATCH; gh pr."""
+import json, os, re, sys
 from pathlib import Path
 
-store, arguments = Path("comments.json"), sys.argv[1:]
+store, arguments = Path(os.environ["COMMENTS"]), sys.argv[1:]
 comments = json.loads(store.read_text())
+if arguments[0] == "pr":
+    assert arguments[2 : 4] == ["--head", "heavytop-baseline"] and "--base" in arguments
+    comments.append({{"id": 0, "user": {{"login": "gh pr"}}, "body": Path(arguments[-1]).read_text()}})
+    store.write_text(json.dumps(comments))
+    sys.exit()
 assert arguments.pop(0) == "api"
 options = [each for each in arguments if each.startswith("-")]
 address = next(each for each in arguments if each.startswith("repos/"))
@@ -55,87 +75,289 @@ store.write_text(json.dumps(comments))
 '''
 
 
-def steps() -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = yaml.safe_load(WORKFLOW.read_text("utf-8"))["jobs"]["heavytop"]["steps"]
+def read(workflow: Path) -> dict[str, Any]:
+    found: dict[str, Any] = yaml.safe_load(workflow.read_text("utf-8"))
     return found
 
 
-def test_the_program_understands_the_commands_of_the_workflow() -> None:
-    lines = [line.strip() for step in steps() for line in step.get("run", "").splitlines()]
-    said = [SHELL.split(line)[0] for line in lines if line.startswith("heavytop ")]
-    assert len(said) >= 2
+def steps(workflow: Path) -> list[dict[str, Any]]:
+    return [step for job in read(workflow)["jobs"].values() for step in job["steps"]]
+
+
+@BOTH
+def test_the_program_understands_the_commands_of_the_workflow(workflow: Path) -> None:
+    words = {f"${name}": str(value) for name, value in read(workflow)["env"].items()}
+    text = "\n".join(step.get("run", "") for step in steps(workflow)).replace("\\\n", " ")
+    said = [SHELL.split(line)[0] for line in map(str.strip, text.splitlines()) if line.startswith("heavytop ")]
+    assert len(said) == 3
     known = typer.main.get_command(app).commands
     for command in said:
+        for name, value in words.items():
+            command = command.replace(name, value)
         name, *arguments = shlex.split(command)[1:]
         known[name].make_context(name, arguments)
 
 
-def test_the_workflow_is_one_that_github_reads() -> None:
-    workflow = yaml.safe_load(WORKFLOW.read_text("utf-8"))
+@BOTH
+def test_the_workflow_is_one_that_github_reads(workflow: Path) -> None:
+    content = read(workflow)
     # YAML 1.1 takes the key `on` for a boolean
-    assert "pull_request" in workflow[True]
-    assert workflow["permissions"] == {"contents": "read", "pull-requests": "write"}
-    (job,) = workflow["jobs"].values()
-    assert job["runs-on"]
-    assert all(("uses" in step) != ("run" in step) for step in steps())
-    assert all(re.fullmatch(r"[\w-]+/[\w-]+@v\d+", step["uses"]) for step in steps() if "uses" in step)
-    assert "https://" not in WORKFLOW.read_text("utf-8")
-    gate = next(step["run"] for step in steps() if "heavytop compare" in step.get("run", ""))
-    assert gate.rstrip().endswith("exit $verdict")
-    kept = next(step for step in steps() if step.get("uses", "").startswith("actions/upload-artifact"))
-    assert kept["if"] == "always()"
-    written = re.findall(r"--(?:html|junit) (\S+)", gate)
-    assert len(written) == 2
-    assert set(written) <= set(kept["with"]["path"].split())
+    assert set(content[True]) == {"pull_request", "workflow_dispatch"}
+    # what runs the code of a pull request may only read; GitHub's default without `permissions` is more
+    assert content["permissions"] == {"contents": "read"}
+    assert "permissions" not in content["jobs"]["measure"]
+    assert content["jobs"]["comment"]["permissions"] == {"pull-requests": "write"}
+    assert all(job["runs-on"] for job in content["jobs"].values())
+    assert all(("uses" in step) != ("run" in step) for step in steps(workflow))
+    assert all(re.fullmatch(r"[\w-]+/[\w-]+@v\d+", step["uses"]) for step in steps(workflow) if "uses" in step)
+    assert "https://" not in workflow.read_text("utf-8")
+    # a job that was cancelled says what it has: its last steps, and the job that writes the comment
+    say, keep = content["jobs"]["measure"]["steps"][-2:]
+    assert say["if"] == keep["if"] == "always()"
+    assert "always()" in content["jobs"]["comment"]["if"]
+    assert keep["uses"].startswith("actions/upload-artifact")
+
+
+def test_both_workflows_are_one_but_for_the_project() -> None:
+    """Apart from the pinned commit, what is measured, and how the project is installed."""
+    two = [read(file) for file in (EXAMPLE, STARTER)]
+    for content in two:
+        del content["env"]["INTEGRATOR"], content["env"]["HEAVYTOP_COMMIT"]
+        project = content["jobs"]["measure"]["steps"].pop(3)
+        assert "this project" in project["name"]
+    assert two[0] == two[1]
+    assert (ROOT / "examples" / "mine" / "policy.toml").read_text() == (STARTER.parent / "policy.toml").read_text()
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_starter_brings_a_workflow_pinned_to_this_commit(
+    language: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for made_from, pinned in (("f00-dirty", "f00"), (None, "HEAD")):
+        monkeypatch.setattr("heavytop.api.integrators.commit", lambda known=made_from: known)
+        folder = tmp_path / str(pinned)
+        new_integrator(folder, language)
+        content = read(folder / ".github" / "workflows" / "heavytop.yml")
+        assert content["env"]["HEAVYTOP_COMMIT"] == pinned
+        assert LANGUAGES[language].build in content["jobs"]["measure"]["steps"][3]["run"]
+        assert (folder / ".gitignore").exists()
+
+
+class Runner:
+    """A machine that runs the jobs of a workflow in a checkout; artefacts are kept in a folder."""
+
+    def __init__(self, workflow: Path, folder: Path, event: str, **more: str) -> None:
+        self.folder, self.content = folder, read(workflow)
+        self.kept = folder.parent / "kept"
+        self.environment = os.environ | {
+            "GITHUB_STEP_SUMMARY": str(folder.parent / "summary.md"),
+            "GITHUB_SERVER_URL": "https://forge.example",
+            "GITHUB_REPOSITORY": "us/mine",
+            "GITHUB_RUN_ID": "17",
+            "GITHUB_EVENT_NAME": event,
+            "GITHUB_REF_NAME": "main",
+            "GITHUB_SHA": "f00",
+            "RUNNER_TEMP": str(folder.parent / "temp"),
+            "COMMENTS": str(folder.parent / "comments.json"),
+            "NUMBER": "7",
+            **self.content["env"],
+            **more,
+        }
+        self.environment["PATH"] = f"{folder.parent / 'bin'}:{self.environment['PATH']}"
+
+    def job(self, name: str, skip: str = "", cancelled_in: str = "") -> dict[str, int]:
+        """Run a job; the exit code of each step that ran.  skip: a pattern of steps that count as done."""
+        done: dict[str, int] = {}
+        cancelled = False
+        for step in self.content["jobs"][name]["steps"]:
+            when = step.get("if", "success()")
+            if (cancelled and when != "always()") or (any(done.values()) and when == "success()"):
+                continue
+            if "uses" in step:
+                self._artefact(step)
+            elif not skip or not re.match(skip, step["name"]):
+                done[step["name"]] = self._shell(step["run"])
+            cancelled = cancelled or step.get("name") == cancelled_in
+        return done
+
+    def _artefact(self, step: dict[str, Any]) -> None:
+        result = self.folder / "result"
+        if "upload" in step["uses"] and result.exists():
+            shutil.copytree(result, self.kept, dirs_exist_ok=True)
+        if "download" in step["uses"] and self.kept.exists():
+            shutil.copytree(self.kept, result, dirs_exist_ok=True)
+
+    def _shell(self, script: str) -> int:
+        # what GitHub makes of `shell: bash`
+        line = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script]
+        found = subprocess.run(line, cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=300)
+        self.said = found.stdout + found.stderr
+        return found.returncode
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A checkout on a runner: programs named heavytop and gh, and comments of other people, one with the marker."""
     (tmp_path / "bin").mkdir()
+    (tmp_path / "mine").mkdir()
     for name, text in (("heavytop", HEAVYTOP), ("gh", GH.format(python=sys.executable))):
         (tmp_path / "bin" / name).write_text(text)
         (tmp_path / "bin" / name).chmod(0o755)
     people = [{"id": n, "user": {"login": "someone"}, "body": body} for n, body in ((1, "Nice."), (2, MARKER))]
     (tmp_path / "comments.json").write_text(json.dumps(people))
-    return tmp_path
+    return tmp_path / "mine"
 
 
-def on_github(folder: Path, table: str, code: int) -> list[int]:
-    """The exit codes of the steps from the measurement on, in the shell that GitHub runs them with."""
-    environment = {
-        "PATH": f"{folder / 'bin'}:{os.environ['PATH']}",
-        "GITHUB_STEP_SUMMARY": "page.md",
-        "GITHUB_REPOSITORY": "us/mine",
-        "NUMBER": "7",
-        "INTEGRATOR": "mine:rk4",
-        "TABLE": table,
-        "CODE": str(code),
-    }
-    (folder / "summary.md").unlink(missing_ok=True)
-    scripts = [step["run"] for step in steps() if "run" in step][1:]
-    return [
-        subprocess.run(["bash", "-e", "-c", script], cwd=folder, env=environment, check=False).returncode
-        for script in scripts
-    ]
+def on_github(folder: Path, table: str, run: int, compare: int, **more: Any) -> list[int]:
+    """The exit codes of the steps from the measurement on, and of the comment, with a heavytop that says this."""
+    shutil.rmtree(folder / "result", ignore_errors=True)
+    shutil.rmtree(folder.parent / "kept", ignore_errors=True)
+    values = {"TABLE": table, "RUN": str(run), "COMPARE": str(compare), "CONTRACT": more.pop("contract", "kept  one")}
+    runner = Runner(EXAMPLE, folder, more.pop("event", "pull_request"), **values)
+    done = runner.job("measure", skip="Install", **more)
+    shutil.rmtree(folder / "result", ignore_errors=True)  # another machine
+    return [*done.values(), *runner.job("comment").values()]
 
 
 def comments(folder: Path) -> list[tuple[int, str]]:
-    return [(each["id"], each["body"]) for each in json.loads((folder / "comments.json").read_text())]
+    return [(each["id"], each["body"]) for each in json.loads((folder.parent / "comments.json").read_text())]
 
 
 def test_one_comment_is_written_and_then_kept_up_to_date(folder: Path) -> None:
     others = comments(folder)
-    assert on_github(folder, "### heavytop: same", 0) == [0, 0, 0]
-    assert comments(folder) == [*others, (102, f"{MARKER}\n### heavytop: same\n")]
+    end = f"[The run, with pages and reports]({RUN})\n"
+    assert on_github(folder, "### heavytop: same", 0, 0) == [0, 0, 0, 0, 0]
+    assert comments(folder) == [*others, (102, f"{MARKER}\n### heavytop: same\n{end}")]
     # something is worse: the step fails, and the same comment says so
-    assert on_github(folder, "### heavytop: worse", 1) == [1, 1, 0]
-    assert comments(folder) == [*others, (102, f"{MARKER}\n### heavytop: worse\n")]
-    assert (folder / "page.md").read_text() == "### heavytop: same\n### heavytop: worse\n"
+    assert on_github(folder, "### heavytop: worse", 0, 1) == [0, 1, 0, 0, 0]
+    assert comments(folder) == [*others, (102, f"{MARKER}\n### heavytop: worse\n{end}")]
+    assert (folder.parent / "summary.md").read_text() == f"### heavytop: same\n{end}### heavytop: worse\n{end}"
 
 
-def test_a_row_that_failed_is_for_the_comparison_to_say_and_none_at_all_is_said(folder: Path) -> None:
-    assert on_github(folder, "### heavytop: incomparable", 3) == [0, 3, 0]
-    assert on_github(folder, "", 2)[0] != 0
-    ((_, said),) = comments(folder)[2:]
-    assert said == f"{MARKER}\nheavytop compared nothing: the log of this run says why.\n"
+def test_the_comment_is_there_whatever_became_of_the_job(folder: Path) -> None:
+    # a row that failed is for the comparison to say
+    assert on_github(folder, "### heavytop: incomparable", 3, 3) == [0, 3, 0, 0, 0]
+    # bad input: what the program said of it
+    assert on_github(folder, "", 2, 0) == [1, 0, 0, 0]
+    assert "nothing was compared\n```text\nsaid by run\n```" in comments(folder)[-1][1]
+    assert on_github(folder, "", 0, 2) == [0, 2, 0, 0, 0]
+    assert "said by compare" in comments(folder)[-1][1]
+    # cancelled while it measures, or before anything was kept
+    assert on_github(folder, "", 0, 0, cancelled_in="Measure") == [0, 0, 0]
+    assert "nothing was compared\n```text\nsaid by run\n```" in comments(folder)[-1][1]
+    assert "said by compare" not in comments(folder)[-1][1]
+    runner = Runner(EXAMPLE, folder, "pull_request")
+    shutil.rmtree(folder / "result", ignore_errors=True)
+    shutil.rmtree(folder.parent / "kept")
+    assert runner.job("comment") == {"Write the comment": 0}
+    assert comments(folder)[-1][1] == f"{MARKER}\nheavytop compared nothing: [the run]({RUN}) ended before that.\n"
+    # what is violated stands below the findings, and fences stay closed
+    said = "kept      a  fine\nviolated  b  It says ```\n             twice.\nkept      c  fine"
+    assert on_github(folder, "### heavytop: worse", 0, 1, contract=said)[1] == 1
+    body = comments(folder)[-1][1]
+    assert "### heavytop: worse\n```text\nviolated  b  It says \n             twice.\n```\n" in body
+    # a comment takes 65,536 characters, whatever anyone writes
+    assert on_github(folder, "x" * 60_000, 0, 1, contract=("violated " + "y" * 4000 + "\n") * 30)[1] == 1
+    assert len(comments(folder)[-1][1]) < 65_536
+
+
+def test_running_it_by_hand_needs_no_baseline(folder: Path) -> None:
+    assert on_github(folder, "", 0, 2, event="workflow_dispatch")[:4] == [0, 0, 0, 0]
+
+
+def git(folder: Path, *words: str) -> str:
+    line = ["git", "-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false", *words]
+    return subprocess.run(line, cwd=folder, check=True, capture_output=True, text=True).stdout
+
+
+def heavytop_repository(folder: Path) -> Path:
+    """This project as it stands, to be cloned; of the pins those that hold here, so that nothing is fetched."""
+    files = ("hatch_build.py", "pyproject.toml", "README.md", "LICENSE")
+    folder.mkdir()
+    for name in files:
+        shutil.copy(ROOT / name, folder)
+    shutil.copytree(ROOT / "src", folder / "src", ignore=shutil.ignore_patterns("__pycache__"))
+    pins = re.findall(
+        r"^(([\w.-]+)==(\S+) \\\n(?: +--hash=\S+(?: \\)?\n)+)", (ROOT / "constraints/run.txt").read_text(), re.M
+    )
+    here = {re.sub("[-_.]+", "-", each.name).lower(): each.version for each in metadata.distributions()}
+    held = [text for text, name, version in pins if here.get(name) == version]
+    assert len(held) > 20
+    (folder / "constraints").mkdir()
+    (folder / "constraints" / "run.txt").write_text("".join(held))
+    git(folder, "init", "--quiet")
+    git(folder, "add", ".")
+    git(folder, "commit", "--quiet", "-m", "heavytop")
+    return folder
+
+
+def project(folder: Path) -> str:
+    """The example as a project of somebody else that depends on a package of theirs; returns where that is found."""
+    place = folder.parent
+    shutil.copytree(ROOT / "examples" / "mine", folder, dirs_exist_ok=True)
+    toml = folder / "pyproject.toml"
+    toml.write_text(toml.read_text().replace('version = "1.0"', 'version = "1.0"\ndependencies = ["weights==2.0"]'))
+    code = (folder / "mine.py").read_text()
+    (folder / "mine.py").write_text(
+        code.replace("2 * q", "weights.TWO * q").replace("\n\nfrom", "\n\nimport weights\nfrom", 1)
+    )
+    plan = 'name = "tiny"\n[[measure]]\nkind = "work_precision"\ncases = ["euler"]\nhorizon = "1"\nsamples = 2\n'
+    (folder / "gate.toml").write_text(plan + 'ladders = [{ integrator = "mine:rk4", steps = ["1/20"] }]\n')
+    with zipfile.ZipFile(place / "weights-2.0-py3-none-any.whl", "w") as wheel:
+        wheel.writestr("weights.py", "TWO = 2\n")
+        info = "weights-2.0.dist-info"
+        wheel.writestr(f"{info}/METADATA", "Metadata-Version: 2.1\nName: weights\nVersion: 2.0\n")
+        wheel.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+        wheel.writestr(f"{info}/RECORD", "")
+    git(folder, "init", "--quiet", "--initial-branch", "main")
+    git(place, "init", "--quiet", "--bare", "origin.git")
+    git(folder, "remote", "add", "origin", str(place / "origin.git"))
+    git(folder, "add", ".")
+    git(folder, "commit", "--quiet", "-m", "mine")
+    return str(place)
+
+
+def test_a_baseline_is_proposed_and_a_mistake_found_in_a_fresh_environment(folder: Path) -> None:
+    """Every step of shell as it stands, with heavytop installed from its repository, offline."""
+    pytest.importorskip("hatchling")
+    place = folder.parent
+    (place / "bin" / "heavytop").unlink()
+    (place / "temp").mkdir()
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", place / "env"], check=True)
+    (place / "env" / "lib" / version / "site-packages" / "others.pth").write_text(packages())
+    more = {
+        "HEAVYTOP": str(heavytop_repository(place / "heavytop")),
+        "PATH": f"{place / 'env' / 'bin'}:{os.environ['PATH']}",
+        "PIP_NO_INDEX": "1",
+        "PIP_FIND_LINKS": project(folder),
+        "PIP_NO_BUILD_ISOLATION": "0",  # pip reads it the other way round
+        "PYTHONPATH": "",
+    }
+    # by hand: a baseline on a branch of its own, and a pull request
+    runner = Runner(EXAMPLE, folder, "workflow_dispatch", **more)
+    done = runner.job("measure")
+    assert set(done.values()) == {0}, (done, runner.said)
+    assert len(done) == 6
+    shutil.rmtree(folder / "result")
+    assert runner.job("baseline") == {"Propose the baseline": 0}, runner.said
+    assert "nothing was compared" in comments(folder)[-1][1]
+    git(folder, "fetch", "--quiet", "origin", "heavytop-baseline")
+    proposed = git(folder, "diff", "--name-only", "FETCH_HEAD~1", "FETCH_HEAD").split()
+    assert ".heavytop/baseline/report.json" in proposed
+    assert all(name.startswith(".heavytop/baseline/report.") for name in proposed)
+    assert not any(b"\0" in (folder / name).read_bytes() for name in proposed)  # text
+    # a pull request with a wrong coefficient, in the environment that the last job left
+    code = (folder / "mine.py").read_text()
+    (folder / "mine.py").write_text(code.replace("weights.TWO * q", "(weights.TWO + 1e-3) * q"))
+    shutil.rmtree(folder / "result")
+    runner = Runner(EXAMPLE, folder, "pull_request", **more)
+    worse = runner.job("measure", skip="Install heavytop|Go through")
+    assert [name for name, code in worse.items() if code] == ["Compare with the baseline"], runner.said
+    shutil.rmtree(folder / "result")
+    assert runner.job("comment") == {"Write the comment": 0}
+    body = comments(folder)[-1][1]
+    assert body.startswith(f"{MARKER}\n### heavytop: Verdict: worse")
+    assert "- Digits right" in body.splitlines()[3]
+    # its only links go to the run: nothing in a comment lies beside a file
+    assert set(re.findall(r"\]\(([^)]*)\)", body)) == {RUN}

@@ -4,6 +4,7 @@ The environment takes its other packages from the one that runs the tests, so th
 """
 
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -78,6 +79,32 @@ def installed(folder: Path, wheel: Path) -> Path:
     pip = (sys.executable, "-m", "pip", "--python", "env/bin/python", "install", "--quiet", "--no-deps")
     done(folder, *pip, "--ignore-installed", wheel)
     return folder / "env" / "bin"
+
+
+def test_a_program_in_c_has_a_gate_in_five_commands(wheel: Path, tmp_path: Path) -> None:
+    """From nothing; `tests/from_a_wheel.py` does it with the whole plan, as the README has it."""
+    if not all(map(shutil.which, ("cc", "make"))):
+        pytest.skip("there is no compiler of C here")
+    heavytop = installed(tmp_path, wheel) / "heavytop"
+    done(tmp_path, heavytop, "new", "mine", "--language", "c")
+    folder = tmp_path / "mine"
+    starters = ROOT / "src" / "heavytop" / "api" / "starters"
+    assert len([each for each in folder.rglob("*") if each.is_file()]) == sum(
+        len(list((starters / part).iterdir())) for part in ("common", "c")
+    )
+    done(folder, "make")
+    assert "Nothing is violated" in done(folder, heavytop, "check-integrator", "mine.toml")
+    plan = (folder / "gate.toml").read_text()
+    single_steps = re.search(r"\[\[measure\]\]\nkind = \"local_error\".*?\n\n", plan, re.S)
+    assert single_steps is not None
+    head = plan[: plan.index("# digits right")]
+    (folder / "gate.toml").write_text(head + single_steps[0])
+    done(folder, heavytop, "run", "--plan", "gate.toml", "--out", "old", "--workers", "1")
+    code = (folder / "mine.c").read_text()
+    (folder / "mine.c").write_text(code.replace("{1.0, 2.0, 2.0, 1.0}", "{1.0, 2.0, 2.001, 1.0}"))
+    done(folder, "make")
+    done(folder, heavytop, "run", "--plan", "gate.toml", "--out", "new", "--workers", "1")
+    assert "- Order observed 4 → 0" in done(folder, heavytop, "compare", "old", "new", code=1)
 
 
 @pytest.mark.skipif(sys.platform == "win32" or not sysconfig.get_path("purelib"), reason="paths of POSIX")

@@ -11,6 +11,7 @@ from heavytop.errors import InputError, quoted
 from heavytop.integrate.peers.source import named
 from heavytop.suite.files import replace
 from heavytop.suite.integrator_check import Checked, check
+from heavytop.version import commit
 
 
 class Language(NamedTuple):
@@ -30,6 +31,8 @@ LANGUAGES = {
     "julia": Language("Julia", "mine.jl", '["julia", "--startup-file=no", "mine.jl"]', "julia --version"),
     "fortran": Language("Fortran", "mine.f90", '["./mine"]'),
 }
+
+_WORKFLOW = ".github/workflows/heavytop.yml"
 
 
 def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
@@ -59,9 +62,10 @@ def new_integrator(folder: Path, language: str) -> list[str]:
             raise InputError(f"{folder} already holds other content.", "Give a new folder.")
         about = LANGUAGES[language]
         files = _texts("common") | _texts(language)
-        files[".github/workflows/heavytop.yml"] = files.pop("workflow.yml")
+        files[_WORKFLOW], files[".gitignore"] = files.pop("workflow.yml"), files.pop("gitignore")
         words = {"COMMAND": about.command, "LANGUAGE": about.title, "BUILD": about.build, "FILE": about.file}
-        for name in ("mine.toml", "README.md", ".github/workflows/heavytop.yml"):
+        words["MADE_FROM"] = (commit() or "HEAD").removesuffix("-dirty")
+        for name in ("mine.toml", "README.md", _WORKFLOW):
             for word, text in words.items():
                 files[name] = files[name].replace(word, text)
         for name, text in sorted(files.items()):

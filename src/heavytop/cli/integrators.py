@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import fill
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from heavytop.cli.app import Json, app, command, print_json
+
+_WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False}
 
 
 @app.command(name="check-integrator")
@@ -26,7 +28,7 @@ def check_integrator(
     from heavytop.api.integrators import check_integrator as check
     from heavytop.cli.progress import waiting
 
-    with waiting("checking", 300):
+    with waiting("each part of the contract", 60):
         found = check(integrator)
     violated = [each for each in found if each.verdict == "violated"]
     if json:
@@ -36,7 +38,7 @@ def check_integrator(
         width = max(len(each.check) for each in found)
         for each in found:
             head = f"{each.verdict:8}  {each.check:{width}}  "
-            print(fill(each.text, 100, initial_indent=head, subsequent_indent=" " * len(head)))
+            print(fill(each.text, 80, initial_indent=head, subsequent_indent=" " * len(head), **_WHOLE_WORDS))
         print(f"\n{len(violated)} of {len(found)} violated." if violated else "\nNothing is violated.")
     raise typer.Exit(1 if violated else 0)
 
@@ -54,6 +56,6 @@ def new(
     from heavytop.api.integrators import LANGUAGES, new_integrator
 
     files = new_integrator(folder, language)
-    print(f"{folder}: {', '.join(files)}")
+    print(fill(f"{folder}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))
     print(f"Next: cd {folder}; {LANGUAGES[language].build}; heavytop check-integrator mine.toml")
     return 0

@@ -35,7 +35,7 @@ def propagate(
     gamma: Gamma,
     times: Times,
     precision: Annotated[
-        str, typer.Option(help="double, extended, quad, real:BITS, or, of words, double-double.")
+        str, typer.Option(help="double, extended, double-double (of words), quad, real:BITS.")
     ] = "double",
     integrator: Annotated[str, typer.Option(help="One of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
     system: SystemName = "heavy_top",

@@ -36,7 +36,7 @@ def run(
     """Run a plan of measurements and write its report.
 
     It goes to DIR/report.json and DIR/report.html.  On two cores smoke takes about 10 seconds, default a minute,
-    gate two minutes, peers seven, growth ten, long half an hour.
+    gate two minutes, peers five, growth ten, long half an hour.
     """
     from heavytop.api.run_folder import PAGE, prepare
     from heavytop.kinds import KINDS

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -13,6 +15,8 @@ _PROVEN = {
     "integral": "It is proven to be constant along the motions of",
     "relation": "It is proven to be kept by the motions of",
 }
+_RESIDUAL = 20
+"""Characters of a line of a residual: what a terminal of 80 columns leaves to it."""
 _STYLES = {True: "green", False: "bold red", None: "yellow"}
 
 
@@ -40,8 +44,18 @@ def _table(report: Audit) -> Table:
     for row in report.rows:
         verdict = Text(VERDICTS[row.holds], style=_STYLES[row.holds])
         cells = (Text(value) for value in (_label(row), row.branch, row.domain))
-        table.add_row(*cells, verdict, Text(row.residual), Text(row.statement))
+        table.add_row(*cells, verdict, Text(_in_lines(row.residual)), Text(row.statement))
     return table
+
+
+def _in_lines(expression: str) -> str:
+    """The expression in lines of at most 20 characters, broken behind an operator or a space, never inside a name."""
+    lines = [""]
+    for part in re.findall(r"[\w.]+'*\)*|\*\*|\W", expression):
+        if lines[-1] and len((lines[-1] + part).rstrip()) > _RESIDUAL:
+            lines.append("")
+        lines[-1] += part if lines[-1] else part.lstrip()
+    return "\n".join(line.rstrip() for line in lines)
 
 
 def _label(row: Row) -> str:

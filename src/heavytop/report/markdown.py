@@ -31,7 +31,8 @@ def comparison_markdown(result: Comparison, page: Path | None = None) -> str:
         end += ["| " + " | ".join(map(_cell, difference)) + " |" for difference in result.environment[:_MOST]]
         end += ["", "</details>", ""]
     if page is not None:
-        end += [f"[Both on the same axes]({page.name.replace(' ', '%20')})", ""]
+        # no link: a comment does not lie beside the file
+        end += [f"Both on the same axes: {_cell(page.name)}.", ""]
     texts = ("\n".join(lines) for lines in ([*head, *rows, *metrics, *end], [*head, *rows, *end], head))
     return next((text for text in texts if len(text) <= _COMMENT), "\n".join(head))
 

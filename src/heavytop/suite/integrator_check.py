@@ -31,7 +31,8 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 _PATIENCE = 60
 """Seconds of one request, at most; a shorter timeout of the integrator's own counts."""
-_PATIENCE_OF_ALL = 300
+_PATIENCE_HUGE = 10
+"""Seconds of the motion that is too fast to follow, where no program answers that it is."""
 _FAREWELL = 2.0
 _OFF = 0.05
 """An error beyond which a state is that of another motion, in units of its largest component, at |t| <= 10."""
@@ -55,7 +56,7 @@ class Checked:
 def check(which: str | Source) -> list[Checked]:
     """Every part of the contract of a third-party integrator, or one that is named.
 
-    A Python integrator is called in a process of its own, which is ended after five minutes.
+    A Python integrator is called in a process of its own, which is ended where one part takes more than a minute.
     Raises InputError for an unknown integrator.
     """
     peers.require(which)
@@ -66,18 +67,40 @@ def check(which: str | Source) -> list[Checked]:
         finally:
             close_all()
     with ProcessPoolExecutor(1, mp_context=ChildContext()) as pool:
+        return list(_in_child(pool, which))
+
+
+def _in_child(pool: ProcessPoolExecutor, which: str | Source) -> Iterator[Checked]:
+    """Each part in the process of the pool; where one does not come back, what was found before it stands."""
+    for place, (name, _) in enumerate(_Contract(which).parts()):
+        seconds = _PATIENCE_HUGE if name == _TOO_FAST else _PATIENCE
+        ended = True
         try:
-            return pool.submit(_all_checks, which).result(timeout=_PATIENCE_OF_ALL)
+            found = pool.submit(_part, which, place).result(timeout=seconds)
+            ended = False
         except TimeoutError:
             for process in list((pool._processes or {}).values()):
                 process.kill()
-            return [Checked("ends", "violated", f"It did not answer everything within {_PATIENCE_OF_ALL} s.")]
+            text = f"It does not answer within {seconds} s; its process was ended."
+            found = Checked(name, "note" if name == _TOO_FAST else "violated", text)
         except BrokenProcessPool:
-            return [Checked("ends", "violated", "It ended its whole process.")]
+            found = Checked(name, "violated", "It ended its whole process.")
+        yield found
+        if found.verdict == "violated" and (ended or place < _FIRST):
+            yield _NOTHING_ELSE
+            return
 
 
-def _all_checks(which: str | Source) -> list[Checked]:
-    return list(_Contract(which).checks())
+def _part(which: str | Source, place: int) -> Checked:
+    """That part of the contract."""
+    begin_row()
+    return _judged(*_Contract(which).parts()[place])
+
+
+_NOTHING_ELSE = Checked("rest of the contract", "note", "Nothing else was tried: mend that first.")
+_FIRST = 2
+"""Parts that nothing works without."""
+_TOO_FAST = "huge"
 
 
 class _Violated(Exception):
@@ -105,7 +128,17 @@ class _Contract:
         self.top, self.start, self.system = case.top, case.start, case.system
 
     def checks(self) -> Iterator[Checked]:
-        """Each part; where the first is violated by a program that does not start, no other is tried."""
+        """Each part; where one of the first is violated by a program that does not start, no other is tried."""
+        for place, (name, part) in enumerate(self.parts()):
+            begin_row()
+            found = _judged(name, part)
+            yield found
+            if found.verdict == "violated" and place < _FIRST:
+                yield _NOTHING_ELSE
+                return
+
+    def parts(self) -> list[tuple[str, Callable[[], str]]]:
+        """The name of each part, and what tries it."""
         parts: list[tuple[str, Callable[[], str]]] = [
             ("start", self._starts),
             ("one time", self._one_time),
@@ -124,15 +157,8 @@ class _Contract:
         if self.program:
             parts += [("attitude", self._attitude)] if self.program.attitude else []
             parts += [("unknown lines", self._unknown_lines), ("two processes", self._two_at_once)]
-        parts.append(("huge", self._huge))
-        parts += [("quit", self._quit), ("end of input", self._end_of_input)] if self.program else []
-        for place, (name, part) in enumerate(parts):
-            begin_row()
-            found = _judged(name, part)
-            yield found
-            if found.verdict == "violated" and place < 2:
-                yield Checked("rest of the contract", "note", "Nothing else was tried: mend that first.")
-                return
+        parts.append((_TOO_FAST, self._huge))
+        return parts + ([("quit", self._quit), ("end of input", self._end_of_input)] if self.program else [])
 
     def _run(
         self,
@@ -329,7 +355,7 @@ class _Contract:
                 f"{subject} is off by {decimal_text(off, 2)} at t = {decimal_text(time, 3)}: "
                 "look at the order of the components, at the signs and at how the parameters are read."
             )
-        return f"{subject} is right to {decimal_text(off, 2)}."
+        return f"{subject} is right to {decimal_text(off, 2)}." if off else f"{subject} is right to the last bit."
 
 
 class _Extended(Request):

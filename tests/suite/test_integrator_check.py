@@ -1,0 +1,61 @@
+"""The contract of a Python integrator: a part that does not come back takes nothing from what was found before it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from heavytop.integrate.peers.source import named
+from heavytop.suite import integrator_check
+from heavytop.suite.integrator_check import check
+
+INTEGRATOR = '''
+import os, time
+from math import ceil
+from heavytop.integrate.peers.double import Solved
+
+
+def solve(given):
+    """Runge-Kutta of order 4."""
+    FAULT
+    def field(y):
+        return [float(value) for value in given.system.field(given.parameters, y)]
+    y, t, count = [float(value) for value in given.start], 0.0, 0
+    states = []
+    for end in given.times:
+        n = max(1, ceil(abs(end - t) * 50))
+        h = (end - t) / n
+        for _ in range(n):
+            k, total = [0.0] * 6, [0.0] * 6
+            for at, weight in ((0, 1), (0.5, 2), (0.5, 2), (1, 1)):
+                k = field([a + at * h * b for a, b in zip(y, k)])
+                total = [a + weight * b for a, b in zip(total, k)]
+            y = [a + h / 6 * b for a, b in zip(y, total)]
+        t, count = end, count + n
+        states.append(list(y))
+    return Solved(states, t, count, 4 * count)
+'''
+
+
+@pytest.mark.parametrize(
+    ("fault", "part", "verdict", "said"),
+    [
+        ("while abs(given.start[0]) > 1e9: time.sleep(0.1)", "huge", "note", "within 5 s; its process was ended"),
+        ("if len(given.times) > 100: time.sleep(60)", "many times", "violated", "within 10 s; its process was ended"),
+        ("if len(given.times) > 100: os._exit(1)", "many times", "violated", "It ended its whole process."),
+    ],
+)
+def test_what_was_found_before_a_part_that_hangs_stands(
+    fault: str, part: str, verdict: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(integrator_check, "_PATIENCE", 10)
+    monkeypatch.setattr(integrator_check, "_PATIENCE_HUGE", 5)
+    (tmp_path / "mine.py").write_text(INTEGRATOR.replace("FAULT", fault))
+    found = check(named(f"{tmp_path / 'mine.py'}:solve"))
+    place = [each.check for each in found].index(part)
+    assert {each.verdict for each in found[:place]} == {"kept"}
+    assert place >= 3
+    assert (found[place].verdict, said in found[place].text) == (verdict, True)
+    rest = [each.check for each in found[place + 1 :]]
+    assert rest == ([] if verdict == "note" else ["rest of the contract"])
