@@ -17,7 +17,7 @@ times = [1, "3/2", 2.0]
 run = ht.propagate(top, start, times, ht.QUAD, integrator="heyoka", observer=None)
 reveal_type(run)  # Trajectory
 reveal_type(run.outcome)  # Outcome
-reveal_type(run.times)  # tuple[Fraction, ...]
+reveal_type(run.times)  # Sequence[Fraction]
 reveal_type(run.to_numpy())  # ndarray[...float64...]
 reveal_type(run.texts())  # list[list[str]]
 known = ht.reference(top, start, np.array([1.0, 2.0]), digits=40)

@@ -223,7 +223,7 @@ def test_a_forged_place_with_its_checksum_is_measured_from_the_beginning(tmp_pat
 
 
 def measured_again(task, saved: Saved) -> bytes:
-    found = workers._measure(KINDS[task.key.kind], task, saved)
+    found = workers.measure(KINDS[task.key.kind], task, saved)
     found.seconds = {}
     return msgspec.json.encode(found)
 

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
+from heavytop.integrate import reach
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds import growth
@@ -183,6 +184,7 @@ def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatc
         return type(start)([Fraction(10) ** 140, Fraction(10) ** 140, 1], start.gamma)
 
     plain = row(tmp_path, "lagrange", 'horizon = "20", starts = 10, decades = 2')
+    monkeypatch.setattr(reach, "MOST_STEPS", 10**400)  # so that what overflows is tried
     monkeypatch.setattr(growth, "ensemble_of", with_a_wild_one)
     found = row(tmp_path, "lagrange", 'horizon = "20", starts = 10, decades = 2')
     assert plain.metrics["starts_failed"].value == "0"

@@ -91,7 +91,7 @@ def command(function: Callable[..., int]) -> Callable[..., None]:
             code = function(*args, **options)
         raise typer.Exit(code)
 
-    name = function.__name__.rstrip("_")
+    name = function.__name__.rstrip("_").replace("_", "-")
     return app.command(name=name)(with_exit_code)
 
 

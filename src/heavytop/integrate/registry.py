@@ -19,8 +19,8 @@ from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.source import Source
 from heavytop.integrate.reach import require_reach
 from heavytop.integrate.trajectory import Problem
-from heavytop.precision import Precision, exact
-from heavytop.top.equations import System
+from heavytop.precision import DOUBLE, Precision, exact
+from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 HERE = "heavytop.integrate"
@@ -47,9 +47,16 @@ def propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., An
     run = _unguarded(which, options)
 
     def call(
-        top: HeavyTop, start: State, times: Sequence[Any], precision: Precision, *, system: System, **more: Any
+        top: HeavyTop,
+        start: State,
+        times: Sequence[Any],
+        precision: Precision = DOUBLE,
+        *,
+        system: System = HEAVY_TOP,
+        **more: Any,
     ) -> Any:
-        require_reach(Problem.of(top, start, precision, system), exact(times[-1]), options.get("step_limit"))
+        if len(times):  # what is wrong with times is for the integrator to say
+            require_reach(Problem.of(top, start, precision, system), exact(times[-1]), options.get("step_limit"))
         return run(top, start, times, precision, system=system, **more)
 
     return call
@@ -94,7 +101,7 @@ def ensemble_propagator(which: str | Source, options: dict[str, Any]) -> Callabl
     run = _with(_load(place), peers.name_of(which), options)
 
     def call(problems: Sequence[Problem], times: Sequence[Any], **more: Any) -> Any:
-        for problem in problems:
+        for problem in problems if len(times) else ():
             require_reach(problem, exact(times[-1]), options.get("step_limit"))
         return run(problems, times, **more)
 

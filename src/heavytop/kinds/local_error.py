@@ -115,7 +115,7 @@ class LocalError(Kind):
         error = local_error.LocalError(run.problem)
         for time, step in steps:
             error(time, step)
-        if run.outcome is Outcome.SUCCESS and error.running.count:
+        if run.outcome is Outcome.SUCCESS and error.running.count and task.integrator.of_another_package:
             require_sum(task.integrator, run, error.largest)
         if run.outcome is Outcome.SUCCESS and not error.running.count:
             raise OutOfReach(f"{case.name} rests, so its integrator takes no step.", "Measure the steps of a motion.")

@@ -88,14 +88,12 @@ def _require_count(integrator: Integrator, runs: Sequence[Trajectory], most: int
 
 
 def require_sum(integrator: Integrator, whole: Trajectory, step: Fraction) -> None:
-    """Raises PeerFailed where an integrator of another package ends further off than its steps can have taken it.
+    """Raises PeerFailed where an integrator ends further off than its steps, each a number, can have taken it.
 
     step: the largest error of a step over the mean step, which follows from its count of steps; one too large makes
     every step short, and its error small.  Errors add up, roundings as a random walk, and grow along the motion as its
     neighbours part, or with the angle that it turns by.
     """
-    if not integrator.of_another_package:
-        return
     p, until = whole.problem, whole.times[-1]
     growth = 1 + until * exact(float(_rate_squared(p)) ** 0.5) + _parting(p, until)
     bits = p.precision.bits + GUARD_BITS
