@@ -30,8 +30,8 @@ def export(
 ) -> int:
     """Write a report in the format of another tool.
 
-    For tools that follow numbers over commits.  Every number is one of which smaller is better: minus the digits right, log10 of a drift, exponents of growth laws,
-    seconds.  Without --out it is printed.
+    For tools that follow numbers over commits.  Every number is one of which smaller is better: minus the digits
+    right, log10 of a drift, exponents of growth laws, seconds.  Without --out it is printed.
     """
     from heavytop.kinds import KINDS
     from heavytop.report import exports, store
