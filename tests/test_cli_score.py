@@ -8,18 +8,20 @@ from fractions import Fraction
 from io import StringIO
 from pathlib import Path
 
+import msgspec
 import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
 import heavytop as ht
+import heavytop.suite.score as score_module
 from heavytop.cli import app
 from heavytop.errors import InputError
 from heavytop.integrate.taylor import propagate
 from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE
-from heavytop.report.score_page import score_page
-from heavytop.report.score_text import guessed, score_text
+from heavytop.report.score_page import score_page, score_report
+from heavytop.report.score_text import guessed, requirement, score_text
 from heavytop.suite.cases import CASES
 from heavytop.suite.given import Given, of_arrays
 from heavytop.suite.plan import read
@@ -117,12 +119,91 @@ def test_the_command_takes_a_case_and_writes_json_and_a_page(tmp_path: Path) -> 
 
 def test_the_page_draws_both_parts_and_is_the_same_every_time() -> None:
     found = assess(given(spoilt=across))
-    page = score_page(found, {"commit": "x"})
-    assert page == score_page(found, {"commit": "x"})
+    page = score_page(score_report(found, {"commit": "x"}))
+    assert page == score_page(score_report(found, {"commit": "x"}))
+    assert page is not None
     assert page.count("<svg") >= 1
     assert "along the flow (phase)" in page
     no_reference = assess(given(CASES["generic"], [Fraction(3000)]))
-    assert "Digits lost over time" not in score_page(no_reference, {})
+    assert "Digits lost over time" not in str(score_page(score_report(no_reference, {})))
+
+
+def write_motion(folder: Path, spoilt=lambda i, state: state, more: str = "") -> str:
+    """A file of the motion of the case."""
+    motion = given(spoilt=spoilt)
+    lines = [",".join([str(t), *(repr(float(x)) for x in s)]) for t, s in zip(motion.times, motion.states, strict=True)]
+    head = "t,omega1,omega2,omega3,gamma1,gamma2,gamma3"
+    (folder / "motion.csv").write_text("\n".join([head, *lines, *([more] if more else [])]) + "\n", "utf-8")
+    return str(folder / "motion.csv")
+
+
+@pytest.mark.parametrize("spoilt", [across, lambda i, state: [*state[:3], *(-x for x in state[3:])]])
+def test_the_page_of_score_and_that_of_its_report_are_the_same(spoilt, tmp_path: Path) -> None:
+    motion, out = write_motion(tmp_path, spoilt), str(tmp_path / "out")
+    pages = [tmp_path / name for name in ("a.html", "b.html", "c.html")]
+    command("score", motion, "--case", "lagrange", "--html", str(pages[0]), "--out", out)
+    command("score", motion, "--case", "lagrange", "--html", str(pages[1]))
+    assert command("show", out, "--html", str(pages[2]))[0] == 0
+    first, *others = (page.read_bytes() for page in pages)
+    assert b"digits right at every sample up to T = 8; heyoka" in first
+    assert others == [first, first]
+    # a report that says nothing beside its row has the usual page
+    content = json.loads((tmp_path / "out" / "report.json").read_text())
+    del content["beside"]
+    (tmp_path / "old.json").write_text(json.dumps(content))
+    assert command("show", str(tmp_path / "old.json"), "--html", str(pages[1]))[0] == 0
+    assert "heavytop report, plan score" in pages[1].read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("require", "spoilt", "more", "code", "said"),
+    [
+        ("8", across, "", 0, "8 digits are required: they are right."),
+        ("17/2", across, "", 0, "8.5 digits are required: they are right."),
+        ("9", across, "", 1, "9 digits are required: 8."),
+        ("99", None, "", 1, "99 digits are required: 1"),
+        ("8", across, "9,nan,nan,nan,nan,nan,nan", 3, "8 digits are required: not known, for the run ended early."),
+        ("9", across, "9,nan,nan,nan,nan,nan,nan", 1, "9 digits are required: 8."),
+    ],
+)
+def test_digits_that_are_required(require: str, spoilt, more: str, code: int, said: str, tmp_path: Path) -> None:
+    motion = write_motion(tmp_path, spoilt or (lambda i, state: state), more)
+    done = command("score", motion, "--case", "lagrange", "--require", require)
+    assert done[0] == code, done
+    assert said in done[1]
+    code, text, _ = command("score", motion, "--case", "lagrange", "--require", require, "--json")
+    assert {0: True, 1: False, 3: None}[done[0]] is json.loads(text)["passed"]
+    assert code == done[0]
+
+
+@pytest.mark.parametrize("require", ["0", "-1", "nan", "nine", "", "1e400"])
+def test_a_number_of_digits_that_is_none_is_refused(require: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        command("score", write_motion(tmp_path), "--case", "lagrange", "--require", require)
+    assert caught.value.remedy
+    with pytest.raises(InputError):
+        ht.score(TIMES, given().states, top=CASE.top, start=CASE.start, require=require)
+
+
+def test_digits_that_nobody_knows_do_not_pass() -> None:
+    def passed(case, times: list[Fraction], require: object) -> bool | None:
+        run = ht.propagate(case.top, case.start, times)
+        return ht.score(times, run.states, top=case.top, start=case.start, require=require).passed
+
+    assert passed(CASE, TIMES, 9) is True
+    assert passed(CASE, TIMES, None) is True
+    assert passed(CASE, TIMES, 17) is False
+    assert passed(CASES["generic"], [Fraction(3000)], None) is True
+    # without a reference nothing is known
+    assert passed(CASES["generic"], [Fraction(3000)], "0.1") is None
+    row = assess(given(spoilt=across)).row
+    unresolved = msgspec.structs.replace(
+        row.metrics["solution_error_relative_max"], bound="1e-9", value="unresolved", log10=None
+    )
+    unsure = msgspec.structs.replace(row, metrics=row.metrics | {"solution_error_relative_max": unresolved})
+    assert score_module.passed(unsure, Fraction(9)) is True
+    assert score_module.passed(unsure, Fraction(10)) is None
+    assert "9 are resolved" in requirement(unsure, Fraction(10))
 
 
 @pytest.mark.parametrize("name", ["lagrange", "gyrostat", "goryachev"])

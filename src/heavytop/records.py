@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple, SupportsFloat
 
 import msgspec
@@ -327,10 +328,31 @@ class Identity(NamedTuple):
         return self._replace(key=msgspec.structs.replace(self.key, horizon=""))
 
 
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """The same motion at the same times in the same format by heyoka: its digits right."""
+
+    integrator: str
+    precision: str
+    digits_right: float
+    steps: Count
+
+
+class Beside(msgspec.Struct, frozen=True, gc=False):
+    """What `score` says beside its row: heyoka's own run, and what explains the error, sentences that nothing reads."""
+
+    peer: Peer | None
+    remarks: tuple[str, ...]
+
+
 class Report(msgspec.Struct):
-    """A run of a plan: schema, plan (name and content hash), environment, rows in the plan's order."""
+    """A run of a plan: schema, plan (name and content hash), environment, rows in the plan's order.
+
+    beside: of a report that `score` wrote.
+    """
 
     schema: str
     plan: dict[str, str]
     environment: dict[str, Any]
     rows: list[Row]
+    beside: Beside | None = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from heavytop.api import arguments
-from heavytop.api.arguments import Numbers
+from heavytop.api.arguments import Number, Numbers
 from heavytop.display import Table, Tabular
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Trajectory
@@ -19,7 +19,7 @@ from heavytop.records import Metric, Row
 from heavytop.report.diagnosis_text import diagnosis_text
 from heavytop.report.text import short
 from heavytop.suite.given import of_arrays
-from heavytop.suite.score import Peer, assess
+from heavytop.suite.score import Peer, assess, passed, required
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
 from heavytop.top.times import check_times
@@ -53,6 +53,8 @@ class Score(Tabular):
     against: what it was compared with, and how well that is known.  row: the same as `heavytop score --json`.
     of_digits: decimal digits of the format.  peer: heyoka's own run over the same times in the same format; None
     without a reference, and where heyoka does not get there.  diagnosis: what explains the error, a sentence each.
+    passed: whether as many digits are right as were required; None, which is no pass, where the run ended early or that
+    is not known.
     """
 
     outcome: str
@@ -64,6 +66,7 @@ class Score(Tabular):
     of_digits: int
     peer: Peer | None
     diagnosis: tuple[str, ...]
+    passed: bool | None = None
 
     @property
     def digits_right(self) -> float | None:
@@ -94,6 +97,7 @@ def score(
     system: System | str = HEAVY_TOP,
     name: str = "given",
     integrator: str = "given",
+    require: Number | None = None,
 ) -> Score:
     """A motion that any program computed, scored like our own.
 
@@ -105,6 +109,7 @@ def score(
         precision: the format in which it computed; None for the narrowest that holds every number as it is given.
         system: "heavy_top" or "gyrostat".
         name, integrator: what the row is called.
+        require: digits that must be right, as :attr:`Score.passed` says; None asks only that the run reached its end.
 
     Returns:
         A :class:`Score`.
@@ -113,6 +118,7 @@ def score(
         InputError: for what is no motion, time or number, and for arrays of another shape.
         Contradiction: where two proofs of the known motion exclude each other.
     """
+    needed = None if require is None else required(require)
     form = None if precision is None else arguments.precision(precision)
     body, state = arguments.motion(top, start)
     about, instants = arguments.system(system), check_times(times)
@@ -130,6 +136,7 @@ def score(
         found.of_digits,
         found.peer,
         tuple(diagnosis_text(each, row.system) for each in found.diagnoses),
+        passed(row, needed),
     )
 
 

@@ -22,6 +22,7 @@ def score(
     case: Annotated[str | None, typer.Option(help="Built-in case of its top and start.", autocompletion=cases)] = None,
     out: Annotated[Path | None, typer.Option(help="New folder for a report with its row.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page about it to that file.")] = None,
+    require: Annotated[str | None, typer.Option(help="Exit 1 where fewer digits are right: 9.5.")] = None,
     json: Json = False,
 ) -> int:
     """Say how many digits of your trajectory are right.
@@ -30,52 +31,51 @@ def score(
     first integrals; what explains the error, where something does.  The file: docs/score.md.  Takes a few seconds.
     """
     from heavytop.suite.cases import case as case_named
-    from heavytop.suite.score import assess, complete
+    from heavytop.suite.score import assess, passed, required
     from heavytop.suite.trajectory_file import read
 
     if out is not None:
         out = absolute(out)
         require_new(out)
+    needed = None if require is None else required(require)
     given = read(trajectory, None if case is None else case_named(case))
     for warning in given.warnings():
         say(f"warning: {warning}")
     with counted("score", 2 * len(given.times), "states", _STATE_SECONDS) as advance:
         found = assess(given, advance)
-    if out is not None:
-        _write_report(found.row, given.sha256, out)
-    if html is not None:
-        _write_page(found, absolute(html))
+    if out is not None or html is not None:
+        _write(found, given.sha256, out, None if html is None else absolute(html))
     if json:
         from heavytop.report.score_text import to_json
 
-        print_json(to_json(found))
+        print_json(to_json(found) if needed is None else to_json(found) | {"passed": passed(found.row, needed)})
     else:
-        from heavytop.report.score_text import score_text
+        from heavytop.report.score_text import requirement, score_text
 
         show_on_terminal(score_text(found))
         if html is not None:
             print(f"\nPage: {html}")
-    return 0 if complete(found.row) else 3
+    good = passed(found.row, needed)
+    if needed is not None and not json:
+        print(f"\n{requirement(found.row, needed)}")
+    return 3 if good is None else 0 if good else 1
 
 
-def _write_report(row: Any, sha256: str, out: Path) -> None:
-    """A report with this row alone, which `compare` understands."""
-    from heavytop.records import SCHEMA, Report
+def _write(found: Any, sha256: str, out: Path | None, html: Path | None) -> None:
+    """The report that `compare` and `show` read, and its page."""
+    from heavytop.kinds import KINDS
     from heavytop.report import store
     from heavytop.report.environment import environment
+    from heavytop.report.html import write_report
+    from heavytop.report.score_page import score_report
 
-    plan = {"name": "score", "sha256": sha256}
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        store.write(Report(SCHEMA, plan, environment(), [row]), out)
-    except OSError as error:
-        raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None
-
-
-def _write_page(found: Any, path: Path) -> None:
-    from heavytop.report.environment import environment
-    from heavytop.report.score_page import score_page
-    from heavytop.suite.files import replace
-
-    with writing():
-        replace(path, score_page(found, environment()).encode())
+    report = score_report(found, environment(), sha256)
+    if out is not None:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            store.write(report, out)
+        except OSError as error:
+            raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None
+    if html is not None:
+        with writing():
+            write_report(report, html, KINDS)

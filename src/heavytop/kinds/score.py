@@ -9,11 +9,12 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from heavytop.kinds.base import Kind
-from heavytop.records import Row
+from heavytop.records import Report, Row
 from heavytop.report.answers import digits_headline
 from heavytop.report.brief import digits_lines
 from heavytop.report.digits_chart import digits
 from heavytop.report.plots import growth
+from heavytop.report.score_page import score_page
 from heavytop.report.text import DIGITS, largest_over, motions, title
 
 
@@ -23,6 +24,10 @@ class Score(Kind):
     name = "score"
     sections = (digits, growth)
     place = 30
+
+    def page(self, report: Report) -> str | None:
+        """That of one motion, as `score --html` writes it."""
+        return score_page(report)
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
         """Digits right."""

@@ -36,8 +36,17 @@ class Measured(Protocol):
 def digits_kept(row: Measured) -> float | None:
     """−log10 of the largest |error|/max(1, |true value|) over the samples and the components of Ω and γ.
 
-    Rounded to two places, and at most the digits that the format has.  Where the reference does not resolve the error,
-    the digits that are proven.  Of an ensemble: from the root mean square over its starts of each start's largest.
+    Rounded to two places; :func:`digits_right` has all.
+    """
+    found = digits_right(row)
+    return None if found is None else round(found, 2)
+
+
+def digits_right(row: Measured) -> float | None:
+    """−log10 of the largest |error|/max(1, |true value|) over the samples and the components of Ω and γ.
+
+    At most the digits that the format has.  Where the reference does not resolve the error, the digits that are proven.
+    Of an ensemble: from the root mean square over its starts of each start's largest.
     0 where the format has no digit left before the end.
     None without a reference, without a sample, and for a value that is not finite.
     """
@@ -48,7 +57,7 @@ def digits_kept(row: Measured) -> float | None:
         return 0.0
     size = metric.log10 if metric.bound is None else log10(exact(metric.bound))
     most = row.bits * math.log10(2)
-    return round(most if size is None else min(most, -size), 2)
+    return most if size is None else min(most, -size)
 
 
 def digits_text(kept: float) -> str:

@@ -39,6 +39,11 @@ def write_report(report: Report, path: Path, kinds: Kinds) -> None:
 
 def report_page(report: Report, kinds: Kinds) -> str:
     """The page of ``report``; the same report gives the same bytes."""
+    first = report.rows[0] if report.rows else None
+    if first and all(row.key.kind == first.key.kind for row in report.rows):
+        own = kind_of(first, kinds).page(report)
+        if own is not None:
+            return own
     rows, left_out = detailed(report.rows)
     failures = [row for row in report.rows if failed(row, kinds)]
     of_kind = {name: [row for row in report.rows if row.key.kind == name] for name in kinds}

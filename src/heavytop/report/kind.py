@@ -8,7 +8,7 @@ from typing import Protocol
 
 from rich.console import RenderableType
 
-from heavytop.records import Metric, Quantity, Row, Subject
+from heavytop.records import Metric, Quantity, Report, Row, Subject
 from heavytop.report.section import Card, Section, Sources
 
 MakeSection = Callable[[Sources, Iterable[str]], Section | None]
@@ -83,6 +83,10 @@ class Kind(Protocol):
 
         That of the first place opens the page.
         """
+        return None
+
+    def page(self, report: Report) -> str | None:
+        """The page of a report that holds rows of this kind alone; None for the usual one."""
         return None
 
     def cards(self, rows: Sequence[Row]) -> list[Card]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from heavytop.records import Row
+from heavytop.records import SCHEMA, Beside, Report, Row
 from heavytop.report.html import render
 from heavytop.report.score_text import answer, sizes, told
 from heavytop.report.section import TIME, Key, Section, draw, logarithm, scientific
@@ -13,21 +13,35 @@ from heavytop.report.svg import MARKERS, decades, finish, new_axes, quiet_style,
 from heavytop.report.text import short
 from heavytop.suite.score import Assessment
 
+_MOST = 50
+"""Sentences beside the answer."""
 _PARTS = {"along": "along the flow (phase)", "across": "across the flow"}
 
 
-def score_page(found: Assessment, environment: dict[str, Any]) -> str:
-    """One self-contained page; the same assessment gives the same bytes."""
+def score_report(found: Assessment, environment: dict[str, Any], sha256: str = "") -> Report:
+    """A report with this row alone, which `compare` understands, and what its page says beside the row."""
+    beside = Beside(found.peer, tuple(told(found)))
+    return Report(SCHEMA, {"name": "score", "sha256": sha256}, environment, [found.row], beside)
+
+
+def score_page(report: Report) -> str | None:
+    """One self-contained page of a report with one scored motion; the same report gives the same bytes.
+
+    None for a report of anything else.
+    """
+    if report.beside is None or len(report.rows) != 1:
+        return None
+    (row,) = report.rows
     with quiet_style():
-        section = digits_lost(found.row)
+        section = digits_lost(row)
     return render(
         "score.html.j2",
-        row=found.row,
-        answer=answer(found),
-        told=told(found),
+        row=row,
+        answer=answer(row, report.beside.peer),
+        told=report.beside.remarks[:_MOST],
         section=section,
-        sizes=sizes(found.row),
-        environment=environment,
+        sizes=sizes(row),
+        environment=report.environment,
     )
 
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Iterator
 from dataclasses import asdict
+from fractions import Fraction
 from typing import Any
 
 import msgspec
 from rich.console import Console, ConsoleOptions, Group, RenderableType
 from rich.text import Text
 
-from heavytop.measure.digits import digits_text
-from heavytop.records import Row
+from heavytop.measure.digits import digits_kept, digits_of, digits_right, digits_text
+from heavytop.records import Peer, Row
 from heavytop.report.diagnosis_text import diagnosis_text
 from heavytop.report.text import short, table
-from heavytop.suite.score import Assessment
+from heavytop.suite.score import Assessment, direction, passed
 
 WIDTH = 80
 _PARTS = {"omega": "Ω", "gamma": "γ", "along": "along the flow", "across": "across the flow"}
@@ -26,21 +28,22 @@ _DIRECTIONS = {
 }
 
 
-def answer(found: Assessment) -> list[str]:
+def answer(row: Row, peer: Peer | None) -> list[str]:
     """The sentences that say how good it is; the first may be longer than a line, and can be broken behind its ";"."""
-    row, digits = found.row, found.digits_right
+    digits = digits_kept(row)
     lines = []
     if row.outcome != "success":
         lines.append(f"The run ended early ({row.outcome}), at t = {row.time_reached} of {row.horizon}.")
     if digits is None:
         return [*lines, _without_digits(row)]
     where = "every sample up to" if row.samples > 1 else "its one sample,"
-    said = f"{digits_text(digits)} of {found.of_digits} digits right at {where} T = {short(row.time_reached)}"
-    if found.peer is not None:
-        said += f"; {found.peer.integrator} in {found.peer.precision} keeps {digits_text(found.peer.digits_right)}"
+    said = f"{digits_text(digits)} of {digits_of(row.bits)} digits right at {where} T = {short(row.time_reached)}"
+    if peer is not None:
+        said += f"; {peer.integrator} in {peer.precision} keeps {digits_text(peer.digits_right)}"
     lines.append(f"{said}.")
-    if found.direction is not None:
-        lines.append(_DIRECTIONS[found.direction])
+    mostly = direction(row)
+    if mostly is not None:
+        lines.append(_DIRECTIONS[mostly])
     return lines
 
 
@@ -48,6 +51,19 @@ def _without_digits(row: Row) -> str:
     if not row.samples:
         return "No digit can be counted: the first state is not finite."
     return "How many digits are right is not known: there is no reference. Drift is measured."
+
+
+def requirement(row: Row, needed: Fraction) -> str:
+    """Whether as many digits are right as are required, in a sentence."""
+    asked = f"{float(needed):g} digits are required"
+    kept, good = digits_right(row), passed(row, needed)
+    # rounded down, so that what is not enough does not look so
+    shown = "" if kept is None else f"{math.floor(kept * 1000) / 1000:g}"
+    if good is not None:
+        return f"{asked}: " + ("they are right." if good else f"{shown} are right.")
+    if row.outcome != "success":
+        return f"{asked}: not known, for the run ended early."
+    return f"{asked}: not known, for " + ("there is no reference." if kept is None else f"{shown} are resolved.")
 
 
 def guessed(found: Assessment) -> str | None:
@@ -93,7 +109,7 @@ def score_text(found: Assessment) -> RenderableType:
     row = found.row
     numbers = table(["", f"largest over {row.samples} samples", "rms", "final"], sizes(row))
     about = f"{row.case}: {row.integrator}, {row.system} in {row.precision} ({row.bits} bits)"
-    parts: list[RenderableType] = [_Sentence(line) for line in answer(found)]
+    parts: list[RenderableType] = [_Sentence(line) for line in answer(row, found.peer)]
     parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Compared with {row.against}.")]
     explained = told(found)
     if explained:

@@ -37,7 +37,9 @@ def write(report: Report, directory: Path, rows: Iterable[Row] | None = None) ->
 
 
 def _pieces(report: Report, rows: Iterable[Row]) -> Iterator[bytes]:
-    head = {"schema": report.schema, "plan": report.plan, "environment": report.environment}
+    head: dict[str, Any] = {"schema": report.schema, "plan": report.plan, "environment": report.environment}
+    if report.beside is not None:
+        head["beside"] = report.beside
     between = msgspec.json.encode(head)[:-1] + b',"rows":[\n'
     for row in rows:
         yield between + msgspec.json.encode(row)

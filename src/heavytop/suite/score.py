@@ -9,25 +9,25 @@ from typing import Any
 
 import msgspec
 
-from heavytop.errors import HeavyTopError
+from heavytop.errors import HeavyTopError, InputError, quoted
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.diagnosis import Diagnosis, diagnose
-from heavytop.measure.digits import RELATIVE, digits_kept, digits_of
+from heavytop.measure.digits import RELATIVE, digits_kept, digits_of, digits_right
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
 from heavytop.measure.suspects import turning_rate
 from heavytop.measure.truth import truth
 from heavytop.measure.written import rounding
-from heavytop.precision import DOUBLE_DOUBLE, exact, round_to, time_text
-from heavytop.records import Against, Metric, Row, RowKey, Subject
+from heavytop.precision import DOUBLE_DOUBLE, exact, physical, round_to, time_text
+from heavytop.records import Against, Metric, Peer, Row, RowKey, Subject
 from heavytop.suite.cases import Case
 from heavytop.suite.given import Given
 from heavytop.suite.rows import computed_row, data_of
 from heavytop.suite.sampling import log_spaced
 from heavytop.suite.task import Task, seconds_a_step
 
-__all__ = ["Assessment", "Peer", "assess", "complete", "digits_kept", "score"]
+__all__ = ["Assessment", "Peer", "assess", "complete", "digits_kept", "direction", "score"]
 
 Progress = Callable[[], None]
 PEER = "heyoka"
@@ -35,16 +35,6 @@ _REFERENCE_EFFORT = 10.0
 """Seconds of the model of its cost that a computed reference may take."""
 _EFFORT = 20.0
 """Seconds that the run of heyoka beside the scored one may take, roughly."""
-
-
-@dataclass(frozen=True, slots=True)
-class Peer:
-    """The same motion at the same times in the same format by heyoka: its digits right."""
-
-    integrator: str
-    precision: str
-    digits_right: float
-    steps: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,16 +64,21 @@ class Assessment:
 
     @property
     def direction(self) -> str | None:
-        """Where most of the error lies: "along" the flow, "across" it, "both"; None where neither is a number."""
-        along, across = (self.row.metric(SOLUTION_ERROR, part, "max") for part in ("along", "across"))
-        if along is None or across is None or not (_is_number(along) and _is_number(across)):
-            return None
-        sizes = [exact(along.value), exact(across.value)]
-        if not any(sizes):
-            return None
-        if sizes[0] > _MOSTLY * sizes[1]:
-            return "along"
-        return "across" if sizes[1] > _MOSTLY * sizes[0] else "both"
+        """Where most of the error lies."""
+        return direction(self.row)
+
+
+def direction(row: Row) -> str | None:
+    """Where most of the error lies: "along" the flow, "across" it, "both"; None where neither is a number."""
+    along, across = (row.metric(SOLUTION_ERROR, part, "max") for part in ("along", "across"))
+    if along is None or across is None or not (_is_number(along) and _is_number(across)):
+        return None
+    sizes = [exact(along.value), exact(across.value)]
+    if not any(sizes):
+        return None
+    if sizes[0] > _MOSTLY * sizes[1]:
+        return "along"
+    return "across" if sizes[1] > _MOSTLY * sizes[0] else "both"
 
 
 _MOSTLY = 2
@@ -199,6 +194,31 @@ def _peer(given: Given, scorer: Scorer, count: int, progress: Progress) -> Peer 
     if run.outcome is not Outcome.SUCCESS or digits is None:
         return None
     return Peer(PEER, precision.name, digits, run.steps)
+
+
+def required(digits: Any) -> Fraction:
+    """How many digits are asked for, exactly; raises InputError for what is no number, or is not positive."""
+    asked = physical(exact(digits), "require")
+    if asked <= 0:
+        raise InputError(f"require must be positive, got {quoted(digits)}.", "Give a number of digits, such as 9.5.")
+    return asked
+
+
+def passed(row: Row, needed: Fraction | None) -> bool | None:
+    """Whether so many digits are right; False where fewer are, also of a run that ended early.
+
+    None, which is no pass, where it ended early, and where it is not known how many are right, or only that so many are
+    which the reference resolves.  needed: None for no demand.
+    """
+    good = None if not complete(row) else True
+    if needed is None:
+        return good
+    kept = digits_right(row)
+    if kept is None:
+        return None
+    if exact(kept) < needed:
+        return False if row.metrics[RELATIVE.text].bound is None else None
+    return good
 
 
 def complete(row: Row) -> bool:
