@@ -345,7 +345,7 @@ class Beside(msgspec.Struct, frozen=True, gc=False):
     remarks: tuple[str, ...]
 
 
-class Report(msgspec.Struct):
+class Report(msgspec.Struct, omit_defaults=True):
     """A run of a plan: schema, plan (name and content hash), environment, rows in the plan's order.
 
     beside: of a report that `score` wrote.
