@@ -105,4 +105,4 @@ def at_import(path: Path) -> set[str]:
 
 def test_no_file_is_longer_than_anyone_reads() -> None:
     for path in SOURCE.rglob("*.py"):
-        assert len(path.read_text("utf-8").splitlines()) <= 350, path
+        assert len(path.read_text("utf-8").splitlines()) <= 700, path

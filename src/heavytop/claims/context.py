@@ -10,7 +10,7 @@ from typing import ClassVar
 import sympy
 from flint import arb
 
-from heavytop.claims.assume import Assumed, assume, comparison
+from heavytop.claims.assume import Assumed, assume, comparisons
 from heavytop.claims.conditions import Need, condition, is_exactly_zero
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
@@ -61,7 +61,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     for name in (*content.parameters, *content.definitions):
         if name in _RESERVED or (name in content.parameters and name in content.definitions):
             raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(_RESERVED))}.")
-    above = [comparison(text) for text in content.assume]
+    above = [link for text in content.assume for link in comparisons(text)]
     # the principal moments of a top are positive, said or not
     positive = {left for left, right in above if right == "0"} | {text.strip() for text in content.top.inertia}
     symbols = {

@@ -6,12 +6,14 @@ Every rule here is a proof.  What no rule decides is unknown, and a condition th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import sympy
 from flint import arb, fmpq
 
+from heavytop.claims.combination import nonnegative_combination
 from heavytop.claims.sign import NUMBER_BITS, UNKNOWN, Sign, Unprovable, sum_of, used
 from heavytop.exact.balls import working_precision
 
@@ -25,6 +27,11 @@ _MAX_TERMS = 200
 # terms of what is taken apart further than into factors
 _MAX_PARTED = 40
 _MAX_DEGREE = 24
+# atoms and products of a combination, their degree, and linear programs a tower
+_MAX_ATOMS = 10
+_MAX_PRODUCTS = 200
+_MAX_DEGREE_OF_PRODUCTS = 4
+_PROGRAMS = 60
 
 
 class Signs:
@@ -44,6 +51,7 @@ class Signs:
         self._factors: dict[str, Any] = {}
         self._left = _BUDGET
         self._depth = 0
+        self._programs = _PROGRAMS
         self._half_angles: dict[int, int] = {}
         self.ranges: dict[int, tuple[Fraction, Fraction]] = {}
         self.circles: dict[int, int] = {}
@@ -82,7 +90,17 @@ class Signs:
             for factor in open_factors:
                 product = product * factor
             self._products.append((product, known))
+            self._declare_each(open_factors, known)
         self._known.clear()
+
+    def _declare_each(self, factors: list[Any], known: Sign) -> None:
+        """Two factors whose product is > 0 have the sign of their sum, where that is known; or of a difference."""
+        if len(factors) != 2 or not (known.value and known.strict):
+            return
+        first, second = factors
+        total = self.of(first + second * known.value)
+        if total.value and total.strict:
+            self._facts += [(first, Sign(total.value, True)), (second, Sign(total.value * known.value, True))]
 
     def factors(self, p: Any) -> Any:
         """(constant, [(factor, power)]), made once."""
@@ -129,7 +147,10 @@ class Signs:
         self._left -= 1
         found = UNKNOWN
         for rule in self._rules(p):
-            one = rule(p)
+            try:
+                one = rule(p)
+            except Unprovable:  # too large for this rule
+                continue
             # a rule may tell the sign, another that it is never 0
             found = Sign(found.value or one.value, found.strict or one.strict)
             if found.value and found.strict:
@@ -143,6 +164,7 @@ class Signs:
         if len(p) <= _MAX_PARTED and self._left > 0:
             yield from (self._by_roots_of_one_variable, self._by_generators, self._by_half_angle)
             yield self._by_difference_from_facts
+            yield self._by_products_of_facts
 
     # --- rules ------------------------------------------------------------------------------------------------------
 
@@ -208,13 +230,20 @@ class Signs:
             p = self._tower.context.from_dict(terms)
         if not self._forms.keys() & used(p):
             return UNKNOWN
-        while forms := self._forms.keys() & used(p):
-            # the last first: a form uses only what was declared before it, and generators without a form
-            last = max(forms, key=list(self._forms).index)
-            p = self._substitute(p, last, self._forms[last])
-            if len(p) > _MAX_TERMS:
-                return UNKNOWN
+        p = self._without_forms(p)
         return self._by_terms(p) if p else UNKNOWN
+
+    def _without_forms(self, p: Any) -> Any:
+        """Every generator with a form written as that; raises Unprovable where that is too large.
+
+        It ends, since forms do not go round in a circle.
+        """
+        while forms := self._forms.keys() & used(p):
+            index = min(forms)
+            p = self._substitute(p, index, self._forms[index])
+            if len(p) > _MAX_TERMS:
+                raise Unprovable("A polynomial is too large.", "Split the claim into smaller ones.")
+        return p
 
     def _substitute(self, p: Any, index: int, form: Any) -> Any:
         total = self._tower.context.constant(0)
@@ -346,3 +375,58 @@ class Signs:
                     if found.value:
                         return found
         return UNKNOWN
+
+    # --- combinations of products -----------------------------------------------------------------------------------
+
+    def _by_products_of_facts(self, p: Any) -> Sign:
+        """p or −p = Σ c q with c ≥ 0, each q a product of what is known to be ≥ 0."""
+        if not (self._facts or self._forms) or self._programs <= 0 or self._depth > 2:
+            return UNKNOWN
+        p = self._tower.reduce(self._without_forms(p))
+        degree = max((sum(map(int, monomial)) for monomial in p.to_dict()), default=0)
+        atoms = self._atoms_for(p)
+        if not 0 < degree <= _MAX_DEGREE_OF_PRODUCTS or len(p) > _MAX_PARTED or len(atoms) < 2:
+            return UNKNOWN
+        self._programs -= 1
+        products = self._products_of(atoms, degree)
+        for sign in (1, -1):
+            weights = nonnegative_combination((sign * p).to_dict(), [product.to_dict() for product, _ in products])
+            if weights is not None:
+                return Sign(sign, any(weight and strict for weight, (_, strict) in zip(weights, products, strict=True)))
+        return UNKNOWN
+
+    def _atoms_for(self, p: Any) -> list[tuple[Any, bool]]:
+        """(polynomial ≥ 0, whether it is never 0): facts and generators that have to do with ``p``."""
+        facts = []
+        for fact, sign in self._facts:
+            if sign.value:
+                with suppress(Unprovable):
+                    facts.append((self._tower.reduce(self._without_forms(fact * sign.value)), sign.strict))
+        for index in self._forms:
+            g = self._tower.generators[index]
+            if g.sign and index not in self._below_one:
+                with suppress(Unprovable):
+                    facts.append((self._without_forms(self._tower.gens[index] * g.sign), g.strict))
+        near, chosen = used(p), []
+        while more := [fact for fact in facts if fact not in chosen and used(fact[0]) & near]:
+            chosen += more
+            near = near.union(*(used(fact) for fact, _ in more))
+        for index in sorted(near):
+            g = self._tower.generators[index]
+            if g.sign and index not in self._forms:
+                chosen.append((self._tower.gens[index] * g.sign, g.strict))
+        return chosen[:_MAX_ATOMS]
+
+    def _products_of(self, atoms: list[tuple[Any, bool]], degree: int) -> list[tuple[Any, bool]]:
+        """1 and the products of up to ``degree`` atoms, as many as are tried."""
+        found = level = [(self._tower.one, True, 0)]
+        for _ in range(degree):
+            level = [
+                (self._tower.times(product, atom), strict and also, i)
+                for product, strict, first in level
+                for i, (atom, also) in enumerate(atoms[first:], first)
+            ]
+            if len(found) + len(level) > _MAX_PRODUCTS:
+                break
+            found = found + level
+        return [(self._tower.reduce(product), strict) for product, strict, _ in found]

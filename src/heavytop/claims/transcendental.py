@@ -31,6 +31,8 @@ _RANGES = {
     "acos": (Fraction(0), Fraction(22, 7)),
     "atan2": (Fraction(-22, 7), Fraction(22, 7)),
 }
+# 1 where the function increases, -1 where it decreases
+_MONOTONE = {"exp": 1, "log": 1, "asin": 1, "atan": 1, "acos": -1}
 Circle = tuple[Quotient, Quotient]
 
 
@@ -326,7 +328,19 @@ class Transcendental:
         )
         self._field.means(index, meaning)
         self._set_number(index, meaning)
+        if kind in _MONOTONE:
+            self._declare_order(index)
         return index
+
+    def _declare_order(self, index: int) -> None:
+        """Of a monotone function of constants in order: the values have an order too."""
+        t, g = self._tower, self._tower.generators[index]
+        for other, before in enumerate(t.generators[:index]):
+            if before.kind == g.kind and g.constant and before.constant:
+                minus = t.product((t.number(-1), before.arguments[0]))
+                sign = t.sign(t.sum((g.arguments[0], minus)))
+                if sign.value and sign.strict:
+                    t.signs.declare(t.gens[index] - t.gens[other], Sign(sign.value * _MONOTONE[g.kind], True))
 
     def _set_number(self, index: int, meaning: sympy.Expr) -> None:
         if not meaning.free_symbols:
