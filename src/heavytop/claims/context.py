@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import ClassVar
 
@@ -17,6 +17,7 @@ from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
 from heavytop.claims.from_file import ClaimFile, sample_rows
 from heavytop.claims.real_zeros import conditions_for_zero
+from heavytop.claims.relations import solve_relations
 from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import Setting
 from heavytop.claims.statements import SYSTEMS
@@ -136,9 +137,19 @@ def setting_of(context: Context, variable: sympy.Symbol) -> Setting:
     """The setting of a claim in this context."""
     a = context.assumed
     relations = tuple(part for relation in context.relations for part in conditions_for_zero(relation))
-    return Setting(
-        variable, a.positive, context.samples, a.greater, relations=relations, facts=a.facts, ranges=a.ranges
+    parameters = frozenset(context.symbols.values())
+    setting = Setting(
+        variable,
+        a.positive,
+        context.samples,
+        a.greater,
+        relations=relations,
+        facts=a.facts,
+        ranges=a.ranges,
+        parameters=parameters,
     )
+    known = replace(setting.assumptions(0), relations=())
+    return replace(setting, solutions=solve_relations(relations, known, parameters))
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from heavytop.claims.algebra import Field
 from heavytop.claims.conditions import Kind, Need
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.rational import Quotient
-from heavytop.claims.real_zeros import on_conditions
+from heavytop.claims.real_zeros import is_small_polynomial, on_conditions
 from heavytop.claims.regularity import Regularity
 from heavytop.claims.sign import NUMBER_BITS, Unprovable, used
 from heavytop.claims.statement import Place, Setting, Statement
@@ -97,9 +97,10 @@ class Region:
     def _is_connected(self) -> bool:
         """Linear inequalities bound a convex domain."""
         a = self.field.assumptions
-        bounds = [*a.facts, *(symbol - bound for symbol, bound in a.greater)]
         return not a.nonzero and all(
-            bound.is_polynomial() and sympy.Poly(bound).total_degree() <= 1 for bound in bounds if bound.free_symbols
+            is_small_polynomial(bound) and sympy.Poly(bound).total_degree() <= 1
+            for bound in a.bounds()
+            if bound.free_symbols
         )
 
     def _is_nonzero_at(self, p: Any, place: Place) -> bool:

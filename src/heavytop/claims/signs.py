@@ -5,7 +5,7 @@ Every rule here is a proof.  What no rule decides is unknown, and a condition th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -82,6 +82,8 @@ class Signs:
                 open_factors.append(factor)
             else:
                 total = total.times(known if power % 2 else Sign(1, True))
+                if sign.strict and not known.strict:
+                    self._facts.append((factor, Sign(0, True)))
         known = Sign(sign.value * total.value, sign.strict)
         if len(open_factors) == 1:
             self._facts.append((open_factors[0], known))
@@ -98,9 +100,19 @@ class Signs:
         if len(factors) != 2 or not (known.value and known.strict):
             return
         first, second = factors
+        self._facts += [(factor, Sign(0, True)) for factor in factors]
         total = self.of(first + second * known.value)
         if total.value and total.strict:
             self._facts += [(first, Sign(total.value, True)), (second, Sign(total.value * known.value, True))]
+
+    def never_zero(self, relations: Sequence[Any]) -> list[Any]:
+        """Polynomials that are 0 nowhere and have to do with these: facts, their own factors, generators in them."""
+        indices = set().union(*map(used, relations))
+        found = [fact for fact, sign in (*self._facts, *self._products) if sign.strict and used(fact) & indices]
+        found += [self._tower.gens[index] for index in sorted(indices) if self._tower.generators[index].strict]
+        factors = [factor for relation in relations for factor, _ in self.factors(relation)[1]]
+        found += [factor for factor in factors if self.of(factor).strict]
+        return list({str(p): p for p in found}.values())
 
     def factors(self, p: Any) -> Any:
         """(constant, [(factor, power)]), made once."""
@@ -169,11 +181,13 @@ class Signs:
     # --- rules ------------------------------------------------------------------------------------------------------
 
     def _by_facts(self, p: Any) -> Sign:
+        found = UNKNOWN
         for fact, sign in self._facts:
             ratio = p.leading_coefficient() / fact.leading_coefficient()
             if p == fact * ratio:
-                return sign.times(Sign(1 if ratio > 0 else -1, True))
-        return UNKNOWN
+                one = sign.times(Sign(1 if ratio > 0 else -1, True))
+                found = Sign(found.value or one.value, found.strict or one.strict)
+        return found
 
     def ball(self, p: Any) -> arb | None:
         """The ball of a polynomial in numbers; None where another generator occurs."""
@@ -331,7 +345,7 @@ class Signs:
 
     def _of_root_sum(self, a: Any, b: Any, radicand: Any, sign: int) -> Sign:
         """a + b R with R² = radicand >= 0: the larger of a² and b² R² decides."""
-        difference = self.of(a * a - b * b * radicand)
+        difference = self.of(self._tower.reduce(a * a - b * b * radicand))
         if difference.value > 0:
             return Sign(self.of(a).value, difference.strict)
         if difference.value < 0:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import sympy
 
-from heavytop.claims.algebra import Assumptions
+from heavytop.claims.algebra import Assumptions, Solution
 from heavytop.claims.conditions import Need, is_exactly_zero
 
 Place = dict[sympy.Symbol, Fraction]
@@ -101,6 +101,8 @@ class Setting:
     samples: exact parameter sets.  parts: names with expressions through which a residual may be written, such as γ3.
     constants: the same for constant factors, such as k/2.  relations: what is 0 wherever the claim is made.
     facts: expressions that are > 0.  nonzero: symbols that are not 0.  ranges: closed intervals of symbols.
+    solutions: of relations that can be solved.  solved: those that are put in, in the place of their relations.
+    parameters: symbols that are constant along every motion.
     """
 
     variable: sympy.Symbol
@@ -113,6 +115,15 @@ class Setting:
     facts: tuple[sympy.Expr, ...] = ()
     nonzero: tuple[sympy.Symbol, ...] = ()
     ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...] = ()
+    solutions: tuple[Solution, ...] = ()
+    solved: tuple[Solution, ...] = ()
+    parameters: frozenset[sympy.Symbol] = frozenset()
+
+    def with_solutions(self) -> Setting:
+        """The same, with the solutions in the place of their relations."""
+        done = {solution.relation for solution in self.solutions}
+        left = tuple(relation for relation in self.relations if relation not in done)
+        return replace(self, relations=left, solutions=(), solved=self.solutions)
 
     def assumptions(self, sign: int, *, strict: bool = False, facts: tuple[sympy.Expr, ...] = ()) -> Assumptions:
         """What the algebra may use on a domain where the variable has this sign (strict: and is not 0)."""
@@ -126,12 +137,15 @@ class Setting:
             (*self.facts, *facts),
             self.nonzero,
             self.ranges,
+            self.solved,
+            self.parameters,
         )
 
     def places(self, statement: Statement) -> Iterator[Place]:
         """Exact parameters and points of the domain of ``statement`` that lie on all relations, proven."""
+        zero = (*self.relations, *(solution.symbol - solution.value for solution in self.solved))
         for sample in self.samples:
             for point in statement.domain.points:
                 place = {self.variable: point, **sample}
-                if all(is_exactly_zero(relation, place) for relation in self.relations):
+                if all(is_exactly_zero(relation, place) for relation in zero):
                     yield place
