@@ -175,7 +175,8 @@ SIN, COS, ROOT = sympy.sin(T), sympy.cos(T), sympy.sqrt(1 + T**2)
         (sympy.sqrt(2) - 1, 0, (1, True)),
         (sympy.sqrt(2) - sympy.Rational(3, 2), 0, (-1, True)),
         # 0, which no ball can tell
-        (sympy.sqrt(3 + 2 * sympy.sqrt(2)) - 1 - sympy.sqrt(2), 0, (0, False)),
+        (sympy.atan(sympy.Rational(1, 2)) + sympy.atan(sympy.Rational(1, 3)) - sympy.pi / 4, 0, (0, False)),
+        (sympy.sqrt(3 + 2 * sympy.sqrt(2)) - 1 - sympy.sqrt(2), 0, (1, False)),
         (sympy.exp(T) + sympy.exp(-T) - 2, 0, (1, False)),
         (sympy.tanh(T) + 1, 0, (1, True)),
         # arcs go to pi and pi/2, which lie between 3 and 22/7

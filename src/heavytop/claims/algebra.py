@@ -7,7 +7,7 @@ are taken on the expression before.  Reduction to 0 is a proof; anything else pr
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -174,13 +174,16 @@ class Field:
         except Unprovable:
             return False
 
-    def is_forced(self, expression: sympy.Expr, *, radical: bool) -> bool:
+    def is_forced(
+        self, expression: sympy.Expr, *, radical: bool, simpler: Callable[[Any], Any] = lambda p: p
+    ) -> bool:
         """The relations of the claim force it to be 0: it is their combination with factors of this field.
 
         radical: a power of it is, which proves as much at each point, but not that the flow keeps a relation.
+        simpler: the same polynomial where more is known of its generators.
         """
         try:
-            numerator = self.enter(expression).numerator
+            numerator = simpler(self.enter(expression).numerator)
             relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
         except Unprovable:
             return False
@@ -249,6 +252,7 @@ class Field:
         if e is sympy.pi:
             index = self._add(e, sign=Sign(1, True), kind="number")
             tower.signs.numbers[index] = evaluate(e, {}, NUMBER_BITS)
+            tower.signs.pi = index
             return self._known[e]
         if e.is_Symbol:
             self._add(e, sign=UNKNOWN)

@@ -147,10 +147,14 @@ def judge(
         if row.holds is None and second is not None:
             # with a relation solved for a parameter more is seen, if not always
             with_solutions = _judge_one(statement, solved, second)
-            row = row if with_solutions.holds is None else with_solutions
+            row = min(row, with_solutions, key=_what_is_open)
         rows.append(row)
         progress(len(rows), len(statements))
     return tuple(rows)
+
+
+def _what_is_open(row: Row) -> tuple[bool, int]:
+    return row.holds is None, sum(not condition.discharged for condition in row.conditions)
 
 
 def _bare(statement: Statement) -> Statement:

@@ -14,6 +14,7 @@ import sympy
 from flint import arb
 
 from heavytop.claims.algebra import Field
+from heavytop.claims.arcs import Arcs
 from heavytop.claims.conditions import Kind, Need
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.rational import Quotient
@@ -43,15 +44,28 @@ class Region:
         self.field = field
         self._setting = setting
         self._flow = statement.flow
-        self._places = [place for place in places if self._holds(place)]
+        self.places = [place for place in places if self._holds(place)]
         self._thin: dict[str, bool] = {}
         self._divisors: dict[tuple[bool, str], bool] = {}
         self.regularity = Regularity(field, self.is_nowhere_zero)
+        self._arcs = Arcs(self)
 
     def _holds(self, place: Place) -> bool:
         a = self.field.assumptions
         value = place[a.variable] * a.variable_sign
         return value > 0 or (value == 0 and not (a.strict and a.variable_sign))
+
+    def vanishes(self, expression: sympy.Expr) -> bool:
+        """0 by the algebra, and by what inverse functions add up to."""
+        try:
+            p = self.field.enter(expression).numerator
+            return not p or not self._arcs.without(p)
+        except Unprovable:
+            return False
+
+    def is_forced(self, expression: sympy.Expr, *, radical: bool) -> bool:
+        """0 by the relations of the claim, as in :meth:`~heavytop.claims.algebra.Field.is_forced`."""
+        return self.field.is_forced(expression, radical=radical, simpler=self._arcs.without)
 
     def is_nowhere_zero(self, p: Any) -> bool:
         """0 nowhere on the region (of a first integral: nowhere on the part that the flow keeps)."""
@@ -90,14 +104,14 @@ class Region:
             return self.is_zero_nowhere_dense(tower.radicand(index))
         if all(tower.generators[i].kind == "symbol" for i in used(p)) or tower.signs.of(p).strict:
             return True
-        if not self._is_connected() or self.regularity.obstacle_of_generators(used(p), analytic=True):
+        if not self.is_connected() or self.regularity.obstacle_of_generators(used(p), analytic=True):
             return False
-        return any(self._is_nonzero_at(p, place) for place in self._places)
+        return any(self._is_nonzero_at(p, place) for place in self.places)
 
-    def _is_connected(self) -> bool:
+    def is_connected(self) -> bool:
         """Linear inequalities bound a convex domain."""
         a = self.field.assumptions
-        return not a.nonzero and all(
+        return not (a.nonzero or a.relations) and all(
             is_small_polynomial(bound) and sympy.Poly(bound).total_degree() <= 1
             for bound in a.bounds()
             if bound.free_symbols

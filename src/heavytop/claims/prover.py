@@ -123,10 +123,10 @@ class Prover:
         """The divisors that stand against the proof; None where there is no proof."""
         if region is None:
             return None
-        if region.field.vanishes(statement.residual):
+        if region.vanishes(statement.residual):
             return list(region.divisors(forced=False))
         radical = statement.flow is None or not statement.flow.is_relation
-        if region.field.is_forced(statement.residual, radical=radical):
+        if region.is_forced(statement.residual, radical=radical):
             return list(region.divisors(forced=True))
         return None
 
@@ -185,7 +185,7 @@ class Prover:
     def _kept(self, statement: Statement, region: Region) -> Iterable[Condition]:
         """The side conditions are invariant: their rates are combinations of them."""
         for text, rate in statement.flow.kept if statement.flow is not None else ():
-            kept = region.field.vanishes(rate) or region.field.is_forced(rate, radical=False)
+            kept = region.vanishes(rate) or region.is_forced(rate, radical=False)
             reason = "its rate is a combination of the conditions" if kept else "its rate is not shown to be 0 there"
             yield Condition(f"{text} = 0 is kept by the flow", kept, reason)
 

@@ -14,7 +14,6 @@ from typing import Any
 import sympy
 
 from heavytop.claims.algebra import Assumptions, Field, Solution
-from heavytop.claims.rational import Quotient
 from heavytop.claims.sign import Unprovable, used
 
 _MAX_DEGREE = 12
@@ -78,7 +77,7 @@ def _solutions(
     zero = tower.context.constant(0)
     for index in sorted(used(p), reverse=True):
         symbol = tower.generators[index].meaning
-        if tower.generators[index].kind != "symbol" or symbol not in parameters or _occurs_inside(field, index):
+        if tower.generators[index].kind != "symbol" or symbol not in parameters or _occurs_inside(field, index, p):
             continue
         parts = tower.by_power(p, index)
         leading = parts[max(parts)]
@@ -93,11 +92,8 @@ def _solutions(
                 yield Solution(symbol, sign.value * sympy.sqrt(square, evaluate=False), relation, square)
 
 
-def _occurs_inside(field: Field, index: int) -> bool:
-    """Whether a root or a function of the field holds the generator."""
-    return any(
-        index in used(argument.numerator) | used(argument.denominator)
-        for generator in field.tower.generators
-        for argument in generator.arguments
-        if isinstance(argument, Quotient)
-    )
+def _occurs_inside(field: Field, index: int, p: Any) -> bool:
+    """Whether a root or a function in ``p`` holds the generator."""
+    generators = [field.tower.generators[i] for i in used(p)]
+    inner = [part for g in generators for argument in g.arguments for part in (argument.numerator, argument.denominator)]
+    return any(index in used(part) or _occurs_inside(field, index, part) for part in inner)

@@ -38,7 +38,7 @@ class Signs:
     """What is known of the signs and ranges of the generators of ``tower``, and what follows for polynomials.
 
     ranges: closed intervals of generators.  circles: cosine of each sine.  numbers: the ball of each generator that
-    is a number.
+    is a number.  pi: the generator π.  turns: the ends, over π, of open intervals in which generators lie.
     """
 
     def __init__(self, tower: Tower) -> None:
@@ -56,6 +56,8 @@ class Signs:
         self.ranges: dict[int, tuple[Fraction, Fraction]] = {}
         self.circles: dict[int, int] = {}
         self.numbers: dict[int, arb] = {}
+        self.pi: int | None = None
+        self.turns: dict[int, tuple[Fraction, Fraction]] = {}
 
     def declare_form(self, index: int, form: Any) -> None:
         """Generator ``index`` is ``form``, a polynomial in generators of known sign."""
@@ -254,12 +256,13 @@ class Signs:
         """
         while forms := self._forms.keys() & used(p):
             index = min(forms)
-            p = self._substitute(p, index, self._forms[index])
+            p = self.substituted(p, index, self._forms[index])
             if len(p) > _MAX_TERMS:
                 raise Unprovable("A polynomial is too large.", "Split the claim into smaller ones.")
         return p
 
-    def _substitute(self, p: Any, index: int, form: Any) -> Any:
+    def substituted(self, p: Any, index: int, form: Any) -> Any:
+        """``p`` with a polynomial in the place of a generator."""
         total = self._tower.context.constant(0)
         for power, part in self._tower.by_power(p, index).items():
             total += self._tower.times(part, self._tower.raised(form, power))
@@ -335,10 +338,17 @@ class Signs:
             if leading.value and leading.strict and defect.value == 1:
                 yield Sign(leading.value, defect.strict)
         if degree == 1 and index in self.ranges:
-            ends = [self._substitute(p, index, self._constant(end)) for end in self.ranges[index]]
+            ends = [self.substituted(p, index, self._constant(end)) for end in self.ranges[index]]
             signs = [self.of(end) for end in ends]
             if signs[0].value == signs[1].value != 0:
                 yield Sign(signs[0].value, signs[0].strict and signs[1].strict)
+
+        if degree == 1 and index in self.turns and self.pi in used(p):
+            pi = self._tower.gens[self.pi]
+            ends = [self.substituted(p, index, self._constant(end) * pi) for end in self.turns[index]]
+            first, second = (self.of(end) for end in ends)
+            if first.value == second.value != 0:
+                yield Sign(first.value, first.strict or second.strict)
 
     def _constant(self, value: Fraction) -> Any:
         return self._tower.context.constant(fmpq(value.numerator, value.denominator))
@@ -365,8 +375,8 @@ class Signs:
                 rest = [0 if index in (sine, cosine) else power for index, power in enumerate(monomial)]
                 factor = (2 * tau) ** i * (1 - tau**2) ** j * (1 + tau**2) ** (degree - i - j)
                 total += self._tower.context.from_dict({tuple(rest): coefficient}) * factor
-            straight = self._substitute(
-                self._substitute(p, sine, self._constant(Fraction(0))), cosine, -self._tower.one
+            straight = self.substituted(
+                self.substituted(p, sine, self._constant(Fraction(0))), cosine, -self._tower.one
             )
             signs = self.of(total), self.of(straight)
             if signs[0].value == signs[1].value != 0:

@@ -310,8 +310,13 @@ class Transcendental:
             if name in ("asin", "atan"):
                 sign = self._tower.sign(arguments[0])
             elif name == "acos":
-                sign = Sign(1, False)
+                below = self._tower.sum((self._tower.number(1), self._tower.product((self._tower.number(-1), *arguments))))
+                sign = Sign(1, self._tower.sign(below).strict)
             index = self._new(name, meaning, arguments, sign)
+            if name == "atan":
+                one_sided = sign.value if sign.strict else 0
+                low, high = 0 if one_sided > 0 else -1, 0 if one_sided < 0 else 1
+                self._tower.signs.turns[index] = Fraction(low, 2), Fraction(high, 2)
             if name in _RANGES:
                 self._tower.signs.ranges[index] = _RANGES[name]
             self._functions[key] = index
