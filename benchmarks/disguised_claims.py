@@ -464,8 +464,8 @@ def classical_claims() -> Iterator[Claim]:
     for root in ("sqrt(1 - p^2)", "q"):
         for end, expected in (("", "holds"), (" + 1/10", "not holds")):
             definitions = {"r": root, "I2": "I1*r^2 + I3*p^2", "D": "I1 - I2 + I3", "k": f"p*r*(I1 - I3){end}", "S": "sqrt(D^2 + k^2)", "s": "sin(n*t)", "c": "cos(n*t)"}
-            omega = ["n*(p - r*s)", "n*c", "n*(r + p*s)"]
-            gamma = ["(-D*r*s - k*c*r*c + k*s*p)/S", "(D*c - k*c*s)/S", "(D*p*s + k*c*p*c + k*s*r)/S"]
+            omega = ["n*(p + r*s)", "n*c", "n*(r - p*s)"]
+            gamma = ["(D*r*s - k*c*r*c - k*s*p)/S", "(D*c + k*c*s)/S", "(-D*p*s + k*c*p*c - k*s*r)/S"]
             table = _motion(["I1", "I2", "I3"], ["n^2*S*p", "0", "n^2*S*r"], omega, gamma)
             table |= {"definitions": definitions, "parameters": sizes | circle, "relations": ["p^2 + q^2 - 1"]}
             yield _claim("classical", table, expected, assume=["p > 0", "q > 0", "n > 0", "I1 > 0", "I3 > 0"])

@@ -14,6 +14,7 @@ from typing import Any
 
 import sympy
 
+from heavytop.claims.defined import Defined
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.ideal import forces_zero
 from heavytop.claims.rational import Quotient, Tower
@@ -254,6 +255,8 @@ class Field:
             tower.signs.numbers[index] = evaluate(e, {}, NUMBER_BITS)
             tower.signs.pi = index
             return self._known[e]
+        if isinstance(e, Defined):
+            return self._definition(e)
         if e.is_Symbol:
             self._add(e, sign=UNKNOWN)
             return self._known[e]
@@ -266,6 +269,14 @@ class Field:
         if e.is_Pow:
             return self._power(e)
         return self._function(type(e).__name__, [self.enter(part) for part in e.args])
+
+    def _definition(self, e: Defined) -> Quotient:
+        """What it stands for; where that is too large, a free generator, since what holds for any value holds for it."""
+        try:
+            return self.enter(e.meaning)
+        except Unprovable:
+            self._add(e, constant=self.assumptions.variable not in e.free_symbols, sign=UNKNOWN, kind="defined")
+            return self._known[e]
 
     def _function(self, name: str, arguments: list[Quotient]) -> Quotient:
         tower, first = self.tower, arguments[0]

@@ -10,6 +10,7 @@ import sympy
 
 from heavytop.claims.conditions import Need
 from heavytop.claims.context import TIME, Context, FileClaim, needs_of, setting_of, three
+from heavytop.claims.defined import rate_along
 from heavytop.claims.expression import Formula
 from heavytop.claims.from_file import ClaimFile, MotionTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
@@ -74,9 +75,7 @@ class UserMotion(FileClaim):
 
 
 def _read_motion(content: ClaimFile, table: MotionTable, context: Context) -> Motion:
-    def rate(value: sympy.Expr) -> sympy.Expr:
-        return sympy.diff(value, TIME)
-
+    rate = rate_along({TIME: sympy.Integer(1)})
     names, needs, domain = context.names, context.needs, _domain(content)
 
     def reduced(formulas: Triple) -> Triple:

@@ -14,6 +14,7 @@ import sympy
 from heavytop.claims.algebra import Assumptions, Field
 from heavytop.claims.conditions import Need, is_exactly_zero
 from heavytop.claims.context import STATE, TIME, FileClaim, needs_of, setting_of
+from heavytop.claims.defined import rate_along
 from heavytop.claims.expression import Formula, parse
 from heavytop.claims.from_file import IntegralTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
@@ -87,10 +88,7 @@ class UserIntegral(FileClaim):
     def statements(self, system: System) -> list[Statement]:
         """dF/dt = 0 along the field of ``system``, on the conditions."""
         rates = system.field(self.context.parameters(system), STATE)
-
-        def rate(value: sympy.Expr) -> sympy.Expr:
-            return sum((sympy.diff(value, x) * dx for x, dx in zip(STATE, rates, strict=True)), sympy.Integer(0))
-
+        rate = rate_along(dict(zip(STATE, rates, strict=True)))
         needs = needs_of([self.value, *self.where]) | self.context.needs
         if system is GYROSTAT:
             needs |= self.context.rotor_needs
