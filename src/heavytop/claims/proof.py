@@ -26,6 +26,7 @@ from heavytop.claims.structure import sign_of
 from heavytop.exact.balls import working_precision
 
 _EVERYWHERE = "proven all over the domain"
+KEPT = "kept by the flow: where it is so at first, it stays so"
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +160,7 @@ class Region:
         if apart or need.kind.is_met_by(sign):
             return _EVERYWHERE
         if self._flow is not None and value.numerator and self.is_kept(value.numerator):
-            return "kept by the flow: where it is so at first, it stays so"
+            return KEPT
         return ""
 
     def _factors_nowhere_zero(self, p: Any) -> bool:

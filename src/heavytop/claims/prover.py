@@ -10,7 +10,7 @@ import sympy
 from heavytop.claims.algebra import Field
 from heavytop.claims.conditions import Kind, Need
 from heavytop.claims.evaluate import evaluate
-from heavytop.claims.proof import Condition, Region
+from heavytop.claims.proof import KEPT, Condition, Region
 from heavytop.claims.sign import NUMBER_BITS, PLUS, Unprovable
 from heavytop.claims.statement import Domain, Place, Setting, Statement
 
@@ -61,14 +61,18 @@ class Prover:
         facts = (*statements[0].domain.facts, *self._kept_facts(statements[0]))
         assumptions = self._setting.assumptions(sign, strict=strict, facts=facts)
         expressions = dict.fromkeys([*(s.residual for s in statements), *parts])
+        kept: set[sympy.Expr] = set()
         for statement in statements:
             f = statement.formulas
             expressions |= dict.fromkeys((*f.values, *f.attitude))
             expressions |= dict.fromkeys(need.expression for need in _sorted(f.needs | f.angle_needs))
-        try:
-            return Field(assumptions, expressions)
-        except Unprovable:
-            return None
+            kept |= {need.expression for need in f.needs if _is_kept(need, statement)}
+        for chosen in (expressions, [e for e in expressions if e not in kept]):
+            try:
+                return Field(assumptions, chosen)
+            except Unprovable:
+                continue
+        return None
 
     def _kept_facts(self, statement: Statement) -> list[sympy.Expr]:
         """Of a first integral: what has to be positive for it to be real, and stays so under the flow."""
@@ -168,7 +172,10 @@ class Prover:
             return [Condition(_ALGEBRA, False, "the formulas are too large, or hold what it does not know")]
         against = whole.obstacle(f.values), inner.obstacle(f.attitude)
         continuous = bool(f.values) and not any(against)
-        found = {need: whole.discharge(need) for need in _sorted(f.needs | f.angle_needs)}
+        found = {
+            need: whole.discharge(need) or (KEPT if _is_kept(need, statement) else "")
+            for need in _sorted(f.needs | f.angle_needs)
+        }
         for need, how in found.items():
             if not how and need not in f.needs and inner.discharge(need) and continuous:
                 found[need] = _AT_THE_END
@@ -188,6 +195,10 @@ class Prover:
             kept = region.vanishes(rate) or region.is_forced(rate, radical=False)
             reason = "its rate is a combination of the conditions" if kept else "its rate is not shown to be 0 there"
             yield Condition(f"{text} = 0 is kept by the flow", kept, reason)
+
+
+def _is_kept(need: Need, statement: Statement) -> bool:
+    return statement.flow is not None and statement.flow.keeps(need.expression)
 
 
 def shortest(formula: sympy.Expr, setting: Setting, domain: Domain) -> sympy.Expr:

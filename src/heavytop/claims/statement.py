@@ -67,6 +67,7 @@ class Flow:
     rate: the derivative along it.  kept: the relations that have to be invariant, with their text.
     state: the variables.  is_relation: whether the statement is that a relation stays 0.
     always: what is 0 at every state of a body, so that a witness has to lie there.
+    constants: names of first integrals, which are among the variables of the state.
     """
 
     rate: Callable[[sympy.Expr], sympy.Expr]
@@ -74,6 +75,12 @@ class Flow:
     kept: tuple[tuple[str, sympy.Expr], ...] = ()
     is_relation: bool = False
     always: tuple[sympy.Expr, ...] = ()
+    constants: frozenset[sympy.Symbol] = frozenset()
+
+    def keeps(self, e: sympy.Expr) -> bool:
+        """Whether it holds nothing of the state but names of first integrals, and at least one of them."""
+        inside = e.free_symbols & self.state
+        return bool(inside) and inside <= self.constants
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from heavytop.claims.algebra import Assumptions, Field
 from heavytop.claims.conditions import Need, is_exactly_zero
 from heavytop.claims.context import STATE, TIME, FileClaim, needs_of, setting_of
 from heavytop.claims.defined import rate_along
+from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import Formula, parse
 from heavytop.claims.from_file import IntegralTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
@@ -30,6 +31,7 @@ Rate = Callable[[sympy.Expr], sympy.Expr]
 _STATES = (("1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"), ("1", "2", "-1", "3/5", "0", "4/5"))
 # states of our own, where a file gives none
 _ENOUGH = 3
+_BITS = 192
 # 0 at every state of a body: |γ|² - 1
 _OFF_SPHERE = sum(x**2 for x in STATE[3:]) - 1
 
@@ -100,10 +102,12 @@ class UserIntegral(FileClaim):
         value, named, names = self._with_names(rate, needs)
         # states that the file names are taken as they are
         always = (_OFF_SPHERE,) if self._table.states is None else ()
-        flow = Flow(rate, frozenset((*STATE, *names)), self._kept(rate), self.kind == "relation", always)
+        constants = frozenset(names)
+        flow = Flow(rate, constants.union(STATE), self._kept(rate), self.kind == "relation", always, constants)
         # a condition in simpler words is the same set
         where = tuple(part for formula in self.where for part in conditions_for_zero(formula.expression))
-        values = (*self._parts(value), *where)
+        # a function of first integrals alone is as constant as they are, continuous or not
+        values = tuple(part for part in (*self._parts(value), *where) if not flow.keeps(part))
         domain = replace(ALL, points=(Fraction(0),))
         formulas = Formulas(values, named, sampled=needs)
         return [
@@ -137,7 +141,7 @@ class UserIntegral(FileClaim):
             return value, needs, []
         assumptions = self.setting.assumptions(0)
         state = frozenset(STATE)
-        names = Names(state, lambda e: _is_constant(rate(e), assumptions))
+        names = Names(state, lambda e: _is_constant(rate(e), assumptions, self.setting.samples))
         named = names.put_into(value)
         if named.free_symbols & state:
             return value, needs, []
@@ -150,9 +154,13 @@ class UserIntegral(FileClaim):
         return [], tuple(name for name, rows in found.items() if verdict_of(rows) == "holds")
 
 
-def _is_constant(rate: sympy.Expr, assumptions: Assumptions) -> bool:
+def _is_constant(rate: sympy.Expr, assumptions: Assumptions, samples: Sequence[Place]) -> bool:
     """Whether a rate is proven to be 0 by an algebra that divides by nothing that may be 0."""
     try:
+        # what is not 0 at a sample need not be taken into the algebra
+        balls = [evaluate(rate, {TIME: Fraction(0), **sample}, _BITS) for sample in samples[:1]]
+        if any(ball.is_finite() and not ball.contains(0) for ball in balls):
+            return False
         field = Field(assumptions, [rate])
     except Unprovable:
         return False
