@@ -67,7 +67,7 @@ class Assumptions:
         """Expressions that are > 0, in the symbols that are not solved."""
         solved = {solution.symbol for solution in self.solved}
         found = [*self.facts, *(symbol - bound for symbol, bound in self.greater), *solved.intersection(self.positive)]
-        for solution in reversed(self.solved):
+        for solution in self.solved:
             found = [bound.xreplace({solution.symbol: solution.value}) for bound in found]
         return found
 
@@ -118,7 +118,8 @@ class Field:
         for fact in facts:
             if not fact.free_symbols & solved:
                 self._declare(fact)
-        for solution in a.solved:
+        # the last solution holds none of the symbols that are solved before it
+        for solution in reversed(a.solved):
             if solution.radicand is not None:
                 self._declare(solution.radicand)
             self._known[solution.symbol] = self.enter(solution.value)
@@ -175,9 +176,7 @@ class Field:
         except Unprovable:
             return False
 
-    def is_forced(
-        self, expression: sympy.Expr, *, radical: bool, simpler: Callable[[Any], Any] = lambda p: p
-    ) -> bool:
+    def is_forced(self, expression: sympy.Expr, *, radical: bool, simpler: Callable[[Any], Any] = lambda p: p) -> bool:
         """The relations of the claim force it to be 0: it is their combination with factors of this field.
 
         radical: a power of it is, which proves as much at each point, but not that the flow keeps a relation.
@@ -271,7 +270,7 @@ class Field:
         return self._function(type(e).__name__, [self.enter(part) for part in e.args])
 
     def _definition(self, e: Defined) -> Quotient:
-        """What it stands for; where that is too large, a free generator, since what holds for any value holds for it."""
+        """What it stands for; where that is too large, a free generator: what holds for any value holds for it."""
         try:
             return self.enter(e.meaning)
         except Unprovable:

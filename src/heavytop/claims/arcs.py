@@ -1,4 +1,4 @@
-"""Sums of inverse functions that are a multiple of π all over a region: 4 atan(1/5) − atan(1/239) = π/4.
+"""Sums of inverse functions that are a multiple of π all over a region, 4 atan(1/5) − atan(1/239) = π/4; of logarithms.
 
 A relation with small integers is proposed from values at samples (lattice reduction) and then proven: the product of
 the unit vectors with these angles, turned back by the multiple of π, has no imaginary part, by exact algebra; so the
@@ -56,7 +56,7 @@ class Arcs:
         generators = self._region.field.tower.generators
         known, self._known = self._known, len(generators)
         for index in range(known, self._known):
-            if generators[index].kind in _ARCS and len(self._free) < _MOST_ARCS:
+            if generators[index].kind in (*_ARCS, "log") and len(self._free) < _MOST_ARCS:
                 try:
                     form = self._form_of(index)
                 except Unprovable:
@@ -69,7 +69,11 @@ class Arcs:
     def _form_of(self, index: int) -> Any | None:
         """Inverse function ``index`` through those before it and π; None where there is no such relation."""
         field = self._region.field
-        arcs = [*self._free, index]
+        is_log = field.tower.generators[index].kind == "log"
+        alike = [other for other in self._free if (field.tower.generators[other].kind == "log") is is_log]
+        arcs = [*alike, index]
+        if is_log:
+            return self._form_of_logarithm(arcs)
         factors = _integer_relation([*(self._values(arc) for arc in arcs), [_pi()] * _PLACES])
         if factors is None or not factors[-2]:
             return None
@@ -82,6 +86,20 @@ class Arcs:
             if arc != index:
                 total += gens[arc] * factor
         return total / -weights[index]
+
+    def _form_of_logarithm(self, logarithms: list[int]) -> Any | None:
+        """The last logarithm through the others: a product of powers of what they are taken of is 1."""
+        tower = self._region.field.tower
+        factors = _integer_relation([self._values(index) for index in logarithms])
+        if factors is None or not factors[-1] or sum(map(abs, factors)) > _MOST_TURNS:
+            return None
+        weights = {index: factor for index, factor in zip(logarithms, factors, strict=True) if factor}
+        parts = [tower.power(tower.generators[index].arguments[0], factor) for index, factor in weights.items()]
+        if tower.product(parts) != tower.number(1):
+            return None
+        last = logarithms[-1]
+        total = sum((tower.gens[i] * factor for i, factor in weights.items() if i != last), tower.context.constant(0))
+        return total / -weights[last]
 
     def _values(self, index: int) -> list[arb]:
         """Its values at a few places of the region; of a number, the number."""
@@ -104,7 +122,9 @@ class Arcs:
     def _is_proven(self, weights: dict[int, int], turns: int) -> bool:
         """Σ weight · arc = turns · π all over the region."""
         common = gcd(*weights.values())
-        whole = next(h for h in range(1, common + 1) if common % h == 0 and 12 % Fraction(h * turns, common).denominator == 0)
+        whole = next(
+            h for h in range(1, common + 1) if common % h == 0 and 12 % Fraction(h * turns, common).denominator == 0
+        )
         weights = {arc: weight * whole // common for arc, weight in weights.items()}
         angle = Fraction(whole * turns, common)
         return self._is_multiple_of_pi(weights, angle) and (
@@ -135,7 +155,8 @@ class Arcs:
             least, most = self._ends(arc)
             low, high = low + min(weight * least, weight * most), high + max(weight * least, weight * most)
             inside = inside or (g.kind == "atan" and g.strict)
-        return (-1 < low and high < 1) or (inside and -1 <= low and high <= 1)
+        size = max(-low, high)
+        return size < 1 or (inside and size == 1)
 
     def _ends(self, index: int) -> tuple[Fraction, Fraction]:
         """A closed interval of the values of an inverse function, over π."""
@@ -151,7 +172,8 @@ class Arcs:
         """|Σ weight · arc − angle · π| < π: of numbers, or at a place where it is continuous on a connected domain."""
         region = self._region
         if not weights.keys() <= region.field.tower.signs.numbers.keys() and (
-            not region.is_connected() or region.regularity.obstacle_of_generators(set(weights), analytic=False)
+            not region.is_connected(set(weights))
+            or region.regularity.obstacle_of_generators(set(weights), analytic=False)
         ):
             return False
         values = {arc: self._values(arc)[0] for arc in weights}

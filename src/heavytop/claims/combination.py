@@ -55,23 +55,23 @@ def _feasible(rows: list[Row], count: int) -> Row | None:
     basis = [-1] * len(rows)
     for _ in range(_MOST_STEPS):
         # what the rows still without a basic column add up to has to become 0
-        short = [row for row, column in zip(rows, basis, strict=True) if column < 0]
+        short = [row for row, basic in zip(rows, basis, strict=True) if basic < 0]
         if not any(row[-1] for row in short):
             solution = [Fraction(0)] * count
-            for row, column in zip(rows, basis, strict=True):
-                if column >= 0:
-                    solution[column] = row[-1]
+            for row, basic in zip(rows, basis, strict=True):
+                if basic >= 0:
+                    solution[basic] = row[-1]
             return solution
-        column = next((j for j in range(count) if j not in basis and sum(row[j] for row in short) > 0), None)
-        if column is None:
+        entering = next((j for j in range(count) if j not in basis and sum(row[j] for row in short) > 0), None)
+        if entering is None:
             return None
-        ratios = [(row[-1] / row[column], basis[i], i) for i, row in enumerate(rows) if row[column] > 0]
+        ratios = [(row[-1] / row[entering], basis[i], i) for i, row in enumerate(rows) if row[entering] > 0]
         _, _, pivot = min(ratios)
-        scale = rows[pivot][column]
+        scale = rows[pivot][entering]
         rows[pivot] = [value / scale for value in rows[pivot]]
         for i, row in enumerate(rows):
-            if i != pivot and row[column]:
-                factor = row[column]
+            if i != pivot and row[entering]:
+                factor = row[entering]
                 rows[i] = [value - factor * other for value, other in zip(row, rows[pivot], strict=True)]
-        basis[pivot] = column
+        basis[pivot] = entering
     return None

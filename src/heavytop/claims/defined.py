@@ -1,4 +1,4 @@
-"""Definitions that are kept as names, so that a chain of them is not expanded: symbols with a meaning, and their rates."""
+"""Definitions kept as names, so that a chain of them is not expanded: symbols with a meaning, and their rates."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import sympy
 
 
-class Defined(sympy.Dummy):
+class Defined(sympy.Dummy):  # type: ignore[misc]
     """A symbol that stands for a formula, of which it depends on the symbols.  meaning: that formula."""
 
     meaning: sympy.Expr

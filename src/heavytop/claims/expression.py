@@ -256,7 +256,9 @@ class _Parser:
         limits = Size(_MAX_NODES, _MAX_BITS, _MAX_DEGREE, _MAX_TERMS)
         for what, value, limit in zip(Size._fields, size, limits, strict=True):
             if value > limit:
-                raise TooLarge(f"{self._where}: the formula grows beyond {limit} {what}.", "Name parts of it in [definitions].")
+                raise TooLarge(
+                    f"{self._where}: the formula grows beyond {limit} {what}.", "Name parts of it in [definitions]."
+                )
 
 
 def _added(a: Size, b: Size) -> Size:

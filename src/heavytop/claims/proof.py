@@ -105,17 +105,21 @@ class Region:
             return self.is_zero_nowhere_dense(tower.radicand(index))
         if all(tower.generators[i].kind == "symbol" for i in used(p)) or tower.signs.of(p).strict:
             return True
-        if not self.is_connected() or self.regularity.obstacle_of_generators(used(p), analytic=True):
+        if not self.is_connected(used(p)) or self.regularity.obstacle_of_generators(used(p), analytic=True):
             return False
         return any(self._is_nonzero_at(p, place) for place in self.places)
 
-    def is_connected(self) -> bool:
-        """Linear inequalities bound a convex domain."""
+    def is_connected(self, indices: set[int]) -> bool:
+        """Linear inequalities bound a convex domain of the symbols in these generators, and of those bound to them."""
         a = self.field.assumptions
-        return not (a.nonzero or a.relations) and all(
+        bounds = [bound for bound in a.bounds() if bound.free_symbols]
+        near = set().union(*(self.field.meaning(index).free_symbols for index in indices))
+        while more := set().union(*(e.free_symbols for e in (*bounds, *a.relations) if e.free_symbols & near)) - near:
+            near |= more
+        return not near & set(a.nonzero).union(*(relation.free_symbols for relation in a.relations)) and all(
             is_small_polynomial(bound) and sympy.Poly(bound).total_degree() <= 1
-            for bound in a.bounds()
-            if bound.free_symbols
+            for bound in bounds
+            if bound.free_symbols & near
         )
 
     def _is_nonzero_at(self, p: Any, place: Place) -> bool:

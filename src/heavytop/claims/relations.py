@@ -49,10 +49,16 @@ def _factors_with_zeros(field: Field, p: Any) -> list[Any]:
     """The factors of ``p`` that may be 0, but for those that are 0 at points where another is."""
     signs = field.tower.signs
     factors = [factor for factor, _ in signs.factors(p)[1] if not signs.of(factor).strict]
-    open_factors = [factor for factor in factors if not _is_zero_at_origin_alone(factor)]
+    isolated = [factor for factor in factors if _is_zero_at_origin_alone(factor)]
+    others = [factor for factor in factors if factor not in isolated]
     # a factor that is 0 at the origin alone adds nothing to one that is 0 there
-    through = any(not factor.to_dict().get((0,) * len(factor.degrees())) for factor in open_factors)
-    return open_factors if through or len(open_factors) == len(factors) else factors
+    return [*others, *(factor for factor in isolated if not any(_is_zero_there(other, factor) for other in others))]
+
+
+def _is_zero_there(p: Any, form: Any) -> bool:
+    """``p`` is 0 where the generators of ``form`` are."""
+    indices = used(form)
+    return all(any(monomial[index] for index in indices) for monomial in p.to_dict())
 
 
 def _is_zero_at_origin_alone(p: Any) -> bool:
@@ -63,15 +69,11 @@ def _is_zero_at_origin_alone(p: Any) -> bool:
     if len(indices) != 2 or len(degrees) != 1 or max(degrees) > _MAX_DEGREE:
         return False
     z = sympy.Symbol("z")
-    line = sympy.Poly(
-        sum(sympy.Rational(int(c.p), int(c.q)) * z ** int(m[indices[0]]) for m, c in terms.items()), z
-    )
+    line = sympy.Poly(sum(sympy.Rational(int(c.p), int(c.q)) * z ** int(m[indices[0]]) for m, c in terms.items()), z)
     return bool(line.degree() == degrees.pop() and line.eval(0) != 0 and line.count_roots() == 0)
 
 
-def _solutions(
-    field: Field, p: Any, relation: sympy.Expr, parameters: Collection[sympy.Symbol]
-) -> Iterator[Solution]:
+def _solutions(field: Field, p: Any, relation: sympy.Expr, parameters: Collection[sympy.Symbol]) -> Iterator[Solution]:
     """The solutions of p = 0 for each of the parameters in it."""
     tower = field.tower
     zero = tower.context.constant(0)
@@ -95,5 +97,7 @@ def _solutions(
 def _occurs_inside(field: Field, index: int, p: Any) -> bool:
     """Whether a root or a function in ``p`` holds the generator."""
     generators = [field.tower.generators[i] for i in used(p)]
-    inner = [part for g in generators for argument in g.arguments for part in (argument.numerator, argument.denominator)]
+    inner = [
+        part for g in generators for argument in g.arguments for part in (argument.numerator, argument.denominator)
+    ]
     return any(index in used(part) or _occurs_inside(field, index, part) for part in inner)

@@ -29,9 +29,9 @@ _MAX_PARTED = 40
 _MAX_DEGREE = 24
 # atoms and products of a combination, their degree, and linear programs a tower
 _MAX_ATOMS = 10
-_MAX_PRODUCTS = 200
+_MAX_PRODUCTS = 150
 _MAX_DEGREE_OF_PRODUCTS = 4
-_PROGRAMS = 60
+_PROGRAMS = 30
 
 
 class Signs:
@@ -404,7 +404,10 @@ class Signs:
 
     def _by_products_of_facts(self, p: Any) -> Sign:
         """p or −p = Σ c q with c ≥ 0, each q a product of what is known to be ≥ 0."""
-        if not (self._facts or self._forms) or self._programs <= 0 or self._depth > 2:
+        still = all(
+            g.constant and g.kind in ("symbol", "root") for g in map(self._tower.generators.__getitem__, used(p))
+        )
+        if not (self._facts or self._forms) or not still or self._programs <= 0 or self._depth > 2:
             return UNKNOWN
         p = self._tower.reduce(self._without_forms(p))
         degree = max((sum(map(int, monomial)) for monomial in p.to_dict()), default=0)

@@ -310,7 +310,9 @@ class Transcendental:
             if name in ("asin", "atan"):
                 sign = self._tower.sign(arguments[0])
             elif name == "acos":
-                below = self._tower.sum((self._tower.number(1), self._tower.product((self._tower.number(-1), *arguments))))
+                below = self._tower.sum(
+                    (self._tower.number(1), self._tower.product((self._tower.number(-1), *arguments)))
+                )
                 sign = Sign(1, self._tower.sign(below).strict)
             index = self._new(name, meaning, arguments, sign)
             if name == "atan":

@@ -154,7 +154,9 @@ class UserIntegral(FileClaim):
         return [], tuple(name for name, rows in found.items() if verdict_of(rows) == "holds")
 
 
-def _is_constant(rate: sympy.Expr, assumptions: Assumptions, samples: Sequence[Place]) -> bool:
+def _is_constant(
+    rate: sympy.Expr, assumptions: Assumptions, samples: Sequence[Mapping[sympy.Symbol, Fraction]]
+) -> bool:
     """Whether a rate is proven to be 0 by an algebra that divides by nothing that may be 0."""
     try:
         # what is not 0 at a sample need not be taken into the algebra
