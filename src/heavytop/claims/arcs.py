@@ -170,10 +170,9 @@ class Arcs:
 
     def _is_small_somewhere(self, weights: dict[int, int], angle: Fraction) -> bool:
         """|Σ weight · arc − angle · π| < π: of numbers, or at a place where it is continuous on a connected domain."""
-        region = self._region
-        if not weights.keys() <= region.field.tower.signs.numbers.keys() and (
-            not region.is_connected(set(weights))
-            or region.regularity.obstacle_of_generators(set(weights), analytic=False)
+        region, arcs = self._region, set(weights)
+        if not arcs <= region.field.tower.signs.numbers.keys() and (
+            not region.is_connected(arcs) or region.regularity.obstacle_of_generators(arcs, analytic=False)
         ):
             return False
         values = {arc: self._values(arc)[0] for arc in weights}

@@ -70,7 +70,7 @@ def _plain_root(tower: Tower, p: Any, *, any_sign: bool = False) -> Quotient | N
     constant, factors = tower.signs.factors(p)
     result = tower.one
     for factor, power in factors:
-        sign = 1 if any_sign and power % 4 == 2 else tower.signs.of(factor).value
+        sign = 1 if _needs_no_sign(power, any_sign) else tower.signs.of(factor).value
         if power % 2:
             constant = constant * sign
             known = tower.known_root(factor * sign) if sign else None
@@ -83,11 +83,16 @@ def _plain_root(tower: Tower, p: Any, *, any_sign: bool = False) -> Quotient | N
         return None
     root = tower.root_of_number(constant)
     for factor, power in factors:
-        sign = 1 if any_sign and power % 4 == 2 else tower.signs.of(factor).value
+        sign = 1 if _needs_no_sign(power, any_sign) else tower.signs.of(factor).value
         result = tower.times(result, tower.raised(factor * sign, int(power) // 2))
         if power % 2:
             result = tower.times(result, tower.gens[tower.root_of(factor * sign)])
     return tower.product((tower.polynomial(result), root))
+
+
+def _needs_no_sign(power: Any, any_sign: bool) -> bool:
+    """An even power of a factor comes out of the root, as does any where the sign of the root may be either."""
+    return bool(power % 4 == 0 or (any_sign and power % 2 == 0))
 
 
 def _through_conjugate(tower: Tower, p: Any) -> Quotient | None:
