@@ -101,6 +101,10 @@ class Tower:
         """q of a root R² = q; None for a free generator."""
         return self._radicands.get(index)
 
+    def radicands(self) -> list[tuple[int, Any]]:
+        """(R, q) of every root R² = q."""
+        return list(self._radicands.items())
+
     def relations(self) -> list[Any]:
         """R² − q for every root R = √q."""
         return [self.gens[index] ** 2 - square for index, square in self._radicands.items()]

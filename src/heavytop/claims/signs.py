@@ -179,6 +179,7 @@ class Signs:
             yield from (self._by_roots_of_one_variable, self._by_generators, self._by_half_angle)
             yield self._by_difference_from_facts
             yield self._by_products_of_facts
+            yield self._by_squares
 
     # --- rules ------------------------------------------------------------------------------------------------------
 
@@ -398,6 +399,14 @@ class Signs:
                     found = sum_of((self.of(quotient).times(fact_sign), self.of(rest)))
                     if found.value:
                         return found
+        return UNKNOWN
+
+    def _by_squares(self, p: Any) -> Sign:
+        """With a generator g written as R², where there is a root R of g."""
+        for root, square in self._tower.radicands():
+            (index, *others) = used(square) or {-1}
+            if not others and index in used(p) and square == self._tower.gens[index]:
+                return self.of(self.substituted(p, index, self._tower.gens[root] ** 2))
         return UNKNOWN
 
     # --- combinations of products -----------------------------------------------------------------------------------
