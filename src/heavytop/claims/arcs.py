@@ -189,12 +189,15 @@ def _pi() -> arb:
 def _integer_relation(values: Sequence[Sequence[arb]]) -> list[int] | None:
     """Small integers with which the values add up to 0, in each of their components, as far as can be seen."""
     with working_precision(NUMBER_BITS):
-        scaled = [[int((value.mid() * 2**_BITS).floor().unique_fmpz()) for value in row] for row in values]
+        found = [[(value.mid() * 2**_BITS).floor().unique_fmpz() for value in row] for row in values]
+    if any(value is None for row in found for value in row):  # not finite, or too large to be told
+        return None
+    scaled = [[int(value) for value in row] for row in found]
     count = len(values)
     rows = [[int(i == j) for j in range(count)] + row for i, row in enumerate(scaled)]
-    for found in fmpz_mat(rows).lll().tolist():
-        factors = [int(value) for value in found[:count]]
-        if any(factors) and max(map(abs, factors)) <= _LARGEST and all(abs(int(v)) < 2**16 for v in found[count:]):
+    for short in fmpz_mat(rows).lll().tolist():
+        factors = [int(value) for value in short[:count]]
+        if any(factors) and max(map(abs, factors)) <= _LARGEST and all(abs(int(v)) < 2**16 for v in short[count:]):
             return factors
     return None
 
