@@ -66,7 +66,7 @@ class Prover:
             f = statement.formulas
             expressions |= dict.fromkeys((*f.values, *f.attitude))
             expressions |= dict.fromkeys(need.expression for need in _sorted(f.needs | f.angle_needs))
-            kept |= {need.expression for need in f.needs if _is_kept(need, statement)}
+            kept |= {e for e in (*f.values, *(need.expression for need in f.needs)) if _is_kept(e, statement)}
         for chosen in (expressions, [e for e in expressions if e not in kept]):
             try:
                 return Field(assumptions, chosen)
@@ -170,10 +170,12 @@ class Prover:
         inner = self._region(statement, domain.sign, strict=True) if ends else whole
         if whole is None or inner is None:
             return [Condition(_ALGEBRA, False, "the formulas are too large, or hold what it does not know")]
-        against = whole.obstacle(f.values), inner.obstacle(f.attitude)
+        # a function of first integrals alone is as constant as they are, continuous or not
+        moving = [value for value in f.values if not _is_kept(value, statement)]
+        against = whole.obstacle(moving), inner.obstacle(f.attitude)
         continuous = bool(f.values) and not any(against)
         found = {
-            need: whole.discharge(need) or (KEPT if _is_kept(need, statement) else "")
+            need: whole.discharge(need) or (KEPT if _is_kept(need.expression, statement) else "")
             for need in _sorted(f.needs | f.angle_needs)
         }
         for need, how in found.items():
@@ -197,8 +199,8 @@ class Prover:
             yield Condition(f"{text} = 0 is kept by the flow", kept, reason)
 
 
-def _is_kept(need: Need, statement: Statement) -> bool:
-    return statement.flow is not None and statement.flow.keeps(need.expression)
+def _is_kept(expression: sympy.Expr, statement: Statement) -> bool:
+    return statement.flow is not None and statement.flow.keeps(expression)
 
 
 def shortest(formula: sympy.Expr, setting: Setting, domain: Domain) -> sympy.Expr:

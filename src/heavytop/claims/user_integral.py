@@ -106,8 +106,7 @@ class UserIntegral(FileClaim):
         flow = Flow(rate, constants.union(STATE), self._kept(rate), self.kind == "relation", always, constants)
         # a condition in simpler words is the same set
         where = tuple(part for formula in self.where for part in conditions_for_zero(formula.expression))
-        # a function of first integrals alone is as constant as they are, continuous or not
-        values = tuple(part for part in (*self._parts(value), *where) if not flow.keeps(part))
+        values = (*self._parts(value), *where)
         domain = replace(ALL, points=(Fraction(0),))
         formulas = Formulas(values, named, sampled=needs)
         return [
