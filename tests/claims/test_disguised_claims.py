@@ -279,6 +279,21 @@ def test_a_relation_of_hess_needs_no_sign_of_its_centre():
     assert audit_claim(claim_from_table(wrong, "x"), HEAVY_TOP).verdict != "holds"
 
 
+@pytest.mark.parametrize(("divisor", "holds"), [("a - b", True), ("a - 2*b", False), ("2 - a", False)])
+def test_a_constant_of_parameters_is_no_gap_that_can_be_removed(divisor, holds):
+    """What is 0 at some parameters is 0 there all along every motion."""
+    energy = "(3*Omega1^2 + 2*Omega2^2 + Omega3^2)"
+    given = {"parameters": {"a": "5", "b": "4"}, "assume": ["a > b", "b > 0"]}
+    table = {
+        "name": "x",
+        "kind": "integral",
+        "top": {"inertia": ["3", "2", "1"], "weight": "0", "centre": ["0", "1", "0"]},
+        "integral": {"value": f"{energy}/({divisor})*Omega1/Omega1"},
+        **given,
+    }
+    assert (audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == "holds") is holds
+
+
 # --- definitions ----------------------------------------------------------------------------------------------------
 
 

@@ -173,7 +173,7 @@ class Prover:
         # a function of first integrals alone is as constant as they are, continuous or not
         moving = [value for value in f.values if not _is_kept(value, statement)]
         against = whole.obstacle(moving), inner.obstacle(f.attitude)
-        continuous = bool(f.values) and not any(against)
+        continuous = bool(f.values) and not any(against) and not whole.obstacle(f.values)
         found = {
             need: whole.discharge(need) or (KEPT if _is_kept(need.expression, statement) else "")
             for need in _sorted(f.needs | f.angle_needs)
