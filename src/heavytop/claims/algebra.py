@@ -7,13 +7,14 @@ are taken on the expression before.  Reduction to 0 is a proof; anything else pr
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import sympy
 
+from heavytop.claims.defined import Defined
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.ideal import forces_zero
 from heavytop.claims.rational import Quotient, Tower
@@ -27,13 +28,27 @@ _INVERSE = ("asin", "acos", "atan", "atan2")
 
 
 @dataclass(frozen=True, slots=True)
+class Solution:
+    """A relation between parameters, solved: symbol = value holds at exactly the points where ``relation`` is 0.
+
+    radicand: where the value is a root ±√radicand, what is under it; it is > 0.
+    """
+
+    symbol: sympy.Symbol
+    value: sympy.Expr
+    relation: sympy.Expr
+    radicand: sympy.Expr | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Assumptions:
     """What is known of the symbols.
 
     positive: symbols > 0.  greater: pairs (symbol, expression) with symbol > expression.
     variable: the symbol that moves.  variable_sign: its sign on the domain, 0 for both; strict: it is not 0 there.
     relations: expressions that are 0.  facts: expressions that are > 0.  nonzero: symbols that are not 0.
-    ranges: closed intervals of symbols.  weak: expressions that are >= 0.
+    ranges: closed intervals of symbols.  weak: expressions that are >= 0.  solved: symbols that are put in through
+    others, in this order.  parameters: symbols that are constant along every motion.
     """
 
     variable: sympy.Symbol
@@ -46,6 +61,17 @@ class Assumptions:
     nonzero: tuple[sympy.Symbol, ...] = ()
     ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...] = ()
     weak: tuple[sympy.Expr, ...] = ()
+    solved: tuple[Solution, ...] = ()
+    parameters: frozenset[sympy.Symbol] = frozenset()
+
+    def bounds(self) -> list[sympy.Expr]:
+        """Expressions that are > 0 or >= 0, in the symbols that are not solved."""
+        solved = {solution.symbol for solution in self.solved}
+        greater = [symbol - bound for symbol, bound in self.greater]
+        found = [*self.facts, *self.weak, *greater, *solved.intersection(self.positive)]
+        for solution in self.solved:
+            found = [bound.xreplace({solution.symbol: solution.value}) for bound in found]
+        return found
 
 
 class Field:
@@ -73,34 +99,53 @@ class Field:
         self._expressions: dict[int, sympy.Expr] = {}
         self._transcendental = Transcendental(self, self._divisors)
         a = self.assumptions
+        solved = {solution.symbol for solution in a.solved}
         for symbol in a.positive:
-            if symbol != a.variable:
+            if symbol != a.variable and symbol not in solved:
                 self._add(symbol, sign=Sign(1, True))
         if a.variable not in self._known:
             self._add(a.variable, constant=False, sign=Sign(a.variable_sign, a.strict))
         for symbol in a.nonzero:
-            self._add(symbol, sign=Sign(0, True))
+            if symbol not in solved:
+                self._add(symbol, sign=Sign(0, True))
         for symbol, ends in a.ranges:
-            self.tower.signs.ranges[_index(self.enter(symbol))] = ends
+            if symbol not in solved:
+                self.tower.signs.ranges[_index(self.enter(symbol))] = ends
+        facts = [(fact, True) for fact in (*a.facts, *(symbol for symbol in a.positive if symbol in solved))]
         for symbol, bound in a.greater:
-            self._declare_greater(symbol, bound)
-        for strict, facts in ((True, a.facts), (False, a.weak)):
-            for fact in facts:
-                value = self.enter(fact)
-                below = self.tower.signs.of(value.denominator)
-                self.tower.signs.declare(value.numerator, Sign(below.value, strict))
+            if solved & {symbol, *bound.free_symbols}:
+                facts.append((symbol - bound, True))
+            else:
+                self._declare_greater(symbol, bound)
+        facts += [(fact, False) for fact in a.weak]
+        for fact, strict in facts:
+            if not fact.free_symbols & solved:
+                self._declare(fact, strict=strict)
+        # the last solution holds none of the symbols that are solved before it
+        for solution in reversed(a.solved):
+            if solution.radicand is not None:
+                self._declare(solution.radicand)
+            self._known[solution.symbol] = self.enter(solution.value)
+        for fact, strict in facts:
+            if fact.free_symbols & solved:
+                self._declare(fact, strict=strict)
+
+    def _declare(self, fact: sympy.Expr, *, strict: bool = True) -> None:
+        """fact > 0, or >= 0 where it is not strict."""
+        value = self.enter(fact)
+        below = self.tower.signs.of(value.denominator)
+        above = value.numerator if below.value else self.tower.times(value.numerator, value.denominator)
+        self.tower.signs.declare(above, Sign(below.value or 1, strict))
 
     def _declare_greater(self, symbol: sympy.Symbol, bound: sympy.Expr) -> None:
         """symbol = bound + excess."""
         floor = self.enter(bound)
         index = _index(self.enter(symbol))
-        if floor.denominator == self.tower.one and not self.tower.signs.has_form(index):
+        if floor.denominator == self.tower.one and self.tower.signs.can_have_form(index, floor.numerator):
             excess = self.tower.add(f"{symbol} - ({bound})", constant=True, sign=1, strict=True)
             self.tower.signs.declare_form(index, floor.numerator + self.tower.gens[excess])
         else:
-            value = self.enter(symbol - bound)
-            below = self.tower.signs.of(value.denominator)
-            self.tower.signs.declare(value.numerator, Sign(below.value, True))
+            self._declare(symbol - bound)
 
     def _add(self, meaning: sympy.Expr, *, constant: bool = True, sign: Sign, kind: str = "symbol") -> int:
         index = self.tower.add(meaning, constant=constant, sign=sign.value, strict=sign.strict, kind=kind)
@@ -134,25 +179,68 @@ class Field:
         except Unprovable:
             return False
 
-    def is_forced(self, expression: sympy.Expr, *, radical: bool) -> bool:
+    def is_forced(self, expression: sympy.Expr, *, radical: bool, simpler: Callable[[Any], Any] = lambda p: p) -> bool:
         """The relations of the claim force it to be 0: it is their combination with factors of this field.
 
         radical: a power of it is, which proves as much at each point, but not that the flow keeps a relation.
+        simpler: the same polynomial where more is known of its generators.
         """
         try:
-            numerator = self.enter(expression).numerator
+            numerator = simpler(self.enter(expression).numerator)
             relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
-            for symbol in self.assumptions.positive:
-                numerator = self.tower.times(numerator, self.enter(symbol).numerator)
         except Unprovable:
             return False
-        return bool(relations) and forces_zero([*relations, *self.tower.relations()], numerator, radical=radical)
+        return self._forces(relations, numerator, radical=radical)
 
     def never_zero_on_relations(self, p: Any) -> bool:
         """True only where the relations of the claim and p = 0 exclude each other."""
         relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
-        one = self.tower.one
-        return bool(relations) and forces_zero([*relations, *self.tower.relations(), p], one, radical=False)
+        return bool(relations) and self._forces([*relations, p], self.tower.one, radical=False)
+
+    def _forces(self, relations: list[Any], p: Any, *, radical: bool) -> bool:
+        """Also where a factor that is never 0 has to be divided out of the ideal."""
+        if not relations:
+            return False
+        roots = self.tower.relations()
+        if forces_zero([*relations, *roots], p, radical=radical):
+            return True
+        # what stays positive along a motion may be 0 on another
+        never_zero = [q for q in self.tower.signs.never_zero(relations) if self._is_constant_by_name(q)]
+        if never_zero and forces_zero([*relations, *roots], p, radical=radical, never_zero=never_zero):
+            return True
+        # a parameter is 0 or it is not
+        return any(
+            forces_zero([*relations, *roots], p, radical=radical, never_zero=[*never_zero, self.tower.gens[index]])
+            and forces_zero([*self._where_zero(relations, index), *roots], p, radical=radical, never_zero=never_zero)
+            for index in self._open_parameters(relations)
+        )
+
+    def _is_constant_by_name(self, p: Any) -> bool:
+        symbols = set().union(*(self.meaning(index).free_symbols for index in used(p)))
+        return symbols <= self.assumptions.parameters.union(self.assumptions.positive)
+
+    def _is_of_parameters(self, p: Any) -> bool:
+        generators = self.tower.generators
+        names = self.assumptions.parameters
+        return all(generators[i].kind == "symbol" and generators[i].meaning in names for i in used(p))
+
+    def _open_parameters(self, relations: list[Any]) -> list[int]:
+        """Parameters that may be 0, in the relations between parameters."""
+        indices = set().union(*(used(relation) for relation in relations if self._is_of_parameters(relation)))
+        return [index for index in sorted(indices) if not self.tower.generators[index].strict]
+
+    def _where_zero(self, relations: list[Any], index: int) -> list[Any]:
+        """The relations where a parameter is 0; those between parameters without powers and what is never 0."""
+        signs, zero = self.tower.signs, self.tower.context.constant(0)
+        found = [self.tower.gens[index]]
+        for relation in relations:
+            if self._is_of_parameters(relation):
+                product = self.tower.one
+                for factor, _ in self.tower.by_power(relation, index).get(0, zero).factor()[1]:
+                    product = product if signs.of(factor).strict else product * factor
+                relation = product if self.tower.by_power(relation, index).get(0, zero) else zero
+            found.append(relation)
+        return [relation for relation in found if relation]
 
     def vanishes_on(self, expression: sympy.Expr, zero: sympy.Expr) -> bool:
         """True only where the expression is a multiple of the polynomial ``zero``, off the divisors of the tower."""
@@ -162,12 +250,12 @@ class Field:
             return False
 
     def relations_exclude_each_other(self) -> bool:
-        """True only where no real or complex point lies on all relations."""
+        """True only where no point lies on all relations."""
         try:
             relations = [self.enter(relation).numerator for relation in self.assumptions.relations]
         except Unprovable:
             return False
-        return bool(relations) and forces_zero([*relations, *self.tower.relations()], self.tower.one, radical=False)
+        return self._forces(relations, self.tower.one, radical=False)
 
     def is_constant(self, value: Quotient) -> bool:
         """True where only generators that are constant in time are left."""
@@ -182,7 +270,10 @@ class Field:
         if e is sympy.pi:
             index = self._add(e, sign=Sign(1, True), kind="number")
             tower.signs.numbers[index] = evaluate(e, {}, NUMBER_BITS)
+            tower.signs.pi = index
             return self._known[e]
+        if isinstance(e, Defined):
+            return self._definition(e)
         if e.is_Symbol:
             self._add(e, sign=UNKNOWN)
             return self._known[e]
@@ -195,6 +286,14 @@ class Field:
         if e.is_Pow:
             return self._power(e)
         return self._function(type(e).__name__, [self.enter(part) for part in e.args])
+
+    def _definition(self, e: Defined) -> Quotient:
+        """What it stands for; where that is too large, a free generator: what holds for any value holds for it."""
+        try:
+            return self.enter(e.meaning)
+        except Unprovable:
+            self._add(e, constant=self.assumptions.variable not in e.free_symbols, sign=UNKNOWN, kind="defined")
+            return self._known[e]
 
     def _function(self, name: str, arguments: list[Quotient]) -> Quotient:
         tower, first = self.tower, arguments[0]

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 
 import sympy
 
+from heavytop.claims.conditions import Kind, Need
 from heavytop.errors import InputError
 
 Bound = tuple[sympy.Expr, sympy.Expr]
@@ -21,36 +23,50 @@ class Assumed:
     greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...]
     facts: tuple[sympy.Expr, ...]
     ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...]
+    weak: tuple[sympy.Expr, ...]
 
 
-def comparison(text: str) -> tuple[str, str]:
-    """(left, right) of ``left > right`` or ``right < left``; raises InputError for anything else."""
+def comparisons(text: str) -> list[tuple[str, str]]:
+    """(larger, smaller) of ``formula > formula``, and of each link of a chain such as ``0 < k < 1``.
+
+    Raises InputError for anything else.
+    """
     sign = ">" if ">" in text else "<"
-    left, found, right = (part.strip() for part in text.partition(sign))
-    if not found or not left or not right or {"<", ">", "="} & set(left + right):
+    parts = [part.strip() for part in text.split(sign)]
+    if len(parts) < 2 or not all(parts) or {"<", ">", "="} & set("".join(parts)):
         raise InputError(f"assume: {text[:60]!r} is not understood.", "Write: formula > formula.")
-    return (left, right) if sign == ">" else (right, left)
+    links = list(pairwise(parts))
+    return links if sign == ">" else [(right, left) for left, right in links]
 
 
-def assume(bounds: Sequence[Bound], moments: Iterable[sympy.Expr], symbols: Iterable[sympy.Symbol]) -> Assumed:
-    """What follows from left > right of each bound, and from positive principal moments."""
+def assume(
+    bounds: Sequence[Bound], needs: Iterable[Need], moments: Iterable[sympy.Expr], symbols: Iterable[sympy.Symbol]
+) -> Assumed:
+    """What follows from left > right of each bound, from what these need to be real, and from positive moments."""
     symbols = list(symbols)
     positive = tuple(symbol for symbol in symbols if symbol.is_positive)
     greater: list[tuple[sympy.Symbol, sympy.Expr]] = []
     facts: list[sympy.Expr] = []
-    formed: set[sympy.Symbol] = set()
+    below: dict[sympy.Symbol, set[sympy.Symbol]] = {}
     for left, right in bounds:
         if left in positive and right == 0:
             continue
-        # one bound below becomes a form of the symbol; it may not go round in a circle
-        free = left in symbols and left not in formed and not right.free_symbols & formed
-        if free and not any(left in other.free_symbols for _, other in greater) and left not in right.free_symbols:
+        # one bound below becomes a form of the symbol; forms may not go round in a circle
+        reached = set(right.free_symbols).union(*(below.get(symbol, set()) for symbol in right.free_symbols))
+        if left in symbols and left not in below and left not in reached:
             greater.append((left, right))
-            formed.add(left)
+            below[left] = reached
+            for others in below.values():
+                if left in others:
+                    others |= reached
         else:
             facts.append(left - right)
     facts += [moment for moment in moments if not moment.is_positive]
-    return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges(bounds)))
+    asked = sorted(needs, key=lambda need: need.text)
+    facts += [need.expression for need in asked if need.kind is Kind.POSITIVE]
+    facts += [need.expression**2 for need in asked if need.kind is Kind.NONZERO]
+    weak = tuple(need.expression for need in asked if need.kind is Kind.NONNEGATIVE)
+    return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges(bounds)), weak)
 
 
 def _ranges(bounds: Sequence[Bound]) -> Iterable[tuple[sympy.Symbol, tuple[Fraction, Fraction]]]:

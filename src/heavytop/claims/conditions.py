@@ -11,6 +11,7 @@ from typing import Any
 import sympy
 from flint import arb
 
+from heavytop.claims.defined import at_values
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.sign import Sign, Unprovable
 
@@ -124,7 +125,7 @@ def is_exactly_zero(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fracti
         return None
     exact = {symbol: sympy.Rational(value.numerator, value.denominator) for symbol, value in values.items()}
     try:
-        value = expression.subs(exact, simultaneous=True) if expression.free_symbols else expression
+        value = at_values(expression, exact)
     except ValueError:
         # sympy cannot take the root of some numbers of hundreds of digits
         return None

@@ -10,13 +10,14 @@ from typing import ClassVar
 import sympy
 from flint import arb
 
-from heavytop.claims.assume import Assumed, assume, comparison
+from heavytop.claims.assume import Assumed, assume, comparisons
 from heavytop.claims.conditions import Kind, Need, condition, is_exactly_zero
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
 from heavytop.claims.from_file import ClaimFile, sample_rows
 from heavytop.claims.real_zeros import conditions_for_zero
+from heavytop.claims.relations import solve_relations
 from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import Setting
 from heavytop.claims.statements import SYSTEMS
@@ -75,7 +76,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     for name in (*content.parameters, *content.definitions):
         if name in _RESERVED or (name in content.parameters and name in content.definitions):
             raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(_RESERVED))}.")
-    above = [comparison(text) for text in content.assume]
+    above = [link for text in content.assume for link in comparisons(text)]
     # the principal moments of a top are positive, said or not
     positive = {left for left, right in above if right == "0"} | {text.strip() for text in content.top.inertia}
     symbols = {
@@ -86,9 +87,8 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     names |= {"pi": symbol(sympy.pi), **{str(variable): symbol(variable) for variable in variables}}
     for name, text in content.definitions.items():
         names[name] = parse(text, names, f"definition of {name}")
-    bounds = [
-        (parse(left, names, "assume").expression, parse(right, names, "assume").expression) for left, right in above
-    ]
+    sides = [(parse(left, names, "assume"), parse(right, names, "assume")) for left, right in above]
+    bounds = [(left.expression, right.expression) for left, right in sides]
     top = content.top
     moments = three(top.inertia, names, "top.inertia")
     arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
@@ -103,7 +103,7 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     context = Context(
         names,
         symbols,
-        assume(bounds, inertia, symbols.values()),
+        assume(bounds, needs_of(side for link in sides for side in link), inertia, symbols.values()),
         tuple(
             {symbols[name]: sample_number(value, name) for name, value in row.items()}
             for row in sample_rows(content.parameters)
@@ -178,17 +178,21 @@ def setting_of(context: Context, variable: sympy.Symbol) -> Setting:
     """The setting of a claim in this context."""
     a = context.assumed
     relations = tuple(part for relation in context.relations for part in conditions_for_zero(relation))
-    bodies = _body_needs(context.top.inertia)
-    return Setting(
+    parameters = frozenset(context.symbols.values())
+    setting = Setting(
         variable,
         a.positive,
         context.samples,
         a.greater,
         relations=relations,
         facts=a.facts,
+        weak=a.weak,
         ranges=a.ranges,
-        bodies=bodies,
+        parameters=parameters,
+        bodies=_body_needs(context.top.inertia),
     )
+    known = replace(setting.assumptions(0), relations=())
+    return replace(setting, solutions=solve_relations(relations, known, parameters))
 
 
 def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:

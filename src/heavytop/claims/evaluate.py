@@ -9,6 +9,7 @@ from typing import Any
 import sympy
 from flint import arb
 
+from heavytop.claims.defined import Defined
 from heavytop.claims.sign import Unprovable
 from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.flint_context import whole_evaluation
@@ -50,6 +51,8 @@ def evaluate(expression: sympy.Expr, values: Mapping[sympy.Symbol, Fraction], bi
     def compute(e: sympy.Expr) -> Any:
         if e.is_Rational:
             return ball(Fraction(int(e.p), int(e.q)))
+        if isinstance(e, Defined):
+            return visit(e.meaning)
         if e.is_Symbol:
             return ball(values[e])
         if e is sympy.pi:

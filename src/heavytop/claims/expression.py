@@ -12,13 +12,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import comb
 from typing import NamedTuple
 
 import sympy
 
 from heavytop.claims.conditions import Need, condition
+from heavytop.claims.defined import Defined
 from heavytop.errors import InputError
 from heavytop.precision import exact
 
@@ -58,11 +60,30 @@ def symbol(expression: sympy.Expr) -> Formula:
     return Formula(expression, Size(1, 0, 1, 1))
 
 
+class TooLarge(InputError):
+    """A formula that grows beyond the bounds on its size."""
+
+
 def parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
     """The formula that ``text`` says in ``names``; ``where`` says in error texts which formula it is.
 
+    Definitions are put in; where the formula grows too large by that, they are kept as names with a meaning.
     Raises InputError for anything else than the grammar above, and beyond the bounds on its size.
     """
+    try:
+        return _parse(text, names, where)
+    except TooLarge:
+        kept = {name: _kept(name, formula) if formula.size.nodes > 1 else formula for name, formula in names.items()}
+        return _parse(text, kept, where)
+
+
+@lru_cache(maxsize=1_000)
+def _kept(name: str, formula: Formula) -> Formula:
+    """A definition as a name, always the same one for the same formula."""
+    return replace(symbol(Defined(name, formula.expression)), needs=formula.needs)
+
+
+def _parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
     if len(text) > _MAX_LENGTH:
         raise InputError(f"{where}: {len(text)} characters.", f"A formula has at most {_MAX_LENGTH}.")
     parser = _Parser(_tokens(text, where), names, where)
@@ -235,7 +256,9 @@ class _Parser:
         limits = Size(_MAX_NODES, _MAX_BITS, _MAX_DEGREE, _MAX_TERMS)
         for what, value, limit in zip(Size._fields, size, limits, strict=True):
             if value > limit:
-                raise self._error(f"the formula grows beyond {limit} {what}")
+                raise TooLarge(
+                    f"{self._where}: the formula grows beyond {limit} {what}.", "Name parts of it in [definitions]."
+                )
 
 
 def _added(a: Size, b: Size) -> Size:

@@ -139,12 +139,22 @@ def judge(
 ) -> tuple[Row, ...]:
     """The verdict on each statement, in their order.  progress: hears after each how many are done, of how many."""
     statements = [s if s.formulas != Formulas() else _bare(s) for s in statements]
-    prover = Prover(statements, setting)
+    prover, solved = Prover(statements, setting), setting.with_solutions()
+    second = Prover(statements, solved) if setting.solutions else None
     rows = []
     for statement in statements:
-        rows.append(_judge_one(statement, setting, prover))
+        row = _judge_one(statement, setting, prover)
+        if row.holds is None and second is not None:
+            # with a relation solved for a parameter more is seen, if not always
+            with_solutions = _judge_one(statement, solved, second)
+            row = min(row, with_solutions, key=_what_is_open)
+        rows.append(row)
         progress(len(rows), len(statements))
     return tuple(rows)
+
+
+def _what_is_open(row: Row) -> tuple[bool, int]:
+    return row.holds is None, sum(not condition.discharged for condition in row.conditions)
 
 
 def _bare(statement: Statement) -> Statement:
@@ -159,6 +169,11 @@ def _judge_one(statement: Statement, setting: Setting, prover: Prover) -> Row:
         found = prover.field(statement, statement.domain.sign, strict=bool(statement.domain.sign))
         closed = None if found is None else _closed_form(statement, setting, found)
         return _row(statement, False, closed or f"{witness['value']} at the witness", conditions, witness)
+    for text, rate in statement.flow.kept if statement.flow is not None else ():
+        left = next(_witnesses(replace(statement, residual=rate), setting, prover), None)
+        if left is not None:
+            residual = f"the flow leaves {text} = 0, at the rate {left['value']} at the witness"
+            return _row(statement, False, residual, conditions, left)
     if proven and all(condition.discharged for condition in conditions):
         return _row(statement, True, "0", conditions)
     residual = "0 where the conditions are met" if proven else _bound(statement, prover)

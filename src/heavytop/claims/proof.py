@@ -15,10 +15,11 @@ import sympy
 from flint import arb
 
 from heavytop.claims.algebra import Field
+from heavytop.claims.arcs import Arcs
 from heavytop.claims.conditions import Kind, Need
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.rational import Quotient
-from heavytop.claims.real_zeros import on_conditions
+from heavytop.claims.real_zeros import is_small_polynomial, on_conditions
 from heavytop.claims.regularity import Regularity
 from heavytop.claims.sign import NUMBER_BITS, Unprovable, used
 from heavytop.claims.statement import Flow, Place, Setting, Statement
@@ -26,6 +27,7 @@ from heavytop.claims.structure import sign_of
 from heavytop.exact.balls import working_precision
 
 _EVERYWHERE = "proven all over the domain"
+KEPT = "kept by the flow: where it is so at first, it stays so"
 # rational, with |γ| = 1, on no surface of low degree with small coefficients
 _SOME_STATE = {
     **dict(zip(("Omega1", "Omega2", "Omega3"), (Fraction(17, 13), Fraction(-29, 31), Fraction(37, 23)), strict=True)),
@@ -50,18 +52,32 @@ class Region:
         self._statement = statement
         self._setting = setting
         self._flow = statement.flow
-        self._places = [place for place in places if self._holds(place)]
+        self.places = [place for place in places if self._holds(place)]
         self._thin: dict[str, bool] = {}
         self._kept: dict[str, bool] = {}
         self._divisors: dict[tuple[bool, str], bool] = {}
         self._needs = statement.formulas.needs
         self.regularity = Regularity(field, self.is_nowhere_zero)
-        self._everywhere = Regularity(field) if statement.flow is not None else self.regularity
+        # what is not 0 where the flow keeps it so may part the domain
+        self.everywhere = Regularity(field) if statement.flow is not None else self.regularity
+        self._arcs = Arcs(self)
 
     def _holds(self, place: Place) -> bool:
         a = self.field.assumptions
         value = place[a.variable] * a.variable_sign
         return value > 0 or (value == 0 and not (a.strict and a.variable_sign))
+
+    def vanishes(self, expression: sympy.Expr) -> bool:
+        """0 by the algebra, and by what inverse functions add up to."""
+        try:
+            p = self.field.enter(expression).numerator
+            return not p or not self._arcs.without(p)
+        except Unprovable:
+            return False
+
+    def is_forced(self, expression: sympy.Expr, *, radical: bool) -> bool:
+        """0 by the relations of the claim, as in :meth:`~heavytop.claims.algebra.Field.is_forced`."""
+        return self.field.is_forced(expression, radical=radical, simpler=self._arcs.without)
 
     def is_nowhere_zero(self, p: Any) -> bool:
         """0 nowhere on the region (of a first integral: nowhere on the part that the flow keeps)."""
@@ -93,7 +109,7 @@ class Region:
         regularity = Regularity(field)
         if regularity.obstacle(cofactor) or regularity.obstacle(value):
             return False
-        own = Region(field, self._setting, self._statement, self._places)
+        own = Region(field, self._setting, self._statement, self.places)
         return all(own.is_zero_nowhere_dense(divisor) for divisor in divisors)
 
     def leaves(self, rate: sympy.Expr) -> str:
@@ -105,9 +121,9 @@ class Region:
             field = Field(self.field.assumptions, [rate, *self.field.assumptions.relations])
         except Unprovable as error:
             return error.cause
-        if not field.vanishes(rate) and not field.is_forced(rate, radical=False):
+        own = Region(field, self._setting, self._statement, self.places)
+        if not own.vanishes(rate) and not own.is_forced(rate, radical=False):
             return "its rate is not shown to be 0 there"
-        own = Region(field, self._setting, self._statement, self._places)
         divisor = next(own.divisors(forced=True), "")
         return divisor and f"its rate is divided by {divisor}, which may be 0 there"
 
@@ -140,17 +156,25 @@ class Region:
             return True
         if all(tower.generators[i].kind == "symbol" for i in used(p)):
             return self._flow is None or self._is_nonzero_at_some_state(p, self._flow)
-        # what is not 0 where the flow keeps it so may part the domain
-        if not self._is_connected() or self._everywhere.obstacle_of_generators(used(p), analytic=True):
+        if not self.is_connected(used(p)) or self.everywhere.obstacle_of_generators(used(p), analytic=True):
             return False
-        return any(self._is_nonzero_at(p, place) for place in self._places)
+        return any(self._is_nonzero_at(p, place) for place in self.places)
 
-    def _is_connected(self) -> bool:
-        """Linear inequalities bound a convex domain."""
+    def is_connected(self, indices: set[int]) -> bool:
+        """Linear inequalities bound a convex domain of the symbols in these generators, and of those bound to them."""
         a = self.field.assumptions
-        bounds = [*a.facts, *a.weak, *(symbol - bound for symbol, bound in a.greater)]
-        return not a.nonzero and all(
-            bound.is_polynomial() and sympy.Poly(bound).total_degree() <= 1 for bound in bounds if bound.free_symbols
+        bounds = [bound for bound in a.bounds() if bound.free_symbols]
+        zeros = [relation for relation in a.relations if relation not in self._always]
+        near = set().union(*(self.field.meaning(index).free_symbols for index in indices))
+        bound_together = [e.free_symbols for e in (*bounds, *zeros, *self._always)]
+        while more := set().union(*(symbols for symbols in bound_together if symbols & near)) - near:
+            near |= more
+        cut = set(a.nonzero).union(*(zero.free_symbols for zero in zeros))
+        round_ = set().union(*(zero.free_symbols for zero in self._always))
+        return not near & cut and all(
+            not bound.free_symbols & round_ and is_small_polynomial(bound) and sympy.Poly(bound).total_degree() <= 1
+            for bound in bounds
+            if bound.free_symbols & near
         )
 
     def _is_nonzero_at_some_state(self, p: Any, flow: Flow) -> bool:
@@ -220,7 +244,7 @@ class Region:
         if apart or need.kind.is_met_by(sign):
             return _EVERYWHERE
         if self.keeps_sign(value, need.kind):
-            return "kept by the flow: where it is so at first, it stays so"
+            return KEPT
         return ""
 
     def keeps_sign(self, value: Quotient, kind: Kind) -> bool:

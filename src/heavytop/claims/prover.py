@@ -10,7 +10,7 @@ import sympy
 from heavytop.claims.algebra import Field
 from heavytop.claims.conditions import Kind, Need
 from heavytop.claims.evaluate import evaluate
-from heavytop.claims.proof import Condition, Region
+from heavytop.claims.proof import KEPT, Condition, Region
 from heavytop.claims.sign import NUMBER_BITS, PLUS, Unprovable
 from heavytop.claims.statement import Domain, Place, Setting, Statement
 
@@ -58,19 +58,23 @@ class Prover:
     def _make(
         self, statements: Sequence[Statement], sign: int, strict: bool, parts: Iterable[sympy.Expr]
     ) -> Field | None:
-        kept = self._kept_facts(statements[0])
-        facts = (*statements[0].domain.facts, *(n.expression for n in kept if n.kind is Kind.POSITIVE))
-        weak = tuple(need.expression for need in kept if need.kind is Kind.NONNEGATIVE)
+        needs = self._kept_facts(statements[0])
+        facts = (*statements[0].domain.facts, *(need.expression for need in needs if need.kind is Kind.POSITIVE))
+        weak = tuple(need.expression for need in needs if need.kind is Kind.NONNEGATIVE)
         assumptions = self._setting.assumptions(sign, strict=strict, facts=facts, weak=weak)
         expressions = dict.fromkeys([*(s.residual for s in statements), *parts])
+        kept: set[sympy.Expr] = set()
         for statement in statements:
             f = statement.formulas
             expressions |= dict.fromkeys((*f.values, *f.attitude))
             expressions |= dict.fromkeys(need.expression for need in _sorted(f.needs | f.angle_needs))
-        try:
-            return Field(assumptions, expressions)
-        except Unprovable:
-            return None
+            kept |= {e for e in (*f.values, *(need.expression for need in f.needs)) if _is_kept(e, statement)}
+        for chosen in (expressions, [e for e in expressions if e not in kept]):
+            try:
+                return Field(assumptions, chosen)
+            except Unprovable:
+                continue
+        return None
 
     def _kept_facts(self, statement: Statement) -> list[Need]:
         """Of a first integral: what has to be positive or 0 for it to be real, and stays so under the flow."""
@@ -127,13 +131,13 @@ class Prover:
         if region is None:
             return None
         flow = statement.flow
-        if region.field.vanishes(statement.residual) or (
+        if region.vanishes(statement.residual) or (
             flow is not None and any(region.field.vanishes_on(statement.residual, zero) for zero in flow.always)
         ):
             # where the relations are 0 a divisor may be so too, however thin the set of its zeros is elsewhere
             return list(region.divisors(forced=flow is not None and bool(self._setting.relations)))
         radical = flow is None or not flow.is_relation
-        if region.field.is_forced(statement.residual, radical=radical):
+        if region.is_forced(statement.residual, radical=radical):
             return list(region.divisors(forced=True))
         return None
 
@@ -184,9 +188,14 @@ class Prover:
         inner = self._region(statement, domain.sign, strict=True) if ends else whole
         if whole is None or inner is None:
             return [Condition(_ALGEBRA, False, "the formulas are too large, or hold what it does not know")]
-        against = whole.obstacle(f.values), inner.obstacle(f.attitude)
-        continuous = bool(f.values) and not any(against)
-        found = {need: whole.discharge(need) for need in _sorted(f.needs | f.angle_needs)}
+        # a function of first integrals alone is as constant as they are, continuous or not
+        moving = [value for value in f.values if not _is_kept(value, statement)]
+        against = whole.obstacle(moving), inner.obstacle(f.attitude)
+        continuous = bool(f.values) and not any(against) and not whole.obstacle(f.values)
+        found = {
+            need: whole.discharge(need) or (KEPT if _is_kept(need.expression, statement) else "")
+            for need in _sorted(f.needs | f.angle_needs)
+        }
         for need, how in found.items():
             if not how and need not in f.needs and inner.discharge(need) and continuous:
                 found[need] = _AT_THE_END
@@ -209,6 +218,10 @@ class Prover:
             against = region.leaves(rate)
             reason = against or "its rate is a combination of the conditions"
             yield Condition(f"{text} = 0 is kept by the flow", not against, reason)
+
+
+def _is_kept(expression: sympy.Expr, statement: Statement) -> bool:
+    return statement.flow is not None and statement.flow.keeps(expression)
 
 
 def shortest(formula: sympy.Expr, setting: Setting, domain: Domain) -> sympy.Expr:

@@ -15,6 +15,7 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpz
 
+from heavytop.claims.radicals import denested
 from heavytop.claims.sign import NUMBER_BITS, Sign, Unprovable, used
 from heavytop.claims.signs import Signs
 from heavytop.exact.balls import working_precision
@@ -99,6 +100,10 @@ class Tower:
     def radicand(self, index: int) -> Any | None:
         """q of a root R² = q; None for a free generator."""
         return self._radicands.get(index)
+
+    def radicands(self) -> list[tuple[int, Any]]:
+        """(R, q) of every root R² = q."""
+        return list(self._radicands.items())
 
     def relations(self) -> list[Any]:
         """R² − q for every root R = √q."""
@@ -246,7 +251,7 @@ class Tower:
         result = self.context.constant(abs(constant))
         for factor, power in factors:
             sign = self.signs.of(factor).value
-            size = factor * sign if sign else self.gens[self._root_of(factor * factor)]
+            size = factor * sign if sign else self.gens[self.root_of(factor * factor)]
             result = self.times(result, self.raised(size, int(power)))
         return result
 
@@ -261,24 +266,37 @@ class Tower:
         """√p: squares come out as absolute values, factors of known sign as roots of their own."""
         constant, factors = p.factor()
         outside, rest, sign = self.one, self.one, 1 if constant > 0 else -1
+        roots = []
         for factor, power in factors:
             outside = self.times(outside, self._absolute(self.raised(factor, int(power) // 2)))
             if power % 2:
                 known = self.signs.of(factor).value
                 if known:
-                    outside = self.times(outside, self.gens[self._root_of(factor * known)])
+                    roots.append(self._simplest_root(factor * known))
                     sign *= known
                 else:
                     rest = self.times(rest, factor)
         if rest != self.one:
-            outside = self.times(outside, self.gens[self._root_of(rest * sign)])
+            roots.append(self._simplest_root(rest * sign))
         elif sign < 0:
             raise Unprovable(
                 "A square root of a negative number.", "Check the formula, or the domain it is claimed on."
             )
-        return self.product((self.polynomial(outside), self._root_of_number(abs(constant))))
+        return self.product((self.polynomial(outside), *roots, self.root_of_number(abs(constant))))
 
-    def _root_of_number(self, value: Any) -> Quotient:
+    def _simplest_root(self, square: Any) -> Quotient:
+        """√square as a sum of simpler roots where there is one, else as a generator."""
+        if self.known_root(square) is None:
+            simpler = denested(self, square)
+            if simpler is not None:
+                return simpler
+        return self.polynomial(self.gens[self.root_of(square)])
+
+    def known_root(self, square: Any) -> int | None:
+        """The generator √square, None where there is none yet."""
+        return self._roots.get(str(square))
+
+    def root_of_number(self, value: Any) -> Quotient:
         """√(p/q) = √(p q)/q, over the primes of p q."""
         whole = int(value.p) * int(value.q)
         root = isqrt(whole)
@@ -289,10 +307,10 @@ class Tower:
         for prime, power in primes:
             result *= int(prime) ** (int(power) // 2)
             if power % 2:
-                result = self.times(result, self.gens[self._root_of(self.context.constant(int(prime)))])
+                result = self.times(result, self.gens[self.root_of(self.context.constant(int(prime)))])
         return self.polynomial(result)
 
-    def _root_of(self, square: Any) -> int:
+    def root_of(self, square: Any) -> int:
         """The generator √square, made once."""
         key = str(square)
         if key not in self._roots:

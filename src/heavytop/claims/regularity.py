@@ -45,6 +45,8 @@ class Regularity:
         for argument in g.arguments:
             if found := self.obstacle(argument, analytic=analytic):
                 return found
+        if g.kind == "defined":
+            return f"the definition of {g.meaning} is too large for the algebra"
         wanted = "> 0" if analytic else "≥ 0"
         if g.kind == "root":
             return self._unless_positive(g.arguments[0], analytic, wanted)

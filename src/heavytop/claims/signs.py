@@ -5,13 +5,15 @@ Every rule here is a proof.  What no rule decides is unknown, and a condition th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import sympy
 from flint import arb, fmpq
 
+from heavytop.claims.combination import nonnegative_combination
 from heavytop.claims.sign import NUMBER_BITS, UNKNOWN, Sign, Unprovable, sum_of, used
 from heavytop.exact.balls import working_precision
 
@@ -25,13 +27,18 @@ _MAX_TERMS = 200
 # terms of what is taken apart further than into factors
 _MAX_PARTED = 40
 _MAX_DEGREE = 24
+# atoms and products of a combination, their degree, and linear programs a tower
+_MAX_ATOMS = 10
+_MAX_PRODUCTS = 150
+_MAX_DEGREE_OF_PRODUCTS = 4
+_PROGRAMS = 30
 
 
 class Signs:
     """What is known of the signs and ranges of the generators of ``tower``, and what follows for polynomials.
 
     ranges: closed intervals of generators.  circles: cosine of each sine.  numbers: the ball of each generator that
-    is a number.
+    is a number.  pi: the generator π.  turns: the ends, over π, of open intervals in which generators lie.
     """
 
     def __init__(self, tower: Tower) -> None:
@@ -44,19 +51,22 @@ class Signs:
         self._factors: dict[str, Any] = {}
         self._left = _BUDGET
         self._depth = 0
+        self._programs = _PROGRAMS
         self._half_angles: dict[int, int] = {}
         self.ranges: dict[int, tuple[Fraction, Fraction]] = {}
         self.circles: dict[int, int] = {}
         self.numbers: dict[int, arb] = {}
+        self.pi: int | None = None
+        self.turns: dict[int, tuple[Fraction, Fraction]] = {}
 
     def declare_form(self, index: int, form: Any) -> None:
         """Generator ``index`` is ``form``, a polynomial in generators of known sign."""
         self._forms[index] = form
         self._known.clear()
 
-    def has_form(self, index: int) -> bool:
-        """Whether generator ``index`` has been declared already."""
-        return index in self._forms
+    def can_have_form(self, index: int, form: Any) -> bool:
+        """Whether ``form`` may be declared: there is none yet, and nothing in it has the form of its reciprocal."""
+        return index not in self._forms and not self._below_one & used(form)
 
     def declare_below_one(self, index: int) -> None:
         """1/x is the form of generator ``index``: it lies in (0, 1]."""
@@ -77,6 +87,8 @@ class Signs:
                 open_factors.append(factor)
             else:
                 total = total.times(known if power % 2 else Sign(1, known.strict or sign.strict))
+                if sign.strict and not known.strict:
+                    self._facts.append((factor, Sign(0, True)))
         if not sign.strict and not total.strict:
             return
         known = Sign(sign.value * total.value, sign.strict)
@@ -87,7 +99,27 @@ class Signs:
             for factor in open_factors:
                 product = product * factor
             self._products.append((product, known))
+            self._declare_each(open_factors, known)
         self._known.clear()
+
+    def _declare_each(self, factors: list[Any], known: Sign) -> None:
+        """Two factors whose product is > 0 have the sign of their sum, where that is known; or of a difference."""
+        if len(factors) != 2 or not (known.value and known.strict):
+            return
+        first, second = factors
+        self._facts += [(factor, Sign(0, True)) for factor in factors]
+        total = self.of(first + second * known.value)
+        if total.value and total.strict:
+            self._facts += [(first, Sign(total.value, True)), (second, Sign(total.value * known.value, True))]
+
+    def never_zero(self, relations: Sequence[Any]) -> list[Any]:
+        """Polynomials that are 0 nowhere and have to do with these: facts, their own factors, generators in them."""
+        indices = set().union(*map(used, relations))
+        found = [fact for fact, sign in (*self._facts, *self._products) if sign.strict and used(fact) & indices]
+        found += [self._tower.gens[index] for index in sorted(indices) if self._tower.generators[index].strict]
+        factors = [factor for relation in relations for factor, _ in self.factors(relation)[1]]
+        found += [factor for factor in factors if self.of(factor).strict]
+        return list({str(p): p for p in found}.values())
 
     def factors(self, p: Any) -> Any:
         """(constant, [(factor, power)]), made once."""
@@ -134,7 +166,10 @@ class Signs:
         self._left -= 1
         found = UNKNOWN
         for rule in self._rules(p):
-            one = rule(p)
+            try:
+                one = rule(p)
+            except Unprovable:  # too large for this rule
+                continue
             # a rule may tell the sign, another that it is never 0
             found = Sign(found.value or one.value, found.strict or one.strict)
             if found.value and found.strict:
@@ -148,15 +183,19 @@ class Signs:
         if len(p) <= _MAX_PARTED and self._left > 0:
             yield from (self._by_roots_of_one_variable, self._by_generators, self._by_half_angle)
             yield self._by_difference_from_facts
+            yield self._by_products_of_facts
+            yield self._by_squares
 
     # --- rules ------------------------------------------------------------------------------------------------------
 
     def _by_facts(self, p: Any) -> Sign:
+        found = UNKNOWN
         for fact, sign in self._facts:
             ratio = p.leading_coefficient() / fact.leading_coefficient()
             if p == fact * ratio:
-                return sign.times(Sign(1 if ratio > 0 else -1, True))
-        return UNKNOWN
+                one = sign.times(Sign(1 if ratio > 0 else -1, True))
+                found = Sign(found.value or one.value, found.strict or one.strict)
+        return found
 
     def ball(self, p: Any) -> arb | None:
         """The ball of a polynomial in numbers; None where another generator occurs."""
@@ -203,7 +242,8 @@ class Signs:
 
     def _by_forms(self, p: Any) -> Sign:
         """By terms, after each generator is written through positive ones."""
-        for index in self._below_one & used(p):
+        turned = self._below_one & used(p)
+        for index in turned:
             # p(X) has the sign of X^n p(1/Z) with Z = 1/X >= 1
             degree = int(p.degrees()[index])
             terms = {
@@ -213,15 +253,25 @@ class Signs:
             p = self._tower.context.from_dict(terms)
         if not self._forms.keys() & used(p):
             return UNKNOWN
-        while forms := self._forms.keys() & used(p):
-            # the last first: a form uses only what was declared before it, and generators without a form
-            last = max(forms, key=list(self._forms).index)
-            p = self._substitute(p, last, self._forms[last])
-            if len(p) > _MAX_TERMS:
-                return UNKNOWN
+        p = self._without_forms(p, turned)
         return self._by_terms(p) if p else UNKNOWN
 
-    def _substitute(self, p: Any, index: int, form: Any) -> Any:
+    def _without_forms(self, p: Any, turned: Collection[int] = ()) -> Any:
+        """Every generator with a form written as that; raises Unprovable where that is too large.
+
+        turned: generators that stand for their reciprocals in ``p``; others that lie below 1 are left as they are.
+        It ends, since forms do not go round in a circle.
+        """
+        left = self._below_one.difference(turned)
+        while forms := self._forms.keys() & used(p) - left:
+            index = min(forms)
+            p = self.substituted(p, index, self._forms[index])
+            if len(p) > _MAX_TERMS:
+                raise Unprovable("A polynomial is too large.", "Split the claim into smaller ones.")
+        return p
+
+    def substituted(self, p: Any, index: int, form: Any) -> Any:
+        """``p`` with a polynomial in the place of a generator."""
         total = self._tower.context.constant(0)
         for power, part in self._tower.by_power(p, index).items():
             total += self._tower.times(part, self._tower.raised(form, power))
@@ -297,17 +347,24 @@ class Signs:
             if leading.value and leading.strict and defect.value == 1:
                 yield Sign(leading.value, defect.strict)
         if degree == 1 and index in self.ranges:
-            ends = [self._substitute(p, index, self._constant(end)) for end in self.ranges[index]]
+            ends = [self.substituted(p, index, self._constant(end)) for end in self.ranges[index]]
             signs = [self.of(end) for end in ends]
             if signs[0].value == signs[1].value != 0:
                 yield Sign(signs[0].value, signs[0].strict and signs[1].strict)
+
+        if degree == 1 and index in self.turns and self.pi in used(p):
+            pi = self._tower.gens[self.pi]
+            ends = [self.substituted(p, index, self._constant(end) * pi) for end in self.turns[index]]
+            first, second = (self.of(end) for end in ends)
+            if first.value == second.value != 0:
+                yield Sign(first.value, first.strict or second.strict)
 
     def _constant(self, value: Fraction) -> Any:
         return self._tower.context.constant(fmpq(value.numerator, value.denominator))
 
     def _of_root_sum(self, a: Any, b: Any, radicand: Any, sign: int) -> Sign:
         """a + b R with R² = radicand >= 0: the larger of a² and b² R² decides."""
-        difference = self.of(a * a - b * b * radicand)
+        difference = self.of(self._tower.reduce(a * a - b * b * radicand))
         if difference.value > 0:
             return Sign(self.of(a).value, difference.strict)
         if difference.value < 0:
@@ -327,8 +384,8 @@ class Signs:
                 rest = [0 if index in (sine, cosine) else power for index, power in enumerate(monomial)]
                 factor = (2 * tau) ** i * (1 - tau**2) ** j * (1 + tau**2) ** (degree - i - j)
                 total += self._tower.context.from_dict({tuple(rest): coefficient}) * factor
-            straight = self._substitute(
-                self._substitute(p, sine, self._constant(Fraction(0))), cosine, -self._tower.one
+            straight = self.substituted(
+                self.substituted(p, sine, self._constant(Fraction(0))), cosine, -self._tower.one
             )
             signs = self.of(total), self.of(straight)
             if signs[0].value == signs[1].value != 0:
@@ -351,3 +408,77 @@ class Signs:
                     if found.value:
                         return found
         return UNKNOWN
+
+    def _at_once(self, p: Any) -> Sign:
+        """The sign of ``p`` by the rules that ask for no other sign."""
+        found = [rule(p) for rule in (self._by_facts, self._by_terms, self._by_forms)]
+        return next((sign for sign in found if sign.value), UNKNOWN)
+
+    def _by_squares(self, p: Any) -> Sign:
+        """With a generator g ≥ 0 written as R², where there is a root R of g."""
+        for root, square in self._tower.radicands():
+            (index, *others) = used(square) or {-1}
+            # that there is a root does not make it real
+            is_real = self._at_once(square).value > 0
+            if is_real and not others and index in used(p) and square == self._tower.gens[index]:
+                return self.of(self.substituted(p, index, self._tower.gens[root] ** 2))
+        return UNKNOWN
+
+    # --- combinations of products -----------------------------------------------------------------------------------
+
+    def _by_products_of_facts(self, p: Any) -> Sign:
+        """p or −p = Σ c q with c ≥ 0, each q a product of what is known to be ≥ 0."""
+        still = all(
+            g.constant and g.kind in ("symbol", "root") for g in map(self._tower.generators.__getitem__, used(p))
+        )
+        if not (self._facts or self._forms) or not still or self._programs <= 0 or self._depth > 2:
+            return UNKNOWN
+        p = self._tower.reduce(self._without_forms(p))
+        degree = max((sum(map(int, monomial)) for monomial in p.to_dict()), default=0)
+        atoms = self._atoms_for(p)
+        if not 0 < degree <= _MAX_DEGREE_OF_PRODUCTS or len(p) > _MAX_PARTED or len(atoms) < 2:
+            return UNKNOWN
+        self._programs -= 1
+        products = self._products_of(atoms, degree)
+        for sign in (1, -1):
+            weights = nonnegative_combination((sign * p).to_dict(), [product.to_dict() for product, _ in products])
+            if weights is not None:
+                return Sign(sign, any(weight and strict for weight, (_, strict) in zip(weights, products, strict=True)))
+        return UNKNOWN
+
+    def _atoms_for(self, p: Any) -> list[tuple[Any, bool]]:
+        """(polynomial ≥ 0, whether it is never 0): facts and generators that have to do with ``p``."""
+        facts = []
+        for fact, sign in self._facts:
+            if sign.value:
+                with suppress(Unprovable):
+                    facts.append((self._tower.reduce(self._without_forms(fact * sign.value)), sign.strict))
+        for index in self._forms:
+            g = self._tower.generators[index]
+            if g.sign and index not in self._below_one:
+                with suppress(Unprovable):
+                    facts.append((self._without_forms(self._tower.gens[index] * g.sign), g.strict))
+        near, chosen = used(p), []
+        while more := [fact for fact in facts if fact not in chosen and used(fact[0]) & near]:
+            chosen += more
+            near = near.union(*(used(fact) for fact, _ in more))
+        for index in sorted(near):
+            g, square = self._tower.generators[index], self._tower.radicand(index)
+            is_real = square is None or index in used(p) or self._at_once(square).value > 0
+            if g.sign and index not in self._forms.keys() - self._below_one and is_real:
+                chosen.append((self._tower.gens[index] * g.sign, g.strict))
+        return chosen[:_MAX_ATOMS]
+
+    def _products_of(self, atoms: list[tuple[Any, bool]], degree: int) -> list[tuple[Any, bool]]:
+        """1 and the products of up to ``degree`` atoms, as many as are tried."""
+        found = level = [(self._tower.one, True, 0)]
+        for _ in range(degree):
+            level = [
+                (self._tower.times(product, atom), strict and also, i)
+                for product, strict, first in level
+                for i, (atom, also) in enumerate(atoms[first:], first)
+            ]
+            if len(found) + len(level) > _MAX_PRODUCTS:
+                break
+            found = found + level
+        return [(self._tower.reduce(product), strict) for product, strict, _ in found]

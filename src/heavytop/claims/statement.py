@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import sympy
 
-from heavytop.claims.algebra import Assumptions
+from heavytop.claims.algebra import Assumptions, Solution
 from heavytop.claims.conditions import Need, is_exactly_zero
 
 Place = dict[sympy.Symbol, Fraction]
@@ -67,7 +67,7 @@ class Flow:
     rate: the derivative along it.  kept: the relations that have to be invariant, with their text.
     state: the variables.  is_relation: whether the statement is that a relation stays 0.
     always: what is 0 at every state of a body and stays so, so that a witness has to lie there: |γ|² - 1.
-    names: symbols of ``state`` that stand for a first integral.
+    names: symbols of ``state`` that stand for a first integral, with its formula.
     """
 
     rate: Callable[[sympy.Expr], sympy.Expr]
@@ -76,6 +76,11 @@ class Flow:
     is_relation: bool = False
     always: tuple[sympy.Expr, ...] = ()
     names: Mapping[sympy.Symbol, sympy.Expr] = field(default_factory=dict, hash=False)
+
+    def keeps(self, e: sympy.Expr) -> bool:
+        """Whether it holds nothing of the state but names of first integrals, and at least one of them."""
+        inside = e.free_symbols & self.state
+        return bool(inside) and inside <= self.names.keys()
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +107,11 @@ class Setting:
     variable: the symbol that moves (t, or Ω2 in the general case).
     samples: exact parameter sets.  parts: names with expressions through which a residual may be written, such as γ3.
     constants: the same for constant factors, such as k/2.  relations: what is 0 wherever the claim is made.
-    facts: expressions that are > 0.  nonzero: symbols that are not 0.  ranges: closed intervals of symbols.
+    facts: expressions that are > 0.  weak: expressions that are >= 0.  nonzero: symbols that are not 0.
+    ranges: closed intervals of symbols.
     bodies: what the parameters have to meet for a body with the moments of the claim to exist.
+    solutions: of relations that can be solved.  solved: those that are put in, in the place of their relations.
+    parameters: symbols that are constant along every motion.
     """
 
     variable: sympy.Symbol
@@ -114,9 +122,19 @@ class Setting:
     constants: tuple[tuple[str, sympy.Expr], ...] = ()
     relations: tuple[sympy.Expr, ...] = ()
     facts: tuple[sympy.Expr, ...] = ()
+    weak: tuple[sympy.Expr, ...] = ()
     nonzero: tuple[sympy.Symbol, ...] = ()
     ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...] = ()
     bodies: tuple[Need, ...] = ()
+    solutions: tuple[Solution, ...] = ()
+    solved: tuple[Solution, ...] = ()
+    parameters: frozenset[sympy.Symbol] = frozenset()
+
+    def with_solutions(self) -> Setting:
+        """The same, with the solutions in the place of their relations."""
+        done = {solution.relation for solution in self.solutions}
+        left = tuple(relation for relation in self.relations if relation not in done)
+        return replace(self, relations=left, solutions=(), solved=self.solutions)
 
     def assumptions(
         self,
@@ -137,15 +155,18 @@ class Setting:
             (*self.facts, *facts),
             self.nonzero,
             self.ranges,
-            weak,
+            (*self.weak, *weak),
+            self.solved,
+            self.parameters,
         )
 
     def places(self, statement: Statement) -> Iterator[Place]:
         """Exact parameters of bodies, and points of the domain of ``statement``, that lie on all relations, proven."""
+        zero = (*self.relations, *(solution.symbol - solution.value for solution in self.solved))
         for sample in self.samples:
             if not all(need.is_met(sample) for need in self.bodies):
                 continue
             for point in statement.domain.points:
                 place = {self.variable: point, **sample}
-                if all(is_exactly_zero(relation, place) for relation in self.relations):
+                if all(is_exactly_zero(relation, place) for relation in zero):
                     yield place

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import sympy
 
+from heavytop.claims.defined import Defined
 from heavytop.claims.sign import PLUS, UNKNOWN, Sign, sum_of
 
 _BOUNDS = {"sin": Fraction(1), "cos": Fraction(1), "tanh": Fraction(1), "sech": Fraction(1), "atan": Fraction(11, 7)}
@@ -81,12 +82,20 @@ class Names:
         """``e`` with its first integrals replaced by their symbols."""
         if not e.free_symbols & self._state:
             return e
+        if isinstance(e, Defined):
+            return self._definition(e)
         if not e.args:
             return self._name(e)
         if e.is_Add:
             return self._into_sum(e)
         named = e.func(*(self.put_into(part) for part in e.args))
         return self._name(e) if e.is_Mul and named.free_symbols & self._state else named
+
+    def _definition(self, e: Defined) -> sympy.Expr:
+        if e not in self._names:
+            is_constant = not self.put_into(e.meaning).free_symbols & self._state
+            self._names[e] = sympy.Symbol(f"({e})", real=True) if is_constant else None
+        return self._names[e] or e
 
     def _into_sum(self, e: sympy.Expr) -> sympy.Expr:
         parts = {part: self.put_into(part) for part in e.args}

@@ -31,6 +31,8 @@ _RANGES = {
     "acos": (Fraction(0), Fraction(22, 7)),
     "atan2": (Fraction(-22, 7), Fraction(22, 7)),
 }
+# 1 where the function increases, -1 where it decreases
+_MONOTONE = {"exp": 1, "log": 1, "asin": 1, "atan": 1, "acos": -1}
 Circle = tuple[Quotient, Quotient]
 
 
@@ -308,8 +310,15 @@ class Transcendental:
             if name in ("asin", "atan"):
                 sign = self._tower.sign(arguments[0])
             elif name == "acos":
-                sign = Sign(1, False)
+                below = self._tower.sum(
+                    (self._tower.number(1), self._tower.product((self._tower.number(-1), *arguments)))
+                )
+                sign = Sign(1, self._tower.sign(below).strict)
             index = self._new(name, meaning, arguments, sign)
+            if name == "atan":
+                one_sided = sign.value if sign.strict else 0
+                low, high = 0 if one_sided > 0 else -1, 0 if one_sided < 0 else 1
+                self._tower.signs.turns[index] = Fraction(low, 2), Fraction(high, 2)
             if name in _RANGES:
                 self._tower.signs.ranges[index] = _RANGES[name]
             self._functions[key] = index
@@ -326,7 +335,19 @@ class Transcendental:
         )
         self._field.means(index, meaning)
         self._set_number(index, meaning)
+        if kind in _MONOTONE:
+            self._declare_order(index)
         return index
+
+    def _declare_order(self, index: int) -> None:
+        """Of a monotone function of constants in order: the values have an order too."""
+        t, g = self._tower, self._tower.generators[index]
+        for other, before in enumerate(t.generators[:index]):
+            if before.kind == g.kind and g.constant and before.constant:
+                minus = t.product((t.number(-1), before.arguments[0]))
+                sign = t.sign(t.sum((g.arguments[0], minus)))
+                if sign.value and sign.strict:
+                    t.signs.declare(t.gens[index] - t.gens[other], Sign(sign.value * _MONOTONE[g.kind], True))
 
     def _set_number(self, index: int, meaning: sympy.Expr) -> None:
         if not meaning.free_symbols:

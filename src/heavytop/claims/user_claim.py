@@ -10,6 +10,7 @@ import sympy
 
 from heavytop.claims.conditions import Need
 from heavytop.claims.context import TIME, Context, FileClaim, needs_of, sample_number, setting_of, three
+from heavytop.claims.defined import rate_along
 from heavytop.claims.expression import Formula
 from heavytop.claims.from_file import ClaimFile, MotionTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
@@ -87,9 +88,7 @@ def _with_constant_rotor(context: Context, domain: Domain) -> Context:
 
 
 def _read_motion(content: ClaimFile, table: MotionTable, context: Context) -> Motion:
-    def rate(value: sympy.Expr) -> sympy.Expr:
-        return sympy.diff(value, TIME)
-
+    rate = rate_along({TIME: sympy.Integer(1)})
     names, needs, domain = context.names, context.needs, _domain(content)
 
     def reduced(formulas: Triple) -> Triple:

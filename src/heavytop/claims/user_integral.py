@@ -14,6 +14,8 @@ import sympy
 from heavytop.claims.algebra import Assumptions, Field
 from heavytop.claims.conditions import Need, is_exactly_zero
 from heavytop.claims.context import STATE, TIME, Context, FileClaim, needs_of, sample_number, setting_of
+from heavytop.claims.defined import rate_along
+from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import Formula, parse
 from heavytop.claims.from_file import IntegralTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
@@ -30,6 +32,7 @@ Rate = Callable[[sympy.Expr], sympy.Expr]
 _STATES = (("1/2", "-2/3", "3/4", "2/3", "-1/3", "2/3"), ("1", "2", "-1", "3/5", "0", "4/5"))
 # states of our own, where a file gives none
 _ENOUGH = 3
+_BITS = 192
 # 0 at every state of a body: |γ|² - 1
 _OFF_SPHERE = sum(x**2 for x in STATE[3:]) - 1
 
@@ -126,9 +129,7 @@ class UserIntegral(FileClaim):
     def _rate(self, system: System) -> Rate:
         """The derivative along the field of ``system``."""
         rates = system.field(self.context.parameters(system), STATE)
-        return lambda value: sum(
-            (sympy.diff(value, x) * dx for x, dx in zip(STATE, rates, strict=True)), sympy.Integer(0)
-        )
+        return rate_along(dict(zip(STATE, rates, strict=True)))
 
     def _parts(self, value: sympy.Expr) -> tuple[sympy.Expr, ...]:
         """What has to be constant: F; or the parts of a relation that is no polynomial, as |L| has no rate at 0."""
@@ -161,7 +162,7 @@ class UserIntegral(FileClaim):
         value = all_over(self.value.expression, [_OFF_SPHERE])
         assumptions = self.setting.assumptions(0)
         state = frozenset(STATE)
-        names = Names(state, lambda e: _is_constant(rate(e), assumptions))
+        names = Names(state, lambda e: _is_constant(rate(e), assumptions, self.setting.samples))
         named = names.put_into(value)
         if named.free_symbols & state:
             return value, needs, {}
@@ -195,9 +196,15 @@ def _check_states(table: IntegralTable) -> None:
             )
 
 
-def _is_constant(rate: sympy.Expr, assumptions: Assumptions) -> bool:
+def _is_constant(
+    rate: sympy.Expr, assumptions: Assumptions, samples: Sequence[Mapping[sympy.Symbol, Fraction]]
+) -> bool:
     """Whether a rate is proven to be 0 by an algebra that divides by nothing that may be 0."""
     try:
+        # what is not 0 at a sample need not be taken into the algebra
+        balls = [evaluate(rate, {TIME: Fraction(0), **sample}, _BITS) for sample in samples[:1]]
+        if any(ball.is_finite() and not ball.contains(0) for ball in balls):
+            return False
         field = Field(assumptions, [rate])
     except Unprovable:
         return False
