@@ -7,9 +7,7 @@ by token and by byte.  An answer or an error with its cause is right, whatever t
 by right is told to take less: the audit of a file 10 s, a run 10^5 steps.  Exit code 1 where there is any;
 `python benchmarks/fuzz.py N SEED FIRST` begins at the input with the number FIRST, to see one again.
 
-`python benchmarks/fuzz.py 3000 1 7000`, on two loaded cores: 309 s, the longest 20.3 s; 1 traceback (input 8190: a
-diagnosis of `score` with an infinite quantity) and 2 hangs (7355, 7751: `score` of a top so heavy that its computed
-reference takes up to a minute).
+`python benchmarks/fuzz.py 10000 1`, beside other work on two cores: 933 s, the longest input 10.1 s; 0 tracebacks, 0 hangs.
 """
 
 from __future__ import annotations
