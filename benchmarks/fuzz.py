@@ -7,7 +7,8 @@ by token and by byte.  An answer or an error with its cause is right, whatever t
 by right is told to take less: the audit of a file 10 s, a run 10^5 steps.  Exit code 1 where there is any;
 `python benchmarks/fuzz.py N SEED FIRST` begins at the input with the number FIRST, to see one again.
 
-`python benchmarks/fuzz.py 10000 1`, beside other work on two cores: 933 s, the longest input 10.1 s; 0 tracebacks, 0 hangs.
+`python benchmarks/fuzz.py 10000 1`, beside other work on two cores: 933 s, the longest input 10.1 s; 0 tracebacks,
+0 hangs.
 """
 
 from __future__ import annotations
