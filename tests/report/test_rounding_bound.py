@@ -222,7 +222,7 @@ def test_the_series_of_an_ensemble_may_move_by_no_more_than_its_metrics() -> Non
 
 def test_where_all_digits_are_lost_a_narrow_band_is_chance() -> None:
     lost = Against("computed", "words", until="90")
-    for reference, near, far in ((lost, 0.49, 0.51), (Against("computed", "words"), 0.24, 0.26)):
+    for reference, near, far in ((lost, 1.49, 1.51), (Against("computed", "words"), 0.24, 0.26)):
         said = {"reference": reference, "against": reference.text, "data": UPRIGHT}
         old, name = one("0.5", 0.041, **said), "noise: {:.2g} decades, not 0.041"
         assert judged(old, one("0.5", near, **said))[0] == "same"

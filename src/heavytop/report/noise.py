@@ -22,8 +22,9 @@ _BY_CHANCE = 1.4
 """One rerun in ten has a band wider by more than that: further, a candidate's own band is not allowed for."""
 _LEAST = 0.05
 """Decades.  A band below this excuses nothing that the allowed loss does not; its own scatter is of no interest."""
-_LEAST_LOST = 0.1
-"""The same where the motion loses all digits before the end: how near to that its last sample is makes the band."""
+_LEAST_LOST = 0.3
+"""The same where the motion loses all digits before the end: its errors are as large as it is, and a rerun that comes
+near the motion again by chance makes the band."""
 STEP_CONTROL = 1.2
 """Decades.  A rounding may turn a step of a method with step control into another one, which moves its truncation error
 by that at most; reruns that are no further apart are reproducible, whatever their size."""
