@@ -11,6 +11,7 @@ power for an odd one, a sum of arcs that is off by π.
 from __future__ import annotations
 
 import argparse
+import signal
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from typing import Any
 
 from heavytop.claims.audit import audit_claim
 from heavytop.claims.from_file import claim_from_table
+from heavytop.claims.guard import SECONDS
 from heavytop.errors import HeavyTopError
 from heavytop.top.equations import system
 
@@ -936,12 +938,27 @@ def claims() -> Iterator[Claim]:
 # --- what is counted ------------------------------------------------------------------------------------------------
 
 
+class StoppedError(Exception):
+    """The time of a claim is over."""
+
+
+def _stop(*_: object) -> None:
+    raise StoppedError
+
+
 def verdict(claim: Claim) -> tuple[str, str]:
-    """(verdict, what leaves it undecided)."""
+    """(verdict, what leaves it undecided); ``stopped`` after the time that the command gives an audit."""
+    before = signal.signal(signal.SIGALRM, _stop)
+    signal.alarm(SECONDS)
     try:
         report = audit_claim(claim_from_table(claim.table, claim.family), system(claim.about))
     except HeavyTopError as error:
         return "refused", error.cause
+    except StoppedError:
+        return "stopped", f"after {SECONDS} s"
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
     texts = [
         f"{c.text} ({c.reason})" for row in report.rows if row.holds is None for c in row.conditions if not c.discharged
     ]
@@ -972,7 +989,11 @@ def main() -> None:
         counts[claim.family, claim.expected, found] += 1
         if seconds > slowest:
             slowest, where = seconds, str(claim.table)[:300]
-        if is_fault(claim.expected, found) or (found != claim.expected and claim.expected != "not holds"):
+        if (
+            is_fault(claim.expected, found)
+            or found == "stopped"
+            or (found != claim.expected and claim.expected != "not holds")
+        ):
             said = claim.table.get("motion") or claim.table["integral"]
             about = {name: claim.table.get(name) for name in ("top", "assume", "relations", "domain")}
             label = "FAULT" if is_fault(claim.expected, found) else "open"
