@@ -375,7 +375,7 @@ def test_an_exponential_below_1_is_no_lower_bound_above_1():
         Assumptions(T, positive=(P,), facts=(B - small,)),
         Assumptions(T, positive=(P,), greater=((B, small),)),
     ):
-        assert _signs(said_, [small], B - 1, B, small - 2) == [0, 1, -1]
+        assert _signs(said_, [small], B - 1, B * small - 1, B, small - 2) == [0, 0, 1, -1]
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,11 @@ import pytest
 import sympy
 
 from heavytop.claims.algebra import Assumptions, Field
+from heavytop.claims.context import STATE
+from heavytop.claims.proof import Region
 from heavytop.claims.relations import solve_relations
-from heavytop.claims.sign import Sign
+from heavytop.claims.sign import Sign, used
+from heavytop.claims.statement import ALL, Flow, Setting, Statement
 
 T = sympy.Symbol("t", real=True)
 A, B, C, D, E = SYMBOLS = sympy.symbols("a b c d e", real=True)
@@ -34,6 +37,8 @@ def sign(e: sympy.Expr, facts: tuple[sympy.Expr, ...] = (), weak: tuple[sympy.Ex
         (A - C, (B - C,), (A - B,), POSITIVE),
         ((A - C) * (B - C) + (D - C) * (E - C), (B - C, E - C), (A - C, D - C), NONNEGATIVE),
         ((A - C) * (B - C) + (D - C) * (E - C), (A - C, B - C, E - C), (D - C,), POSITIVE),
+        (A + P**2, (sympy.sqrt(A) + A * B,), (), UNKNOWN),
+        (A + P**2, (sympy.sqrt(A) + A * B,), (A,), POSITIVE),
         (sympy.pi / 2 - sympy.atan(P), (), (), POSITIVE),
         (sympy.atan(P) - sympy.pi / 4, (), (), UNKNOWN),
         (sympy.atan(P) + sympy.atan(A) + sympy.pi / 2, (), (), POSITIVE),
@@ -86,3 +91,27 @@ def test_a_parameter_that_may_be_0_parts_a_proof_in_two():
 def test_a_relation_is_solved_where_the_solution_is_the_whole_of_it(relation, facts, weak, solved):
     found = solve_relations([relation], Assumptions(T, facts=facts, weak=weak), SYMBOLS)
     assert [solution.symbol for solution in found] == ([] if solved is None else [solved])
+
+
+@pytest.mark.parametrize(
+    ("facts", "weak", "relations", "connected"),
+    [
+        ((), (), (), True),
+        ((A,), (), (), True),
+        ((STATE[3],), (), (), False),
+        ((), (STATE[4] - A,), (), False),
+        ((STATE[0],), (), (), True),
+        ((STATE[0] - STATE[3],), (), (), False),
+        ((STATE[0] ** 2 - 1,), (), (), True),
+        ((), (), (STATE[0] * STATE[1],), True),
+        ((), (), (STATE[0] - STATE[3],), False),
+    ],
+)
+def test_the_unit_sphere_is_connected_where_nothing_cuts_it(facts, weak, relations, connected):
+    """Asked of gamma: what bounds Omega alone has nothing to do with it."""
+    sphere = sum(x**2 for x in STATE[3:]) - 1
+    known = Assumptions(T, facts=facts, weak=weak, relations=(*relations, sphere))
+    field = Field(known, STATE)
+    flow = Flow(lambda e: sympy.Integer(0), frozenset(STATE), always=(sphere,))
+    region = Region(field, Setting(T, (), ()), Statement("", 0, "", ALL, STATE[3], "", flow=flow), [])
+    assert region.is_connected(used(field.enter(STATE[3] + STATE[4]).numerator)) is connected
