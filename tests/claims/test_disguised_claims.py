@@ -393,3 +393,10 @@ def test_halves_that_a_divisor_parts_have_sums_of_arcs_of_their_own(value, expec
     table = {"kind": "integral", "name": "x", "integral": {"value": value, "states": states}}
     table["top"] = {"inertia": ["2", "2", "1"], "weight": "1", "centre": ["0", "0", "1"]}
     assert audit_claim(claim_from_table(table, "x"), HEAVY_TOP).verdict == expected
+
+
+def test_arcs_at_samples_tell_nothing_of_another_part_of_the_domain():
+    value = "2/pi*(atan(a) + atan(1/a))"
+    samples = {"a": ["2", "3", "5"]}
+    assert said(value, parameters=samples, assume=["a^2 > 1"]) == "undecided"
+    assert said(value, parameters=samples, assume=["a > 1"]) == "holds"
