@@ -6,11 +6,15 @@ curve, orders of parameters.  Beside each stands a false neighbour: a sign turne
 power for an odd one, a sum of arcs that is off by π.
 
     python benchmarks/disguised_claims.py [--family NAME] [--every 1]
+
+Of the whole, 261 of the 263 claims that are true, or refuted by construction, get that verdict, and none of the 138
+false neighbours holds.
 """
 
 from __future__ import annotations
 
 import argparse
+import signal
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -19,6 +23,7 @@ from typing import Any
 
 from heavytop.claims.audit import audit_claim
 from heavytop.claims.from_file import claim_from_table
+from heavytop.claims.guard import SECONDS
 from heavytop.errors import HeavyTopError
 from heavytop.top.equations import system
 
@@ -936,12 +941,27 @@ def claims() -> Iterator[Claim]:
 # --- what is counted ------------------------------------------------------------------------------------------------
 
 
+class StoppedError(Exception):
+    """The time of a claim is over."""
+
+
+def _stop(*_: object) -> None:
+    raise StoppedError
+
+
 def verdict(claim: Claim) -> tuple[str, str]:
-    """(verdict, what leaves it undecided)."""
+    """(verdict, what leaves it undecided); ``stopped`` after as many seconds as the command gives an audit."""
+    before = signal.signal(signal.SIGPROF, _stop)
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
         report = audit_claim(claim_from_table(claim.table, claim.family), system(claim.about))
     except HeavyTopError as error:
         return "refused", error.cause
+    except StoppedError:
+        return "stopped", f"after {SECONDS} s of the processor"
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
     texts = [
         f"{c.text} ({c.reason})" for row in report.rows if row.holds is None for c in row.conditions if not c.discharged
     ]
@@ -972,7 +992,8 @@ def main() -> None:
         counts[claim.family, claim.expected, found] += 1
         if seconds > slowest:
             slowest, where = seconds, str(claim.table)[:300]
-        if is_fault(claim.expected, found) or (found != claim.expected and claim.expected != "not holds"):
+        is_missed = found != claim.expected and claim.expected != "not holds"
+        if is_fault(claim.expected, found) or found == "stopped" or is_missed:
             said = claim.table.get("motion") or claim.table["integral"]
             about = {name: claim.table.get(name) for name in ("top", "assume", "relations", "domain")}
             label = "FAULT" if is_fault(claim.expected, found) else "open"

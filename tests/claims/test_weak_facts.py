@@ -1,0 +1,117 @@
+"""What is ≥ 0 is not taken for what is > 0, and a relation is solved only where the solution is the whole of it."""
+
+from __future__ import annotations
+
+import pytest
+import sympy
+
+from heavytop.claims.algebra import Assumptions, Field
+from heavytop.claims.context import STATE
+from heavytop.claims.proof import Region
+from heavytop.claims.relations import solve_relations
+from heavytop.claims.sign import Sign, used
+from heavytop.claims.statement import ALL, Flow, Setting, Statement
+
+T = sympy.Symbol("t", real=True)
+A, B, C, D, E = SYMBOLS = sympy.symbols("a b c d e", real=True)
+P = sympy.Symbol("p", positive=True)
+UNKNOWN, NONNEGATIVE, POSITIVE = Sign(0, False), Sign(1, False), Sign(1, True)
+
+
+def sign(e: sympy.Expr, facts: tuple[sympy.Expr, ...] = (), weak: tuple[sympy.Expr, ...] = ()) -> Sign:
+    """The sign of ``e`` where the facts are > 0 and the weak facts are >= 0."""
+    field = Field(Assumptions(T, facts=facts, weak=weak, positive=(P,)), [e])
+    return field.tower.sign(field.enter(e))
+
+
+@pytest.mark.parametrize(
+    ("e", "facts", "weak", "expected"),
+    [
+        (A, (A**2 * B,), (), Sign(0, True)),
+        (B, (A**2 * B,), (), POSITIVE),
+        (A, (), (A**2 * B,), UNKNOWN),
+        (B, (), (A**2 * B,), UNKNOWN),
+        (A, (A + B, A * B), (), POSITIVE),
+        (A, (A + B,), (A * B,), UNKNOWN),
+        (A - C, (), (A - B, B - C), NONNEGATIVE),
+        (A - C, (B - C,), (A - B,), POSITIVE),
+        ((A - C) * (B - C) + (D - C) * (E - C), (B - C, E - C), (A - C, D - C), NONNEGATIVE),
+        ((A - C) * (B - C) + (D - C) * (E - C), (A - C, B - C, E - C), (D - C,), POSITIVE),
+        (A + P**2, (sympy.sqrt(A) + A * B,), (), UNKNOWN),
+        (A + P**2, (sympy.sqrt(A) + A * B,), (A,), POSITIVE),
+        (sympy.pi / 2 - sympy.atan(P), (), (), POSITIVE),
+        (sympy.atan(P) - sympy.pi / 4, (), (), UNKNOWN),
+        (sympy.atan(P) + sympy.atan(A) + sympy.pi / 2, (), (), POSITIVE),
+    ],
+)
+def test_a_sign_is_as_strict_as_what_it_follows_from(e, facts, weak, expected):
+    assert sign(sympy.expand(e), facts, weak) == expected
+
+
+@pytest.mark.parametrize(("facts", "weak", "expected"), [((A,), (), True), ((), (A,), False), ((), (), False)])
+def test_only_what_is_never_0_is_divided_out_of_a_relation(facts, weak, expected):
+    known = Assumptions(T, facts=facts, weak=weak, relations=(A * C,), parameters=frozenset(SYMBOLS))
+    field = Field(known, [A, C])
+    assert field.is_forced(C, radical=False) is expected
+    assert field.is_forced(A * C, radical=False)
+
+
+def test_a_fact_of_the_state_is_not_divided_out_of_a_relation():
+    """A motion that starts with it positive may be near one on which it is 0."""
+    field = Field(Assumptions(T, facts=(A,), relations=(A * C,), parameters=frozenset((C,))), [A, C])
+    assert not field.is_forced(C, radical=False)
+
+
+def test_a_parameter_that_may_be_0_parts_a_proof_in_two():
+    parameters = frozenset(SYMBOLS)
+    for relations, forced in (
+        ((A * B, B - A * C), True),
+        ((A * B,), False),
+        ((A * B, A * C), False),
+        ((A**2 + A * B,), False),
+    ):
+        field = Field(Assumptions(T, relations=relations, parameters=parameters), [A, B, C])
+        assert field.is_forced(B, radical=True) is forced, relations
+
+
+@pytest.mark.parametrize(
+    ("relation", "facts", "weak", "solved"),
+    [
+        (A * B + C * D, (), (), None),
+        (A * B + C, (), (), C),
+        (A**2 + B**2 - 1, (B,), (), B),
+        (A**2 + B**2 - 1, (), (B,), None),
+        (B - sympy.sqrt(B + 3), (), (), None),
+        ((A**2 + B**2) * (C - 1), (), (), None),
+        ((A**2 + B**2 + 1) * (C - 1), (), (), C),
+        ((A**2 - 2 * B**2) * A, (), (), None),
+        ((A**2 + 2 * B**2) * A, (), (), A),
+    ],
+)
+def test_a_relation_is_solved_where_the_solution_is_the_whole_of_it(relation, facts, weak, solved):
+    found = solve_relations([relation], Assumptions(T, facts=facts, weak=weak), SYMBOLS)
+    assert [solution.symbol for solution in found] == ([] if solved is None else [solved])
+
+
+@pytest.mark.parametrize(
+    ("facts", "weak", "relations", "connected"),
+    [
+        ((), (), (), True),
+        ((A,), (), (), True),
+        ((STATE[3],), (), (), False),
+        ((), (STATE[4] - A,), (), False),
+        ((STATE[0],), (), (), True),
+        ((STATE[0] - STATE[3],), (), (), False),
+        ((STATE[0] ** 2 - 1,), (), (), True),
+        ((), (), (STATE[0] * STATE[1],), True),
+        ((), (), (STATE[0] - STATE[3],), False),
+    ],
+)
+def test_the_unit_sphere_is_connected_where_nothing_cuts_it(facts, weak, relations, connected):
+    """Asked of gamma: what bounds Omega alone has nothing to do with it."""
+    sphere = sum(x**2 for x in STATE[3:]) - 1
+    known = Assumptions(T, facts=facts, weak=weak, relations=(*relations, sphere))
+    field = Field(known, STATE)
+    flow = Flow(lambda e: sympy.Integer(0), frozenset(STATE), always=(sphere,))
+    region = Region(field, Setting(T, (), ()), Statement("", 0, "", ALL, STATE[3], "", flow=flow), [])
+    assert region.is_connected(used(field.enter(STATE[3] + STATE[4]).numerator)) is connected
