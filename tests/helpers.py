@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -46,3 +47,8 @@ def start_of(given: dict) -> State:
 def run_peer(name: str, *problem: Any, setting: tuple[str, Fraction] | None = None, **options: Any) -> Trajectory:
     """One run of a peer, as the rows of a report make it."""
     return peers.ready(name, setting)(*problem, **options)
+
+
+def without_progress(errors: str) -> str:
+    """Standard error without the line that says after ten seconds how far a command is."""
+    return re.sub(r"(?m)^heavytop: [\w-]+: \d+ s so far.*\n", "", errors)

@@ -5,6 +5,7 @@ Every start of the program costs a second, so each is asked several things at on
 
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -38,7 +39,7 @@ runs = [{ precision = "double", horizon = "2", samples = 3 }]
 
 def shell(command: str, *, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[bytes]:
     """The command line by a shell, where ``heavytop`` stands for it."""
-    script = command.replace("heavytop", " ".join(PYTHON))
+    script = re.sub(r"(?<![/\w-])heavytop ", " ".join(PYTHON) + " ", command)
     return subprocess.run(
         ["bash", "-c", script], capture_output=True, cwd=cwd, env=os.environ | environment, timeout=120, check=False
     )

@@ -112,6 +112,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "system": "heavy_top",
             "name": "a",
             "integrator": "b",
+            "require": 3,
         },
     ),
     "drift": (ht.drift, {"run": None}),
