@@ -42,7 +42,7 @@ def check_integrator(integrator: str | Callable[..., Any]) -> list[Checked]:
         integrator: a name that `heavytop list` shows, a file ("mine.toml", "./mine.py:solve") or a callable.
 
     Returns:
-        A list of :class:`Checked`: ``check``, ``verdict`` ("kept", "violated" or "note") and ``text``, a sentence.
+        A list of ``Checked``: ``check``, ``verdict`` ("kept", "violated" or "note") and ``text``, a sentence.
 
     Raises:
         InputError: for an unknown integrator, and a file that describes none.
