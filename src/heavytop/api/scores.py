@@ -109,7 +109,7 @@ def score(
         precision: the format in which it computed; None for the narrowest that holds every number as it is given.
         system: "heavy_top" or "gyrostat".
         name, integrator: what the row is called.
-        require: digits that must be right, as ``passed`` of the result says; None asks only that the run reached its end.
+        require: digits that must be right, as ``passed`` of the result says; None asks that the run reached its end.
 
     Returns:
         A :class:`Score`.
