@@ -138,6 +138,22 @@ def test_a_sum_of_arcs_is_told_from_one_that_is_off_by_pi(turns, expected):
     assert arcs._is_small_somewhere({first: 1, second: -1}, Fraction(turns)) is expected
 
 
+@pytest.mark.parametrize(
+    ("terms", "expected"),
+    [
+        ({sympy.atan(P): 2}, True),
+        ({sympy.asin(P): 2}, False),
+        ({sympy.acos(B): 1, sympy.atan(P): -1}, True),
+        ({sympy.acos(B): 1, sympy.atan(A**2): -1}, False),
+        ({sympy.atan(P): 3}, False),
+    ],
+)
+def test_a_range_with_the_end_pi_is_small_where_an_open_range_takes_part(terms, expected):
+    region = region_of(sympy.Add(*terms))
+    weights = {used(region.field.enter(arc).numerator).pop(): weight for arc, weight in terms.items()}
+    assert Arcs(region)._is_small_by_ranges(weights, Fraction(0)) is expected
+
+
 # --- relations --------------------------------------------------------------------------------------------------------
 
 
