@@ -153,7 +153,7 @@ SIZES = (1e-9, 1e-7, 1e-5, 1e-3)
 def bugs() -> list[tuple[str, str, dict[str, object], tuple[str, ...]]]:
     """Name, integrator, what is wrong, and words one of which the first three sentences must have."""
     found: list[tuple[str, str, dict[str, object], tuple[str, ...]]] = []
-    moved = ("Order observed", "Digits right")
+    moved = ("Order observed", "Digits right", "Error of")
     places = [("a", (1, 0)), ("a", (2, 1)), ("a", (3, 2)), *(("b", j) for j in range(4))]
     for where, place in places:
         found += [

@@ -30,7 +30,8 @@ RANK = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING, Verdict.BETTER, Ve
 """The verdicts, the worst first."""
 _ORDER_MOVED = 0.5
 """An order between two settings that moved by less is no finding: errors near rounding bend it by as much."""
-_DIGITS_MOVED = 0.05
+_DIGITS_MOVED = 0.1
+"""Digits right that moved by less are said to one place, and so not at all."""
 _ENDS_AS_BEFORE = 0.5
 """Decades by which the error of the last state may have grown where the dense output alone is worse."""
 _STEPS_MOVED = 0.02
@@ -343,7 +344,7 @@ def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
         old, new = map(digits_text, worst.digits)
         also = len(changes) - 1
         more = f", {'fewer' if sign > 0 else 'more'} on {_count(also, 'other row')} too" if also else ""
-        if sign > 0 and all(_ends_as_before(change) for change in changes):
+        if worst.lost > _ENDS_AS_BEFORE and sign > 0 and all(_ends_as_before(change) for change in changes):
             more += "; the last state is as it was: errors are between steps, of the dense output"
         yield Sentence(f"Digits right {old} → {new} on {_where(worst)}{more}.", frozenset(c.identity for c in changes))
 
