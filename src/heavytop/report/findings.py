@@ -167,12 +167,14 @@ def sentences(changes: Changes, same: int) -> list[str]:
     """
     if not changes.rows:
         return [f"Nothing changed: {_count(same, 'metric is', 'metrics are')} the same within rounding noise."]
-    found: list[Sentence] = [*_orders(changes)]
+    orders = list(_orders(changes))
+    found = [sentence for moved, sentence in orders if moved < 0]
     found += _whole_rows(changes.rows, Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
     for verdicts in ({Verdict.WORSE, Verdict.INCOMPARABLE}, {Verdict.BETTER}):
         rows = [change for change in changes.worst_first if change.verdict in verdicts]
         for make in (_digits_moved, _steps_moved, _laws_moved, _others_moved):
             found += make(rows, verdicts)
+    found += [sentence for moved, sentence in orders if moved > 0]
     found = [*found, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1]
     told = frozenset[Identity]().union(*(each.rows for each in found))
     rest = [change for change in changes.rows if change.identity not in told]
@@ -255,13 +257,13 @@ def _whose(changes: Sequence[Change]) -> str:
     return f" of {', '.join(names[:3])}" + (" and others" if len(names) > 3 else "") if names else ""
 
 
-def _orders(changes: Changes) -> Iterator[Sentence]:
-    """The order that single steps or refined settings show, where it moved: the largest change of each integrator."""
+def _orders(changes: Changes) -> Iterator[tuple[float, Sentence]]:
+    """By how much the order that single steps or refined settings show moved, the largest change of each integrator."""
     largest: dict[str, tuple[float, Sentence]] = {}
     for name, moved, sentence in chain(_orders_of_steps(changes), _orders_of_settings(changes)):
         if name not in largest or abs(moved) > abs(largest[name][0]):
             largest[name] = moved, sentence
-    yield from (sentence for _, sentence in sorted(largest.values(), key=lambda each: each[0]))
+    yield from sorted(largest.values(), key=lambda each: each[0])
 
 
 def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
