@@ -153,7 +153,7 @@ class State:
         if space is not None and attitude is not None:
             spin = rotated(transposed(attitude.rational_rows(_ATTITUDE_BITS)), space)
         else:
-            spin = vector(omega or (), "omega")
+            spin = vector(() if omega is None else omega, "omega")
         for name, value in (("omega", spin), ("gamma", up), ("attitude", attitude), ("omega_space", space)):
             object.__setattr__(self, name, value)
 
