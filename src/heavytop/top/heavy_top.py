@@ -20,7 +20,7 @@ _NORMALIZE = (
     "Give rational components such as 3/5,0,4/5, or move gamma onto the sphere: --normalize on the command line, "
     "State.normalized() in Python."
 )
-_MOST = 10_000_000
+MOST_MEMBERS = 10_000_000
 """Members of a list; a generator may have no end."""
 
 
@@ -43,9 +43,9 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
     """
     if not isinstance(values, str | bytes | bytearray | Set | Mapping):
         try:
-            found = list(islice(values, _MOST + 1))
-            if len(found) > _MOST:
-                raise InputError(f"{what} has more than {_MOST} members.", remedy)
+            found = list(islice(values, MOST_MEMBERS + 1))
+            if len(found) > MOST_MEMBERS:
+                raise InputError(f"{what} has more than {MOST_MEMBERS} members.", remedy)
             return found
         except HeavyTopError:
             raise
