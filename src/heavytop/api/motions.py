@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, TypeAlias, cast
 
@@ -15,6 +16,7 @@ from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.measure.reference import Reference
 from heavytop.measure.reference import reference as proven
 from heavytop.precision import DOUBLE, Precision, whole
+from heavytop.top.angles import perpendicular
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import check_times
@@ -32,6 +34,7 @@ def propagate(
     integrator: str | Callable[..., Any] = "heyoka",
     system: System | str | None = None,
     xi: Numbers | None = None,
+    attitude: bool | None = None,
     tolerance: Number | None = None,
     high_accuracy: bool | None = None,
     compact_mode: bool | None = None,
@@ -50,6 +53,9 @@ def propagate(
         system: "heavy_top", "gyrostat" or "heavy_gyrostat"; None for "heavy_gyrostat" where the top has a rotor, else
             "heavy_top".
         xi: shape (3,), a unit vector ⟂ γ, the space axis x in body components at t = 0, to ride along.
+        attitude: True to have ξ ride along beside the states, from :func:`heavytop.top.angles.perpendicular` of γ where
+            no ``xi`` says otherwise: for ``quaternions()``, ``matrices()``, ``positions()``, ``omega_space()`` and
+            ``euler("ZXZ")`` of the run; an observer is given nine numbers.
         tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; words: from there to
             1e-6, where None finer than the format; splittings have none.
         high_accuracy: compensated summation of heyoka's Taylor series, off where None.
@@ -72,10 +78,15 @@ def propagate(
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)
     options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
-    options |= {} if xi is None else {"xi": arguments.attitude(xi, state, form)}
+    beside = xi is None and arguments.flag(attitude, "attitude")
+    if xi is not None:
+        options["xi"] = arguments.attitude(xi, state, form)
+    elif beside:
+        options["xi"] = perpendicular(state.gamma)
     run = registry.propagator(named(integrator), options)
     about, instants = arguments.system(system, body), check_times(times)
-    return cast(Trajectory, run(body, state, instants, form, system=about))
+    found = cast(Trajectory, run(body, state, instants, form, system=about))
+    return replace(found, states=found.states[:, :6], attitude=found.states[:, 6:]) if beside else found
 
 
 def ensemble(
