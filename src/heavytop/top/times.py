@@ -10,7 +10,7 @@ from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.precision import exact, exact_text, physical, shown
-from heavytop.top.heavy_top import MOST_MEMBERS, ordered
+from heavytop.top.vectors import MOST_MEMBERS, ordered
 
 _SMALL, _LARGE = 1e-300, 1e149
 """Between them a nearest double is rounded relatively, and no time is too large."""
