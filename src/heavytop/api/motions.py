@@ -18,7 +18,7 @@ from heavytop.measure.reference import reference as proven
 from heavytop.precision import DOUBLE, Precision, whole
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import HeavyTop, State, ordered
 from heavytop.top.times import check_times
 
 Observer: TypeAlias = Callable[[Fraction, Any], object]
@@ -159,9 +159,10 @@ def reference(
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
     body, state = arguments.motion(top, start, of_any_size=True)
-    about, instants = arguments.system(system, body), arguments.any_times(times)
+    about, given = arguments.system(system, body), ordered(times, "times", "Give a list such as [1, 2, 5].")
+    arguments.any_times(given)
     return proven(
-        body, state, instants, whole(digits, "digits"), about, attitude=bool(arguments.flag(attitude, "attitude"))
+        body, state, given, whole(digits, "digits"), about, attitude=bool(arguments.flag(attitude, "attitude"))
     )
 
 

@@ -121,7 +121,7 @@ def score(
     needed = None if require is None else required(require)
     form = None if precision is None else arguments.precision(precision)
     body, state = arguments.motion(top, start)
-    about, instants = arguments.system(system), check_times(times)
+    about, instants = arguments.system(system), list(check_times(times))
     rows = _rows(states)
     names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
     found = assess(of_arrays(body, state, about, instants, rows, form, *names))

@@ -24,7 +24,7 @@ from heavytop.measure.reference_outputs import GUARD_BITS, KnownMotion
 from heavytop.precision import decimal_text, exact, exact_text, shown
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
-from heavytop.top.heavy_top import HeavyTop, State, Vector, data_texts, dot
+from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
 from heavytop.top.outputs import Output, output, shaped
 from heavytop.top.times import TimeText
 
@@ -53,7 +53,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     written_times: ``times`` in JSON, as they were given.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
     :func:`heavytop.top.angles.perpendicular` of γ; attitude_method: how it is known; xi: ξ at t = 0.
-    inertia, weight, centre, omega, gamma: the data, exactly.
+    inertia, weight, centre, rotor, omega, gamma: the data, exactly.
     """
 
     method: str
@@ -66,6 +66,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     inertia: list[str] | None = None
     weight: str | None = None
     centre: list[str] | None = None
+    rotor: list[str] | None = None
     omega: list[str] | None = None
     gamma: list[str] | None = None
     xi: list[str] | None = None
@@ -211,7 +212,12 @@ def reference(
         written_times=[str(TimeText.of(time)) for time in times],
         states=[],
         system=system.name,
-        **data_texts(top, start),
+        inertia=list(map(exact_text, top.inertia)),
+        weight=exact_text(top.weight),
+        centre=list(map(exact_text, top.centre)),
+        rotor=None if top.rotor is None else list(map(exact_text, top.rotor)),
+        omega=list(map(exact_text, start.omega)),
+        gamma=list(map(exact_text, start.gamma)),
     )
     if not attitude:
         states = [ball_texts(solution.state, solution.method, time, digits) for time in instants]
@@ -219,10 +225,7 @@ def reference(
     latest = max(instants, key=abs, default=Fraction(0))
     method, whole = state_and_attitude(solution, latest, bits_of(digits) + GUARD_BITS)
     motion = KnownMotion(whole, instants, digits, top.centre, start.gamma, method)
-    parts = [
-        ball_texts(lambda at, bits, place=place: motion.at(place), method, time, digits)
-        for place, time in enumerate(instants)
-    ]
+    parts = [known_texts(motion.at(place), method, time, digits) for place, time in enumerate(instants)]
     found = msgspec.structs.replace(
         found,
         states=[part[:6] for part in parts],
@@ -256,7 +259,12 @@ def ball_texts(evaluate: Evaluate, method: str, time: Fraction, digits: int) -> 
     wrong by five units of the digit that was promised.  Raises OutOfReach where a printed radius exceeds 10^-digits,
     relative to a value above 1.
     """
-    found = [Ball(*value_text(value, digits + 1)) for value in evaluate(time, bits_of(digits))]
+    return known_texts(evaluate(time, bits_of(digits)), method, time, digits)
+
+
+def known_texts(values: Sequence[Any], method: str, time: Fraction, digits: int) -> list[Ball]:
+    """:func:`ball_texts` of balls that are known already."""
+    found = [Ball(*value_text(value, digits + 1)) for value in values]
     for component, ball in enumerate(found, 1):
         if exact(ball.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(ball.value))):
             raise OutOfReach(
