@@ -9,8 +9,10 @@ from typing import Any
 
 import msgspec
 
+from heavytop.measure.certify import bits_of
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
+from heavytop.precision import REAL_BITS, exact
 from heavytop.report.printable import printable
 from heavytop.top.equations import VARIABLES
 from heavytop.top.outputs import Output
@@ -22,6 +24,7 @@ _LINES = 45
 """Lines of a LaTeX table that fit on a page."""
 _DIGITS_A_LINE = 48
 """Digits of a number on a line of a LaTeX table; a multiple of 3, in which they are grouped."""
+_MORE_BITS = 64
 _KNOWN = ("precision", "integrator", "outcome", "steps")
 """Facts of a computed motion, by the keys that `heavytop score` reads."""
 
@@ -122,7 +125,7 @@ def of_reference(found: Reference, outputs: Sequence[Output], command: str, vers
         columns = (*columns, *_columns_of(output))
         parts.append([list(_flat(value)) for value in found.balls(output)])
     facts = [*_made_by(command, version), *_data_of(msgspec.to_builtins(found)), ("system", found.system)]
-    facts += [("digits", str(found.digits)), ("method", found.method)]
+    facts += [("precision", _wide_format(found)), ("digits", str(found.digits)), ("method", found.method)]
     if found.attitude_method not in (None, found.method):
         facts.append(("method of the attitude", str(found.attitude_method)))
     lines = [list(chain(*line)) for line in zip(*parts, strict=True)]
@@ -197,13 +200,24 @@ def _outputs_of(outputs: Sequence[Output]) -> list[tuple[str, str]]:
     return found
 
 
+def _wide_format(found: Reference) -> str:
+    """A format in which data and times are rounded so little that the numbers of a reference do not show it.
+
+    `heavytop score` rounds the data of a file to the format that the file names.
+    """
+    last = max((abs(exact(str(time))) for time in found.times), default=exact(0))
+    bits = bits_of(found.digits) + _MORE_BITS + 2 * int(last).bit_length()
+    return f"real:{min(bits, REAL_BITS[-1])}"
+
+
 def _one_line(text: str) -> str:
     return printable(" ".join(text.split()))
 
 
 def _caption(facts: dict[str, str]) -> str:
     """What a reader of the table alone must know."""
-    known = [(key, facts[key]) for key in (*_DATA, "xi", "precision", "integrator", "digits", "method") if key in facts]
+    made = ("digits", "method") if "digits" in facts else ("precision", "integrator")
+    known = [(key, facts[key]) for key in (*_DATA, "xi", *made) if key in facts]
     said = "; ".join(f"{_escaped(_one_line(key))} {_breakable(text)}" for key, text in known)
     return f"{said}. heavytop {_escaped(facts['version'])}."
 

@@ -35,6 +35,11 @@ _ORIGIN = (Fraction(0), Fraction(0), Fraction(0))
 _REMEDY = "Use quaternion, matrix, euler:ZXZ (or another sequence), position, omega-space."
 
 
+def key_of(name: str) -> str:
+    """The key of an output in a JSON document."""
+    return name.replace("-", "_")
+
+
 @dataclass(frozen=True, slots=True)
 class Output:
     """One of :data:`SHAPES`; Euler angles with their sequence, a position with its point and pivot.
@@ -50,7 +55,7 @@ class Output:
     @property
     def key(self) -> str:
         """In a JSON document."""
-        return self.name.replace("-", "_")
+        return key_of(self.name)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -60,7 +65,7 @@ class Output:
     @property
     def columns(self) -> tuple[str, ...]:
         """In a CSV file."""
-        return _COLUMNS.get(self.name) or tuple(f"{self.sequence}{place}" for place in (1, 2, 3))
+        return _COLUMNS.get(self.name) or tuple(f"euler{place}" for place in (1, 2, 3))
 
     def at(
         self, omega: Any, gamma: Any, xi: Any, centre: Vector, lib: Any, number: Callable[[Fraction], Any]
