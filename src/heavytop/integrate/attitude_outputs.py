@@ -68,7 +68,7 @@ def attitude_of(run: Trajectory) -> Any:
 def _start(run: Trajectory) -> list[float]:
     """The quaternion at t = 0, of the sign of the convention."""
     problem = run.problem
-    rows = rows_of(problem.start.gamma, problem.xi)
+    rows = rows_of(problem.start.gamma, problem.xi) if run.frame is None else rows_of(run.frame.gamma, run.frame.xi)
     products = quaternion_products(rows)
     multiple = max(zip(products, range(4), strict=True), key=lambda each: each[0][each[1]])[0]
     sign = first_sign(multiple, 2**_SIGN_BITS * problem.precision.eps)
@@ -81,6 +81,8 @@ def _root(value: Any) -> Fraction:
 
 def _centre(run: Trajectory, output: Output) -> Vector:
     """The centre of mass, which a rounded problem alone does not know: only its product with the weight."""
+    if run.frame is not None:
+        return run.frame.centre
     if run.problem.given is not None:
         return run.problem.given[0].centre
     if output.name == "position" and output.point is None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from heavytop.display import Lines, Table, Tabular
 from heavytop.errors import InputError
 from heavytop.precision import Precision, decimal_text, exact, native, native_text, number, rounded
+from heavytop.top.bodies import Frame
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import Integral, holding
@@ -188,6 +189,8 @@ class Trajectory(Tabular):
     flags: everything that can change bits, as text.
     evaluations: of the field, where the engine counts them.
     attitude: ξ, native numbers, shape (n, 3), where it was computed beside ``states`` and is no part of them.
+    frame: the axes in which the body was given, and which ``states`` and ``attitude`` are in; None for those of the
+    problem, the principal axes.  principal: then the run as it was computed.
     """
 
     problem: Problem
@@ -202,6 +205,8 @@ class Trajectory(Tabular):
     flags: dict[str, str] = field(default_factory=dict)
     evaluations: int | None = None
     attitude: Any = None
+    frame: Frame | None = None
+    principal: Trajectory | None = None
 
     def __post_init__(self) -> None:
         import numpy

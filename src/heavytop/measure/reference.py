@@ -11,8 +11,8 @@ import msgspec
 
 from heavytop.display import Table, Tabular
 from heavytop.errors import InputError, OutOfReach, quoted
-from heavytop.exact.attitude import state_and_attitude
 from heavytop.exact.balls import radius_text, value_text, working_precision
+from heavytop.exact.bodies import BodyMotion
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.motion import initial_xi
@@ -23,6 +23,7 @@ from heavytop.measure.certify import bits_of
 from heavytop.measure.reference_outputs import GUARD_BITS, KnownMotion
 from heavytop.precision import decimal_text, exact, exact_text, shown
 from heavytop.top.angles import perpendicular
+from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
 from heavytop.top.outputs import Output, document_of, output, shaped
@@ -70,6 +71,10 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     omega: list[str] | None = None
     gamma: list[str] | None = None
     xi: list[str] | None = None
+    mass: str | None = None
+    gravity: str | None = None
+    start_attitude: str | None = None
+    start_omega_space: list[str] | None = None
 
     @property
     def times(self) -> list[TimeText]:
@@ -197,7 +202,7 @@ def _rounded_up(text: str) -> float:
 
 
 def reference(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     times: Sequence[Any],
     digits: int,
@@ -214,26 +219,22 @@ def reference(
     if digits not in DIGITS:
         raise InputError(f"{quoted(digits)} digits are not available.", "References have 1 to 20000 digits.")
     instants = [exact(time) for time in times]
-    require_handy(top, start, instants)
-    solution = finder(top, start, system)
+    known = BodyMotion(top, start, system, finder)
+    require_handy(known.resolved.top, known.resolved.start, instants)
     found = Reference(
-        method=solution.method,
+        method=known.method,
         digits=digits,
         written_times=[str(TimeText.of(time)) for time in times],
         states=[],
         system=system.name,
-        inertia=list(map(exact_text, top.inertia)),
-        weight=exact_text(top.weight),
-        centre=list(map(exact_text, top.centre)),
-        rotor=None if top.rotor is None else list(map(exact_text, top.rotor)),
-        omega=list(map(exact_text, start.omega)),
-        gamma=list(map(exact_text, start.gamma)),
+        **_body_texts(top, digits),
+        **_start_texts(start, digits),
     )
     if not attitude:
-        states = [ball_texts(solution.state, solution.method, time, digits) for time in instants]
+        states = [ball_texts(known.state, known.method, time, digits) for time in instants]
         return msgspec.structs.replace(found, states=states)
     latest = max(instants, key=abs, default=Fraction(0))
-    method, whole = state_and_attitude(solution, latest, bits_of(digits) + GUARD_BITS)
+    method, whole = known.whole(latest, bits_of(digits) + GUARD_BITS)
     motion = KnownMotion(whole, instants, digits, top.centre, start.gamma, method)
     parts = [known_texts(motion.at(place), method, time, digits) for place, time in enumerate(instants)]
     found = msgspec.structs.replace(
@@ -241,18 +242,54 @@ def reference(
         states=[part[:6] for part in parts],
         attitude=[part[6:] for part in parts],
         attitude_method=method,
-        xi=xi_texts(start.gamma, digits),
+        xi=xi_texts(start, digits),
     )
     found.__dict__["_motion"] = motion
     return found
 
 
-def xi_texts(gamma: Vector, digits: int) -> list[str]:
-    """ξ at t = 0 where γ alone is given: exact where it is rational, else to that many digits."""
-    square = dot(gamma, gamma)
-    if square == 1:
-        return [exact_text(value) for value in perpendicular(gamma)]
-    return start_texts(gamma, digits)
+def _body_texts(body: HeavyTop | Body, digits: int) -> dict[str, Any]:
+    """The body as exact text, by the keys of the JSON document."""
+    found: dict[str, Any] = {
+        "centre": list(map(exact_text, body.centre)),
+        "rotor": None if body.rotor is None else list(map(exact_text, body.rotor)),
+        "weight": exact_text(body.weight),
+    }
+    if isinstance(body, HeavyTop):
+        return found | {"inertia": list(map(exact_text, body.inertia))}
+    tensor = [exact_text(value) for row in body.tensor for value in row]
+    return found | {"mass": exact_text(body.mass), "gravity": exact_text(body.gravity), "inertia": tensor}
+
+
+def _start_texts(start: State, digits: int) -> dict[str, Any]:
+    """The start as exact text; γ and Ω of an irrational attitude to the digits asked."""
+    known = start.attitude is None or start.attitude.exact_rows() is not None
+
+    def texts(values: Vector, known: bool) -> list[str]:
+        return [exact_text(value) if known else decimal_text(value, digits + 1) for value in values]
+
+    found: dict[str, Any] = {
+        "omega": texts(start.omega, known or start.omega_space is None),
+        "gamma": texts(start.gamma, known),
+    }
+    if start.attitude is not None:
+        found["start_attitude"] = f"{start.attitude.kind}:{start.attitude}"
+    if start.omega_space is not None:
+        found["start_omega_space"] = texts(start.omega_space, True)
+    return found
+
+
+def xi_texts(start: State, digits: int) -> list[str]:
+    """ξ at t = 0: of the attitude given, else of γ alone; exact where it is rational, else to that many digits."""
+    if start.attitude is not None:
+        rows = start.attitude.exact_rows()
+        if rows is not None:
+            return [exact_text(value) for value in rows[0]]
+        near = start.attitude.rational_rows(bits_of(digits) + GUARD_BITS)
+        return [decimal_text(value, digits + 1) for value in near[0]]
+    if dot(start.gamma, start.gamma) == 1:
+        return [exact_text(value) for value in perpendicular(start.gamma)]
+    return start_texts(start.gamma, digits)
 
 
 @whole_evaluation
