@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal
+from heavytop.cli.app import Json, command, numbers
+from heavytop.cli.motion_output import made_by, require_one_output, write_motion
 from heavytop.cli.output import say
 from heavytop.cli.progress import reaching, watched
 from heavytop.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from heavytop.report.motion_table import MotionTable
+    from heavytop.top.outputs import Output
 
 Inertia = Annotated[str, typer.Option(help="Principal moments A,B,C at the fixed point.")]
 Weight = Annotated[str, typer.Option(help="Weight P.")]
@@ -21,6 +29,16 @@ Rotor = Annotated[str | None, typer.Option(help="Momentum k1,k2,k3 of a rotor: t
 SystemName = Annotated[
     str | None,
     typer.Option(help="heavy_top, gyrostat or heavy_gyrostat; without it heavy_top, or heavy_gyrostat with --rotor."),
+]
+Show = Annotated[
+    str | None,
+    typer.Option(metavar="WHAT", help="Also quaternion, matrix, euler:ZXZ (any sequence), position, omega-space."),
+]
+Point = Annotated[str | None, typer.Option(help="Point x,y,z of the body, in place of the centre of mass.")]
+Pivot = Annotated[str | None, typer.Option(help="Place x,y,z of the fixed point in space, 0,0,0 without it.")]
+Csv = Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table as CSV, which `score` reads.")]
+Latex = Annotated[
+    Path | None, typer.Option(metavar="[FILE]", help="Write it as LaTeX (siunitx, booktabs); print it without FILE.")
 ]
 Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]
 
@@ -47,6 +65,11 @@ def propagate(
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     normalize: Normalize = False,
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
+    show: Show = None,
+    point: Point = None,
+    pivot: Pivot = None,
+    csv: Csv = None,
+    latex: Latex = None,
     json: Json = False,
 ) -> int:
     """Integrate one motion and print its states.
@@ -60,6 +83,8 @@ def propagate(
 
     top, start = _motion(inertia, weight, centre, omega, gamma, normalize, rotor)
     form, which, instants = formats.parse(precision), system_of(system, top), check_times(numbers(times))
+    wanted = _outputs(show, point, pivot)
+    require_one_output(csv, latex, json)
     if max_steps is not None and max_steps < 1:
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top, start)
@@ -76,14 +101,30 @@ def propagate(
     end, which_one = instants[-1] or 1, named(integrator)
     with reaching("integration", _PROPAGATE_SECONDS) as reach:
         motion = compute(
-            top, start, instants, form, which, attitude, max_steps, which_one, lambda time: reach(float(time / end))
+            top,
+            start,
+            instants,
+            form,
+            which,
+            attitude,
+            max_steps,
+            which_one,
+            lambda time: reach(float(time / end)),
+            wanted,
+            numbers(times),
         )
-    if json:
-        print_json(motion.to_json())
-    else:
+
+    def table() -> MotionTable:
+        from heavytop.report.motion_table import of_motion
+
+        return of_motion(motion, *made_by())
+
+    def text(shown: MotionTable) -> RenderableType:
         from heavytop.report.motion_text import motion_text
 
-        show_on_terminal(motion_text(motion))
+        return motion_text(motion, shown)
+
+    write_motion(motion.to_json, table, text, csv, latex, json)
     return 0 if motion.complete else 3
 
 
@@ -100,6 +141,11 @@ def reference(
     system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Give xi too, fixed in space and across gamma.")] = False,
     normalize: Normalize = False,
+    show: Show = None,
+    point: Point = None,
+    pivot: Pivot = None,
+    csv: Csv = None,
+    latex: Latex = None,
     json: Json = False,
 ) -> int:
     """Print proven states of one motion.
@@ -113,16 +159,35 @@ def reference(
 
     top, start = _motion(inertia, weight, centre, omega, gamma, normalize, rotor, of_any_size=True)
     which, instants = system_of(system, top), check_times(numbers(times))
+    wanted = _outputs(show, point, pivot)
+    require_one_output(csv, latex, json)
     watch = _Watch([abs(time) for time in instants])
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        found = proven(top, start, instants, digits, which, watch.find, attitude)
-    if json:
-        print_json(found)
-    else:
+        found = proven(top, start, numbers(times), digits, which, watch.find, attitude or bool(wanted))
+        found.require_outputs(wanted)
+
+    def table() -> MotionTable:
+        from heavytop.report.motion_table import of_reference
+
+        return of_reference(found, wanted, *made_by())
+
+    def text(shown: MotionTable) -> RenderableType:
         from heavytop.report.motion_text import reference_text
 
-        show_on_terminal(reference_text(found))
+        return reference_text(found, shown)
+
+    write_motion(lambda: found.document(wanted), table, text, csv, latex, json)
     return 0
+
+
+def _outputs(show: str | None, point: str | None, pivot: str | None) -> tuple[Output, ...]:
+    """The outputs asked for; raises InputError for one that is unknown, and for a point or pivot without a position."""
+    from heavytop.top.outputs import outputs
+
+    places = [None if each is None else numbers(each) for each in (point, pivot)]
+    if show is None and places == [None, None]:
+        return ()
+    return outputs("" if show is None else show, *places)
 
 
 class _Watch:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import msgspec
 
@@ -26,7 +26,7 @@ from heavytop.top.angles import perpendicular
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
-from heavytop.top.outputs import Output, output, shaped
+from heavytop.top.outputs import Output, document_of, output, shaped
 from heavytop.top.times import TimeText
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
         """Exact text, as it was given, which ``float`` and ``Fraction`` read."""
         return [TimeText(time) for time in self.written_times]
 
-    def texts(self, of: str | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
+    def texts(self, of: str | Output | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
         """The values as decimal text, shape (n, 6).
 
         of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for the values of that in place of the
@@ -94,13 +94,23 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
             return self._outputs(output(of, point, pivot), lambda value: outputs_of.text(value, self.digits)[0])
         return [[ball.value for ball in state] for state in self.states]
 
-    def balls(self, of: str, *, point: Any = None, pivot: Any = None) -> list[Any]:
+    def balls(self, of: str | Output, *, point: Any = None, pivot: Any = None) -> list[Any]:
         """An output as :class:`Ball`, in the shape of its array; "nan" within "inf" for what is not defined.
 
         of, point, pivot: as in :meth:`texts`.  Each number is proven to ``digits``, relative to a size above 1; a
         position relative to |p|.
         """
         return self._outputs(output(of, point, pivot), lambda value: Ball(*outputs_of.text(value, self.digits)))
+
+    def document(self, outputs: Sequence[Output] = ()) -> dict[str, Any]:
+        """The document of `reference --json`, with these outputs in it."""
+        values = document_of(outputs, lambda what: msgspec.to_builtins(self.balls(what)))
+        return cast("dict[str, Any]", msgspec.to_builtins(self)) | values
+
+    def require_outputs(self, outputs: Sequence[Output]) -> None:
+        """Evaluates them, so that they are there when they are asked for; raises OutOfReach as :meth:`balls` does."""
+        for what in outputs:
+            self._known().balls(what)
 
     def quaternions(self) -> NDArray[np.float64]:
         """(w, x, y, z) at every time, body to space, of length 1, rounded to double, shape (n, 4).
