@@ -145,6 +145,16 @@ def test_numbers_of_runs_that_stopped_alike_are_compared() -> None:
     assert compare(report(new), report(old), Policy()).verdict == "better"
 
 
+@pytest.mark.parametrize("word", ["nan", "missing"])
+def test_what_neither_of_two_runs_that_stopped_reached_is_no_difference(word: str) -> None:
+    metrics = {"drift_energy_max": error("1e-12"), "drift_energy_final": Metric(word, None)}
+    stopped = ended("step_limit", metrics=metrics)
+    result = compare(report(stopped), report(stopped), Policy())
+    assert result.verdict == "same"
+    assert result.sentences[1].startswith("1 row of heyoka failed in both reports on euler")
+    assert compare(report(ended("step_limit")), report(stopped), Policy()).verdict == "incomparable"
+
+
 def test_a_failure_of_another_motion_says_nothing_of_this_one() -> None:
     data = Data(("2", "2", "1"), "1", ("0", "0", "1"), ("0", "0", "1"), ("1", "0", "0"))
     other = msgspec.structs.replace(data, weight="2")

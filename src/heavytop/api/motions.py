@@ -49,7 +49,7 @@ def propagate(
             "./mine.py:solve"; or a callable, a peer or a solver (:func:`heavytop.integrate.peers.double.double_peer`).
         system: "heavy_top" or "gyrostat".
         xi: shape (3,), a unit vector ⟂ γ, the space axis x in body components at t = 0, to ride along.
-        tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; words: from there to
+        tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; multiword: from there to
             1e-6, where None finer than the format; splittings have none.
         high_accuracy: compensated summation of heyoka's Taylor series, off where None.
         compact_mode: heyoka's, slower but quick to compile; None for off in double and extended, on elsewhere.

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal
-from heavytop.cli.output import say
+from heavytop.cli.output import say, say_former
 from heavytop.cli.progress import reaching, watched
 from heavytop.errors import InputError
 
@@ -35,7 +35,7 @@ def propagate(
     gamma: Gamma,
     times: Times,
     precision: Annotated[
-        str, typer.Option(help="double, extended, double-double (of words), quad, real:BITS.")
+        str, typer.Option(help="double, extended, double-double (of multiword), quad, real:BITS.")
     ] = "double",
     integrator: Annotated[str, typer.Option(help="One of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
     system: SystemName = "heavy_top",
@@ -58,6 +58,7 @@ def propagate(
     if max_steps is not None and max_steps < 1:
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top, start)
+    say_former([integrator])
     if form.bits >= _SLOW_BITS and integrator == "heyoka":
         say(
             f"warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "

@@ -113,8 +113,8 @@ def compute(
     attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
     integrator: a name that `heavytop list` shows, or a source.
-    reached: called with the times on the way, some fifty and one for each doubling; by others than heyoka and words at
-    the end.
+    reached: called with the times on the way, some fifty and one for each doubling; by others than heyoka and multiword
+    at the end.
 
     Raises InputError for another integrator, OutOfReach where the run would take more steps than anyone waits for.
     """

@@ -163,12 +163,13 @@ class Sentence(NamedTuple):
 def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[str]:
     """At most eight sentences, the most telling first; what is worse before what is better.
 
-    same: how many metrics are the same, each row that failed in both reports counted as one.
+    same: how many metrics are the same, each row that came to nothing in both reports counted as one.
     failed: rows that failed in both reports, in the same way.
     """
     if not changes.rows:
-        numbers = f"{_count(same - len(failed), 'metric is', 'metrics are')} the same within rounding noise"
-        return [*([f"Nothing changed: {numbers}."] if same > len(failed) else []), *_still_failed(failed)]
+        counted = same - sum(row.outcome in UNMEASURED for row in failed)
+        numbers = f"{_count(counted, 'metric is', 'metrics are')} the same within rounding noise"
+        return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed)]
     orders = list(_orders(changes))
     found = [sentence for moved, sentence in orders if moved < 0]
     by_rank = sorted(changes.rows, key=lambda change: RANK.index(change.verdict))
@@ -193,7 +194,15 @@ def _still_failed(rows: Sequence[Row]) -> list[str]:
     if not rows:
         return []
     whose, on = _whose([row.identity for row in rows]), _on([row.identity for row in rows])
-    return [f"{_count(len(rows), 'row')}{whose} failed in both reports{on}: {clip(rows[0].reference.reason, 160)}."]
+    return [f"{_count(len(rows), 'row')}{whose} failed in both reports{on}: {clip(_why(rows[0]), 160)}."]
+
+
+def _why(row: Row) -> str:
+    """What ended a row: the reason that its integrator gives, or its outcome and how far it came."""
+    if row.outcome == FAILED:
+        return row.reference.reason
+    stopped = f"at t = {short(row.time_reached)} of {short(row.horizon)}"
+    return f"{row.outcome}, {row.reference.reason if row.outcome in UNMEASURED else stopped}"
 
 
 def line(change: Change) -> str:
@@ -353,12 +362,9 @@ def _became(change: Change) -> tuple[str, str]:
         return became.get(change.verdict, "cannot be compared"), change.findings[0].reason
     if change.new.outcome == UNSUPPORTED:
         return "are no longer supported", change.new.reference.reason
-    stopped = f"at t = {short(change.new.time_reached)} of {short(change.new.horizon)}"
-    reason = change.new.reference.reason if change.new.outcome in UNMEASURED else stopped
-    how = "" if change.new.outcome == FAILED else f"{change.new.outcome}, "
     if change.old is None or change.old.outcome == "success":
-        return "failed", f"{how}{reason}"
-    return ("stop earlier" if change.verdict is Verdict.WORSE else "failed in both reports"), f"{how}{reason}"
+        return "failed", _why(change.new)
+    return ("stop earlier" if change.verdict is Verdict.WORSE else "failed in both reports"), _why(change.new)
 
 
 def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:

@@ -21,7 +21,7 @@ from heavytop.report.policy import BITS, Limits, Lookup, Policy
 from heavytop.report.rounding_bound import RoundingBound
 from heavytop.report.series import judge_series
 from heavytop.report.timings import BAND, judge_repeated
-from heavytop.report.verdicts import Judged, Verdict, beyond_limit, judge, judge_seconds
+from heavytop.report.verdicts import MISSING, NAN, SAME, Judged, Verdict, beyond_limit, judge, judge_seconds
 
 _STEPS = 2
 """The same method with the same setting takes as many steps, and evaluates the field as often: a factor beyond this is
@@ -59,7 +59,7 @@ class RowComparison:
 
     timed: whether seconds are compared; repeated: whether those of runs that were repeated for it are.
     list_same: False to count what plainly stayed the same, in :attr:`same`.
-    failed: rows that failed in both reports, in the same way.
+    failed: rows of the candidate that failed in both reports, in the same way.
     checked: of the baseline and of the candidate, whether each row was found consistent as it was read.
     """
 
@@ -97,6 +97,8 @@ class RowComparison:
             if self.ignores(old):
                 return []
             return [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
+        if new.outcome != SUCCESS and not self.ignores(old):
+            self.failed.append(new)
         rules = self.lookup.row(old.key.kind, old.case) if self.policy.rule else ()
         found = self._metrics(key, rules, old, new)
         if old.laws or new.laws:
@@ -177,6 +179,8 @@ class RowComparison:
         """The noise of the baseline first, then the values, then the noise of the candidate, which is worse where it is
         more than chance and reaches further than that of the baseline.
         """
+        if new.outcome != SUCCESS and metric.value == match.value in (NAN, MISSING):
+            return SAME  # both stopped before there was one
         least_of = least(old.metrics, metric), least(new.metrics, match)
         kind = kind_of(old, self.kinds)
         bound = RoundingBound(old, kind) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
