@@ -146,7 +146,7 @@ def test_whoever_is_fastest_is_named() -> None:
     words = [row(f"multiword tolerance=1e{n}", n, 0.25, precision="double-double") for n in (-25, -31)]
     heyoka = row("heyoka tolerance=eps", -33, 4.0, precision="quad")
     (lead,) = leads([heyoka, *words])
-    assert lead.text.startswith("top/T=9: the fastest at error 1e-30 is words double-double (250 ms); ")
+    assert lead.text.startswith("top/T=9: the fastest at error 1e-30 is multiword double-double (250 ms); ")
     assert lead.short == "At 1e-30 multiword double-double is 16.0 × as fast as heyoka quad"
 
 
