@@ -47,8 +47,8 @@ _CHUNK = 1 << 16
 _GREETING = 20.0
 _MANY = 4
 """States still due, from which on they are read several at a time: each waking of the reader slows the program."""
-_NAP, _NAP_SHARE = 1e-3, 1 / 32
-"""Seconds, and part of the seconds so far, between two readings of such states."""
+_NAP, _NAP_SHARE, _NAP_LEFT = 1e-3, 1 / 4, 1 / 3
+"""Seconds, part of the seconds so far, and part of those that are left, between two readings of such states."""
 _LOOK = 0.1
 """Seconds between two looks whether a silent program is still there."""
 _FAREWELL = 0.3
@@ -291,6 +291,15 @@ class Reply:
         """How many states are still to come."""
         return len(self.request.times) - len(self.states)
 
+    def nap(self, seconds: float) -> float:
+        """Seconds until the next reading, ``seconds`` after the request: the fewer are left, the sooner.
+
+        What is left is estimated by the time that the last state has reached, as if all steps were equal.
+        """
+        reached = self.request.times[len(self.states) - 1] / self.request.times[-1] if self.states else 0
+        left = seconds * float((1 - reached) / reached) if reached else inf
+        return min(_NAP_SHARE * seconds, _NAP_LEFT * left)
+
     def take_states(self, lines: list[bytes]) -> int:
         """Takes the states of doubles that these lines begin with, as many as are due and not one beyond; their count.
 
@@ -396,6 +405,10 @@ class _Greeting:
     def __init__(self, take: Callable[[bytes], bool]) -> None:
         self.take = take
 
+    def nap(self, seconds: float) -> float:
+        """None is needed."""
+        return 0.0 * seconds
+
     def take_states(self, lines: list[bytes]) -> int:
         """None."""
         return 0
@@ -495,7 +508,7 @@ class Session:
             if not events and self.process.poll() is not None and not self._drained():
                 raise self._failed(f"{self._end()} before it said {awaited}")
             if events and not waiting and reply.due >= _MANY:
-                sleep(min(_NAP, _NAP_SHARE * (monotonic() - began)))
+                sleep(min(_NAP, reply.nap(monotonic() - began)))
             self._receive([descriptor for descriptor, _ in events], awaited)
 
     def _write(self, waiting: memoryview) -> memoryview:
