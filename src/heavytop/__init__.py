@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from heavytop.integrate.trajectory import Outcome, Trajectory
     from heavytop.measure.reference import Reference
     from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, available, real
-    from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+    from heavytop.top.attitude import Attitude
+    from heavytop.top.bodies import Body
+    from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
     from heavytop.top.heavy_top import HeavyTop, State
     from heavytop.top.integrals import holding
 
@@ -30,7 +32,9 @@ _PLACES = {
     "integrate.trajectory": ("Outcome", "Trajectory"),
     "measure.reference": ("Reference",),
     "precision": ("DOUBLE", "DOUBLE_DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),
-    "top.equations": ("GYROSTAT", "HEAVY_TOP", "System"),
+    "top.attitude": ("Attitude",),
+    "top.bodies": ("Body",),
+    "top.equations": ("GYROSTAT", "HEAVY_GYROSTAT", "HEAVY_TOP", "System"),
     "top.heavy_top": ("HeavyTop", "State"),
     "top.integrals": ("holding",),
 }
@@ -41,9 +45,12 @@ __all__ = [
     "DOUBLE_DOUBLE",
     "EXTENDED",
     "GYROSTAT",
+    "HEAVY_GYROSTAT",
     "HEAVY_TOP",
     "QUAD",
+    "Attitude",
     "Audit",
+    "Body",
     "Comparison",
     "Contradiction",
     "HeavyTop",

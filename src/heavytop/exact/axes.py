@@ -6,8 +6,8 @@ the top (I, r), then
     Ω~ = d QΩ,   γ~ = Qγ    solve those of the top (QI, Qr):
     M~' = d QM' = QM × QΩ + P Qγ × Qr = M~ × Ω~ + P γ~ × r~,    γ~' = d Qγ × QΩ = γ~ × Ω~
 
-without a reversal of the time.  Likewise the gyrostat, where Q keeps axis 2 and λ = P b/(M·γ) goes to d λ.  A vector
-fixed in space goes to its image under Q.
+without a reversal of the time.  Likewise the gyrostat, where Q keeps axis 2 and λ = P b/(M·γ) goes to d λ, and the
+heavy gyrostat, whose k goes to d Qk as M does.  A vector fixed in space goes to its image under Q.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ def permuted(vector: Sequence[Any], axes: Axes) -> tuple[Any, Any, Any]:
 
 def renamed_top(top: HeavyTop, axes: Axes) -> HeavyTop:
     """The same top with its axis ``axes[k]`` called k."""
-    return HeavyTop(permuted(top.inertia, axes), top.weight, permuted(top.centre, axes))
+    d = orientation(axes)
+    rotor = None if top.rotor is None else [d * k for k in permuted(top.rotor, axes)]
+    return HeavyTop(permuted(top.inertia, axes), top.weight, permuted(top.centre, axes), rotor)
 
 
 def renamed_state(state: State, axes: Axes) -> State:
@@ -111,11 +113,11 @@ class Renamed:
 
         Raises NotInClass where the solution has no attitude.
         """
+        return turned_to_start(self, self.own_attitude, time, bits)
+
+    def own_attitude(self, time: Fraction, bits: int) -> Sequence[arb]:
+        """ξ in the new names, starting where the solution's does.  Raises NotInClass where it has no attitude."""
         attitude = getattr(self.solution, "attitude", None)
         if attitude is None:
             raise NotInClass(f"{self.method} has no attitude in closed form.", "Integrate the attitude along with it.")
-
-        def own(at: Fraction, working: int) -> Sequence[arb]:
-            return permuted(attitude(at, working), self.axes)
-
-        return turned_to_start(self, own, time, bits)
+        return permuted(attitude(time, bits), self.axes)

@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import exact, number
 from heavytop.top.angles import euler_angles, unwrap
-from heavytop.top.heavy_top import cross, dot
+from heavytop.top.equations import GYROSTAT
+from heavytop.top.heavy_top import cross
 
 Angles = tuple[float, float, float]
 
@@ -36,15 +37,18 @@ class _Seen(NamedTuple):
 
 
 class FollowedAngles:
-    """(φ, θ, ψ) in rad at the samples that were seen, in any order."""
+    """(φ, θ, ψ) in rad at the samples that were seen, in any order.
 
-    def __init__(self, problem: Problem) -> None:
+    problem: of the run.  start: (Ω, γ, ξ) at t = 0, in the axes whose angles these are, as are all states seen.
+    """
+
+    def __init__(self, problem: Problem, start: Sequence[Fraction]) -> None:
         self._problem = problem
         self._rate = _fastest(problem)
         inertia = problem.parameters.inertia
         self._bend = 2 + max(inertia) / min(inertia)
         self._seen: dict[Fraction, _Seen] = {}
-        self.see(Fraction(0), (*problem.start.flat, *(problem.xi or ())))
+        self.see(Fraction(0), start)
 
     def see(self, time: Fraction, state: Any) -> None:
         """Keep the angles of a state (Ω, γ, ξ)."""
@@ -97,9 +101,13 @@ class FollowedAngles:
 
 
 def _fastest(problem: Problem) -> Fraction:
-    """Not less than |ω| at any time: |Ω|² <= (Ω·M + 4 |P r|)/min I by the energy (heavy top), or by |M| (gyrostat)."""
-    top, omega = problem.top, problem.start.omega
-    least, most = min(top.inertia), max(top.inertia)
-    square = (dot(omega, top.angular_momentum(omega)) + 4 * sum(map(abs, top.moment))) * most / least**2
+    """Not less than |ω| at any time: |Ω|² <= (Ω·IΩ + 4 |P r|)/min I by the energy (heavy top and heavy gyrostat), or by
+    |M| (gyrostat).  The rotor is added: |λ|, or |k|/min I, by which it bends the path.
+    """
+    p, omega = problem.parameters, problem.start.omega
+    least, most = min(p.inertia), max(p.inertia)
+    twice = sum((i * w * w for i, w in zip(p.inertia, omega, strict=True)), Fraction(0))
+    square = (twice + 4 * sum(map(abs, p.moment))) * most / least**2
     root = Fraction(math.isqrt(square.numerator * square.denominator << 40) + 1, square.denominator << 20)
-    return root + abs(Fraction(problem.parameters.rotor))
+    rotor = sum(abs(Fraction(part)) for part in p.rotors)
+    return root + (rotor if problem.system is GYROSTAT else rotor / least)
