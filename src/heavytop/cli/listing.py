@@ -59,7 +59,7 @@ def _everything() -> dict[str, Any]:
     from heavytop.suite.plan import BUILT_IN
 
     notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
-    said = {"heyoka": "every format but double-double", "words": "every format"}
+    said = {"heyoka": "every format but double-double", "multiword": "every format"}
     own = {name: said.get(name, "installed") for name in registry.INTEGRATORS}
     others = {name: "installed" if reason is None else reason for name, reason in peers.available().items()}
     return {
