@@ -1,7 +1,6 @@
 """Draw the conventions of attitudes: python benchmarks/attitude_figure.py [--out docs/attitude.svg]
 
-Space axes, body axes turned by R = R_z(φ) R_x(θ) R_z(ψ), ξ, γ and a point of the body; projected as it is drawn, by hand
-of matplotlib alone.
+Space axes, body axes turned by R = R_z(a) R_x(b) R_z(c), and the centre of mass, in a parallel projection.
 """
 
 import argparse
