@@ -67,8 +67,8 @@ def propagate(
 
     Returns:
         A :class:`Trajectory`: ``outcome``, ``times``, ``states`` as an array (n, 6) of the format's numbers in the
-        order Ω1 Ω2 Ω3 γ1 γ2 γ3, or (n, 9) with ξ, in the axes in which the body was given; ``to_numpy()`` in double, ``texts()`` in full.  A run that fails is
-        an outcome, not an exception.
+        order Ω1 Ω2 Ω3 γ1 γ2 γ3, or (n, 9) with ξ, in the axes in which the body was given; ``to_numpy()`` in double,
+        ``texts()`` in full.  A run that fails is an outcome, not an exception.
 
     Raises:
         InputError: for what is no motion, time, format or option.

@@ -12,14 +12,17 @@ import msgspec
 from heavytop.measure.certify import bits_of
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
-from heavytop.precision import REAL_BITS, exact
+from heavytop.precision import REAL_BITS, exact, exact_text
 from heavytop.report.printable import printable
+from heavytop.top.attitude import rows_of
+from heavytop.top.bodies import PIVOT
 from heavytop.top.equations import VARIABLES
+from heavytop.top.heavy_top import dot
 from heavytop.top.outputs import Output
 
 _GREEK = {"Ω": r"\Omega", "γ": r"\gamma", "ξ": r"\xi", "φ": r"\varphi", "θ": r"\theta", "ψ": r"\psi"}
 _BODY = ("mass", "gravity", "inertia", "about", "weight", "centre", "rotor")
-_DATA = (*_BODY, "omega", "omega_space", "gamma", "quaternion", "matrix", "euler", "axis_angle")
+_DATA = (*_BODY, "omega", "start_omega_space", "gamma", "start_attitude", "xi")
 _LINES = 45
 """Lines of a LaTeX table that fit on a page."""
 _DIGITS_A_LINE = 48
@@ -176,16 +179,17 @@ def _made_by(command: str, version: str) -> list[tuple[str, str]]:
 
 
 def _data_of(document: dict[str, Any]) -> list[tuple[str, str]]:
-    """The body, the start and ξ at t = 0, exactly, by the keys of the JSON document."""
-    found = [(key, document[key]) for key in _DATA if document.get(key) is not None and _is_data(document[key])]
-    if document.get("xi") is not None:
-        found.append(("xi", document["xi"]))
-    return [(key, value if isinstance(value, str) else ", ".join(_flat(value))) for key, value in found]
+    """The body, the start and ξ at t = 0, by the keys of the JSON document; R at t = 0 where it was given exactly.
 
-
-def _is_data(value: Any) -> bool:
-    """Whether a value is text or vectors of text, and no table of outputs of the same name."""
-    return isinstance(value, str) or all(isinstance(part, str) for part in value)
+    Of a body given by its mass the tensor is about the pivot.
+    """
+    given = document | ({"about": PIVOT, "weight": None} if document.get("mass") is not None else {})
+    found = [(key, given[key]) for key in _DATA if given.get(key) is not None]
+    if given.get("start_attitude") is not None:
+        xi, gamma = ([exact(part) for part in given[key]] for key in ("xi", "gamma"))
+        if dot(xi, xi) == dot(gamma, gamma) == 1 and dot(xi, gamma) == 0:
+            found.append(("start_matrix", [exact_text(part) for row in rows_of(gamma, xi) for part in row]))
+    return [(key, value if isinstance(value, str) else ", ".join(value)) for key, value in found]
 
 
 def _outputs_of(outputs: Sequence[Output]) -> list[tuple[str, str]]:
@@ -217,7 +221,7 @@ def _one_line(text: str) -> str:
 def _caption(facts: dict[str, str]) -> str:
     """What a reader of the table alone must know."""
     made = ("digits", "method") if "digits" in facts else ("precision", "integrator")
-    known = [(key, facts[key]) for key in (*_DATA, "xi", *made) if key in facts]
+    known = [(key, facts[key]) for key in (*_DATA, *made) if key in facts]
     said = "; ".join(f"{_escaped(_one_line(key))} {_breakable(text)}" for key, text in known)
     return f"{said}. heavytop {_escaped(facts['version'])}."
 
