@@ -61,7 +61,8 @@ def test_a_reference_names_its_times_as_they_were_given() -> None:
 def test_doubles_in_order_are_checked_as_an_array_and_give_the_same_bits(make: object) -> None:
     doubles = [0.0, 0.1, 0.25, 1.75]
     found = check_times(make(doubles))
-    assert isinstance(found, DoubleTimes) and check_times(found) is found
+    assert isinstance(found, DoubleTimes)
+    assert check_times(found) is found
     assert list(found) == [Fraction(value) for value in doubles]
     exact = [Fraction(value) for value in doubles]
     for precision in ("double", "extended", "quad"):
@@ -93,5 +94,5 @@ def test_doubles_that_are_no_times_are_refused_as_others_are(times: list[float],
     for given in (times, np.array(times)):
         with pytest.raises(InputError, match=message):
             check_times(given)
-    with pytest.raises(InputError, match="not a list|not a number|A ndarray"):
+    with pytest.raises(InputError, match=r"not a list|not a number|A ndarray"):
         check_times(np.ones((2, 2)))

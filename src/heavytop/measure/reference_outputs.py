@@ -49,6 +49,7 @@ class KnownMotion:
     ) -> None:
         self.whole, self.times, self.digits, self.method = whole, times, digits, method
         self.centre, self.gamma, self.as_written = centre, gamma, as_written
+        self._unit = dot(gamma, gamma) == 1
         self._kept: dict[int, Sequence[arb]] = {}
         self._signs: list[int] | None = None
 
@@ -132,8 +133,10 @@ class KnownMotion:
     @whole_evaluation
     def _evaluated(self, whole: Sequence[arb], bits: int, output: Output) -> list[arb]:
         with working_precision(bits + _WORKING_BITS):
-            length = ball(dot(self.gamma, self.gamma)).sqrt()
-            omega, gamma, xi = whole[:3], [part / length for part in whole[3:6]], whole[6:]
+            omega, gamma, xi = whole[:3], whole[3:6], whole[6:]
+            if not self._unit:
+                length = ball(dot(self.gamma, self.gamma)).sqrt()
+                gamma = [part / length for part in gamma]
             return list(output.at(omega, gamma, xi, self.centre, _BALLS, ball))
 
     def _lacking(self, value: arb, output: Output) -> float:
@@ -141,6 +144,8 @@ class KnownMotion:
         if not value.is_finite():
             return math.inf
         if self.as_written:
+            return 0
+        if output.name != "position" and value.rel_one_accuracy_bits() >= bits_of(self.digits):
             return 0
         scale = max(Fraction(1), abs(midpoint(value)))
         if output.name == "position":
