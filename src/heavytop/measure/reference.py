@@ -21,11 +21,11 @@ from heavytop.exact.solution import ExactSolution
 from heavytop.measure import reference_outputs as outputs_of
 from heavytop.measure.certify import bits_of
 from heavytop.measure.reference_outputs import GUARD_BITS, KnownMotion
-from heavytop.precision import decimal_text, exact, exact_text, shown
-from heavytop.top.angles import perpendicular
+from heavytop.measure.setup import motion_texts, xi_texts
+from heavytop.precision import decimal_text, exact, shown
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
-from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
+from heavytop.top.heavy_top import HeavyTop, State, Vector
 from heavytop.top.outputs import Output, document_of, output, shaped
 from heavytop.top.times import TimeText
 
@@ -73,8 +73,11 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     xi: list[str] | None = None
     mass: str | None = None
     gravity: str | None = None
-    start_attitude: str | None = None
-    start_omega_space: list[str] | None = None
+    about: str | None = None
+    start_quaternion: list[str] | None = None
+    start_matrix: list[str] | None = None
+    start_euler: list[str] | None = None
+    start_sequence: str | None = None
 
     @property
     def times(self) -> list[TimeText]:
@@ -227,8 +230,7 @@ def reference(
         written_times=[str(TimeText.of(time)) for time in times],
         states=[],
         system=system.name,
-        **_body_texts(top, digits),
-        **_start_texts(start, digits),
+        **motion_texts(top, start, digits),
     )
     if not attitude:
         states = [ball_texts(known.state, known.method, time, digits) for time in instants]
@@ -242,54 +244,10 @@ def reference(
         states=[part[:6] for part in parts],
         attitude=[part[6:] for part in parts],
         attitude_method=method,
-        xi=xi_texts(start, digits),
+        xi=xi_texts(start, digits) or start_texts(start.gamma, digits),
     )
     found.__dict__["_motion"] = motion
     return found
-
-
-def _body_texts(body: HeavyTop | Body, digits: int) -> dict[str, Any]:
-    """The body as exact text, by the keys of the JSON document."""
-    found: dict[str, Any] = {
-        "centre": list(map(exact_text, body.centre)),
-        "rotor": None if body.rotor is None else list(map(exact_text, body.rotor)),
-        "weight": exact_text(body.weight),
-    }
-    if isinstance(body, HeavyTop):
-        return found | {"inertia": list(map(exact_text, body.inertia))}
-    tensor = [exact_text(value) for row in body.tensor for value in row]
-    return found | {"mass": exact_text(body.mass), "gravity": exact_text(body.gravity), "inertia": tensor}
-
-
-def _start_texts(start: State, digits: int) -> dict[str, Any]:
-    """The start as exact text; γ and Ω of an irrational attitude to the digits asked."""
-    known = start.attitude is None or start.attitude.exact_rows() is not None
-
-    def texts(values: Vector, known: bool) -> list[str]:
-        return [exact_text(value) if known else decimal_text(value, digits + 1) for value in values]
-
-    found: dict[str, Any] = {
-        "omega": texts(start.omega, known or start.omega_space is None),
-        "gamma": texts(start.gamma, known),
-    }
-    if start.attitude is not None:
-        found["start_attitude"] = f"{start.attitude.kind}:{start.attitude}"
-    if start.omega_space is not None:
-        found["start_omega_space"] = texts(start.omega_space, True)
-    return found
-
-
-def xi_texts(start: State, digits: int) -> list[str]:
-    """ξ at t = 0: of the attitude given, else of γ alone; exact where it is rational, else to that many digits."""
-    if start.attitude is not None:
-        rows = start.attitude.exact_rows()
-        if rows is not None:
-            return [exact_text(value) for value in rows[0]]
-        near = start.attitude.rational_rows(bits_of(digits) + GUARD_BITS)
-        return [decimal_text(value, digits + 1) for value in near[0]]
-    if dot(start.gamma, start.gamma) == 1:
-        return [exact_text(value) for value in perpendicular(start.gamma)]
-    return start_texts(start.gamma, digits)
 
 
 @whole_evaluation

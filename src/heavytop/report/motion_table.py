@@ -14,15 +14,15 @@ from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
 from heavytop.precision import REAL_BITS, exact, exact_text
 from heavytop.report.printable import printable
+from heavytop.top.angles import perpendicular
 from heavytop.top.attitude import rows_of
-from heavytop.top.bodies import PIVOT
 from heavytop.top.equations import VARIABLES
 from heavytop.top.heavy_top import dot
 from heavytop.top.outputs import Output
 
 _GREEK = {"Ω": r"\Omega", "γ": r"\gamma", "ξ": r"\xi", "φ": r"\varphi", "θ": r"\theta", "ψ": r"\psi"}
 _BODY = ("mass", "gravity", "inertia", "about", "weight", "centre", "rotor")
-_DATA = (*_BODY, "omega", "start_omega_space", "gamma", "start_attitude", "xi")
+_DATA = (*_BODY, "omega", "gamma", "start_quaternion", "start_matrix", "start_euler", "start_sequence", "xi")
 _LINES = 45
 """Lines of a LaTeX table that fit on a page."""
 _DIGITS_A_LINE = 48
@@ -179,16 +179,13 @@ def _made_by(command: str, version: str) -> list[tuple[str, str]]:
 
 
 def _data_of(document: dict[str, Any]) -> list[tuple[str, str]]:
-    """The body, the start and ξ at t = 0, by the keys of the JSON document; R at t = 0 where it was given exactly.
-
-    Of a body given by its mass the tensor is about the pivot.
-    """
-    given = document | ({"about": PIVOT, "weight": None} if document.get("mass") is not None else {})
-    found = [(key, given[key]) for key in _DATA if given.get(key) is not None]
-    if given.get("start_attitude") is not None:
-        xi, gamma = ([exact(part) for part in given[key]] for key in ("xi", "gamma"))
-        if dot(xi, xi) == dot(gamma, gamma) == 1 and dot(xi, gamma) == 0:
-            found.append(("start_matrix", [exact_text(part) for row in rows_of(gamma, xi) for part in row]))
+    """The body, the start and ξ at t = 0, by the keys of the JSON document; R at t = 0 where no other key tells it."""
+    found = [(key, document[key]) for key in _DATA if document.get(key) is not None]
+    if document.get("xi") is not None and not any(key.startswith("start_") for key, _ in found):
+        x, y, z = (exact(part) for part in document["gamma"])
+        xi = tuple(exact(part) for part in document["xi"])
+        if x * x + y * y + z * z == dot(xi, xi) == 1 and xi != perpendicular((x, y, z)):
+            found.append(("start_matrix", [exact_text(part) for row in rows_of((x, y, z), xi) for part in row]))
     return [(key, value if isinstance(value, str) else ", ".join(value)) for key, value in found]
 
 
