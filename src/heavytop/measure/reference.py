@@ -35,7 +35,9 @@ if TYPE_CHECKING:
 
 DIGITS = range(1, 20001)
 _SHOWN = 15
-"""Digits of a value in a table; all of them are in :meth:`Reference.texts`."""
+"""Up to so many digits the components of a state stand beside each other in a table."""
+_WIDE, _ENDS = 52, 2
+"""Characters of a number in a row, and times at either end that are shown of many."""
 
 Finder = Callable[[HeavyTop, State, System], ExactSolution]
 Evaluate = Callable[[Fraction, int], Sequence[Any]]
@@ -191,12 +193,33 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
 
     def _table(self) -> Table:
         worst = max((Fraction(ball.radius) for state in self.states for ball in state), default=Fraction(0))
+        title = f"{self.system}, known to {self.digits} digits: {self.method}"
+        notes = [f"largest radius {radius_text(worst)}"]
+        if self.xi is not None:
+            notes.append(f"xi(0) = ({', '.join(self.xi)})")
+        if self.digits > _SHOWN:
+            return Table(title, ("t", "", "value", "radius"), self._long_rows(), notes, whole=True)
         rows = [
-            [time, *(decimal_text(Fraction(ball.value), min(_SHOWN, self.digits)) for ball in state)]
+            [time, *(decimal_text(Fraction(ball.value), self.digits) for ball in state)]
             for time, state in zip(self.times, self.states, strict=True)
         ]
-        title = f"{self.system}, known to {self.digits} digits: {self.method}"
-        return Table(title, ("t", *NAMES), rows, [f"largest radius {radius_text(worst)}"])
+        return Table(title, ("t", *NAMES), rows, notes)
+
+    def _long_rows(self) -> list[list[str]]:
+        """All digits, a number a row, which goes on below where it is long; of many times the first and the last."""
+        rows: list[list[str]] = []
+        count = len(self.times)
+        for place, (time, state) in enumerate(zip(self.times, self.states, strict=True)):
+            if count > 2 * _ENDS and _ENDS <= place < count - _ENDS:
+                rows += [[f"... {count - 2 * _ENDS} more", "", "", ""]] if place == _ENDS else []
+                continue
+            for name, ball in zip(NAMES, state, strict=True):
+                parts = [ball.value[i : i + _WIDE] for i in range(0, len(ball.value), _WIDE)]
+                rows.append(
+                    [time if name == NAMES[0] else "", name, parts[0].ljust(_WIDE * (len(parts) > 1)), ball.radius]
+                )
+                rows += [["", "", part.ljust(_WIDE), ""] for part in parts[1:]]
+        return rows
 
 
 def _rounded_up(text: str) -> float:
