@@ -14,7 +14,7 @@ from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.goryachev import goryachev_motion
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.kowalewski import kowalewski_motion
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
 
@@ -172,6 +172,13 @@ CASES: dict[str, Case] = {
             GYROSTAT,
             HeavyTop((2, 3, "5/2"), "3/2", (0, "2/3", 0)),
             State(("3/10", "4/15", "24/25"), ("3/13", "4/13", "12/13")),
+        ),
+        Case(
+            "heavy-gyrostat",
+            "the generic top with a rotor: no closed form",
+            HEAVY_GYROSTAT,
+            HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"), ("1/2", "-1/3", "3/4")),
+            State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5")),
         ),
     )
 }
