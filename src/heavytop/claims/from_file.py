@@ -26,8 +26,8 @@ Samples = Annotated[list[Text], msgspec.Meta(min_length=1, max_length=8)]
 
 
 class TopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[top]: principal moments, weight, centre of mass; the rotor, λ where the claim is about `gyrostat`, and k1, k2, k3
-    where it is about `heavy_gyrostat`.
+    """[top]: principal moments, weight, centre of mass; the rotor, λ where the claim is about `gyrostat`, or k1, k2,
+    k3 where it is about `heavy_gyrostat`.
     """
 
     inertia: Three

@@ -45,9 +45,8 @@ class Answer(msgspec.Struct, frozen=True):
 def in_time(path: str, system_name: str, seconds: float = SECONDS) -> Audit:
     """The audit of the claim in a file, about its own system for the name "".
 
-    Raises InputError where it takes more than ``seconds``, 3 GB or the stack.
-
-    Raises AuditEnded with what happened where the process of the audit ends without an answer.
+    Raises InputError where it takes more than ``seconds``, 3 GB or the stack, and
+    AuditEnded with what happened where the process of the audit ends without an answer.
     """
     last = str(math.ceil(seconds) + _GRACE)
     command = [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path), path, system_name, last]
