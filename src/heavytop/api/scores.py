@@ -20,7 +20,7 @@ from heavytop.report.diagnosis_text import diagnosis_text
 from heavytop.report.text import short
 from heavytop.suite.given import of_arrays
 from heavytop.suite.score import Peer, assess, passed, required
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
 from heavytop.top.times import check_times
 
@@ -94,7 +94,7 @@ def score(
     top: HeavyTop,
     start: State,
     precision: Precision | str | None = None,
-    system: System | str = HEAVY_TOP,
+    system: System | str | None = None,
     name: str = "given",
     integrator: str = "given",
     require: Number | None = None,
@@ -107,7 +107,7 @@ def score(
             any format, or of decimal, fraction or hexadecimal text.  NaN and infinities are an outcome, not an error.
         top, start: what the program was given; rounded to the format first.
         precision: the format in which it computed; None for the narrowest that holds every number as it is given.
-        system: "heavy_top" or "gyrostat".
+        system: as in :func:`propagate`.
         name, integrator: what the row is called.
         require: digits that must be right, as ``passed`` of the result says; None asks that the run reached its end.
 
@@ -121,7 +121,7 @@ def score(
     needed = None if require is None else required(require)
     form = None if precision is None else arguments.precision(precision)
     body, state = arguments.motion(top, start)
-    about, instants = arguments.system(system), list(check_times(times))
+    about, instants = arguments.system(system, body), list(check_times(times))
     rows = _rows(states)
     names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
     found = assess(of_arrays(cast(HeavyTop, body), state, about, instants, rows, form, *names))

@@ -12,7 +12,7 @@ from heavytop.top.equations import VARIABLES
 
 REMEDY = "docs/score.md shows both forms of the file, `heavytop list --case lagrange` one to paste."
 COLUMNS = ("t", *VARIABLES)
-VECTORS = ("inertia", "centre", "omega", "gamma")
+VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
 _COMMENT = ("#", "%", "!", "//")
 _OMEGA = ("omega", "om", "w", "ω", "angularvelocity")
 _GAMMA = ("gamma", "gam", "g", "γ")
