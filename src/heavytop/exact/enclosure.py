@@ -91,7 +91,8 @@ class Step:
 
     series: the polynomial, in whole ulps of 2^-precision.  variation: V̂ by powers of τ.
     powers: an upper bound of Σ |V̂_n|.
-    variation_error: bound of |V − V̂|.  local: bound of |v| in ulps 2^errors.exponent.  widest: W, as a number.
+    variation_error: bound of |V − V̂|.  local: bound of |v| in ulps 2^errors.exponent.  widest: W, as a number;
+    widest_ulps: the same in ulps 2^errors.exponent.
     """
 
     node: Node
@@ -102,6 +103,7 @@ class Step:
     variation_error: float
     local: float
     widest: float
+    widest_ulps: float
 
     @property
     def length(self) -> Fraction:
@@ -119,7 +121,7 @@ class Step:
         return self.series.values
 
     @property
-    def _summed_error(self) -> float:
+    def summed_error(self) -> float:
         """|V − V̂| with the rounding of the sum that V̂ is evaluated by."""
         return self.variation_error + 8 * _VARIATIONAL_ORDER * _UNIT * self.powers
 
@@ -129,7 +131,7 @@ class Step:
 
     def radii(self, tau: Fraction) -> Matrix:
         """Bounds of the errors at 0 ≤ τ ≤ 1, in ulps 2^errors.exponent; in binary64, without FLINT."""
-        slack = self._summed_error
+        slack = self.summed_error
         variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(self.variation))
         errors = self.node.errors
         # the second term: the rounding of the product below
@@ -143,15 +145,18 @@ class Step:
         unit = arb(2) ** -self.precision
         scale = arb(2) ** self.node.errors.exponent
         return [
-            arb(fmpz(int(_horner(component, tau))) * unit, (arb(float(r * _UP)) * scale + rounding).upper() * unit)
+            arb(fmpz(int(horner(component, tau))) * unit, (arb(float(r * _UP)) * scale + rounding).upper() * unit)
             for component, r in zip(self.coefficients, radii, strict=True)
         ]
 
-    def end(self) -> Node:
-        """The node at τ = 1: Σ b_n exactly, and the set of errors in a new frame."""
+    def transfer(self) -> tuple[Matrix, Matrix, float]:
+        """(Q', T, η): the frame at τ = 1, T = Q'^T V̂ Q and a bound of |Q'^-1 V Q − T|; η also bounds |Q'^-1 − Q'^T|."""
+        return _new_frame(self.variation.sum(axis=0), self.summed_error, self.node.errors)
+
+    def end(self, transfer: tuple[Matrix, Matrix, float] | None = None) -> Node:
+        """The node at τ = 1: Σ b_n exactly, and the set of errors in a new frame, that of :meth:`transfer`."""
         errors = self.node.errors
-        variation = self.variation.sum(axis=0)
-        frame, turned, slack = _new_frame(variation, self._summed_error, errors)
+        frame, turned, slack = transfer or self.transfer()
         radii = Errors(turned, errors.radii, 0).sizes(slack=slack)
         reach = np.abs(frame.T).sum(axis=1) + slack
         radii = (radii + reach * self.local) * _UP
@@ -168,7 +173,8 @@ class Step:
         return self.node.halvings - int(wanted < few and _norm(self.variation[1]) < _LARGEST_SLOPE / 2)
 
 
-def _horner(coefficients: list[int], tau: Fraction) -> mpz:
+def horner(coefficients: list[int], tau: Fraction) -> mpz:
+    """The polynomial at 0 ≤ τ ≤ 1, within half a unit an order; exactly at 1."""
     if tau == 1:
         return mpz(sum(coefficients))
     total = mpz(0)
@@ -232,7 +238,7 @@ def step(field: Quadratic, node: Node, precision: int, carrier: Carrier | None =
     halvings = node.halvings
     while halvings < node.halvings + 64:
         trial = Node(node.time, node.centre, node.errors, halvings)
-        series = _series(field, trial, precision, carrier)
+        series = taylor_series(field, trial, precision, carrier)
         found = None if series is None else _prove(field, trial, series, precision)
         if found is not None and isfinite(found.widest) and found.variation_error < CAP:
             return found if found.widest < CAP else None
@@ -240,7 +246,8 @@ def step(field: Quadratic, node: Node, precision: int, carrier: Carrier | None =
     return None
 
 
-def _series(field: Quadratic, node: Node, precision: int, carrier: Carrier | None) -> StepSeries | None:
+def taylor_series(field: Quadratic, node: Node, precision: int, carrier: Carrier | None) -> StepSeries | None:
+    """The polynomial from a node, over its own step; None where that is too long for it."""
     if carrier is not None:
         return carrier.series(node.centre, node.halvings)
     values = coefficients(field, node.centre, precision, node.halvings)
@@ -256,16 +263,16 @@ def _prove(field: Quadratic, node: Node, series: StepSeries, precision: int) -> 
         return None
     factor = exp(growth) * _UP
     scale = node.errors.exponent
-    defect = np.ldexp(_defect(series, precision, h * q, h * slope), -scale) + _TINY
+    defect = np.ldexp(defect_bound(series, precision, h * q, h * slope), -scale) + _TINY
     variation, powers, variation_error = _variation(field, series, h, h * 2 * q * sizes)
     bound = (float(node.errors.sizes().max()) + defect) * factor * _UP
     square = np.ldexp(h * q * bound * bound, max(scale - precision, -2000)) + _TINY
     local = float(factor * (defect + square) * _UP)
     widest = float(np.ldexp(bound, min(scale - precision, 900)))
-    return Step(node, precision, series, variation, powers, factor * variation_error * _UP, local, widest)
+    return Step(node, precision, series, variation, powers, factor * variation_error * _UP, local, widest, bound)
 
 
-def _defect(series: StepSeries, precision: int, quadratic: float, linear: float) -> float:
+def defect_bound(series: StepSeries, precision: int, quadratic: float, linear: float) -> float:
     """D of (a) in ulps; ``quadratic`` and ``linear`` are h q and h l.
 
     β_n is multiplied by 2^(rate n), so that binary64 holds it at any precision.
