@@ -11,7 +11,7 @@ from typing import Any
 from heavytop.errors import Contradiction
 from heavytop.exact.quadratic import Quadratic, quadratic
 from heavytop.exact.step_series import lacking
-from heavytop.top.equations import GYROSTAT, Parameters, System
+from heavytop.top.equations import Parameters, System
 from heavytop.words import fixed
 from heavytop.words.digits import grid_of
 from heavytop.words.kernels import Grid
@@ -52,7 +52,7 @@ class ScaledMotion:
         scaled = self.scaled
         given = coefficients(scaled.system, p, len(scaled.state) == 9)
         unit, gamma = scaled.rate, scaled.sizes[3]
-        linear = given.with_linear(1 / unit if scaled.system is GYROSTAT else gamma / unit**2)
+        linear = given.with_linear(gamma / unit**2, 1 / unit)
         return self._in_units(dataclasses.replace(scaled, coefficients=linear), p, self.forwards)
 
     @classmethod
@@ -119,7 +119,9 @@ class ScaledMotion:
 def own_parameters(scaled: Scaled, p: Parameters) -> Parameters:
     """``p`` in the units of a scaled motion."""
     unit, gamma = scaled.rate, scaled.sizes[3]
-    return Parameters(p.inertia, [gamma * n / unit**2 for n in p.moment], Fraction(p.rotor) / unit)
+    return p.mapped(lambda value: Fraction(value) / unit)._replace(
+        inertia=p.inertia, moment=tuple(gamma * n / unit**2 for n in p.moment)
+    )
 
 
 def _ladder(bits: float) -> int:
