@@ -135,7 +135,7 @@ class Step:
         variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(self.variation))
         errors = self.node.errors
         # the second term: the rounding of the product below
-        spread = (slack + 64 * _UNIT * self.powers) * _norm(errors.frame) * _UP
+        spread = (slack + 64 * _UNIT * self.powers) * norm(errors.frame) * _UP
         return np.asarray(errors.sizes(variation @ errors.frame, spread) + self.local)
 
     def around(self, tau: Fraction, radii: Matrix) -> list[arb]:
@@ -170,7 +170,7 @@ class Step:
         (few, many), wanted = self.series.thrifty, self.order / (self.precision + 16)
         if wanted > many:
             return self.node.halvings + 1
-        return self.node.halvings - int(wanted < few and _norm(self.variation[1]) < _LARGEST_SLOPE / 2)
+        return self.node.halvings - int(wanted < few and norm(self.variation[1]) < _LARGEST_SLOPE / 2)
 
 
 def horner(coefficients: list[int], tau: Fraction) -> mpz:
@@ -191,9 +191,9 @@ def _new_frame(variation: Matrix, variation_error: float, errors: Errors) -> tup
     order = np.argsort(-np.sqrt((carried * carried).sum(axis=0)) * errors.radii, kind="stable")
     frame = np.linalg.qr(carried[:, order])[0]
     rounding = 2 * (size + 4) * _UNIT
-    transposed, before = _norm(frame.T), _norm(errors.frame)
-    product = (_norm(variation) + variation_error) * before
-    off = _norm(frame.T @ frame - _identity(size)) + rounding * transposed * size
+    transposed, before = norm(frame.T), norm(errors.frame)
+    product = (norm(variation) + variation_error) * before
+    off = norm(frame.T @ frame - _identity(size)) + rounding * transposed * size
     # (1 + F)^-1 differs from 1 by at most |F|/(1 − |F|)
     inverse = off / (1 - off) * transposed if off < 1 else inf
     slack = inverse * product + transposed * before * variation_error + 3 * rounding * transposed * product
@@ -205,7 +205,7 @@ def _identity(size: int) -> Matrix:
     return np.eye(size)
 
 
-def _norm(matrix: Matrix) -> float:
+def norm(matrix: Matrix) -> float:
     """The largest row sum of absolute values."""
     return float(max(np.add.reduce(np.abs(matrix), 1).tolist()))
 
