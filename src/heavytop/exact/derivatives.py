@@ -42,8 +42,11 @@ METHOD = "validated: variational equation on the Taylor enclosure"
 _UP = 1 + 2.0**-32
 _UNIT = 2.0**-53
 _ATTEMPTS = 6
-_GUARD = 24
+_GUARD = 18
 """Bits beyond those asked for: what bounds lose, and what a motion loses that loses little."""
+_COARSER = 4
+"""δ is 2^4 times the root of an ulp: the ends of a step are known less well than its second derivative is small."""
+_FEW = 4
 _SHORTENED = 4
 
 Balls = list[list[arb]]
@@ -100,7 +103,7 @@ def _one_way(
     motion = known.motion(direction)
     time = direction * spans[-1]
     forecast, steps = known.forecast(time, bits)
-    loss, wanted = forecast, bits + _GUARD
+    loss, wanted = forecast, bits + _GUARD + int(min(forecast, _FEW * bits) / 4)
     for _ in range(_ATTEMPTS):
         planned = motion.precision(max(2 * wanted, wanted + loss), steps)
         columns = 7 + 6 * data
@@ -126,7 +129,7 @@ def _one_way(
 
 def _tangent(known: Validated, motion: ScaledMotion, precision: int, in_words: bool, data: bool) -> Tangent:
     carrier = motion.carrier(precision) if in_words else None
-    tangent = Tangent(motion.field, carrier, precision, precision // 2)
+    tangent = Tangent(motion.field, carrier, precision, precision // 2 - _COARSER)
     if not data:
         return tangent
     return replace(tangent, data=tuple(_datum(known, motion, tangent, k) for k in range(len(DATA))))

@@ -10,13 +10,14 @@ the centre c, Φ = Dφ its fundamental matrix, and σ the derivative with respec
 later: nothing of the quotient's error grows with time but by Φ itself.  So the machine code that computes the motion
 computes its derivatives too.  For θ the field is f + δ G̃, G̃ = (f(θ + δ) − f(θ))/δ, exactly.
 
-*Theorem.*  With Λ = h (2q R + l), R ≥ |y| for every motion that starts within max(δ, |w0|) of c, the end of each
-polynomial is within E = D e^Λ of the motion (D: its defect, as in the enclosure), and |D²φ| ≤ M = 2 h q e^(3Λ).  So
-for any start y(0) = c + w, |w| ≤ |w0|,
+*Theorem.*  Every motion that starts within max(δ, |w0|) of c is within C of the polynomial Σ b_n τⁿ of c, so that
+R = Σ |b_n| + C bounds it, and Λ = h (2q (Σ |b_n|/(n + 1) + C) + l) the integral of |h Df| along it.  The end of each
+polynomial is within E = D e^Λ of its motion (D: its defect, as in the enclosure).  |D²φ| ≤ M = 2 h q e^Λ B², where
+B = Σ |V̂_n| + |V − V̂| + e^Λ 2 h q C (Σ |V̂_n| + |V − V̂|) bounds |Φ|.  So for any start y(0) = c + w, |w| ≤ |w0|,
 
     |Φ e_j − quotient| ≤ M (δ/2 + |w0|) + (E_j + E_0)/δ.                                                          (a)
 
-Let g = q_G R² + l_G R bound |G̃| and Λ' = h (2 (q + δ q_G) R + l + δ l_G).  Then |σ| ≤ s = e^Λ' h g, its derivative
+Let g = q_G R² + l_G R bound |G̃| and Λ' be Λ with q + δ q_G and l + δ l_G.  Then |σ| ≤ s = e^Λ' h g, its derivative
 with respect to the datum is at most M' = e^Λ' h (2 (2 q_G R + l_G) s + 2 (q + δ q_G) s²), that with respect to the start
 M'' = e^(2Λ') h (2 q_G R + l_G + 2q s), and
 
@@ -138,12 +139,14 @@ def _rounding(step: Step, series: StepSeries, tau: Fraction) -> float:
 class _Bounds:
     """The numbers of the theorem for one step; errors in ulps of the motion, which are those of the derivatives.
 
-    reach: R.  widest: how far any motion of Φ goes from the polynomial.  away: |w0|, as a number.  own_error: E_0.  of_start: M (δ/2 + |w0|).
+    reach: R.  mean: Σ |b_n|/(n + 1) + C.  widest: C of the motions of Φ.  away: |w0|, as a number.  own_error: E_0.
+    of_start: M (δ/2 + |w0|).
     """
 
     tangent: Tangent
     length: float
     reach: float
+    mean: float
     widest: float
     away: float
     own_error: float
@@ -156,28 +159,30 @@ class _Bounds:
         field, precision = tangent.field, tangent.precision
         h, q, slope = 2.0**-step.node.halvings, float(field.q) * _UP, float(field.l) * _UP
         away = _ldexp(float(step.node.errors.sizes().max()), step.node.errors.exponent - precision)
-        reach = (float(step.series.sizes.sum()) + CAP) * _UP
-        growth = h * (2 * q * reach + slope) * _UP
+        reach, mean = (float(step.series.sizes.sum()) + CAP) * _UP, _mean(step.series)
+        growth = h * (2 * q * mean + slope) * _UP
         if not growth < _LARGEST_GROWTH:
             return None
         factor = exp(growth) * _UP
-        delta = _ldexp(1.0, -tangent.shift)
-        # every motion within max(δ, |w0|) of the centre stays within CAP of the polynomial
-        widest = (step.widest + delta * factor) * _UP
+        # every motion within max(δ, |w0|) of the centre stays so near to the polynomial
+        widest = (step.widest + _ldexp(1.0, -tangent.shift) * factor) * _UP
         if not widest < CAP:
             return None
         own = (defect_bound(step.series, precision, h * q, h * slope) + TINY) * factor * _UP
-        second = 2 * h * q * factor**3 * _UP
+        first = (step.powers + step.summed_error) * (1 + 2 * h * q * widest * factor) * _UP
+        second = 2 * h * q * factor * first**2 * _UP
         of_start = second * (_ldexp(0.5, tangent.bits - tangent.shift) + _scaled(step, tangent)) * _UP
         moved = second * (away + _ldexp(own, -precision)) * _UP
-        return cls(tangent, h, reach, widest, away, own, of_start, moved) if of_start < inf else None
+        if not of_start < inf:
+            return None
+        return cls(tangent, h, reach, mean, widest, away, own, of_start, moved)
 
     def end_error(self, field: Quadratic, series: StepSeries | None) -> float | None:
         """E of the polynomial that another motion of the step has, in ulps; None where it is too large."""
         if series is None:
             return None
         h, q, slope = self.length, float(field.q) * _UP, float(field.l) * _UP
-        growth = h * (2 * q * float(series.sizes.sum()) + slope + q * CAP) * _UP
+        growth = h * (2 * q * _mean(series) + slope) * _UP
         if not growth < _LARGEST_GROWTH:
             return None
         precision = self.tangent.precision
@@ -190,7 +195,7 @@ class _Bounds:
         delta = _ldexp(1.0, -tangent.shift)
         (gq, gl), (oq, ol) = datum.quotient, datum.off
         q, slope = float(tangent.field.q) * _UP + delta * gq, float(tangent.field.l) * _UP + delta * gl
-        growth = h * (2 * q * reach + slope) * _UP
+        growth = h * (2 * q * self.mean + slope) * _UP
         if not growth < _LARGEST_GROWTH:
             return inf
         factor = exp(growth) * _UP
@@ -202,6 +207,12 @@ class _Bounds:
         by_start = factor**2 * h * (turning + 2 * q * size) * _UP
         off = factor * h * (oq * reach + ol) * reach * _UP
         return (by_datum * delta / 2 + by_start * self.away + off) * _ldexp(1.0, tangent.bits) * _UP
+
+
+def _mean(series: StepSeries) -> float:
+    """Σ |b_n|/(n + 1) + C, which bounds the integral of |y| over the step."""
+    sizes = series.sizes
+    return (float(sizes @ (1 / np.arange(1.0, len(sizes) + 1))) + CAP) * _UP
 
 
 def _scaled(step: Step, tangent: Tangent) -> float:
