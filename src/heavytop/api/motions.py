@@ -12,6 +12,7 @@ from heavytop.errors import InputError
 from heavytop.integrate import registry
 from heavytop.integrate.peers.source import named
 from heavytop.integrate.trajectory import Problem, Trajectory
+from heavytop.measure.derivatives import which_derivatives
 from heavytop.measure.reference import Reference
 from heavytop.measure.reference import reference as proven
 from heavytop.precision import DOUBLE, Precision, whole
@@ -127,6 +128,7 @@ def reference(
     *,
     system: System | str | None = None,
     attitude: bool = False,
+    derivatives: str | None = None,
 ) -> Reference:
     """The known motion: proven states, from a closed form where there is one, else from a validated enclosure.
 
@@ -137,11 +139,14 @@ def reference(
         system: "heavy_top", "gyrostat" or "heavy_gyrostat"; None for "heavy_gyrostat" where the top has a rotor, else
             "heavy_top".
         attitude: give ξ as well, fixed in space and ⟂ γ, in body components.
+        derivatives: "start" for ∂(Ω, γ)(t)/∂(Ω0, γ0) as well, γ0 as three independent variables; "data" for
+            ∂(Ω, γ)(t)/∂(I1, I2, I3, n1, n2, n3), n = P r; "all" for both.
 
     Returns:
         A :class:`Reference`: ``method``, ``states[i][j].value`` and ``.radius`` as decimal text (the true number is
         within the radius of the value), ``texts()``, ``to_numpy()`` and ``radii()``, each of shape (n, 6);
-        ``attitude[i][j]``, shape (n, 3), and ``attitude_method``, where asked for, else None.
+        ``attitude[i][j]``, shape (n, 3), and ``attitude_method``, where asked for, else None; ``derivatives`` with
+        balls, ``derivatives_numpy()``, shape (n, 6, 6), and ``lyapunov()``.
 
     Raises:
         InputError: for what is no motion or time, and for other digits.
@@ -150,7 +155,13 @@ def reference(
     body, state = arguments.motion(top, start, of_any_size=True)
     about, instants = arguments.system(system, body), arguments.any_times(times)
     return proven(
-        body, state, instants, whole(digits, "digits"), about, attitude=bool(arguments.flag(attitude, "attitude"))
+        body,
+        state,
+        instants,
+        whole(digits, "digits"),
+        about,
+        attitude=bool(arguments.flag(attitude, "attitude")),
+        derivatives=which_derivatives(derivatives),
     )
 
 

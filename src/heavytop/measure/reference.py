@@ -17,6 +17,7 @@ from heavytop.exact.catalogue import find
 from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
 from heavytop.measure.certify import bits_of
+from heavytop.measure.derivatives import DerivativeBall, Derivatives, known_derivatives
 from heavytop.precision import decimal_text, exact, exact_text, shown
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -46,6 +47,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True):
     times: exact, as decimals or fractions.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
     :func:`heavytop.top.angles.perpendicular` of γ; attitude_method: how it is known.
+    derivatives: on request, with respect to the start and the data.
     """
 
     method: str
@@ -55,6 +57,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True):
     system: str
     attitude: list[list[Ball]] | None = None
     attitude_method: str | None = None
+    derivatives: Derivatives | None = None
 
     def texts(self) -> list[list[str]]:
         """The values as decimal text, shape (n, 6)."""
@@ -71,6 +74,31 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True):
         import numpy
 
         return numpy.array([[_rounded_up(ball.radius) for ball in state] for state in self.states])
+
+    def derivatives_numpy(self) -> NDArray[np.float64] | dict[str, NDArray[np.float64]]:
+        """∂y_i(t)/∂y_j(0) in double, shape (n, 6, 6); where data were asked for, a dict of "start" and "data".
+
+        Raises InputError where none were asked for.
+        """
+        return self._derivatives().numpy()
+
+    def lyapunov(self) -> list[DerivativeBall | None]:
+        """The finite-time Lyapunov exponent at each time, in 1/time unit, with its radius; None at t = 0.
+
+        It is the logarithm of the largest singular value of ∂y(t)/∂y(0) over |t|.  Raises InputError where the
+        derivatives with respect to the start were not asked for.
+        """
+        found = self._derivatives().lyapunov
+        if found is None:
+            raise InputError(
+                "This reference has no derivatives with respect to the start.", 'Ask for derivatives="start" or "all".'
+            )
+        return found
+
+    def _derivatives(self) -> Derivatives:
+        if self.derivatives is None:
+            raise InputError("This reference has no derivatives.", 'Ask for derivatives="start", "data" or "all".')
+        return self.derivatives
 
     def _table(self) -> Table:
         worst = max((Fraction(ball.radius) for state in self.states for ball in state), default=Fraction(0))
@@ -95,10 +123,12 @@ def reference(
     system: System = HEAVY_TOP,
     finder: Finder = find,
     attitude: bool = False,
+    derivatives: str | None = None,
 ) -> Reference:
     """The states at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1 and absolute below.
 
-    times: exact numbers in any order.  digits: 1 to 20,000.  attitude: give ξ too.
+    times: exact numbers in any order.  digits: 1 to 20,000.  attitude: give ξ too.  derivatives: "start", "data" or
+    "all" for those too.
     Raises InputError for other digits, for a time that is not a finite rational, and where the system does not admit
     the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
@@ -117,6 +147,7 @@ def reference(
         system=system.name,
         attitude=None if xi is None else [ball_texts(xi, str(method), time, digits) for time in instants],
         attitude_method=method,
+        derivatives=derivatives and known_derivatives(top, start, instants, digits, system, derivatives),
     )
 
 

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
+from heavytop.report.derivative_text import derivative_lines
 from heavytop.report.printable import printable
 from heavytop.report.text import short
 
@@ -50,6 +51,8 @@ def reference_text(found: Reference) -> RenderableType:
     for index, (time, state) in enumerate(zip(found.times, found.states, strict=True)):
         xi = found.attitude[index] if found.attitude else []
         parts += [Text(), _at(time, [f"{ball.value} ± {ball.radius}" for ball in (*state, *xi)])]
+    if found.derivatives is not None:
+        parts += derivative_lines(found.times, found.derivatives)
     return Group(*parts)
 
 
