@@ -118,9 +118,14 @@ def _matrices(jacobians: Any, count: int) -> list[list[list[Any]]]:
         raise InputError(f"The Jacobians have the shape {tuple(shape)}.", _SHAPE)
     found = []
     for i, matrix in enumerate(ordered(jacobians, "jacobians", _SHAPE)):
-        rows = [ordered(row, f"jacobians[{i}][{j}]", _SHAPE) for j, row in enumerate(ordered(matrix, f"jacobians[{i}]", _SHAPE))]
+        rows = [
+            ordered(row, f"jacobians[{i}][{j}]", _SHAPE)
+            for j, row in enumerate(ordered(matrix, f"jacobians[{i}]", _SHAPE))
+        ]
         if len(rows) != 6 or any(len(row) != 6 for row in rows):
-            raise InputError(f"jacobians[{i}] has {len(rows)} rows of {sorted({len(r) for r in rows})} numbers.", _SHAPE)
+            raise InputError(
+                f"jacobians[{i}] has {len(rows)} rows of {sorted({len(r) for r in rows})} numbers.", _SHAPE
+            )
         found.append([list(row) for row in rows])
     if len(found) != count:
         raise InputError(f"There are {count} times and {len(found)} Jacobians.", "Give one Jacobian for each time.")
@@ -182,8 +187,10 @@ def _digits(error: Fraction, most: int) -> float:
 def _diagnoses(given: Matrix, true: Matrix, radii: Matrix, start: State) -> list[str]:
     """Conventions under which the last Jacobian fits much better than as it was given."""
     size = range(6)
-    flat = [[Fraction(int(i == j)) - (g * h if min(i, j) > 2 else 0) for j, h in enumerate((0, 0, 0, *start.gamma))]
-            for i, g in enumerate((0, 0, 0, *start.gamma))]
+    flat = [
+        [Fraction(int(i == j)) - (g * h if min(i, j) > 2 else 0) for j, h in enumerate((0, 0, 0, *start.gamma))]
+        for i, g in enumerate((0, 0, 0, *start.gamma))
+    ]
     projected = [[sum((true[i][k] * flat[k][j] for k in size), Fraction(0)) for j in size] for i in size]
     said = {
         "It is transposed: row i, column j is ∂y_i(t)/∂y_j(0).": [list(column) for column in zip(*true, strict=True)],

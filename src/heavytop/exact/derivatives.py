@@ -32,7 +32,7 @@ from heavytop.exact.balls import ball, relative_bits, working_precision
 from heavytop.exact.enclosure import Node, Step, norm, start_node, step
 from heavytop.exact.field_derivatives import DATA, difference, moved, quotient
 from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.quadratic import Matrix
+from heavytop.exact.quadratic import Matrix, Quadratic
 from heavytop.exact.scaled_motion import ScaledMotion, own_parameters
 from heavytop.exact.step_derivatives import TINY, Datum, StepDerivatives, Tangent, step_derivatives, unit_columns
 from heavytop.exact.validated import Validated, seconds_a_step
@@ -68,10 +68,13 @@ class _Columns:
     radii: Matrix
     exponent: int
 
-    @property
-    def sizes(self) -> Matrix:
-        """The sum of |entries| of each column, in ulps: rounded up."""
-        return np.array([float(sum(map(abs, column))) * _UP for column in zip(*self.rows, strict=True)])
+    def sizes(self, bits: int) -> Matrix:
+        """Upper bounds of the sum of |entries| of each column, as numbers; infinite where binary64 has none."""
+        shift = max(0, bits - 64)
+        sums = [int(sum(map(abs, column)) >> shift) + 1 for column in zip(*self.rows, strict=True)]
+        return np.array(
+            [np.ldexp(float(total) * _UP, shift - bits) if total.bit_length() < 1000 else np.inf for total in sums]
+        )
 
 
 def derivatives(known: Validated, times: Sequence[Fraction], bits: int, data: bool) -> list[Derivatives]:
@@ -105,15 +108,17 @@ def _one_way(
     forecast, steps = known.forecast(time, bits)
     loss, wanted = forecast, bits + _GUARD + int(min(forecast, _FEW * bits) / 4)
     for _ in range(_ATTEMPTS):
-        planned = motion.precision(max(2 * wanted, wanted + loss), steps)
         columns = 7 + 6 * data
+        planned = motion.precision(max(2 * wanted, wanted + loss), steps * columns)
         if not steps * columns * seconds_a_step(*planned) < known.effort:
             break
         tangent = _tangent(known, motion, *planned, data)
         found, lacking = {}, 0
         for span, values in _run(tangent, motion, spans):
-            at = _in_units(known, motion, tangent, values, direction) if values else None
-            lacking = bits - (min(relative_bits(v) for m in (at.start, at.data or []) for r in m for v in r) if at else 0)
+            at = _in_units(known, motion, tangent, values) if values else None
+            lacking = bits - (
+                min(relative_bits(v) for m in (at.start, at.data or []) for r in m for v in r) if at else 0
+            )
             if at is None or lacking > 0:
                 break
             found[direction * span] = at
@@ -136,7 +141,7 @@ def _tangent(known: Validated, motion: ScaledMotion, precision: int, in_words: b
 
 
 def _datum(known: Validated, motion: ScaledMotion, tangent: Tangent, datum: int) -> Datum:
-    """δ is in units of :func:`unit_of`."""
+    """The field with one of the data larger by δ times :func:`unit_of`."""
     given, size = known.parameters, unit_of(known, datum)
     own = own_parameters(motion.scaled, given)
     delta = Fraction(1, 2**tangent.shift)
@@ -144,15 +149,16 @@ def _datum(known: Validated, motion: ScaledMotion, tangent: Tangent, datum: int)
     unit = size if datum < 3 else size * motion.scaled.sizes[3] / motion.scaled.rate**2
     varied = motion.with_parameters(moved(given, datum, delta * size))
     system = motion.scaled.system
-    direct = quotient(system, own, datum, delta * unit, delta, 1)
+    direct = quotient(system, own, datum, delta * unit, delta)
     off = difference(system, own, datum, delta * unit, delta, unit)
     in_words = tangent.carrier is not None and varied.in_words
     carrier = varied.carrier(tangent.precision) if in_words else None
-    return Datum(varied.field, carrier, _bounds(direct), _bounds(off))
+    return Datum(varied.field, carrier, _bounds(direct, 0), _bounds(off, tangent.bits))
 
 
-def _bounds(field: Any) -> tuple[float, float]:
-    return float(field.q) * _UP + TINY, float(field.l) * _UP + TINY
+def _bounds(field: Quadratic, bits: int) -> tuple[float, float]:
+    """Upper bounds of 2^bits q and 2^bits l."""
+    return float(field.q * 2**bits) * _UP + TINY, float(field.l * 2**bits) * _UP + TINY
 
 
 def unit_of(known: Validated, datum: int) -> Fraction:
@@ -225,7 +231,7 @@ def _local(tangent: Tangent, own: StepDerivatives, columns: _Columns) -> Matrix:
     """Bounds of the errors that a step itself makes in each column, in ulps 2^exponent."""
     size = len(columns.rows)
     of_phi = max(own.errors[:size])
-    found = of_phi * np.ldexp(columns.sizes, -tangent.bits) + 1.0
+    found = of_phi * columns.sizes(tangent.bits) + 1.0
     found[size:] += own.errors[size:]
     return np.asarray(np.ldexp(found * _UP, -columns.exponent) + TINY)
 
@@ -262,9 +268,7 @@ def _at(
 
 
 @whole_evaluation
-def _in_units(
-    known: Validated, motion: ScaledMotion, tangent: Tangent, values: tuple[Any, Matrix, int], direction: int
-) -> Derivatives:
+def _in_units(known: Validated, motion: ScaledMotion, tangent: Tangent, values: tuple[Any, Matrix, int]) -> Derivatives:
     """As balls, in the units given."""
     rows, radii, exponent = values
     sizes = motion.scaled.sizes
@@ -275,9 +279,8 @@ def _in_units(
         unit, scale = arb(2) ** -tangent.bits, arb(2) ** exponent
         table = [
             [
-                arb(fmpz(int(value)) * unit, (arb(limit) * scale).upper() * unit)
-                * ball(size / of if place < len(rows) else size / of)
-                for place, (value, limit, of) in enumerate(zip(line, bounds, scales, strict=True))
+                arb(fmpz(int(value)) * unit, (arb(limit) * scale).upper() * unit) * ball(size / of)
+                for value, limit, of in zip(line, bounds, scales, strict=True)
             ]
             for line, bounds, size in zip(rows, limits, sizes, strict=True)
         ]

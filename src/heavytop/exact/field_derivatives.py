@@ -22,7 +22,7 @@ class Dual:
     """value + slope ε with ε² = 0, over exact numbers."""
 
     value: Any
-    slope: Any = Fraction(0)
+    slope: Any = 0
 
     @classmethod
     def of(cls, number: Any) -> Dual:
@@ -65,25 +65,19 @@ def moved(p: Parameters, datum: int, by: Any) -> Parameters:
     return p._replace(inertia=tuple(numbers[:3]), moment=tuple(numbers[3:]))
 
 
-def derivative(system: System, p: Parameters, datum: int, factor: Fraction) -> Quadratic:
-    """``factor`` ∂f/∂θ for one of :data:`DATA`: again a field of degree two without a constant part."""
-    varied = moved(p, datum, Dual(Fraction(0), factor))
-    return quadratic(lambda y: [Dual.of(rate).slope for rate in system.field(varied, y)], 6)
-
-
-def quotient(system: System, p: Parameters, datum: int, by: Fraction, over: Fraction, sign: int) -> Quadratic:
-    """(f(θ + by) − f(θ))/over, with that sign."""
+def quotient(system: System, p: Parameters, datum: int, by: Fraction, over: Fraction) -> Quadratic:
+    """(f(θ + by) − f(θ))/over for one of :data:`DATA`."""
     varied = moved(p, datum, by)
 
     def field(y: tuple[Any, ...]) -> list[Any]:
         pairs = zip(system.field(varied, y), system.field(p, y), strict=True)
-        return [sign * (a - b) / over for a, b in pairs]
+        return [(a - b) / over for a, b in pairs]
 
     return quadratic(field, 6)
 
 
 def difference(system: System, p: Parameters, datum: int, by: Fraction, over: Fraction, factor: Fraction) -> Quadratic:
-    """factor ∂f/∂θ − (f(θ + by) − f(θ))/over."""
+    """``factor`` ∂f/∂θ − (f(θ + by) − f(θ))/over: what a quotient lacks."""
     varied, slope = moved(p, datum, by), moved(p, datum, Dual(Fraction(0), factor))
 
     def field(y: tuple[Any, ...]) -> list[Any]:

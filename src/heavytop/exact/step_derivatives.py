@@ -18,8 +18,8 @@ B = Σ |V̂_n| + |V − V̂| + e^Λ 2 h q C (Σ |V̂_n| + |V − V̂|) bounds |�
     |Φ e_j − quotient| ≤ M (δ/2 + |w0|) + (E_j + E_0)/δ.                                                          (a)
 
 Let g = q_G R² + l_G R bound |G̃| and Λ' be Λ with q + δ q_G and l + δ l_G.  Then |σ| ≤ s = e^Λ' h g, its derivative
-with respect to the datum is at most M' = e^Λ' h (2 (2 q_G R + l_G) s + 2 (q + δ q_G) s²), that with respect to the start
-M'' = e^(2Λ') h (2 q_G R + l_G + 2q s), and
+with respect to the datum is at most M' = e^Λ' h (2 (2 q_G R + l_G) s + 2 (q + δ q_G) s²), that with respect to the
+start M'' = e^(2Λ') h (2 q_G R + l_G + 2q s), and
 
     |σ − quotient| ≤ M' δ/2 + M'' |w0| + (E_j + E_0)/δ + e^Λ' h |G − G̃|.                                           (b)
 
@@ -52,7 +52,8 @@ _LARGEST_GROWTH = 16.0
 class Datum:
     """A datum θ of the field, in a unit of its own, and the field with θ + δ.
 
-    field: f + δ G̃.  carrier: of its Taylor coefficients, as for a step.  quotient: (q, l) of G̃.  off: (q, l) of G − G̃.
+    field: f + δ G̃.  carrier: of its Taylor coefficients, as for a step.  quotient: (q, l) of G̃.  off: (q, l) of
+    G − G̃, in ulps of the derivatives.
     """
 
     field: Quadratic
@@ -103,24 +104,26 @@ def step_derivatives(tangent: Tangent, step: Step, tau: Fraction) -> StepDerivat
     origin, columns, errors = _end(step.series, tau), [], []
     for j in range(tangent.field.dimension):
         beside = [value + ((k == j) << tangent.bits) for k, value in enumerate(centre)]
-        series = taylor_series(tangent.field, replace_centre(step, beside), tangent.precision, tangent.carrier)
+        series = taylor_series(tangent.field, _centred(step, beside), tangent.precision, tangent.carrier)
         error = bounds.end_error(tangent.field, series)
         if series is None or error is None:
             return None
         columns.append(_end(series, tau))
         errors.append(error + bounds.own_error + bounds.of_start + _rounding(step, series, tau))
     for datum in tangent.data:
-        series = taylor_series(datum.field, replace_centre(step, centre), tangent.precision, datum.carrier)
+        series = taylor_series(datum.field, _centred(step, centre), tangent.precision, datum.carrier)
         error, of_datum = bounds.end_error(datum.field, series), bounds.of_datum(datum)
         if series is None or error is None or not of_datum < inf:
             return None
         columns.append(_end(series, tau))
         errors.append(error + bounds.own_error + of_datum + _rounding(step, series, tau))
-    rows = [[value - start for value in values] for start, values in zip(origin, zip(*columns, strict=True), strict=True)]
+    rows = [
+        [value - start for value in values] for start, values in zip(origin, zip(*columns, strict=True), strict=True)
+    ]
     return StepDerivatives(rows, [error * _UP for error in errors], bounds.moved)
 
 
-def replace_centre(step: Step, centre: Sequence[int]) -> Node:
+def _centred(step: Step, centre: Sequence[int]) -> Node:
     """The node of ``step``, with another centre and the step's own length."""
     return replace(step.node, centre=centre)
 
@@ -139,8 +142,8 @@ def _rounding(step: Step, series: StepSeries, tau: Fraction) -> float:
 class _Bounds:
     """The numbers of the theorem for one step; errors in ulps of the motion, which are those of the derivatives.
 
-    reach: R.  mean: Σ |b_n|/(n + 1) + C.  widest: C of the motions of Φ.  away: |w0|, as a number.  own_error: E_0.
-    of_start: M (δ/2 + |w0|).
+    reach: R.  mean: Σ |b_n|/(n + 1) + C.  widest: C of the motions of Φ.  away_ulps: |w0| in ulps of the derivatives.
+    own_error: E_0.  of_start: M (δ/2 + |w0|).
     """
 
     tangent: Tangent
@@ -148,7 +151,7 @@ class _Bounds:
     reach: float
     mean: float
     widest: float
-    away: float
+    away_ulps: float
     own_error: float
     of_start: float
     moved: float
@@ -171,11 +174,12 @@ class _Bounds:
         own = (defect_bound(step.series, precision, h * q, h * slope) + TINY) * factor * _UP
         first = (step.powers + step.summed_error) * (1 + 2 * h * q * widest * factor) * _UP
         second = 2 * h * q * factor * first**2 * _UP
-        of_start = second * (_ldexp(0.5, tangent.bits - tangent.shift) + _scaled(step, tangent)) * _UP
+        away_ulps = _ldexp(float(step.node.errors.sizes().max()), step.node.errors.exponent - tangent.shift)
+        of_start = second * (_ldexp(0.5, tangent.bits - tangent.shift) + away_ulps) * _UP
         moved = second * (away + _ldexp(own, -precision)) * _UP
         if not of_start < inf:
             return None
-        return cls(tangent, h, reach, mean, widest, away, own, of_start, moved)
+        return cls(tangent, h, reach, mean, widest, away_ulps, own, of_start, moved)
 
     def end_error(self, field: Quadratic, series: StepSeries | None) -> float | None:
         """E of the polynomial that another motion of the step has, in ulps; None where it is too large."""
@@ -206,19 +210,14 @@ class _Bounds:
         by_datum = factor * h * (2 * turning * size + 2 * q * size**2) * _UP
         by_start = factor**2 * h * (turning + 2 * q * size) * _UP
         off = factor * h * (oq * reach + ol) * reach * _UP
-        return (by_datum * delta / 2 + by_start * self.away + off) * _ldexp(1.0, tangent.bits) * _UP
+        by_both = by_datum * _ldexp(0.5, tangent.bits - tangent.shift) + by_start * self.away_ulps
+        return (by_both + off) * _UP
 
 
 def _mean(series: StepSeries) -> float:
     """Σ |b_n|/(n + 1) + C, which bounds the integral of |y| over the step."""
     sizes = series.sizes
     return (float(sizes @ (1 / np.arange(1.0, len(sizes) + 1))) + CAP) * _UP
-
-
-def _scaled(step: Step, tangent: Tangent) -> float:
-    """|w0| in ulps of the derivatives."""
-    errors = step.node.errors
-    return _ldexp(float(errors.sizes().max()), errors.exponent - tangent.shift)
 
 
 def _ldexp(value: float, exponent: int) -> float:

@@ -68,7 +68,7 @@ class Derivatives(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def which_derivatives(value: object) -> str | None:
-    """"start", "data", "all", or None for none; raises InputError for any other."""
+    """ "start", "data", "all", or None for none; raises InputError for any other."""
     if value is None or (isinstance(value, str) and value in WHICH):
         return value
     raise InputError(f"derivatives = {quoted(value)} is none.", 'Give "start", "data" or "all".')
