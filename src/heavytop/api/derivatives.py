@@ -143,8 +143,8 @@ def _scored(
     start: State,
     needed: Fraction | None,
 ) -> DerivativeScore:
-    columns, balls = (STARTS, known.start) if known.start is not None else (PARAMETERS, known.data)
-    assert balls is not None
+    columns = PARAMETERS if known.start is None else STARTS
+    balls = known.start or known.data or []
     true = [[[exact(ball.value) for ball in row] for row in matrix] for matrix in balls]
     radii = [[[exact(ball.radius) for ball in row] for row in matrix] for matrix in balls]
     found = [_worst(*each) for each in zip(given, true, radii, strict=True)]
@@ -186,11 +186,8 @@ def _digits(error: Fraction, most: int) -> float:
 
 def _diagnoses(given: Matrix, true: Matrix, radii: Matrix, start: State) -> list[str]:
     """Conventions under which the last Jacobian fits much better than as it was given."""
-    size = range(6)
-    flat = [
-        [Fraction(int(i == j)) - (g * h if min(i, j) > 2 else 0) for j, h in enumerate((0, 0, 0, *start.gamma))]
-        for i, g in enumerate((0, 0, 0, *start.gamma))
-    ]
+    size, gamma = range(6), (Fraction(0), Fraction(0), Fraction(0), *start.gamma)
+    flat = [[int(i == j) - gamma[i] * gamma[j] for j in size] for i in size]
     projected = [[sum((true[i][k] * flat[k][j] for k in size), Fraction(0)) for j in size] for i in size]
     said = {
         "It is transposed: row i, column j is ∂y_i(t)/∂y_j(0).": [list(column) for column in zip(*true, strict=True)],

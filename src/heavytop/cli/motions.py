@@ -108,7 +108,8 @@ def reference(
     """Print proven states of one motion.
 
     By a closed form where there is one, at once; else by a validated enclosure: a second up to t = 100, a few seconds
-    up to t = 1000; derivatives take about ten times as long.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
+    up to t = 1000; derivatives take about ten times as long.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω
+    with M = IΩ; γ points up.
     """
     from heavytop.measure.derivatives import which_derivatives
     from heavytop.measure.reference import reference as proven

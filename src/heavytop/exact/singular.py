@@ -7,8 +7,6 @@ from flint import acb_mat, arb, arb_mat
 from heavytop.exact.balls import working_precision
 from heavytop.exact.flint_context import whole_evaluation
 
-_MARGINS = 64
-
 
 @whole_evaluation
 def largest_singular_value(matrix: list[list[arb]], bits: int) -> arb:
@@ -16,15 +14,15 @@ def largest_singular_value(matrix: list[list[arb]], bits: int) -> arb:
 
     From below Rayleigh's quotient of any vector, here an approximate eigenvector, at most σ².  From above any μ such
     that μ − S is positive definite, which Cholesky's factorisation in balls proves: μ is the quotient and a margin,
-    four times as large as long as the factorisation does not exist.  So several equal singular values do no harm.
+    sixteen times as large as long as the factorisation does not exist.  So several equal singular values do no harm.
     An infinite ball where neither comes to an end.
     """
     with working_precision(2 * bits + 64):
         given = arb_mat(matrix)
         square = given.transpose() * given
         below = _quotient(square)
-        margin = below.abs_upper() * arb(2) ** -(2 * bits)
-        for _ in range(_MARGINS):
+        margin = below.abs_upper() * arb(2) ** -(bits + 8)
+        for _ in range(bits // 4 + 16):
             above = (below + margin).upper()
             if _positive_definite(above, square):
                 return below.lower().sqrt().union(above.sqrt())

@@ -139,6 +139,7 @@ def reference(
     solution = finder(top, start, system)
     latest = max(instants, key=abs, default=Fraction(0))
     method, xi = attitude_of(solution, latest, bits_of(digits)) if attitude else (None, None)
+    found = None if derivatives is None else known_derivatives(top, start, instants, digits, system, derivatives)
     return Reference(
         method=solution.method,
         digits=digits,
@@ -147,7 +148,7 @@ def reference(
         system=system.name,
         attitude=None if xi is None else [ball_texts(xi, str(method), time, digits) for time in instants],
         attitude_method=method,
-        derivatives=derivatives and known_derivatives(top, start, instants, digits, system, derivatives),
+        derivatives=found,
     )
 
 
