@@ -34,7 +34,8 @@ def main() -> int:
     options.add_argument("--case")
     given = options.parse_args()
     cases = [case for name, case in CASES.items() if given.case in (None, name)]
-    return int(any([_case(case, given.count) for case in cases]))
+    wrong = [_case(case, given.count) for case in cases]
+    return int(any(wrong))
 
 
 def _case(case: Case, count: int) -> bool:
@@ -66,8 +67,8 @@ def _case(case: Case, count: int) -> bool:
                 held.append(holds([row[column] - value for row, value in pairs], Fraction(size) / 10**20))
         wrong += not all(held)
     print(
-        f"{case.name:28} {len(members):4} motions  {wrong} wrong  {refused} refused  widest radius {float(widest):.1e}  "
-        f"{derived / max(plain, 1e-9):5.1f} times the enclosure",
+        f"{case.name:28} {len(members):4} motions  {wrong} wrong  {refused} refused  "
+        f"widest radius {float(widest):.1e}  {derived / max(plain, 1e-9):5.1f} times the enclosure",
         flush=True,
     )
     return bool(wrong)
