@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -150,3 +151,41 @@ def test_a_word_that_is_none_ends_with_cause_and_remedy():
     shown = CliRunner().invoke(app, [*COMMAND, "--derivatives", "gamma"])
     assert isinstance(shown.exception, InputError)
     assert '"start", "data" or "all"' in str(shown.exception)
+
+
+def _tilted(centre=("1/2", "1/3", "1/5"), omega=("1/10", "2/5", "9/10")):
+    """A body whose tensor is not diagonal in the axes given: A diag(3, 2, 1) Aᵀ, A = (1, 2, 2; 2, 1, −2; 2, −2, 1)/3."""
+    axes = [[Fraction(a, 3) for a in row] for row in ((1, 2, 2), (2, 1, -2), (2, -2, 1))]
+    moments = list(enumerate((3, 2, 1)))
+    tensor = [[sum(a[k] * m * b[k] for k, m in moments) for b in axes] for a in axes]
+    body = ht.Body(mass=1, gravity=1, centre=centre, inertia=tensor, about="pivot")
+    return body, ht.State(omega=omega, gamma=("3/5", 0, "4/5"))
+
+
+@pytest.mark.parametrize("place", [0, 2])
+def test_derivatives_of_a_body_are_in_the_axes_given(place):
+    step = Fraction(1, 10**15)
+
+    def ends(**varied):
+        found = []
+        for sign in (1, -1):
+            moved = {name: [*map(Fraction, value)] for name, value in varied.items()}
+            for value in moved.values():
+                value[place] += sign * step
+            found.append(ht.reference(*_tilted(**moved), [2], 50).states[0])
+        return [(Fraction(a.value) - Fraction(b.value)) / (2 * step) for a, b in zip(*found, strict=True)]
+
+    known = ht.reference(*_tilted(), [2], 25, derivatives="all").derivatives
+    for values, matrix, column in (
+        (ends(omega=("1/10", "2/5", "9/10")), known.start, place),
+        (ends(centre=("1/2", "1/3", "1/5")), known.data, 3 + place),
+    ):
+        for value, row in zip(values, matrix[0], strict=True):
+            assert abs(value - Fraction(row[column].value)) < Fraction(1, 10**22)
+
+
+def test_irrational_axes_are_refused_with_the_remedy():
+    tensor = [["3", "1/7", 0], ["1/7", "2", 0], [0, 0, "3/2"]]
+    body = ht.Body(mass=1, gravity=1, centre=("1/2", 0, 0), inertia=tensor, about="pivot")
+    with pytest.raises(InputError, match="Derivatives need exact data"):
+        ht.reference(body, START, [1], 20, derivatives="start")

@@ -18,6 +18,7 @@ from heavytop.measure.digits import digits_of, digits_text
 from heavytop.precision import decimal_text, exact, log10, shown
 from heavytop.suite.given import MOST, bits_of, component
 from heavytop.suite.score import required
+from heavytop.top.bodies import Body
 from heavytop.top.equations import NAMES, System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
 
@@ -70,7 +71,7 @@ def score_derivatives(
     times: Numbers,
     jacobians: Any,
     *,
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     derivatives: str = "start",
     system: System | str | None = None,

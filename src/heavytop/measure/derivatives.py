@@ -19,7 +19,9 @@ from heavytop.exact.singular import largest_singular_value
 from heavytop.exact.validated import Validated
 from heavytop.measure.certify import bits_of
 from heavytop.precision import exact, shown
+from heavytop.top.bodies import Body
 from heavytop.top.equations import NAMES, System
+from heavytop.top.heavy_top import HeavyTop, State
 
 if TYPE_CHECKING:
     import numpy as np
@@ -75,7 +77,7 @@ def which_derivatives(value: object) -> str | None:
 
 
 def known_derivatives(
-    body: Any, start: Any, times: Sequence[Fraction], digits: int, system: System, which: str
+    body: HeavyTop | Body, start: State, times: Sequence[Fraction], digits: int, system: System, which: str
 ) -> Derivatives:
     """The derivatives at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1, absolute below.
 
