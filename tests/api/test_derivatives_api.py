@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 
 import numpy as np
@@ -154,7 +155,7 @@ def test_a_word_that_is_none_ends_with_cause_and_remedy():
 
 
 def _tilted(centre=("1/2", "1/3", "1/5"), omega=("1/10", "2/5", "9/10")):
-    """A body whose tensor is not diagonal in the axes given: A diag(3, 2, 1) Aᵀ, A = (1, 2, 2; 2, 1, −2; 2, −2, 1)/3."""
+    """A body whose tensor A diag(3, 2, 1) Aᵀ is not diagonal in the axes given; A is rational."""
     axes = [[Fraction(a, 3) for a in row] for row in ((1, 2, 2), (2, 1, -2), (2, -2, 1))]
     moments = list(enumerate((3, 2, 1)))
     tensor = [[sum(a[k] * m * b[k] for k, m in moments) for b in axes] for a in axes]
@@ -189,3 +190,14 @@ def test_irrational_axes_are_refused_with_the_remedy():
     body = ht.Body(mass=1, gravity=1, centre=("1/2", 0, 0), inertia=tensor, about="pivot")
     with pytest.raises(InputError, match="Derivatives need exact data"):
         ht.reference(body, START, [1], 20, derivatives="start")
+
+
+def test_threads_that_ask_at_once_get_what_each_gets_alone():
+    starts = [ht.State(("1/10", Fraction(k, 5), "9/10"), ("3/5", 0, "4/5")) for k in range(3)]
+
+    def ask(start):
+        return ht.reference(TOP, start, [1], 20, derivatives="start").derivatives
+
+    alone = [ask(start) for start in starts]
+    with ThreadPoolExecutor(3) as pool:
+        assert list(pool.map(ask, starts)) == alone

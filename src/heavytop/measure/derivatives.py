@@ -92,16 +92,16 @@ def known_derivatives(
         )
     known, bits = Validated(resolved.top, resolved.start, system), bits_of(digits) + _SPARE_BITS
     found = derivatives(known, times, bits, which != "start")
-    start = data = lyapunov = None
+    of_start = of_data = lyapunov = None
     if which != "data":
         matrices = [in_axes(each.start, resolved) for each in found]
-        start = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
+        of_start = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
         exponents = [_exponent(matrix, time, bits) for matrix, time in zip(matrices, times, strict=True)]
         lyapunov = [None if value is None else _text(value, digits) for value in exponents]
     if which != "start":
         matrices = [in_axes(each.data or [], resolved, kept=3) for each in found]
-        data = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
-    return Derivatives(METHOD, start, data, lyapunov)
+        of_data = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
+    return Derivatives(METHOD, of_start, of_data, lyapunov)
 
 
 @whole_evaluation
