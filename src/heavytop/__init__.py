@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from heavytop.api.claims import Audit, audit
+    from heavytop.api.derivatives import DerivativeScore, score_derivatives
     from heavytop.api.motions import ensemble, propagate, reference
     from heavytop.api.reports import Comparison, Report, compare, read_report, run
     from heavytop.api.scores import Score, Summary, drift, score
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "api.claims": ("Audit", "audit"),
+    "api.derivatives": ("DerivativeScore", "score_derivatives"),
     "api.motions": ("ensemble", "propagate", "reference"),
     "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
     "api.scores": ("Score", "Summary", "drift", "score"),
@@ -53,6 +55,7 @@ __all__ = [
     "Body",
     "Comparison",
     "Contradiction",
+    "DerivativeScore",
     "HeavyTop",
     "HeavyTopError",
     "InputError",
@@ -79,6 +82,7 @@ __all__ = [
     "reference",
     "run",
     "score",
+    "score_derivatives",
 ]
 
 

@@ -184,6 +184,9 @@ def reference(
     rotor: Rotor = None,
     system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Give xi too, fixed in space and across gamma.")] = False,
+    derivatives: Annotated[
+        str | None, typer.Option(help="Derivatives too: start, data (I1..I3, n = P r) or all.", metavar="WHICH")
+    ] = None,
     normalize: Normalize = False,
     show: Show = None,
     point: Point = None,
@@ -195,8 +198,10 @@ def reference(
     """Print proven states of one motion.
 
     By a closed form where there is one, at once; else by a validated enclosure: a second up to t = 100, a few seconds
-    up to t = 1000.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
+    up to t = 1000; derivatives take about ten times as long.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω
+    with M = IΩ; γ points up.
     """
+    from heavytop.measure.derivatives import which_derivatives
     from heavytop.measure.reference import reference as proven
     from heavytop.top.equations import system_of
     from heavytop.top.times import check_times
@@ -218,11 +223,11 @@ def reference(
     }
     top, start, system = _motion(given, case, system, normalize, of_any_size=True)
     which, instants = system_of(system, top), check_times(numbers(times))
-    wanted = _outputs(show, point, pivot)
+    wanted, which_ones = _outputs(show, point, pivot), which_derivatives(derivatives)
     require_one_output(csv, latex, json)
     watch = _Watch([abs(time) for time in instants])
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        found = proven(top, start, numbers(times), digits, which, watch.find, attitude or bool(wanted))
+        found = proven(top, start, numbers(times), digits, which, watch.find, attitude or bool(wanted), which_ones)
         found.require_outputs(wanted)
 
     def table() -> MotionTable:

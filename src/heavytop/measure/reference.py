@@ -20,6 +20,7 @@ from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
 from heavytop.measure import reference_outputs as outputs_of
 from heavytop.measure.certify import bits_of
+from heavytop.measure.derivatives import DerivativeBall, Derivatives, known_derivatives
 from heavytop.measure.reference_outputs import GUARD_BITS, KnownMotion
 from heavytop.measure.setup import motion_texts, xi_texts
 from heavytop.precision import decimal_text, exact, shown
@@ -57,6 +58,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
     :func:`heavytop.top.angles.perpendicular` of γ; attitude_method: how it is known; xi: ξ at t = 0.
     inertia, weight, centre, rotor, omega, gamma: the data, exactly.
+    derivatives: on request, with respect to the start and the data.
     """
 
     method: str
@@ -66,6 +68,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     system: str
     attitude: list[list[Ball]] | None = None
     attitude_method: str | None = None
+    derivatives: Derivatives | None = None
     inertia: list[str] | None = None
     weight: str | None = None
     centre: list[str] | None = None
@@ -191,6 +194,31 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
 
         return numpy.array([[_rounded_up(ball.radius) for ball in state] for state in self.states])
 
+    def derivatives_numpy(self) -> NDArray[np.float64] | dict[str, NDArray[np.float64]]:
+        """∂y_i(t)/∂y_j(0) in double, shape (n, 6, 6); where data were asked for, a dict of "start" and "data".
+
+        Raises InputError where none were asked for.
+        """
+        return self._derivatives().numpy()
+
+    def lyapunov(self) -> list[DerivativeBall | None]:
+        """The finite-time Lyapunov exponent at each time, in 1/time unit, with its radius; None at t = 0.
+
+        It is the logarithm of the largest singular value of ∂y(t)/∂y(0) over |t|.  Raises InputError where the
+        derivatives with respect to the start were not asked for.
+        """
+        found = self._derivatives().lyapunov
+        if found is None:
+            raise InputError(
+                "This reference has no derivatives with respect to the start.", 'Ask for derivatives="start" or "all".'
+            )
+        return found
+
+    def _derivatives(self) -> Derivatives:
+        if self.derivatives is None:
+            raise InputError("This reference has no derivatives.", 'Ask for derivatives="start", "data" or "all".')
+        return self.derivatives
+
     def _table(self) -> Table:
         worst = max((Fraction(ball.radius) for state in self.states for ball in state), default=Fraction(0))
         title = f"{self.system}, known to {self.digits} digits: {self.method}"
@@ -235,10 +263,12 @@ def reference(
     system: System = HEAVY_TOP,
     finder: Finder = find,
     attitude: bool = False,
+    derivatives: str | None = None,
 ) -> Reference:
     """The states at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1 and absolute below.
 
-    times: exact numbers in any order.  digits: 1 to 20,000.  attitude: give ξ too.
+    times: exact numbers in any order.  digits: 1 to 20,000.  attitude: give ξ too.  derivatives: "start", "data" or
+    "all" for those too.
     Raises InputError for other digits, for a time that is not a finite rational, and where the system does not admit
     the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
@@ -247,6 +277,7 @@ def reference(
     instants = [exact(time) for time in times]
     known = BodyMotion(top, start, system, finder)
     require_handy(known.resolved.top, known.resolved.start, instants)
+    derived = None if derivatives is None else known_derivatives(top, start, instants, digits, system, derivatives)
     found = Reference(
         method=known.method,
         digits=digits,
@@ -254,6 +285,7 @@ def reference(
         states=[],
         system=system.name,
         **motion_texts(top, start, digits),
+        derivatives=derived,
     )
     if not attitude:
         states = [ball_texts(known.state, known.method, time, digits) for time in instants]

@@ -80,8 +80,8 @@ def of_arrays(
     Raises InputError for what is no number, for counts that differ or are too large, for names that cannot be shown.
     """
     require_states(times, rows)
-    form = precision or written_numbers.of_bits(max(_bits_of(value) for row in rows for value in row))
-    states = [rounded_state([_component(value) for value in row], form) for row in rows]
+    form = precision or written_numbers.of_bits(max(bits_of(value) for row in rows for value in row))
+    states = [rounded_state([component(value) for value in row], form) for row in rows]
     outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
     names = named(name, "name"), named(integrator, "integrator")
     return Given(*names, top, start, which, form, times, states, outcome, 0, {}, "")
@@ -103,7 +103,7 @@ def too_many(count: int) -> InputError:
     )
 
 
-def _component(value: Any) -> Fraction | None:
+def component(value: Any) -> Fraction | None:
     """An exact number out of a number of any format or text; None for NaN and infinities."""
     if isinstance(value, str):
         return written_numbers.component(value)
@@ -115,7 +115,7 @@ def _component(value: Any) -> Fraction | None:
         raise
 
 
-def _bits_of(value: Any) -> int:
+def bits_of(value: Any) -> int:
     """Bits of the format of a number in memory; of exact numbers, those that they are written with."""
     kind = type(value).__name__
     if kind in ("real128", "longdouble", "real"):
