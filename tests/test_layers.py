@@ -26,14 +26,15 @@ MAY_IMPORT = {
     "claims": GROUND | {"top", "exact"},
     "integrate": GROUND | {"top", "words"},
     "measure": MOTIONS,
+    "events": GROUND | {"top", "words", "exact", "integrate", "measure"},
     "suite": MOTIONS | {"measure"},
-    "report": MOTIONS | {"measure", "suite"},
+    "report": MOTIONS | {"measure", "events", "suite"},
     "kinds": MOTIONS | {"measure", "suite", "report"},
-    "api": MOTIONS | {"measure", "suite", "report", "kinds"},
-    "cli": MOTIONS | {"measure", "suite", "report", "kinds", "api"},
+    "api": MOTIONS | {"measure", "events", "suite", "report", "kinds"},
+    "cli": MOTIONS | {"measure", "events", "suite", "report", "kinds", "api"},
     "__main__": {"cli"},
     "pytest_plugin": GROUND | {"suite", "api"},
-    "__init__": GROUND | {"top", "integrate", "measure", "api"},
+    "__init__": GROUND | {"top", "integrate", "measure", "events", "api"},
 }
 
 

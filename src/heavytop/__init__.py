@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from heavytop.api.claims import Audit, audit
+    from heavytop.api.events import events, poincare
     from heavytop.api.motions import ensemble, propagate, reference
     from heavytop.api.reports import Comparison, Report, compare, read_report, run
     from heavytop.api.scores import Score, Summary, drift, score
     from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
+    from heavytop.events.records import Events, ReferenceEvents, Section
     from heavytop.integrate.trajectory import Outcome, Trajectory
     from heavytop.measure.reference import Reference
     from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, available, real
@@ -23,10 +25,12 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "api.claims": ("Audit", "audit"),
+    "api.events": ("events", "poincare"),
     "api.motions": ("ensemble", "propagate", "reference"),
     "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
     "api.scores": ("Score", "Summary", "drift", "score"),
     "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
+    "events.records": ("Events", "ReferenceEvents", "Section"),
     "integrate.trajectory": ("Outcome", "Trajectory"),
     "measure.reference": ("Reference",),
     "precision": ("DOUBLE", "DOUBLE_DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),
@@ -46,6 +50,7 @@ __all__ = [
     "Audit",
     "Comparison",
     "Contradiction",
+    "Events",
     "HeavyTop",
     "HeavyTopError",
     "InputError",
@@ -53,8 +58,10 @@ __all__ = [
     "Outcome",
     "Precision",
     "Reference",
+    "ReferenceEvents",
     "Report",
     "Score",
+    "Section",
     "State",
     "Summary",
     "System",
@@ -65,7 +72,9 @@ __all__ = [
     "compare",
     "drift",
     "ensemble",
+    "events",
     "holding",
+    "poincare",
     "propagate",
     "read_report",
     "real",

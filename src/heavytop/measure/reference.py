@@ -70,7 +70,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True):
         """The radii rounded up to double, shape (n, 6): they stay upper bounds, and none but 0 becomes 0."""
         import numpy
 
-        return numpy.array([[_rounded_up(ball.radius) for ball in state] for state in self.states])
+        return numpy.array([[rounded_up(ball.radius) for ball in state] for state in self.states])
 
     def _table(self) -> Table:
         worst = max((Fraction(ball.radius) for state in self.states for ball in state), default=Fraction(0))
@@ -82,7 +82,8 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True):
         return Table(title, ("t", *NAMES), rows, [f"largest radius {radius_text(worst)}"])
 
 
-def _rounded_up(text: str) -> float:
+def rounded_up(text: str) -> float:
+    """A decimal text as the nearest double that is not less."""
     value = float(text)
     return value if Fraction(value) >= Fraction(text) else math.nextafter(value, math.inf)
 

@@ -1,0 +1,215 @@
+"""Events of a computed motion, located on the Taylor polynomial of every step to the format.
+
+A rational function N/D composed with the polynomials of a step is a quotient of polynomials: its changes of sign
+without a pole are those of N, isolated exactly (:mod:`heavytop.events.roots`).  Steps err by a rounding at their common
+ends: a change that only shows between the end of one and the beginning of the next is an event at that time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from flint import fmpq, fmpq_poly
+
+from heavytop.errors import InputError, quoted
+from heavytop.events.dense import Dense, Piece
+from heavytop.events.functions import EventFunction, composed, terms_of
+from heavytop.events.records import POLYNOMIAL, SAMPLED, Events, arrays
+from heavytop.events.roots import refined, sign_after, sign_before, sign_changes
+from heavytop.integrate.trajectory import Outcome
+from heavytop.integrate.words import native_state
+from heavytop.precision import Precision, number
+
+_GUARD_BITS = 8
+_SAMPLES = 48
+"""Samples of a step for a callable that needs numbers; steps of a Taylor method turn the body by less than a radian."""
+_NARROWED = 60
+
+
+class Found(NamedTuple):
+    """An event in a piece: at s, rising or not in the direction of the run."""
+
+    piece: Piece
+    s: fmpq
+    rising: bool
+
+
+def locate(
+    run: Dense,
+    integrator: str,
+    function: EventFunction,
+    direction: int,
+    limit: int | None = None,
+    reached: Callable[[Fraction], None] | None = None,
+) -> Events:
+    """The events of a run, up to its ``until``.
+
+    direction: 1 for those at which the function rises with time, −1 for those at which it falls, 0 for all.
+    limit: stop after so many.  reached: called with the time of each step.
+    Raises InputError where a callable raises, or gives no finite number.
+    """
+    precision, forwards = run.problem.precision, run.until > 0
+    find = _of_rational if function.rational else _of_callable
+    times: list[Any] = []
+    states: list[Any] = []
+    directions: list[int] = []
+    outcome = None
+    for found in find(function, _watched(run, reached), precision):
+        sign = 1 if found.rising == forwards else -1
+        if direction not in (0, sign):
+            continue
+        state = native_state(tuple(found.piece.state(found.s)), precision)
+        if state is None:
+            outcome = Outcome.NON_FINITE
+            break
+        times.append(_native_time(found.piece.time(found.s), precision))
+        states.append(state)
+        directions.append(sign)
+        if limit is not None and len(times) >= limit:
+            break
+    return Events(
+        run.problem,
+        integrator,
+        function.name,
+        direction,
+        POLYNOMIAL if function.rational else SAMPLED,
+        *arrays(times, states, directions),
+        run.until,
+        outcome or run.outcome,
+        run.reached,
+        run.steps,
+        run.order,
+        run.seconds,
+        run.flags,
+    )
+
+
+def _watched(run: Dense, reached: Callable[[Fraction], None] | None) -> Iterator[Piece]:
+    for piece in run.pieces():
+        if reached is not None:
+            reached(piece.began)
+        yield piece
+
+
+def _native_time(time: Fraction, precision: Precision) -> Any:
+    try:
+        return number(time, precision)
+    except InputError:  # below the smallest number of the format
+        return number(Fraction(0), precision)
+
+
+def _of_rational(function: EventFunction, pieces: Iterator[Piece], precision: Precision) -> Iterator[Found]:
+    """Changes of sign of the numerator where the denominator is not 0."""
+    terms, below = terms_of(function.numerator), terms_of(function.denominator)
+    used, zero = function.used(), fmpq_poly([0])
+    before = 0
+    for piece in pieces:
+        components = [piece.component(index) if index in used else None for index in range(6)]
+        polynomial = composed(terms, components, zero).numer()
+        bits = precision.bits + _GUARD_BITS + (precision.bits if piece.began == 0 else 0)
+        changes = [(refined(polynomial, c, bits), c.rising) for c in sign_changes(polynomial, piece.end, bits)]
+        after = sign_after(polynomial)
+        if before and after and before != after:
+            # the two steps disagree at their common end by a rounding
+            if changes and changes[0][0] < fmpq(1, 1 << precision.bits // 2):
+                changes = changes[1:]
+            else:
+                changes = [(fmpq(0), after > 0), *changes]
+        for s, rising in changes:
+            at = composed(below, [None if c is None else c(s) for c in components], fmpq(0))
+            if at != 0:
+                yield Found(piece, s, rising == (at > 0))
+        before = sign_before(polynomial, piece.end) or before
+
+
+@dataclass(slots=True)
+class _Sampler:
+    """Values of a callable on a piece, in numbers of the format."""
+
+    function: EventFunction
+    precision: Precision
+
+    def value(self, piece: Piece, s: fmpq) -> Any:
+        """The function at s; raises InputError where it raises, or gives no finite number."""
+        import numpy
+
+        state = native_state(tuple(piece.state(s)), self.precision)
+        if state is None:
+            raise InputError("The state is too large for its format.", "Choose other units, or a wider format.")
+        assert self.function.call is not None
+        try:
+            value = self.function.call(state[:3], state[3:])
+            finite = bool(numpy.isfinite(value))
+        except Exception as error:
+            raise InputError(
+                f"The function {quoted(self.function.name)} raised {type(error).__name__} at the state "
+                f"({', '.join(str(v) for v in state)}): {quoted(str(error))}.",
+                "It is called with Ω and γ, arrays of three numbers of the format, and gives one number.",
+            ) from None
+        if not finite:
+            raise InputError(
+                f"The function {quoted(self.function.name)} gave {quoted(value)} at the state "
+                f"({', '.join(str(v) for v in state)}).",
+                "It must give one finite number at every state of the motion.",
+            )
+        return value
+
+
+def _of_callable(function: EventFunction, pieces: Iterator[Piece], precision: Precision) -> Iterator[Found]:
+    """Changes of sign between samples, and where |f| has a minimum between samples of one sign."""
+    sampler = _Sampler(function, precision)
+    sign, piece = 0, None
+    for piece in pieces:
+        places = [piece.end * n / _SAMPLES for n in range(_SAMPLES + 1)]
+        values = [sampler.value(piece, s) for s in places]
+        for n, (s, value) in enumerate(zip(places, values, strict=True)):
+            now = _sign(value)
+            if now and sign and now != sign:
+                at = places[0] if n == 0 else _bisected(sampler, piece, places[n - 1], s, sign)
+                yield Found(piece, at, now > 0)
+            elif now and 0 < n < _SAMPLES and abs(values[n - 1]) > abs(value) < abs(values[n + 1]):
+                other = _narrowed(sampler, piece, places[n - 1], s, places[n + 1], now)
+                if other is not None and now == sign == _sign(values[n + 1]):
+                    yield Found(piece, _bisected(sampler, piece, places[n - 1], other, now), now < 0)
+                    yield Found(piece, _bisected(sampler, piece, other, places[n + 1], -now), now > 0)
+            sign = now or sign
+    if not sign and piece is not None:
+        raise InputError(
+            f"The function {quoted(function.name)} is zero at every sample of this motion.", "Choose another function."
+        )
+
+
+def _sign(value: Any) -> int:
+    return int(value > 0) - int(value < 0)
+
+
+def _bisected(sampler: _Sampler, piece: Piece, low: fmpq, high: fmpq, before: int) -> fmpq:
+    """Where the sign changes between ``low``, with the sign ``before``, and ``high``."""
+    for _ in range(sampler.precision.bits + _GUARD_BITS):
+        middle = (low + high) / 2
+        now = _sign(sampler.value(piece, middle))
+        if now == 0:
+            return middle
+        low, high = (middle, high) if now == before else (low, middle)
+    return (low + high) / 2
+
+
+def _narrowed(sampler: _Sampler, piece: Piece, low: fmpq, middle: fmpq, high: fmpq, sign: int) -> fmpq | None:
+    """A place between, where the function has the other sign, found on the way to its least absolute value; or None."""
+    least = abs(sampler.value(piece, middle))
+    for step in range(_NARROWED):
+        other = (low + middle) / 2 if step % 2 else (middle + high) / 2
+        value = sampler.value(piece, other)
+        if _sign(value) == -sign:
+            return other
+        if abs(value) < least:
+            low, middle, high = (low, other, middle) if step % 2 else (middle, other, high)
+            least = abs(value)
+        elif step % 2:
+            low = other
+        else:
+            high = other
+    return None
