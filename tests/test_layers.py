@@ -26,15 +26,15 @@ MAY_IMPORT = {
     "claims": GROUND | {"top", "exact"},
     "integrate": GROUND | {"top", "words"},
     "measure": MOTIONS,
-    "events": GROUND | {"top", "words", "exact", "integrate", "measure"},
+    "event_times": GROUND | {"top", "words", "exact", "integrate", "measure"},
     "suite": MOTIONS | {"measure"},
-    "report": MOTIONS | {"measure", "events", "suite"},
+    "report": MOTIONS | {"measure", "event_times", "suite"},
     "kinds": MOTIONS | {"measure", "suite", "report"},
-    "api": MOTIONS | {"measure", "events", "suite", "report", "kinds"},
-    "cli": MOTIONS | {"measure", "events", "suite", "report", "kinds", "api"},
+    "api": MOTIONS | {"measure", "event_times", "suite", "report", "kinds"},
+    "cli": MOTIONS | {"measure", "event_times", "suite", "report", "kinds", "api"},
     "__main__": {"cli"},
     "pytest_plugin": GROUND | {"suite", "api"},
-    "__init__": GROUND | {"top", "integrate", "measure", "events", "api"},
+    "__init__": GROUND | {"top", "integrate", "measure", "event_times", "api"},
 }
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from heavytop.api.reports import Comparison, Report, compare, read_report, run
     from heavytop.api.scores import Score, Summary, drift, score
     from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
-    from heavytop.events.records import Events, ReferenceEvents, Section
+    from heavytop.event_times.records import Events, ReferenceEvents, Section
     from heavytop.integrate.trajectory import Outcome, Trajectory
     from heavytop.measure.reference import Reference
     from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, available, real
@@ -30,7 +30,7 @@ _PLACES = {
     "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
     "api.scores": ("Score", "Summary", "drift", "score"),
     "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
-    "events.records": ("Events", "ReferenceEvents", "Section"),
+    "event_times.records": ("Events", "ReferenceEvents", "Section"),
     "integrate.trajectory": ("Outcome", "Trajectory"),
     "measure.reference": ("Reference",),
     "precision": ("DOUBLE", "DOUBLE_DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),

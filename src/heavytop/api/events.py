@@ -10,11 +10,11 @@ from typing import Any, overload
 from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.errors import InputError, OutOfReach, quoted
-from heavytop.events.dense import dense
-from heavytop.events.functions import EventFunction, event_function, first_term
-from heavytop.events.located import locate
-from heavytop.events.proven import proven_events
-from heavytop.events.records import PROVEN, Events, ReferenceEvents, Section
+from heavytop.event_times.dense import dense
+from heavytop.event_times.functions import EventFunction, event_function, first_term
+from heavytop.event_times.located import locate
+from heavytop.event_times.proven import proven_events
+from heavytop.event_times.records import PROVEN, Events, ReferenceEvents, Section
 from heavytop.exact.balls import value_text
 from heavytop.exact.scales import require_handy
 from heavytop.exact.validated import Validated

@@ -11,7 +11,7 @@ import msgspec
 
 from heavytop.display import Lines, Table, Tabular
 from heavytop.errors import InputError, quoted
-from heavytop.events.functions import VARIABLES
+from heavytop.event_times.functions import VARIABLES
 from heavytop.exact.balls import radius_text
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.reference import Ball, rounded_up

@@ -1,7 +1,8 @@
 """Events of a computed motion, located on the Taylor polynomial of every step to the format.
 
 A rational function N/D composed with the polynomials of a step is a quotient of polynomials: its changes of sign
-without a pole are those of N, isolated exactly (:mod:`heavytop.events.roots`).  Steps err by a rounding at their common
+without a pole are those of N, isolated exactly (:mod:`heavytop.event_times.roots`).  Steps err by a rounding at their
+common
 ends: a change that only shows between the end of one and the beginning of the next is an event at that time.
 """
 
@@ -15,10 +16,10 @@ from typing import Any, NamedTuple
 from flint import fmpq, fmpq_poly
 
 from heavytop.errors import InputError, quoted
-from heavytop.events.dense import Dense, Piece
-from heavytop.events.functions import EventFunction, composed, terms_of
-from heavytop.events.records import POLYNOMIAL, SAMPLED, Events, arrays
-from heavytop.events.roots import refined, sign_after, sign_before, sign_changes
+from heavytop.event_times.dense import Dense, Piece
+from heavytop.event_times.functions import EventFunction, composed, terms_of
+from heavytop.event_times.records import POLYNOMIAL, SAMPLED, Events, arrays
+from heavytop.event_times.roots import refined, sign_after, sign_before, sign_changes
 from heavytop.integrate.trajectory import Outcome
 from heavytop.integrate.words import native_state
 from heavytop.precision import Precision, number

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 from flint import arb, arb_poly
 
 from heavytop.errors import Contradiction, HeavyTopError, OutOfReach
-from heavytop.events.functions import EventFunction, composed, first_term, rate_along, terms_of
+from heavytop.event_times.functions import EventFunction, composed, first_term, rate_along, terms_of
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.enclosure import Step
 from heavytop.exact.flint_context import whole_evaluation

@@ -199,7 +199,7 @@ def event_function(given: Any) -> EventFunction:
     else:
         raise InputError(f"function = {quoted(given)} is neither text nor a callable.", _REMEDY)
     found = found.reduced()
-    if found.numerator.is_constant():
+    if found.numerator.is_constant() and found.denominator.is_constant():
         raise InputError(f"The function {quoted(name)} does not depend on the state.", _REMEDY)
     return EventFunction(name, found.numerator, found.denominator)
 
