@@ -1,0 +1,350 @@
+"""The attitude of a body: rotation matrix, quaternion, Euler angles, axis and angle, over any ring.
+
+Conventions, here and nowhere else:
+
+R takes components in body axes to components in space axes, v_space = R v_body.  Space axis e_z points vertically up.
+Its rows are ξ, η = γ × ξ and γ, the space axes e_x, e_y, e_z in body components; R' = R [Ω]×.
+A quaternion is (w, x, y, z), the scalar first, of length 1: v_space = q v_body q̄, q' = q (0, Ω)/2; q and −q are one
+attitude.
+Euler angles (a, b, c) of a sequence "IJK" are intrinsic: R = R_I(a) R_J(b) R_K(c).  For "ZXZ" the angles of the paper,
+(3.2), are (ψ, θ, φ) in this order: its γ depends on φ, the last.
+
+Rows are three sequences of three numbers.  ``lib`` is a namespace with the elementary functions of the numbers at hand,
+as in :mod:`heavytop.top.angles`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+from heavytop.errors import InputError, quoted
+from heavytop.precision import decimal_text, exact, exact_text, round_to
+from heavytop.top.heavy_top import Vector, cross, dot, ordered, vector
+
+Rows = Sequence[Sequence[Any]]
+Number = Callable[[Fraction], Any]
+
+SEQUENCES = tuple("".join(letters) for letters in product("XYZ", repeat=3) if letters[0] != letters[1] != letters[2])
+"""The twelve sequences of Euler angles."""
+_SHOWN_BITS = 64
+_DEGREES = "deg"
+_NORMALIZE = "Normalize it (--normalize on the command line, normalize=True in Python), or give exact numbers."
+
+
+def rows_of(gamma: Any, xi: Any) -> tuple[Any, Any, Any]:
+    """The rows of R: ξ, γ × ξ, γ."""
+    return tuple(xi), cross(gamma, xi), tuple(gamma)
+
+
+def rotated(rows: Rows, v: Any) -> tuple[Any, Any, Any]:
+    """R v: components in space of a vector of the body."""
+    return dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)
+
+
+def transposed(rows: Rows) -> tuple[Any, Any, Any]:
+    """The columns of R."""
+    first, second, third = zip(*rows, strict=True)
+    return first, second, third
+
+
+def multiplied(left: Rows, right: Rows) -> tuple[Any, Any, Any]:
+    """The rows of the product of two matrices."""
+    columns = transposed(right)
+    first, second, third = (tuple(dot(row, column) for column in columns) for row in left)
+    return first, second, third
+
+
+def matrix_of_quaternion(q: Sequence[Any]) -> tuple[Any, Any, Any]:
+    """|q|² R of a quaternion of any length: polynomials, hence exact over the rationals."""
+    w, x, y, z = q
+    return (
+        (w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
+    )
+
+
+def _multiple_of_quaternion(rows: Rows) -> tuple[Any, Any, Any, Any]:
+    """4 c q with c the largest component of q: linear in R, so exact over the rationals.
+
+    c² is at least 1/4, so that no digits are lost.
+    """
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    first = (a + e + i, a - e - i, e - a - i, i - a - e)
+    # 4 q qᵀ, row by row
+    products = (
+        (1 + first[0], h - f, c - g, d - b),
+        (h - f, 1 + first[1], b + d, c + g),
+        (c - g, b + d, 1 + first[2], f + h),
+        (d - b, c + g, f + h, 1 + first[3]),
+    )
+    return products[max(range(4), key=lambda place: float(first[place]))]
+
+
+def quaternion_of_rows(rows: Rows, lib: Any) -> tuple[Any, Any, Any, Any]:
+    """(w, x, y, z) of length 1, of the sign in which its largest component is positive."""
+    multiple = _multiple_of_quaternion(rows)
+    length = lib.sqrt(sum(value * value for value in multiple))
+    w, x, y, z = (value / length for value in multiple)
+    return w, x, y, z
+
+
+def continuous(quaternions: Iterable[Sequence[Any]]) -> list[tuple[Any, ...]]:
+    """The same attitudes with signs that follow the motion.
+
+    The first has w ≥ 0, and its first non-zero component positive where w = 0; each other one is the nearer to the one
+    before of q and −q, meaningful where samples are less than a turn apart.
+    """
+    result: list[tuple[Any, ...]] = []
+    for q in quaternions:
+        if result:
+            turn = sum(float(a) * float(b) for a, b in zip(q, result[-1], strict=True)) < 0
+        else:
+            turn = next((float(value) < 0 for value in q if float(value) != 0), False)
+        result.append(tuple(-value for value in q) if turn else tuple(q))
+    return result
+
+
+def _elementary(axis: int, cosine: Any, sine: Any) -> tuple[Any, ...]:
+    """The rows of the rotation about one axis."""
+    after, last = (axis + 1) % 3, (axis + 2) % 3
+    rows = [[0] * 3 for _ in range(3)]
+    rows[axis][axis] = 1
+    rows[after][after] = rows[last][last] = cosine
+    rows[after][last], rows[last][after] = -sine, sine
+    return tuple(map(tuple, rows))
+
+
+def require_sequence(sequence: object) -> str:
+    """One of :data:`SEQUENCES`; raises InputError for any other."""
+    if not isinstance(sequence, str) or sequence.upper() not in SEQUENCES:
+        raise InputError(
+            f"Unknown sequence of Euler angles {quoted(sequence)}.",
+            f"Use one of {', '.join(SEQUENCES)}: intrinsic, R = R_I(a) R_J(b) R_K(c).",
+        )
+    return sequence.upper()
+
+
+def _axes(sequence: str) -> tuple[int, int, int]:
+    first, second, third = ("XYZ".index(letter) for letter in require_sequence(sequence))
+    return first, second, third
+
+
+def rows_of_euler(sequence: str, angles: Sequence[Any], lib: Any) -> tuple[Any, Any, Any]:
+    """R_I(a) R_J(b) R_K(c); raises InputError for an unknown sequence."""
+    first, second, third = (
+        _elementary(axis, lib.cos(angle), lib.sin(angle)) for axis, angle in zip(_axes(sequence), angles, strict=True)
+    )
+    return multiplied(multiplied(first, second), third)
+
+
+def euler_terms(rows: Rows, sequence: str) -> tuple[tuple[Any, Any], tuple[Any, Any], tuple[Any, Any]]:
+    """(sin, cos) of a and of c, each times s, and in the middle the two squares and the cosine or sine that give b.
+
+    s is |sin b| for a sequence such as ZXZ and |cos b| for one such as ZYX; where it is 0, a and c are not defined by
+    themselves (gimbal lock).  The middle pair is (s², sin b or cos b).
+    """
+    i, j, k = _axes(sequence)
+    rest = 3 - i - j
+    sign = 1 if j == (i + 1) % 3 else -1
+    if i == k:
+        square = rows[i][j] * rows[i][j] + rows[i][rest] * rows[i][rest]
+        return (rows[j][i], -sign * rows[rest][i]), (square, rows[i][i]), (rows[i][j], sign * rows[i][rest])
+    square = rows[i][i] * rows[i][i] + rows[i][j] * rows[i][j]
+    return (-sign * rows[j][k], rows[k][k]), (square, sign * rows[i][k]), (-sign * rows[i][j], rows[i][i])
+
+
+def euler_of_rows(rows: Rows, sequence: str, lib: Any) -> tuple[Any, Any, Any]:
+    """(a, b, c) with R = R_I(a) R_J(b) R_K(c): a and c in (−π, π], b in [0, π], of three different axes in [−π/2, π/2].
+
+    At gimbal lock (:func:`euler_terms`) a and c are what atan2(0, 0) of ``lib`` is.
+    """
+    first, (square, value), third = euler_terms(rows, sequence)
+    across = lib.sqrt(square)
+    proper = sequence[0].upper() == sequence[2].upper()
+    middle = lib.atan2(across, value) if proper else lib.atan2(value, across)
+    return lib.atan2(*first), middle, lib.atan2(*third)
+
+
+@dataclass(frozen=True, slots=True)
+class Angle:
+    """An exact angle: a number of radians, or of degrees."""
+
+    number: Fraction
+    degrees: bool = False
+
+    @classmethod
+    def read(cls, value: Any) -> Angle:
+        """Radians, or degrees where it ends with "deg"; raises InputError for what is no number."""
+        if isinstance(value, Angle):
+            return value
+        if isinstance(value, str) and value.strip().lower().endswith(_DEGREES):
+            return cls(exact(value.strip()[: -len(_DEGREES)].strip()), True)
+        return cls(exact(value))
+
+    def __str__(self) -> str:
+        return exact_text(self.number) + (_DEGREES if self.degrees else "")
+
+    def quarters(self) -> int | None:
+        """How many right angles it is; None where its sine or cosine is none of 0 and ±1."""
+        if self.number == 0:
+            return 0
+        turns = self.number / 90
+        return int(turns) % 4 if self.degrees and turns.denominator == 1 else None
+
+    def radians(self, lib: Any, number: Number) -> Any:
+        """In radians, as a number of the ring."""
+        if not self.degrees:
+            return number(self.number)
+        return number(self.number / 180) * (4 * lib.atan2(number(Fraction(1)), number(Fraction(1))))
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """An attitude as it was given, exactly; made by one of the four constructors.
+
+    kind: quaternion, matrix, euler or axis_angle.  numbers: as given, row by row.  angles: of euler and axis_angle.
+    """
+
+    kind: str
+    numbers: tuple[Fraction, ...] = ()
+    angles: tuple[Angle, ...] = ()
+    sequence: str = ""
+
+    @classmethod
+    def quaternion(cls, w: Any, x: Any, y: Any, z: Any, *, normalize: bool = False) -> Attitude:
+        """From body to space, the scalar first.
+
+        Raises InputError unless |q| = 1 exactly, or, with ``normalize``, for q = 0; R of any rational quaternion is
+        rational.
+        """
+        q = tuple(exact(value) for value in (w, x, y, z))
+        square = sum(value * value for value in q)
+        if square == 0:
+            raise InputError("The quaternion is 0, which is no attitude.", "Give w,x,y,z of length 1.")
+        if square != 1 and not normalize:
+            raise InputError(f"The quaternion is not of length 1: |q|^2 - 1 = {_size(square - 1)}.", _NORMALIZE)
+        return cls("quaternion", q)
+
+    @classmethod
+    def matrix(cls, rows: Iterable[Any], *, normalize: bool = False) -> Attitude:
+        """From R, three rows or nine numbers row by row.
+
+        Raises InputError unless R Rᵀ = 1 and det R = 1 exactly; with ``normalize`` for what is farther than 1e-2 from
+        a rotation, in place of which the rotation near it is taken.
+        """
+        found = _square(rows)
+        off = max(abs(dot(found[i], found[j]) - (i == j)) for i in range(3) for j in range(3))
+        if dot(found[0], cross(found[1], found[2])) < 0:
+            raise InputError(
+                "The matrix is a reflection: its determinant is negative.",
+                "Give the rotation from body axes to space axes; both systems of axes are right-handed.",
+            )
+        if off > (Fraction(1, 100) if normalize else 0):
+            raise InputError(f"The matrix is not orthogonal: an entry of R R^T - 1 is {_size(off)}.", _NORMALIZE)
+        if off:
+            return cls.quaternion(*_multiple_of_quaternion(found), normalize=True)
+        return cls("matrix", tuple(value for row in found for value in row))
+
+    @classmethod
+    def euler(cls, sequence: str, a: Any, b: Any, c: Any) -> Attitude:
+        """R = R_I(a) R_J(b) R_K(c) for ``sequence`` "IJK", intrinsic; radians, or degrees as "30deg".
+
+        Raises InputError for an unknown sequence and for what is no number.
+        """
+        return cls("euler", angles=tuple(map(Angle.read, (a, b, c))), sequence=require_sequence(sequence))
+
+    @classmethod
+    def axis_angle(cls, axis: Iterable[Any], angle: Any) -> Attitude:
+        """The rotation by ``angle`` (radians, or "30deg") about ``axis``, of any length; raises InputError for 0."""
+        found = vector(axis, "axis")
+        if not any(found):
+            raise InputError("The axis is the zero vector, which has no direction.", "Give the axis of the rotation.")
+        return cls("axis_angle", found, (Angle.read(angle),))
+
+    def __str__(self) -> str:
+        """As on the command line."""
+        texts = [exact_text(value) for value in self.numbers]
+        if self.kind == "axis_angle":
+            texts.append(str(self.angles[0]))
+        if self.kind == "euler":
+            return f"{self.sequence}:{','.join(map(str, self.angles))}"
+        return ",".join(texts)
+
+    def exact_rows(self) -> tuple[Vector, Vector, Vector] | None:
+        """R in exact rationals; None where some entry may be irrational."""
+        if self.kind == "quaternion":
+            square = sum(value * value for value in self.numbers)
+            return tuple(tuple(value / square for value in row) for row in matrix_of_quaternion(self.numbers))  # type: ignore[return-value]
+        if self.kind == "matrix":
+            return self.numbers[:3], self.numbers[3:6], self.numbers[6:]  # type: ignore[return-value]
+        quarters = [angle.quarters() for angle in self.angles]
+        if self.kind == "axis_angle" and sum(value != 0 for value in self.numbers) > 1 and quarters != [0]:
+            return None
+        if None in quarters:
+            return None
+        return self._product([_quarter(count or 0) for count in quarters], Fraction, lambda square: square)
+
+    def rows(self, lib: Any, number: Number = lambda value: value) -> tuple[Any, Any, Any]:
+        """The rows of R, as numbers of ``lib``.
+
+        number: what makes an exact rational one of them, such as :func:`heavytop.exact.balls.ball`; left as it is for
+        math.
+        """
+        known = self.exact_rows()
+        if known is not None:
+            first, second, third = (tuple(map(number, row)) for row in known)
+            return first, second, third
+        turns = [angle.radians(lib, number) for angle in self.angles]
+        return self._product([(lib.cos(turn), lib.sin(turn)) for turn in turns], number, lib.sqrt)
+
+    def _product(
+        self, turns: list[tuple[Any, Any]], number: Number, root: Callable[[Any], Any]
+    ) -> tuple[Any, Any, Any]:
+        """R from (cos, sin) of the angles; ``root`` is asked for the length of an axis that has more than one part."""
+        if self.kind == "euler":
+            first, second, third = (
+                _elementary(axis, *turn) for axis, turn in zip(_axes(self.sequence), turns, strict=True)
+            )
+            return multiplied(multiplied(first, second), third)
+        ((cosine, sine),) = turns
+        square = dot(self.numbers, self.numbers)
+        if sum(value != 0 for value in self.numbers) == 1:
+            n = [number(Fraction((value > 0) - (value < 0))) for value in self.numbers]
+        elif sine == 0 and cosine == 1:
+            n = [number(Fraction(place == 0)) for place in range(3)]
+        else:
+            length = root(number(square))
+            n = [number(value) / length for value in self.numbers]
+        skew = ((0, -n[2], n[1]), (n[2], 0, -n[0]), (-n[1], n[0], 0))
+        first, second, third = (
+            tuple((i == j) * cosine + sine * skew[i][j] + (1 - cosine) * n[i] * n[j] for j in range(3))
+            for i in range(3)
+        )
+        return first, second, third
+
+
+def _quarter(count: int) -> tuple[Fraction, Fraction]:
+    """(cos, sin) of so many right angles."""
+    found = ((1, 0), (0, 1), (-1, 0), (0, -1))[count]
+    return Fraction(found[0]), Fraction(found[1])
+
+
+def _square(rows: Iterable[Any]) -> tuple[Vector, Vector, Vector]:
+    """Three rows of three, out of three rows or nine numbers."""
+    remedy = "Give R row by row: nine numbers, or three rows of three."
+    found = ordered(rows, "matrix", remedy)
+    if len(found) == 9:
+        found = [found[:3], found[3:6], found[6:]]
+    if len(found) != 3:
+        raise InputError(f"matrix has {len(found)} entries.", remedy)
+    first, second, third = (vector(row, "a row of the matrix") for row in found)
+    return first, second, third
+
+
+def _size(value: Fraction) -> str:
+    return decimal_text(round_to(value, _SHOWN_BITS), 6)
