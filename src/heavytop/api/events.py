@@ -41,7 +41,7 @@ def events(
     *,
     integrator: str = "heyoka",
     digits: None = None,
-    system: System | str = HEAVY_TOP,
+    system: System | str | None = None,
     tolerance: Number | None = None,
     step_limit: int | None = None,
     limit: int | None = None,
@@ -57,7 +57,7 @@ def events(
     direction: int = 0,
     *,
     digits: int,
-    system: System | str = HEAVY_TOP,
+    system: System | str | None = None,
     limit: int | None = None,
 ) -> ReferenceEvents: ...
 
@@ -72,7 +72,7 @@ def events(
     *,
     integrator: str = "heyoka",
     digits: int | None = None,
-    system: System | str = HEAVY_TOP,
+    system: System | str | None = None,
     tolerance: Number | None = None,
     step_limit: int | None = None,
     limit: int | None = None,
@@ -116,7 +116,7 @@ def events(
             way,
             form,
             integrator,
-            arguments.system(system),
+            arguments.system(system, body),
             arguments.tolerance(tolerance, form),
             arguments.count(step_limit, "step_limit"),
             most,
@@ -127,7 +127,9 @@ def events(
             "Leave these out, or digits.",
         )
     body, state = arguments.motion(top, start, of_any_size=True)
-    return known_events(body, state, _until(until), which, way, whole(digits, "digits"), arguments.system(system), most)
+    return known_events(
+        body, state, _until(until), which, way, whole(digits, "digits"), arguments.system(system, body), most
+    )
 
 
 def computed_events(
@@ -202,7 +204,7 @@ def poincare(
     *,
     integrator: str = "heyoka",
     digits: int | None = None,
-    system: System | str = HEAVY_TOP,
+    system: System | str | None = None,
     limit: int | None = None,
 ) -> Section:
     """The Poincaré section of one or several motions of a top: their states where a function changes sign.
@@ -234,7 +236,8 @@ def poincare(
             )
         except InputError as error:
             raise InputError(f"Start {place}: {error.cause}", error.remedy) from None
-    parameters = [arguments.system(system).parameters(top, start) for start in listed]
+    about = arguments.system(system, top)
+    parameters = [about.parameters(top, start) for start in listed]
     levels = [
         tuple(_as_float(integral(p, start.flat)) for p, start in zip(parameters, listed, strict=True))
         for integral in (energy, area)

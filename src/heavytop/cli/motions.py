@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal
+from heavytop.cli.events import EventDirection, Events, located, requested, show_events
 from heavytop.cli.output import say
 from heavytop.cli.progress import reaching, watched
 from heavytop.errors import InputError
@@ -47,6 +48,8 @@ def propagate(
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     normalize: Normalize = False,
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
+    events: Events = None,
+    event_direction: EventDirection = 0,
     json: Json = False,
 ) -> int:
     """Integrate one motion and print its states.
@@ -63,6 +66,7 @@ def propagate(
     if max_steps is not None and max_steps < 1:
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top, start)
+    functions = requested(events, event_direction, instants[-1])
     if form.bits >= _SLOW_BITS and integrator == "heyoka":
         say(
             f"warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
@@ -78,12 +82,17 @@ def propagate(
         motion = compute(
             top, start, instants, form, which, attitude, max_steps, which_one, lambda time: reach(float(time / end))
         )
+    with reaching("events", _PROPAGATE_SECONDS) as reach:
+        found = _computed(
+            top, start, functions, event_direction, instants[-1], form, integrator, which, max_steps, reach
+        )
     if json:
-        print_json(motion.to_json())
+        print_json(motion.to_json() | ({"events": [each.to_json() for each in found]} if found else {}))
     else:
         from heavytop.report.motion_text import motion_text
 
         show_on_terminal(motion_text(motion))
+        show_events(found)
     return 0 if motion.complete else 3
 
 
@@ -100,6 +109,8 @@ def reference(
     system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Give xi too, fixed in space and across gamma.")] = False,
     normalize: Normalize = False,
+    events: Events = None,
+    event_direction: EventDirection = 0,
     json: Json = False,
 ) -> int:
     """Print proven states of one motion.
@@ -113,16 +124,72 @@ def reference(
 
     top, start = _motion(inertia, weight, centre, omega, gamma, normalize, rotor, of_any_size=True)
     which, instants = system_of(system, top), check_times(numbers(times))
+    functions = requested(events, event_direction, instants[-1])
     watch = _Watch([abs(time) for time in instants])
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
         found = proven(top, start, instants, digits, which, watch.find, attitude)
+    with reaching("events", _REFERENCE_SECONDS) as reach:
+        known = _known(top, start, functions, event_direction, instants[-1], digits, which, reach)
     if json:
-        print_json(found)
+        import msgspec
+
+        print_json(msgspec.to_builtins(found) | ({"events": known} if known else {}))
     else:
         from heavytop.report.motion_text import reference_text
 
         show_on_terminal(reference_text(found))
+        show_events(known)
     return 0
+
+
+def _computed(
+    top: Any,
+    start: Any,
+    functions: list[Any],
+    direction: int,
+    until: Any,
+    form: Any,
+    integrator: str,
+    which: Any,
+    max_steps: int | None,
+    reach: Any,
+) -> list[Any]:
+    """The events of the computed motion."""
+    if not functions:
+        return []
+    from heavytop.api.events import computed_events
+
+    def locate(function: Any) -> Any:
+        return computed_events(
+            top,
+            start,
+            until,
+            function,
+            direction,
+            form,
+            integrator,
+            which,
+            step_limit=max_steps,
+            reached=lambda time: reach(float(time / until)),
+        )
+
+    return located(functions, locate)
+
+
+def _known(
+    top: Any, start: Any, functions: list[Any], direction: int, until: Any, digits: int, which: Any, reach: Any
+) -> list[Any]:
+    """The proven events."""
+    if not functions:
+        return []
+    from heavytop.api.events import known_events
+
+    def locate(function: Any) -> Any:
+        return known_events(
+            top, start, until, function, direction, digits, which, reached=lambda time: reach(float(time / until))
+        )
+
+    return located(functions, locate)
 
 
 class _Watch:

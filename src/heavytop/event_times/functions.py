@@ -18,9 +18,8 @@ from flint import Ordering, fmpq, fmpq_mpoly_ctx, fmpq_series
 
 from heavytop.errors import InputError, quoted
 from heavytop.precision import exact
-from heavytop.top.equations import Parameters, System
+from heavytop.top.equations import VARIABLES, Parameters, System
 
-VARIABLES = ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3")
 _GREEK = {f"{greek}{axis}": f"{name}{axis}" for greek, name in (("Ω", "omega"), ("γ", "gamma")) for axis in (1, 2, 3)}
 _GREEK |= {f"\N{OHM SIGN}{axis}": f"omega{axis}" for axis in (1, 2, 3)}
 _REMEDY = (
@@ -301,24 +300,16 @@ def composed(terms: Sequence[tuple[tuple[int, ...], Any]], components: Sequence[
 def rate_along(polynomial: Any, system: System, parameters: Parameters) -> Any:
     """d/dt of a polynomial along the motions: Σ ∂f/∂y_i f_i(y), a polynomial."""
 
-    def rational(value: Any) -> fmpq:
-        number = Fraction(value)
-        return fmpq(number.numerator, number.denominator)
-
-    own = Parameters(
-        tuple(map(rational, parameters.inertia)), tuple(map(rational, parameters.moment)), _rotor(parameters.rotor)
-    )
-    field = system.field(own, _context.gens())
+    field = system.field(parameters.mapped(_rational), _context.gens())
     found = _context.constant(0)
     for index, rate in enumerate(field):
         found = found + polynomial.derivative(index) * rate
     return found
 
 
-def _rotor(value: Any) -> Any:
-    if isinstance(value, tuple | list):
-        return tuple(fmpq(Fraction(v).numerator, Fraction(v).denominator) for v in value)
-    return fmpq(Fraction(value).numerator, Fraction(value).denominator)
+def _rational(value: Any) -> fmpq:
+    number = Fraction(value)
+    return fmpq(number.numerator, number.denominator)
 
 
 def start_series(

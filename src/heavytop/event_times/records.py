@@ -11,12 +11,11 @@ import msgspec
 
 from heavytop.display import Lines, Table, Tabular
 from heavytop.errors import InputError, quoted
-from heavytop.event_times.functions import VARIABLES
 from heavytop.exact.balls import radius_text
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.reference import Ball, rounded_up
 from heavytop.precision import decimal_text, exact, native_text
-from heavytop.top.equations import NAMES
+from heavytop.top.equations import NAMES, VARIABLES
 
 if TYPE_CHECKING:
     import numpy as np
