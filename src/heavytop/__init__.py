@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from heavytop.api import plot
     from heavytop.api.claims import Audit, audit
     from heavytop.api.events import events, poincare
     from heavytop.api.motions import ensemble, propagate, reference
@@ -75,6 +76,7 @@ __all__ = [
     "ensemble",
     "events",
     "holding",
+    "plot",
     "poincare",
     "propagate",
     "read_report",
@@ -92,6 +94,8 @@ if not TYPE_CHECKING:  # it would tell a type checker that every name is there
             from heavytop.version import version
 
             return version()
+        if name == "plot":
+            return import_module("heavytop.api.plot")
         if name not in _ROOM:
             raise AttributeError(f"module 'heavytop' has no attribute {name!r}")
         found = getattr(import_module(f"heavytop.{_ROOM[name]}"), name)
