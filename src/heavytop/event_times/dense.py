@@ -24,7 +24,7 @@ from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.integrate.words import OUTCOMES
 from heavytop.integrate.words_engines import choose
 from heavytop.integrate.words_engines import compiled as compile_words
-from heavytop.precision import decimal_text, exact, number
+from heavytop.precision import DOUBLE, decimal_text, exact, number
 from heavytop.words.floating import Floating
 from heavytop.words.run import Run, Status
 from heavytop.words.scaled import Scaled
@@ -59,10 +59,11 @@ class Piece:
     """A step: the motion at ``began`` + s ``length`` for 0 ≤ s ≤ 1 (and ``end`` of the last one) as polynomials in s.
 
     began, length: exact; a step back in time has a negative length.
-    coefficients: gives the numbers c_n of one component, which stands for Σ c_n (s length)^n 2^-exponent.
+    coefficients: gives the numbers c_n of one component, which is Σ c_n (s length)^n, or Σ c_n s^n without ``powers``.
+    doubles: the c_n of all components, shape (6, order + 1), where they are doubles; else None.
     """
 
-    __slots__ = ("_bits", "_coefficients", "_found", "_powers", "began", "end", "length")
+    __slots__ = ("_bits", "_coefficients", "_found", "_powers", "began", "doubles", "end", "length")
 
     def __init__(
         self,
@@ -71,8 +72,9 @@ class Piece:
         bits: int,
         coefficients: Callable[[int], Sequence[Dyadic]],
         powers: bool = True,
+        doubles: Any = None,
     ) -> None:
-        self.began, self.length, self.end = began, length, fmpq(1)
+        self.began, self.length, self.end, self.doubles = began, length, fmpq(1), doubles
         self._bits, self._coefficients = bits + _SPARE_BITS, coefficients
         self._found: dict[int, fmpq_poly] = {}
         self._powers: list[Dyadic] | None = None if powers else []
@@ -87,6 +89,16 @@ class Piece:
                 values = [(m * k, e + f) for (m, e), (k, f) in zip(values, self._powers, strict=True)]
             self._found[index] = _fixed_point(values, self._bits)
         return self._found[index]
+
+    def boxes(self) -> tuple[list[float], list[float]] | None:
+        """(middles, half widths) of intervals that hold the components over the step, but for roundings; or None."""
+        if self.doubles is None:
+            return None
+        import numpy
+
+        sizes = abs(float(self.length)) ** numpy.arange(self.doubles.shape[1])
+        sizes[0] = 0.0
+        return self.doubles[:, 0].tolist(), (abs(self.doubles) @ sizes).tolist()
 
     def _powers_of_length(self, count: int) -> list[Dyadic]:
         """length^n for 0 ≤ n < count, to as many bits as are kept."""
@@ -189,7 +201,8 @@ class OfHeyoka(Dense):
                     return
                 self.steps += 1
                 rows = stepper.polynomial()
-                yield Piece(began, exact(engine.last_h), bits, _reader_of(rows))
+                doubles = rows if problem.precision == DOUBLE else None
+                yield Piece(began, exact(engine.last_h), bits, _reader_of(rows), doubles=doubles)
 
 
 class OfWords(Dense):

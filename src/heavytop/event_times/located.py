@@ -8,7 +8,7 @@ ends: a change that only shows between the end of one and the beginning of the n
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -28,6 +28,7 @@ _GUARD_BITS = 8
 _SAMPLES = 48
 """Samples of a step for a callable that needs numbers; steps of a Taylor method turn the body by less than a radian."""
 _NARROWED = 60
+_ROUNDING, _TINY = 2.0**-36, 1e-250
 
 
 class Found(NamedTuple):
@@ -106,8 +107,10 @@ def _of_rational(function: EventFunction, pieces: Iterator[Piece], precision: Pr
     """Changes of sign of the numerator where the denominator is not 0."""
     terms, below = terms_of(function.numerator), terms_of(function.denominator)
     used, zero = function.used(), fmpq_poly([0])
-    before = 0
+    before, floats = 0, _as_floats(terms)
     for piece in pieces:
+        if before and floats and _sign_over(floats, piece) == before:
+            continue
         components = [piece.component(index) if index in used else None for index in range(6)]
         polynomial = composed(terms, components, zero).numer()
         bits = precision.bits + _GUARD_BITS + (precision.bits if piece.began == 0 else 0)
@@ -124,6 +127,42 @@ def _of_rational(function: EventFunction, pieces: Iterator[Piece], precision: Pr
             if at != 0:
                 yield Found(piece, s, rising == (at > 0))
         before = sign_before(polynomial, piece.end) or before
+
+
+_Floats = list[tuple[list[tuple[int, int]], float]]
+
+
+def _as_floats(terms: Sequence[tuple[tuple[int, ...], Any]]) -> _Floats:
+    """The terms of a polynomial in double, each as its (component, power) and coefficient; none where one overflows."""
+    try:
+        return [([(i, count) for i, count in enumerate(powers) if count], int(c.p) / int(c.q)) for powers, c in terms]
+    except OverflowError:
+        return []
+
+
+def _sign_over(terms: _Floats, piece: Piece) -> int:
+    """The sign of a polynomial over a whole step, 0 where intervals in double do not show it.
+
+    It is that of the value at the middle of the box of the components, if that exceeds the most that the terms change
+    in the box and 2^-36 of their sizes, for roundings.
+    """
+    box = piece.boxes()
+    if box is None:
+        return 0
+    middles, widths = box
+    value = change = size = 0.0
+    try:
+        for powers, coefficient in terms:
+            at, most = coefficient, abs(coefficient)
+            for index, count in powers:
+                at *= middles[index] ** count
+                most *= (abs(middles[index]) + widths[index]) ** count
+            value, change, size = value + at, change + most - abs(at), size + most
+    except OverflowError:
+        return 0
+    if not abs(value) > change + _ROUNDING * size or not abs(value) > _TINY:
+        return 0
+    return 1 if value > 0 else -1
 
 
 @dataclass(slots=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from heavytop.display import Table, Tabular
+from heavytop.display import Table, Tabular, path_picture
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.exact.attitude import attitude_of
 from heavytop.exact.balls import radius_text, value_text
@@ -71,6 +71,11 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True):
         import numpy
 
         return numpy.array([[rounded_up(ball.radius) for ball in state] for state in self.states])
+
+    def _repr_html_(self) -> str:
+        states, caption = self.states, "γ, the vertical in body axes, on the unit sphere"
+        picture = path_picture(len(states), lambda place: [ball.value for ball in states[place][3:6]], caption)
+        return self._table().html() + picture
 
     def _table(self) -> Table:
         worst = max((Fraction(ball.radius) for state in self.states for ball in state), default=Fraction(0))
