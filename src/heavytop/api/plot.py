@@ -232,7 +232,7 @@ def poincare(
     if not total:
         raise InputError("The section has no point.", "Ask for a later until, or for another function.")
     drawn = _flat(axes)
-    diameter = size if size is not None else float(np.clip(60 / np.sqrt(total), 1.2, 4))
+    diameter = size if size is not None else float(np.clip(90 / np.sqrt(total), 2, 5))
     columns = [component(name) for name in (x, y)]
     for place, each in enumerate(listed):
         points = each.to_numpy()[:, columns]
@@ -439,7 +439,9 @@ def _globe(axes: Any) -> None:
     _ellipsoid(axes, np.ones(3))
     axes.plot([0, 0], [0, 0], [-1, 1.25], color=_GREY, lw=0.8)
     _equal(axes, 1.0)
-    axes.set(xticks=(-1, 0, 1), yticks=(-1, 0, 1), zticks=(-1, 0, 1))
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_ticks((-1, 0, 1))
+        axis.labelpad = -6
 
 
 def _ellipsoid(axes: Any, radii: NDArray[np.float64]) -> None:
