@@ -98,7 +98,7 @@ def _given(document: dict[str, Any], stem: str, sha256: str, case: Case | None, 
     which = system(_text(document, "system", "heavy_top" if case is None else case.system.name))
     top, at_start = _top(document, case), _row_of_start(document)
     start = _start(document, case, at_start)
-    times = check_times([written_numbers.finite(value, "a time") for value in _list(document, "times")])
+    times = list(check_times([written_numbers.finite(value, "a time") for value in _list(document, "times")]))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
     if case is not None:

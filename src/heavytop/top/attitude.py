@@ -23,7 +23,7 @@ from typing import Any
 
 from heavytop.errors import InputError, quoted
 from heavytop.precision import decimal_text, exact, exact_text, round_to
-from heavytop.top.heavy_top import Vector, cross, dot, ordered, vector
+from heavytop.top.vectors import Vector, cross, dot, ordered, vector
 
 Rows = Sequence[Sequence[Any]]
 Number = Callable[[Fraction], Any]
@@ -31,6 +31,7 @@ Number = Callable[[Fraction], Any]
 SEQUENCES = tuple("".join(letters) for letters in product("XYZ", repeat=3) if letters[0] != letters[1] != letters[2])
 """The twelve sequences of Euler angles."""
 _SHOWN_BITS = 64
+_GUARD_BITS = 16
 _DEGREES = "deg"
 _NORMALIZE = "Normalize it (--normalize on the command line, normalize=True in Python), or give exact numbers."
 
@@ -68,21 +69,28 @@ def matrix_of_quaternion(q: Sequence[Any]) -> tuple[Any, Any, Any]:
     )
 
 
-def _multiple_of_quaternion(rows: Rows) -> tuple[Any, Any, Any, Any]:
-    """4 c q with c the largest component of q: linear in R, so exact over the rationals.
+def rotation_of(q: Sequence[Fraction]) -> tuple[Vector, Vector, Vector]:
+    """R of a rational quaternion of any length but 0, in exact rationals."""
+    square = sum(value * value for value in q)
+    first, second, third = (tuple(value / square for value in row) for row in matrix_of_quaternion(q))
+    return first, second, third
 
-    c² is at least 1/4, so that no digits are lost.
-    """
+
+def quaternion_products(rows: Rows) -> tuple[tuple[Any, ...], ...]:
+    """4 q qᵀ, row by row: each row is a multiple of q; linear in R, so exact over the rationals."""
     (a, b, c), (d, e, f), (g, h, i) = rows
-    first = (a + e + i, a - e - i, e - a - i, i - a - e)
-    # 4 q qᵀ, row by row
-    products = (
-        (1 + first[0], h - f, c - g, d - b),
-        (h - f, 1 + first[1], b + d, c + g),
-        (c - g, b + d, 1 + first[2], f + h),
-        (d - b, c + g, f + h, 1 + first[3]),
+    return (
+        (1 + (a + e + i), h - f, c - g, d - b),
+        (h - f, 1 + (a - e - i), b + d, c + g),
+        (c - g, b + d, 1 + (e - a - i), f + h),
+        (d - b, c + g, f + h, 1 + (i - a - e)),
     )
-    return products[max(range(4), key=lambda place: float(first[place]))]
+
+
+def _multiple_of_quaternion(rows: Rows) -> tuple[Any, ...]:
+    """4 c q with c the largest component of q: c² is at least 1/4, so that no digits are lost."""
+    products = quaternion_products(rows)
+    return products[max(range(4), key=lambda place: float(products[place][place]))]
 
 
 def quaternion_of_rows(rows: Rows, lib: Any) -> tuple[Any, Any, Any, Any]:
@@ -275,11 +283,34 @@ class Attitude:
             return f"{self.sequence}:{','.join(map(str, self.angles))}"
         return ",".join(texts)
 
+    def __repr__(self) -> str:
+        if self.kind == "euler":
+            return f"Attitude.euler({self.sequence!r}, {', '.join(repr(str(angle)) for angle in self.angles)})"
+        texts = ", ".join(repr(exact_text(value)) for value in self.numbers)
+        if self.kind == "axis_angle":
+            return f"Attitude.axis_angle(({texts}), {str(self.angles[0])!r})"
+        unit = self.kind == "matrix" or sum(value * value for value in self.numbers) == 1
+        values = f"({texts})" if self.kind == "matrix" else texts
+        return f"Attitude.{self.kind}({values}{'' if unit else ', normalize=True'})"
+
+    def rational_rows(self, bits: int) -> tuple[Vector, Vector, Vector]:
+        """R where it is rational; else a rational rotation, exactly orthogonal, within 2^-bits of it."""
+        known = self.exact_rows()
+        return known if known is not None else rotation_of(self._near_quaternion(bits + _GUARD_BITS))
+
+    def _near_quaternion(self, bits: int) -> tuple[Fraction, ...]:
+        import mpmath
+
+        # mpmath.mp is shared by all threads
+        lib = mpmath.MPContext()
+        lib.prec = bits
+        rows = self.rows(lib, lambda value: lib.mpf(value.numerator) / value.denominator)
+        return tuple(exact(value) for value in _multiple_of_quaternion(rows))
+
     def exact_rows(self) -> tuple[Vector, Vector, Vector] | None:
         """R in exact rationals; None where some entry may be irrational."""
         if self.kind == "quaternion":
-            square = sum(value * value for value in self.numbers)
-            return tuple(tuple(value / square for value in row) for row in matrix_of_quaternion(self.numbers))  # type: ignore[return-value]
+            return rotation_of(self.numbers)
         if self.kind == "matrix":
             return self.numbers[:3], self.numbers[3:6], self.numbers[6:]  # type: ignore[return-value]
         quarters = [angle.quarters() for angle in self.angles]
