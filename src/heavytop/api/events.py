@@ -9,22 +9,26 @@ from typing import Any, overload
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Number
+from heavytop.api.setup import Setup
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.event_times.dense import dense
-from heavytop.event_times.functions import EventFunction, event_function, first_term
+from heavytop.event_times.functions import EventFunction, event_function, first_term, turned
 from heavytop.event_times.located import locate
 from heavytop.event_times.proven import proven_events
 from heavytop.event_times.records import PROVEN, Events, ReferenceEvents, Section
 from heavytop.exact.balls import value_text
+from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.scales import require_handy
 from heavytop.exact.validated import Validated
-from heavytop.integrate.trajectory import Problem
 from heavytop.measure.reference import DIGITS, Ball
 from heavytop.precision import DOUBLE, Precision, exact, exact_text, physical, whole
+from heavytop.top.amplification import amplification
+from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import area, energy
 
+_DATA_BITS = 192
 Function = str | Callable[[Any, Any], Any]
 """Text such as "omega1" or "gamma3 = 1/2", or a callable of (Ω, γ) that gives a number."""
 Reached = Callable[[Fraction], None]
@@ -32,7 +36,7 @@ Reached = Callable[[Fraction], None]
 
 @overload
 def events(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     until: Number,
     function: Function = "omega1",
@@ -50,7 +54,7 @@ def events(
 
 @overload
 def events(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     until: Number,
     function: Function = "omega1",
@@ -63,7 +67,7 @@ def events(
 
 
 def events(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     until: Number,
     function: Function = "omega1",
@@ -80,7 +84,7 @@ def events(
     """The times strictly between 0 and ``until`` at which a function of the state changes sign, and the states there.
 
     Arguments:
-        top, start: as in :func:`propagate`.
+        top, start: as in :func:`propagate`; of a body in its own axes the function and the states are of those axes.
         until: an exact number of either sign, not 0.
         function: a rational function as text, ``"omega1"``, ``"gamma3 = 1/2"``, ``"omega1*gamma2 - omega2*gamma1"``; or
             a callable of (Ω, γ), called once with indeterminates. One that needs numbers (``math.sin``, ``abs``) is
@@ -133,7 +137,7 @@ def events(
 
 
 def computed_events(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     until: Fraction,
     function: EventFunction,
@@ -147,15 +151,17 @@ def computed_events(
     reached: Reached | None = None,
 ) -> Events:
     """Events of a motion that was checked; ``reached`` is called with the time of each step."""
-    problem = Problem.of(top, start, form, system)
+    setup = Setup.of(top, start, form, system)
+    axes = None if setup.frame is None else setup.frame.axes
     if function.rational:
-        first_term(function, system, system.parameters(top, start), start.flat)
-    run = dense(integrator, problem, until, tolerance, step_limit)
-    return locate(run, integrator, function, direction, limit, reached)
+        own = function if axes is None else turned(function, axes)
+        first_term(own, system, system.parameters(setup.top, setup.start), setup.start.flat)
+    run = dense(integrator, setup.problem, until, tolerance, step_limit)
+    return locate(run, integrator, function, direction, limit, reached, axes)
 
 
 def known_events(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     until: Fraction,
     function: EventFunction,
@@ -173,10 +179,12 @@ def known_events(
             f"The function {quoted(function.name)} is no rational function of Ω and γ, so nothing is proven of it.",
             "Write it with +, -, * and / alone, or leave digits out: then it is sampled.",
         )
-    require_handy(top, start, [until])
-    solution = Validated(top, start, system)
+    resolved = _resolved(top, start, until, digits, system)
+    require_handy(resolved.top, resolved.start, [until])
+    method = "validated: Taylor enclosure" + (" of irrational data" if resolved.uncertainty else "")
+    solution = Validated(resolved.top, resolved.start, system, method=method, uncertainty=resolved.uncertainty)
     try:
-        found = proven_events(solution, until, function, direction, digits, limit, reached)
+        found = proven_events(solution, until, function, direction, digits, limit, reached, resolved)
     except OutOfReach as error:
         remedy = f"{error.remedy} Computed ones reach further: leave digits out, and ask for quad or real:BITS."
         raise OutOfReach(error.cause, remedy) from None
@@ -194,8 +202,17 @@ def known_events(
     )
 
 
+def _resolved(top: HeavyTop | Body, start: State, until: Fraction, digits: int, system: System) -> Resolved:
+    """The motion in principal axes; irrational data to as many bits as the motion loses until then, and more."""
+    found = resolve(top, start)
+    if found.uncertainty is None:
+        return found
+    lost = amplification(system, system.parameters(found.top, found.start), found.start.flat, until)
+    return resolve(top, start, _DATA_BITS + math.ceil(digits * math.log2(10) + 2 * math.log2(max(1.0, lost))))
+
+
 def poincare(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     starts: State | Iterable[State],
     until: Number,
     function: Function = "omega1",
@@ -237,9 +254,10 @@ def poincare(
         except InputError as error:
             raise InputError(f"Start {place}: {error.cause}", error.remedy) from None
     about = arguments.system(system, top)
-    parameters = [about.parameters(top, start) for start in listed]
+    own = [resolve(top, start) for start in listed]
+    parameters = [about.parameters(each.top, each.start) for each in own]
     levels = [
-        tuple(_as_float(integral(p, start.flat)) for p, start in zip(parameters, listed, strict=True))
+        tuple(_as_float(integral(p, each.start.flat)) for p, each in zip(parameters, own, strict=True))
         for integral in (energy, area)
     ]
     return Section(tuple(found), *levels)

@@ -19,11 +19,13 @@ from heavytop.api import arguments
 from heavytop.api.plot_data import (
     Motion,
     Samples,
+    axes_of,
     compared,
     every,
     exact_states,
     parameters_of,
     path_in_space,
+    principal,
     samples,
 )
 from heavytop.errors import InputError, quoted
@@ -90,7 +92,7 @@ def sphere(
 def polhode(
     run: Motion, axes: Any = None, *, top: HeavyTop | None = None, colour: str = COLOURS[0], label: str | None = None
 ) -> Any:
-    """The path of Ω in the body, the polhode; on the energy ellipsoid Ω·IΩ = 2T where the body is free, P r = 0.
+    """The polhode, the path of Ω in the principal axes; on the energy ellipsoid Ω·IΩ = 2T of a free body, P r = 0.
 
     Arguments:
         run: a motion.  axes: three-dimensional axes, or None.
@@ -103,24 +105,24 @@ def polhode(
     Raises:
         InputError: as :func:`sphere`.
     """
-    found = samples(run)
+    omega = principal(run, samples(run).omega)
     drawn = _solid(axes)
     known = isinstance(run, Trajectory) or top is not None
-    extent = abs(found.omega).max() or 1.0
+    extent = abs(omega).max() or 1.0
     if known:
         p = parameters_of(run, top)
         if not any(p.moment) and not any(p.rotors):
             inertia = np.array([float(value) for value in p.inertia])
-            radii = np.sqrt((found.omega[0] ** 2 * inertia).sum() / inertia)
+            radii = np.sqrt((omega[0] ** 2 * inertia).sum() / inertia)
             _ellipsoid(drawn, radii)
             extent = radii.max()
-            _visible_path(drawn, found.omega, colour, label, 1 / radii**2)
+            _visible_path(drawn, omega, colour, label, 1 / radii**2)
             _equal(drawn, extent)
             drawn.set(**_omega_labels())
             drawn.set_title("polhode on the energy ellipsoid", fontsize="medium")
             return drawn
-    drawn.plot(*found.omega.T, color=colour, lw=_WIDTH, label=label)
-    drawn.plot(*found.omega[:1].T, "o", color=colour, ms=4)
+    drawn.plot(*omega.T, color=colour, lw=_WIDTH, label=label)
+    drawn.plot(*omega[:1].T, "o", color=colour, ms=4)
     _equal(drawn, extent)
     drawn.set(**_omega_labels())
     drawn.set_title("Ω in the body", fontsize="medium")
@@ -153,7 +155,9 @@ def herpolhode(
     free = p is not None and not any(p.moment) and not any(p.rotors)
     across = np.eye(3)[:2]
     if p is not None and free:
-        momentum = rows[0] @ (found.omega[0] * np.array([float(value) for value in p.inertia]))
+        own = principal(run, found.omega[:1])[0] * np.array([float(value) for value in p.inertia])
+        turn = axes_of(run)
+        momentum = rows[0] @ (own if turn is None else turn @ own)
         if (size := np.linalg.norm(momentum)) > 0:
             across = _plane_across(momentum / size)
     drawn = _flat(axes)

@@ -16,6 +16,7 @@ from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.measure.reference import Reference
 from heavytop.precision import exact
 from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import rotated, transposed
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import HeavyTop
 
@@ -99,11 +100,24 @@ def _integrated_xi(run: Motion) -> NDArray[np.float64]:
         )
     found = samples(again).xi
     assert found is not None
-    return found[: len(run.states)]
+    turn = axes_of(run)
+    return (found if turn is None else found @ turn.T)[: len(run.states)]
+
+
+def axes_of(run: Motion) -> NDArray[np.float64] | None:
+    """A, v_given = A v_principal, of a run whose states are in other axes than the principal ones; else None."""
+    frame = getattr(run, "frame", None)
+    return None if frame is None else np.array([[float(value) for value in row] for row in frame.axes])
+
+
+def principal(run: Motion, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vectors (n, 3) of a run in its principal axes."""
+    turn = axes_of(run)
+    return vectors if turn is None else vectors @ turn
 
 
 def parameters_of(run: Motion, top: HeavyTop | None) -> Parameters:
-    """I, P r and the rotor of a motion; raises InputError for a known one without ``top``."""
+    """I, P r and the rotor of a motion, in principal axes; raises InputError for a known one without ``top``."""
     if isinstance(run, Trajectory):
         return run.problem.parameters
     if not isinstance(top, HeavyTop):
@@ -125,7 +139,8 @@ def direction(run: Motion, of: str | None, top: HeavyTop | None) -> tuple[str, N
         raise InputError("The centre of mass is at the fixed point, or has no weight.", "Use axis1, axis2 or axis3.")
     largest = max(map(abs, moment))
     vector = np.array([float(value / largest) for value in moment])
-    return of, vector / np.linalg.norm(vector)
+    turn = axes_of(run)
+    return of, (vector if turn is None else turn @ vector) / np.linalg.norm(vector)
 
 
 def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, Samples, NDArray[np.float64]]:
@@ -159,7 +174,7 @@ def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[F
                 f"Sample {place} is at t = {float(time)!r} of one and {float(other)!r} of the other.",
                 "Give the same times.",
             )
-    return run.problem, times, exact_states(run, places), exact_states(known, places)
+    return run.problem, times, exact_states(run, places), exact_states(known, places, run)
 
 
 def every(count: int, most: int = MOST_EXACT) -> list[int]:
@@ -171,8 +186,14 @@ def every(count: int, most: int = MOST_EXACT) -> list[int]:
     return [round(place * (count - 1) / (most - 1)) for place in range(most)]
 
 
-def exact_states(run: Motion, places: Sequence[int]) -> list[list[Fraction]]:
-    """(Ω, γ) at these samples, exactly as they are written."""
+def exact_states(run: Motion, places: Sequence[int], beside: Motion | None = None) -> list[list[Fraction]]:
+    """(Ω, γ) at these samples, exactly as they are written, in the principal axes of the run, or of that ``beside``."""
     if isinstance(run, Reference):
-        return [[exact(ball.value) for ball in run.states[place]][:6] for place in places]
-    return [[exact(value) for value in run.states[place][:6]] for place in places]
+        found = [[exact(ball.value) for ball in run.states[place]][:6] for place in places]
+    else:
+        found = [[exact(value) for value in run.states[place][:6]] for place in places]
+    frame = getattr(beside or run, "frame", None)
+    if frame is None:
+        return found
+    back = transposed(frame.axes)
+    return [[*rotated(back, state[:3]), *rotated(back, state[3:])] for state in found]

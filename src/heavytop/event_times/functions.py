@@ -269,6 +269,20 @@ def _as_ratio(value: Any) -> Ratio:
     return value if isinstance(value, Ratio) else Ratio.of(value)
 
 
+def turned(function: EventFunction, axes: Sequence[Sequence[Fraction]]) -> EventFunction:
+    """The function of the state in axes e of which the given ones are A e, the rows of A being ``axes``."""
+    if not function.rational:
+        return function
+    own = _context.gens()
+    forms = [
+        sum((_rational(axes[i][j]) * own[3 * part + j] for j in range(3)), _context.constant(0))
+        for part in range(2)
+        for i in range(3)
+    ]
+    numerator, denominator = (each.compose(*forms) for each in (function.numerator, function.denominator))
+    return EventFunction(function.name, numerator, denominator)
+
+
 def terms_of(polynomial: Any) -> list[tuple[tuple[int, ...], fmpq]]:
     """(exponents of the six components, coefficient) of every term."""
     return [(tuple(map(int, powers)), coefficient) for powers, coefficient in polynomial.to_dict().items()]
@@ -305,6 +319,11 @@ def rate_along(polynomial: Any, system: System, parameters: Parameters) -> Any:
     for index, rate in enumerate(field):
         found = found + polynomial.derivative(index) * rate
     return found
+
+
+def by_omega(polynomial: Any) -> list[Any]:
+    """∂f/∂Ω_i of a polynomial, three of them."""
+    return [polynomial.derivative(index) for index in range(3)]
 
 
 def _rational(value: Any) -> fmpq:

@@ -17,12 +17,16 @@ from flint import fmpq, fmpq_poly
 
 from heavytop.errors import InputError, quoted
 from heavytop.event_times.dense import Dense, Piece
-from heavytop.event_times.functions import EventFunction, composed, terms_of
+from heavytop.event_times.functions import EventFunction, composed, terms_of, turned
 from heavytop.event_times.records import POLYNOMIAL, SAMPLED, Events, arrays
 from heavytop.event_times.roots import refined, sign_after, sign_before, sign_changes
 from heavytop.integrate.trajectory import Outcome
 from heavytop.integrate.words import native_state
 from heavytop.precision import Precision, number
+from heavytop.top.attitude import rotated
+from heavytop.top.vectors import Vector
+
+Axes = tuple[Vector, Vector, Vector]
 
 _GUARD_BITS = 8
 _SAMPLES = 48
@@ -46,24 +50,33 @@ def locate(
     direction: int,
     limit: int | None = None,
     reached: Callable[[Fraction], None] | None = None,
+    axes: Axes | None = None,
 ) -> Events:
     """The events of a run, up to its ``until``.
 
+    axes: the rows of A where the function is of v_given = A v, and the states are wanted in these axes; None for those
+    of the run.
     direction: 1 for those at which the function rises with time, −1 for those at which it falls, 0 for all.
     limit: stop after so many.  reached: called with the time of each step.
     Raises InputError where a callable raises, or gives no finite number.
     """
     precision, forwards = run.problem.precision, run.until > 0
-    find = _of_rational if function.rational else _of_callable
+    inner = function if axes is None else turned(function, axes)
+    found_in = _watched(run, reached)
+    events = (
+        _of_rational(inner, found_in, precision)
+        if function.rational
+        else _of_callable(_Sampler(function, precision, axes), found_in)
+    )
     times: list[Any] = []
     states: list[Any] = []
     directions: list[int] = []
     outcome = None
-    for found in find(function, _watched(run, reached), precision):
+    for found in events:
         sign = 1 if found.rising == forwards else -1
         if direction not in (0, sign):
             continue
-        state = native_state(tuple(found.piece.state(found.s)), precision)
+        state = native_state(_given(found.piece.state(found.s), axes), precision)
         if state is None:
             outcome = Outcome.NON_FINITE
             break
@@ -87,6 +100,13 @@ def locate(
         run.seconds,
         run.flags,
     )
+
+
+def _given(state: Sequence[Fraction], axes: Axes | None) -> tuple[Fraction, ...]:
+    """(Ω, γ) in the axes given."""
+    if axes is None:
+        return tuple(state)
+    return (*rotated(axes, state[:3]), *rotated(axes, state[3:]))
 
 
 def _watched(run: Dense, reached: Callable[[Fraction], None] | None) -> Iterator[Piece]:
@@ -171,12 +191,13 @@ class _Sampler:
 
     function: EventFunction
     precision: Precision
+    axes: Axes | None = None
 
     def value(self, piece: Piece, s: fmpq) -> Any:
         """The function at s; raises InputError where it raises, or gives no finite number."""
         import numpy
 
-        state = native_state(tuple(piece.state(s)), self.precision)
+        state = native_state(_given(piece.state(s), self.axes), self.precision)
         if state is None:
             raise InputError("The state is too large for its format.", "Choose other units, or a wider format.")
         assert self.function.call is not None
@@ -198,9 +219,8 @@ class _Sampler:
         return value
 
 
-def _of_callable(function: EventFunction, pieces: Iterator[Piece], precision: Precision) -> Iterator[Found]:
+def _of_callable(sampler: _Sampler, pieces: Iterator[Piece]) -> Iterator[Found]:
     """Changes of sign between samples, and where |f| has a minimum between samples of one sign."""
-    sampler = _Sampler(function, precision)
     sign, piece = 0, None
     for piece in pieces:
         places = [piece.end * n / _SAMPLES for n in range(_SAMPLES + 1)]
@@ -218,7 +238,8 @@ def _of_callable(function: EventFunction, pieces: Iterator[Piece], precision: Pr
             sign = now or sign
     if not sign and piece is not None:
         raise InputError(
-            f"The function {quoted(function.name)} is zero at every sample of this motion.", "Choose another function."
+            f"The function {quoted(sampler.function.name)} is zero at every sample of this motion.",
+            "Choose another function.",
         )
 
 

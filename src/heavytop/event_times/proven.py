@@ -19,20 +19,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import chain
 from math import ceil, log2
 from typing import Any, NamedTuple
 
 from flint import arb, arb_poly
 
 from heavytop.errors import Contradiction, HeavyTopError, OutOfReach
-from heavytop.event_times.functions import EventFunction, composed, first_term, rate_along, terms_of
+from heavytop.event_times.functions import EventFunction, by_omega, composed, first_term, rate_along, terms_of, turned
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.bodies import Resolved
 from heavytop.exact.enclosure import Step
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.scaled_motion import ScaledMotion
 from heavytop.exact.validated import Validated
 from heavytop.precision import decimal_text
-from heavytop.top.equations import Parameters
 
 _GUARD_BITS = 24
 _ATTEMPTS = 3
@@ -70,6 +71,8 @@ class _Terms(NamedTuple):
     rate: list[Any]
     below: list[Any]
     first: list[Any]
+    by_omega: list[Any]
+    lacking: Fraction
 
 
 @dataclass(slots=True)
@@ -148,18 +151,22 @@ def proven_events(
     digits: int,
     limit: int | None = None,
     reached: Callable[[Fraction], None] | None = None,
+    resolved: Resolved | None = None,
 ) -> list[ProvenEvent]:
     """The events in 0 < t < ``until`` (or until < t < 0), in the order of |t|, each to ``digits`` digits.
 
     direction: 1 for those at which the function rises with time, −1 where it falls, 0 for all.
+    resolved: where the function and the states are those of other axes, how ``solution`` was made; None for its own.
     Raises InputError where the function is zero along the motion, OutOfReach where the enclosure does not reach or
     cannot decide whether there is an event.
     """
     wanted = ceil(digits * log2(10)) + _GUARD_BITS
-    order, sign = _begins(solution, function)
+    axes = None if resolved is None or not resolved.turned else resolved.axes
+    inner = function if axes is None else turned(function, axes)
+    order, sign = (0, 0) if solution.uncertainty is not None else _begins(solution, inner)
     undecided: _Undecided | None = None
     for attempt in range(_ATTEMPTS):
-        search = _Search(solution, function, until, digits, order, sign, direction, limit, reached)
+        search = _Search(solution, inner, until, digits, order, sign, direction, limit, reached, axes)
         try:
             return search.run(wanted)
         except _Undecided as error:
@@ -195,6 +202,7 @@ class _Search:
     direction: int
     limit: int | None
     reached: Callable[[Fraction], None] | None
+    axes: Any = None
     motion: Any = None
     terms: Any = None
     kept: list[_Piece] = field(default_factory=list)
@@ -202,11 +210,18 @@ class _Search:
     def run(self, bits: int) -> list[ProvenEvent]:
         """The events; raises _Undecided where ``bits`` bits are too few."""
         self.motion, steps = self.solution.walk(self.until, bits)
-        self.terms = _terms(self.function, self.solution.system, self.solution.parameters, self.order)
-        backwards = self.until < 0
-        after = self.sign * (-1 if backwards and self.order % 2 else 1)
+        self.terms = _terms(self.function, self.solution, self.order)
+        pieces = self._pieces(steps)
+        if self.sign:
+            after = self.sign * (-1 if self.until < 0 and self.order % 2 else 1)
+        else:
+            first = next(pieces)
+            after = _sign_at_start(first)
+            if not after:
+                raise _Undecided(Fraction(0), "what sign the function has, with irrational data")
+            pieces = chain([first], pieces)
         events: list[ProvenEvent] = []
-        for low, high in self._zeros(self._pieces(steps), after):
+        for low, high in self._zeros(pieces, after):
             found = self._event(low, high, after)
             after = -after
             if self.direction in (0, 1 if found.rising else -1):
@@ -272,7 +287,7 @@ class _Search:
     def _event(self, low: Fraction, high: Fraction, before: int) -> ProvenEvent:
         """The zero between two scaled times, refined; ``before``: the sign of the numerator before it."""
         pieces = [each for each in self.kept if each.began <= high and each.began + each.length >= low]
-        found = _refined(pieces, low, high, -before, self.digits, self.motion, self.until > 0)
+        found = _refined(pieces, low, high, -before, self.digits, self.motion, self.until > 0, self.axes)
         if found is None:
             raise _Undecided(self._time(high), "to so many digits where the function changes sign")
         time, state, below = found
@@ -282,12 +297,22 @@ class _Search:
         return ProvenEvent(time, state, rising)
 
 
-def _terms(function: EventFunction, system: Any, parameters: Parameters, order: int) -> _Terms:
+def _terms(function: EventFunction, solution: Validated, order: int) -> _Terms:
+    system, parameters = solution.system, solution.parameters
     rate = rate_along(function.numerator, system, parameters)
     first = function.numerator
     for _ in range(order):
         first = rate_along(first, system, parameters)
-    return _Terms(*(terms_of(part) for part in (function.numerator, rate, function.denominator, first)))
+    value, rate, below, first = map(terms_of, (function.numerator, rate, function.denominator, first))
+    lacking = Fraction(0) if solution.uncertainty is None else solution.uncertainty.rate
+    derivatives = [terms_of(part) for part in by_omega(function.numerator)] if lacking else []
+    return _Terms(value, rate, below, first, derivatives, lacking)
+
+
+@whole_evaluation
+def _sign_at_start(piece: _Piece) -> int:
+    with working_precision(piece.bits):
+        return _sign(piece.over(piece.value, Fraction(0), Fraction(0)))
 
 
 @whole_evaluation
@@ -303,8 +328,11 @@ def _piece(step: Step, motion: ScaledMotion, terms: _Terms, span: Fraction) -> _
             numbers = [arb(int(value)) * unit * scale for value in values]
             numbers[0] = numbers[0] + error * scale
             components.append(arb_poly(numbers))
-        parts = [_composed(part, components) for part in (terms if step.node.time == 0 else terms[:3])]
-        value, rate, below, first = (*parts, parts[0])[:4]
+        value, rate, below = (_composed(part, components) for part in (terms.value, terms.rate, terms.below))
+        first = _composed(terms.first, components) if step.node.time == 0 else value
+        for part in terms.by_omega:
+            most = sum((abs(c).upper() for c in _composed(part, components).coeffs()), arb(0))
+            rate = rate + arb_poly([arb(0, (most * ball(terms.lacking)).upper())])
     last = min(Fraction(1), (span - step.node.time) / step.length)
     return _Piece(step.node.time, step.length, last, bits, components, value, rate, below, first)
 
@@ -355,6 +383,11 @@ def _hull(pieces: Sequence[_Piece], choose: Callable[[_Piece], Any], low: Fracti
     return found
 
 
+def _rotated(axes: Any, vector: Sequence[arb]) -> list[arb]:
+    """A vector in the axes given."""
+    return [sum((ball(a) * x for a, x in zip(row, vector, strict=True)), arb(0)) for row in axes]
+
+
 def _component(index: int) -> Callable[[_Piece], Any]:
     return lambda piece: piece.components[index]
 
@@ -368,10 +401,11 @@ def _refined(
     digits: int,
     motion: ScaledMotion,
     forwards: bool,
+    axes: Any,
 ) -> tuple[arb, list[arb], int] | None:
     """(time, state, sign of the denominator) at the only zero between two scaled times; None for too few digits.
 
-    behind: the sign of the numerator behind the zero.
+    behind: the sign of the numerator behind the zero.  axes: of the state, None for those of the pieces.
     """
     bits = max(piece.bits for piece in pieces)
     sign = 1 if forwards else -1
@@ -381,6 +415,8 @@ def _refined(
         unit = ball(sign / motion.scaled.rate)
         time = (ball(middle) + arb(0, ball(half).upper())) * unit
         state = [_hull(pieces, _component(index), low, high) for index in range(6)]
+        if axes is not None:
+            state = [*_rotated(axes, state[:3]), *_rotated(axes, state[3:])]
         below = _sign(_hull(pieces, lambda piece: piece.below, low, high))
     allowed = Fraction(1, 2 * 10**digits)
     if any(radius(v) > allowed * max(Fraction(1), abs(midpoint(v))) for v in (time, *state)):
