@@ -9,7 +9,6 @@ from typing import Any, overload
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Number
-from heavytop.api.setup import Setup
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.event_times.dense import dense
 from heavytop.event_times.functions import EventFunction, event_function, first_term, turned
@@ -21,6 +20,7 @@ from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.scales import require_handy
 from heavytop.exact.validated import Validated
 from heavytop.measure.reference import DIGITS, Ball
+from heavytop.measure.setup import Setup
 from heavytop.precision import DOUBLE, Precision, exact, exact_text, physical, whole
 from heavytop.top.amplification import amplification
 from heavytop.top.bodies import Body

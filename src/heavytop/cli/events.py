@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import show_on_terminal
 from heavytop.errors import InputError
 
 Events = Annotated[
@@ -31,14 +30,68 @@ def requested(texts: Sequence[str] | None, direction: int, until: Fraction) -> l
     return [event_function(text) for text in texts or ()]
 
 
-def located(functions: Sequence[Any], locate: Callable[[Any], Any]) -> list[Any]:
-    """What ``locate`` finds of each."""
-    return [locate(function) for function in functions]
+def computed(
+    top: Any,
+    start: Any,
+    functions: Sequence[Any],
+    direction: int,
+    until: Fraction,
+    form: Any,
+    integrator: str,
+    system: Any,
+    max_steps: int | None,
+    reach: Callable[[float], Any],
+) -> list[Any]:
+    """The events of the computed motion, of each function."""
+    if not functions:
+        return []
+    from heavytop.api.events import computed_events
+
+    def reached(time: Fraction) -> None:
+        reach(float(time / until))
+
+    settings = form, integrator, system, None, max_steps, None, reached
+    return [computed_events(top, start, until, function, direction, *settings) for function in functions]
 
 
-def show_events(found: Sequence[Any]) -> None:
-    """Print the events, where any were asked for."""
-    if found:
+def known_ones(
+    top: Any,
+    start: Any,
+    functions: Sequence[Any],
+    direction: int,
+    until: Fraction,
+    digits: int,
+    system: Any,
+    reach: Callable[[float], Any],
+) -> list[Any]:
+    """The proven events, of each function."""
+    if not functions:
+        return []
+    from heavytop.api.events import known_events
+
+    def reached(time: Fraction) -> None:
+        reach(float(time / until))
+
+    return [
+        known_events(top, start, until, function, direction, digits, system, None, reached) for function in functions
+    ]
+
+
+def with_events(
+    document: Callable[[], dict[str, Any]], table: Any, text: Callable[[Any], Any], found: Sequence[Any]
+) -> tuple[Callable[[], dict[str, Any]], Any, Callable[[Any], Any]]:
+    """The document, the table and the text of a motion, with the events behind, where any were asked for."""
+    if not found:
+        return document, table, text
+
+    def text_with_events(shown: Any) -> Any:
+        from rich.console import Group
+
         from heavytop.report.events_text import events_text
 
-        show_on_terminal(events_text(found))
+        return Group(text(shown), events_text(found))
+
+    def document_with_events() -> dict[str, Any]:
+        return {**document(), "events": [each.to_json() if hasattr(each, "to_json") else each for each in found]}
+
+    return document_with_events, table, text_with_events
