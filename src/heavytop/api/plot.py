@@ -108,22 +108,21 @@ def polhode(
     omega = principal(run, samples(run).omega)
     drawn = _solid(axes)
     known = isinstance(run, Trajectory) or top is not None
-    extent = abs(omega).max() or 1.0
     if known:
         p = parameters_of(run, top)
         if not any(p.moment) and not any(p.rotors):
             inertia = np.array([float(value) for value in p.inertia])
             radii = np.sqrt((omega[0] ** 2 * inertia).sum() / inertia)
             _ellipsoid(drawn, radii)
-            extent = radii.max()
             _visible_path(drawn, omega, colour, label, 1 / radii**2)
-            _equal(drawn, extent)
+            _equal(drawn, radii.max())
             drawn.set(**_omega_labels())
             drawn.set_title("polhode on the energy ellipsoid", fontsize="medium")
             return drawn
     drawn.plot(*omega.T, color=colour, lw=_WIDTH, label=label)
     drawn.plot(*omega[:1].T, "o", color=colour, ms=4)
-    _equal(drawn, extent)
+    low, high = omega.min(axis=0), omega.max(axis=0)
+    _equal(drawn, 0.55 * (high - low).max() or 1.0, (low + high) / 2)
     drawn.set(**_omega_labels())
     drawn.set_title("Ω in the body", fontsize="medium")
     return drawn
@@ -338,7 +337,7 @@ def animate(
         colour: of the path.
 
     Returns:
-        A :class:`matplotlib.animation.FuncAnimation`; in a notebook ``HTML(found.to_jshtml())`` shows it.
+        A ``FuncAnimation`` of matplotlib; in a notebook ``HTML(found.to_jshtml())`` shows it.
 
     Raises:
         InputError: for another kind of file, for .mp4 where there is no ffmpeg, and as :func:`sphere`.
@@ -445,7 +444,7 @@ def _globe(axes: Any) -> None:
     _equal(axes, 1.0)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_ticks((-1, 0, 1))
-        axis.labelpad = -6
+    axes.zaxis.labelpad = -1
 
 
 def _ellipsoid(axes: Any, radii: NDArray[np.float64]) -> None:
@@ -457,8 +456,11 @@ def _ellipsoid(axes: Any, radii: NDArray[np.float64]) -> None:
     axes.plot_wireframe(x, y, z * radii[2], rstride=6, cstride=9, color=_GREY, alpha=0.18, lw=0.5)
 
 
-def _equal(axes: Any, extent: float) -> None:
-    axes.set(xlim=(-extent, extent), ylim=(-extent, extent), zlim=(-extent, extent))
+def _equal(axes: Any, extent: float, middle: Any = (0.0, 0.0, 0.0)) -> None:
+    """One scale on all three axes, ``extent`` to both sides of the middle."""
+    low, high = np.asarray(middle) - extent, np.asarray(middle) + extent
+    for name, ends in zip("xyz", zip(low, high, strict=True), strict=True):
+        getattr(axes, f"set_{name}lim")(*ends)
     axes.set_box_aspect((1, 1, 1), zoom=0.86)
 
 
