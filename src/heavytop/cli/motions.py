@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, command, numbers
+from heavytop.cli.events import EventDirection, Events, computed, known_ones, requested, with_events
 from heavytop.cli.motion_output import made_by, require_one_output, write_motion
 from heavytop.cli.output import say, say_former
 from heavytop.cli.progress import reaching, watched
@@ -84,6 +85,8 @@ def propagate(
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     normalize: Normalize = False,
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
+    events: Events = None,
+    event_direction: EventDirection = 0,
     show: Show = None,
     point: Point = None,
     pivot: Pivot = None,
@@ -124,6 +127,7 @@ def propagate(
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top.top if isinstance(top, Body) else top, start)
     say_former([integrator])
+    functions = requested(events, event_direction, instants[-1])
     if form.bits >= _SLOW_BITS and integrator == "heyoka":
         say(
             f"warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
@@ -160,7 +164,10 @@ def propagate(
 
         return motion_text(motion, shown)
 
-    write_motion(motion.to_json, table, text, csv, latex, json)
+    with reaching("events", _PROPAGATE_SECONDS) as reach:
+        asked = functions, event_direction, instants[-1]
+        found = computed(top, start, *asked, form, integrator, which, max_steps, reach)
+    write_motion(*with_events(motion.to_json, table, text, found), csv, latex, json)
     return 0 if motion.complete else 3
 
 
@@ -188,6 +195,8 @@ def reference(
         str | None, typer.Option(help="Derivatives too: start, data (I1..I3, n = P r) or all.", metavar="WHICH")
     ] = None,
     normalize: Normalize = False,
+    events: Events = None,
+    event_direction: EventDirection = 0,
     show: Show = None,
     point: Point = None,
     pivot: Pivot = None,
@@ -225,6 +234,7 @@ def reference(
     which, instants = system_of(system, top), check_times(numbers(times))
     wanted, which_ones = _outputs(show, point, pivot), which_derivatives(derivatives)
     require_one_output(csv, latex, json)
+    functions = requested(events, event_direction, instants[-1])
     watch = _Watch([abs(time) for time in instants])
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
         found = proven(top, start, numbers(times), digits, which, watch.find, attitude or bool(wanted), which_ones)
@@ -240,7 +250,9 @@ def reference(
 
         return reference_text(found, shown)
 
-    write_motion(lambda: found.document(wanted), table, text, csv, latex, json)
+    with reaching("events", _REFERENCE_SECONDS) as reach:
+        known = known_ones(top, start, functions, event_direction, instants[-1], digits, which, reach)
+    write_motion(*with_events(lambda: found.document(wanted), table, text, known), csv, latex, json)
     return 0
 
 

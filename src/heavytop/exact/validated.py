@@ -18,6 +18,7 @@ time, so that t = 10,000 would need some 1,900 bits, more than there are words f
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import inf, log10
@@ -26,7 +27,7 @@ from flint import arb, arb_series
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, relative_bits, working_precision
-from heavytop.exact.enclosure import Step, coefficient_bound, start_node
+from heavytop.exact.enclosure import Step, coefficient_bound, start_node, step
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.quadratic import Matrix
 from heavytop.exact.runs import FAR, Ahead, Pilot, Run
@@ -127,6 +128,22 @@ class Validated:
         """The |t| up to which the latest enclosure has come, for those who wait; any thread may ask."""
         latest = next(reversed(list(self._runs.values())), None)
         return Fraction(0) if latest is None else latest.nodes[-1].time / Fraction(2) ** self.unit
+
+    def walk(self, time: Fraction, bits: int) -> tuple[ScaledMotion, Iterator[Step]]:
+        """The units of the motion, and its proven steps from t = 0 until one covers ``time``, which is not 0.
+
+        Their working precision is that at which ``bits`` bits are expected to be left at ``time``; they end before it
+        where the errors grow too large.  Raises OutOfReach as :meth:`state` does.
+        """
+        direction = 1 if time > 0 else -1
+        motion = self._motion(direction, self.start.flat)
+        span = abs(time) * motion.scaled.rate
+        loss, steps = self._forecast(direction, span, self.start.flat, bits)
+        planned = motion.precision(bits + loss, steps)
+        if steps * _seconds_a_step(*planned) > self.effort:
+            raise self._refusal(time, self._reachable(time, bits, loss, self.start.flat))
+        run = self._run(direction, self.start.flat, *planned)
+        return motion, _steps_of(run, span)
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
         """ξ: three balls.  Raises InputError where |γ| is not 1 exactly and no ``xi`` was given."""
@@ -272,6 +289,17 @@ class Validated:
             f"So many digits at t = {at} are out of reach of a validated integration.",
             f"About {digits} digits could be proven there: ask for fewer, or for an earlier time.",
         )
+
+
+def _steps_of(run: Run, span: Fraction) -> Iterator[Step]:
+    node = run.nodes[0]
+    while node.time < span:
+        found = step(run.motion, node, run.precision, run.carrier)
+        if found is None:
+            return
+        yield found
+        node = found.end()
+        run.keep(node)
 
 
 @whole_evaluation

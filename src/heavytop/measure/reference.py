@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import msgspec
 
-from heavytop.display import Table, Tabular
+from heavytop.display import Table, Tabular, path_picture
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.exact.balls import radius_text, value_text, working_precision
 from heavytop.exact.bodies import BodyMotion
@@ -192,7 +192,12 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
         """The radii rounded up to double, shape (n, 6): they stay upper bounds, and none but 0 becomes 0."""
         import numpy
 
-        return numpy.array([[_rounded_up(ball.radius) for ball in state] for state in self.states])
+        return numpy.array([[rounded_up(ball.radius) for ball in state] for state in self.states])
+
+    def _repr_html_(self) -> str:
+        states, caption = self.states, "γ, the vertical in body axes, on the unit sphere"
+        picture = path_picture(len(states), lambda place: [ball.value for ball in states[place][3:6]], caption)
+        return self._table().html() + picture
 
     def derivatives_numpy(self) -> NDArray[np.float64] | dict[str, NDArray[np.float64]]:
         """∂y_i(t)/∂y_j(0) in double, shape (n, 6, 6); where data were asked for, a dict of "start" and "data".
@@ -250,7 +255,8 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
         return rows
 
 
-def _rounded_up(text: str) -> float:
+def rounded_up(text: str) -> float:
+    """A decimal text as the nearest double that is not less."""
     value = float(text)
     return value if Fraction(value) >= Fraction(text) else math.nextafter(value, math.inf)
 
