@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from flint import acb, arb
 
@@ -54,7 +55,8 @@ class DeloneAzimuth:
         cubic, e = level.cubic(), level.double()
         if e == 0 or cubic.gcd(cubic.derivative()).degree() > 0:
             raise OutOfReach(f"Delone's level is degenerate: e = {e}, or a double root of its cubic.", _REMEDY)
-        curve = [Root(acb(value), 1, True) for value, _ in cubic.complex_roots()]  # type: ignore[attr-defined]
+        found: Any = cubic.complex_roots()
+        curve = [Root(acb(value), 1, True) for value, _ in found]
         start = start_of(level)
         interval = _interval(curve, start)
         # beyond the cubic's roots, or between them and 0, where the other variable rests
