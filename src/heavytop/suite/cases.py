@@ -14,6 +14,7 @@ from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.goryachev import goryachev_motion
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.kowalewski import kowalewski_motion
+from heavytop.top.bodies import Body
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
@@ -25,6 +26,8 @@ class Case:
     claim: the data of the paper's partial case where the case is one.
     homoclinic: the closed form where the motion tends to a saddle, a permanent rotation or a periodic motion; its data
     are dyadic, so that every format takes them exactly.
+    body, given_start: the body and the start as they were given, in other axes or with an attitude; ``top`` and
+    ``start`` are theirs in principal axes, to 256 bits where these are irrational.
     """
 
     name: str
@@ -34,6 +37,8 @@ class Case:
     start: State
     claim: PartialCase | None = None
     homoclinic: ErshkovPartial | DeloneHomoclinic | Kovalevskaya | None = None
+    body: Body | None = None
+    given_start: State | None = None
 
     @property
     def alpha(self) -> Fraction:
