@@ -140,7 +140,7 @@ class Validated:
         span = abs(time) * motion.scaled.rate
         loss, steps = self._forecast(direction, span, self.start.flat, bits)
         planned = motion.precision(bits + loss, steps)
-        if steps * _seconds_a_step(*planned) > self.effort:
+        if steps * seconds_a_step(*planned) > self.effort:
             raise self._refusal(time, self._reachable(time, bits, loss, self.start.flat))
         run = self._run(direction, self.start.flat, *planned)
         return motion, _steps_of(run, span)
