@@ -116,11 +116,15 @@ class Validated:
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
         """ξ: three balls.  Raises InputError where |γ| is not 1 exactly and no ``xi`` was given."""
+        return self.state_and_attitude(time, bits)[6:]
+
+    def state_and_attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """Ω, γ and ξ from one enclosure: nine balls.  Raises as :meth:`attitude`."""
         xi = self.xi
         if xi is None:
             self.start.require_unit_gamma()
             xi = perpendicular(self.start.gamma)
-        return self._enclosure(time, bits, (*self.start.flat, *xi))[6:]
+        return self._enclosure(time, bits, (*self.start.flat, *xi))
 
     def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
         """See :class:`heavytop.exact.solution.ExactSolution`: the recurrence of Taylor's series on the enclosure."""
