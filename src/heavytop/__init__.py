@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from heavytop.integrate.trajectory import Outcome, Trajectory
     from heavytop.measure.reference import Reference
     from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, available, real
-    from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+    from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
     from heavytop.top.heavy_top import HeavyTop, State
     from heavytop.top.integrals import holding
 
@@ -30,7 +30,7 @@ _PLACES = {
     "integrate.trajectory": ("Outcome", "Trajectory"),
     "measure.reference": ("Reference",),
     "precision": ("DOUBLE", "DOUBLE_DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),
-    "top.equations": ("GYROSTAT", "HEAVY_TOP", "System"),
+    "top.equations": ("GYROSTAT", "HEAVY_GYROSTAT", "HEAVY_TOP", "System"),
     "top.heavy_top": ("HeavyTop", "State"),
     "top.integrals": ("holding",),
 }
@@ -41,6 +41,7 @@ __all__ = [
     "DOUBLE_DOUBLE",
     "EXTENDED",
     "GYROSTAT",
+    "HEAVY_GYROSTAT",
     "HEAVY_TOP",
     "QUAD",
     "Audit",

@@ -60,7 +60,7 @@ ODD: tuple[Any, ...] = (
 GENERATORS: tuple[Callable[[], Any], ...] = (failing, lambda: (x for x in (1, 2, 3)), lambda: iter("321"))
 
 GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
-    "HeavyTop": (ht.HeavyTop, {"inertia": (3, 2, 1), "weight": 1, "centre": (1, 0, 0)}),
+    "HeavyTop": (ht.HeavyTop, {"inertia": (3, 2, 1), "weight": 1, "centre": (1, 0, 0), "rotor": None}),
     "State": (ht.State, {"omega": (1, 2, 3), "gamma": (0, 0, 1)}),
     "real": (ht.real, {"bits": 60}),
     "propagate": (

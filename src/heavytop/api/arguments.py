@@ -11,8 +11,7 @@ from typing import Any, SupportsIndex, TypeAlias, TypeVar
 
 from heavytop.errors import InputError, quoted
 from heavytop.precision import DOUBLE, Precision, exact, parse, physical, require, shown, usable_tolerance, whole
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
-from heavytop.top.equations import system as system_named
+from heavytop.top.equations import SYSTEMS, WHICH_SYSTEM, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, dot, ordered, require_physical, vector
 
 Number: TypeAlias = int | float | str | Fraction | Decimal | SupportsIndex
@@ -56,13 +55,14 @@ def slack_of(precision: Precision) -> Fraction:
     return max(precision.eps, DOUBLE.eps) * (1 << SLACK_BITS)
 
 
-def system(value: System | str) -> System:
-    """The system, or the one of that name."""
-    if isinstance(value, System) and (value is HEAVY_TOP or value is GYROSTAT):
-        return value
-    if not isinstance(value, str):
-        raise InputError(f"system = {quoted(value)} is none.", 'Give "heavy_top" or "gyrostat".')
-    return system_named(value)
+def system(value: System | str | None, *tops: HeavyTop) -> System:
+    """The system, or the one of that name; for None heavy_gyrostat where a top has a rotor, else heavy_top.
+
+    Raises InputError for a system that does not know the rotor of a top.
+    """
+    if not (value is None or isinstance(value, str) or any(value is known for known in SYSTEMS)):
+        raise InputError(f"system = {quoted(value)} is none.", f"Give {WHICH_SYSTEM}, as text.")
+    return system_of(value, *tops)
 
 
 def precision(value: Precision | str) -> Precision:

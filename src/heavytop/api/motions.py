@@ -15,7 +15,7 @@ from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.measure.reference import Reference
 from heavytop.measure.reference import reference as proven
 from heavytop.precision import DOUBLE, Precision, whole
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import check_times
 
@@ -30,7 +30,7 @@ def propagate(
     precision: Precision | str = DOUBLE,
     *,
     integrator: str | Callable[..., Any] = "heyoka",
-    system: System | str = HEAVY_TOP,
+    system: System | str | None = None,
     xi: Numbers | None = None,
     tolerance: Number | None = None,
     high_accuracy: bool | None = None,
@@ -47,7 +47,8 @@ def propagate(
         precision: DOUBLE, EXTENDED, QUAD, real(BITS), or the name of one.
         integrator: "heyoka" or another name that `heavytop list` shows; a file, "mine.toml" of a program or
             "./mine.py:solve"; or a callable, a peer or a solver (:func:`heavytop.integrate.peers.double.double_peer`).
-        system: "heavy_top" or "gyrostat".
+        system: "heavy_top", "gyrostat" or "heavy_gyrostat"; None for "heavy_gyrostat" where the top has a rotor, else
+            "heavy_top".
         xi: shape (3,), a unit vector ⟂ γ, the space axis x in body components at t = 0, to ride along.
         tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; words: from there to
             1e-6, where None finer than the format; splittings have none.
@@ -73,7 +74,7 @@ def propagate(
     options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
     options |= {} if xi is None else {"xi": arguments.attitude(xi, state, form)}
     run = registry.propagator(named(integrator), options)
-    about, instants = arguments.system(system), check_times(times)
+    about, instants = arguments.system(system, body), check_times(times)
     return cast(Trajectory, run(body, state, instants, form, system=about))
 
 
@@ -84,7 +85,7 @@ def ensemble(
     precision: Precision | str = DOUBLE,
     *,
     integrator: str = "heyoka",
-    system: System | str = HEAVY_TOP,
+    system: System | str | None = None,
     threads: int | None = None,
     tolerance: Number | None = None,
     high_accuracy: bool | None = None,
@@ -109,10 +110,9 @@ def ensemble(
         InputError: as :func:`propagate`, naming the motion; for no motions, and for counts that differ.
         OutOfReach: as :func:`propagate`.
     """
-    form, about = arguments.precision(precision), arguments.system(system)
-    bodies = arguments.listed(tops, HeavyTop, "tops")
+    form, bodies = arguments.precision(precision), arguments.listed(tops, HeavyTop, "tops")
     states = arguments.listed(starts, State, "starts")
-    problems = _problems(bodies, states, form, about)
+    problems = _problems(bodies, states, form, arguments.system(system, *bodies))
     options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
     options |= {} if threads is None else {"threads": arguments.count(threads, "threads")}
     run = registry.ensemble_propagator(named(integrator), options)
@@ -125,7 +125,7 @@ def reference(
     times: Numbers,
     digits: int = 50,
     *,
-    system: System | str = HEAVY_TOP,
+    system: System | str | None = None,
     attitude: bool = False,
 ) -> Reference:
     """The known motion: proven states, from a closed form where there is one, else from a validated enclosure.
@@ -134,7 +134,8 @@ def reference(
         top, start: as in :func:`propagate`; the motion is that of the exact numbers given.
         times: shape (n,), exact numbers in any order.
         digits: 1 to 20,000; relative above 1, absolute below.
-        system: "heavy_top" or "gyrostat".
+        system: "heavy_top", "gyrostat" or "heavy_gyrostat"; None for "heavy_gyrostat" where the top has a rotor, else
+            "heavy_top".
         attitude: give ξ as well, fixed in space and ⟂ γ, in body components.
 
     Returns:
@@ -147,7 +148,7 @@ def reference(
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
     body, state = arguments.motion(top, start, of_any_size=True)
-    about, instants = arguments.system(system), arguments.any_times(times)
+    about, instants = arguments.system(system, body), arguments.any_times(times)
     return proven(
         body, state, instants, whole(digits, "digits"), about, attitude=bool(arguments.flag(attitude, "attitude"))
     )

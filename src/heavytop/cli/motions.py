@@ -17,7 +17,11 @@ Centre = Annotated[str, typer.Option(help="Centre of mass a,b,c.")]
 Omega = Annotated[str, typer.Option(help="Angular velocity x,y,z at t = 0.")]
 Gamma = Annotated[str, typer.Option(help="x,y,z at t = 0: unit vector pointing vertically up, in body axes.")]
 Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly away from 0.")]
-SystemName = Annotated[str, typer.Option(help="heavy_top or gyrostat.")]
+Rotor = Annotated[str | None, typer.Option(help="Momentum k1,k2,k3 of a rotor: the system is heavy_gyrostat.")]
+SystemName = Annotated[
+    str | None,
+    typer.Option(help="heavy_top, gyrostat or heavy_gyrostat; without it heavy_top, or heavy_gyrostat with --rotor."),
+]
 Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]
 
 _PROPAGATE_SECONDS, _REFERENCE_SECONDS = 1.0, 3.0
@@ -38,7 +42,8 @@ def propagate(
         str, typer.Option(help="double, extended, double-double (of words), quad, real:BITS.")
     ] = "double",
     integrator: Annotated[str, typer.Option(help="One of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
-    system: SystemName = "heavy_top",
+    rotor: Rotor = None,
+    system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     normalize: Normalize = False,
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
@@ -50,11 +55,11 @@ def propagate(
     Numbers are exact: 3, 0.25, 1e-3, -2/5.
     """
     from heavytop import precision as formats
-    from heavytop.top.equations import system as system_named
+    from heavytop.top.equations import system_of
     from heavytop.top.times import check_times
 
-    top, start = _motion(inertia, weight, centre, omega, gamma, normalize)
-    form, which, instants = formats.parse(precision), system_named(system), check_times(numbers(times))
+    top, start = _motion(inertia, weight, centre, omega, gamma, normalize, rotor)
+    form, which, instants = formats.parse(precision), system_of(system, top), check_times(numbers(times))
     if max_steps is not None and max_steps < 1:
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top, start)
@@ -91,7 +96,8 @@ def reference(
     gamma: Gamma,
     times: Times,
     digits: Annotated[int, typer.Option(help="Proven digits, 1 to 20000.")] = 50,
-    system: SystemName = "heavy_top",
+    rotor: Rotor = None,
+    system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Give xi too, fixed in space and across gamma.")] = False,
     normalize: Normalize = False,
     json: Json = False,
@@ -102,14 +108,14 @@ def reference(
     up to t = 1000.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
     """
     from heavytop.measure.reference import reference as proven
-    from heavytop.top.equations import system as system_named
+    from heavytop.top.equations import system_of
     from heavytop.top.times import check_times
 
-    top, start = _motion(inertia, weight, centre, omega, gamma, normalize, of_any_size=True)
-    instants = check_times(numbers(times))
+    top, start = _motion(inertia, weight, centre, omega, gamma, normalize, rotor, of_any_size=True)
+    which, instants = system_of(system, top), check_times(numbers(times))
     watch = _Watch([abs(time) for time in instants])
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        found = proven(top, start, instants, digits, system_named(system), watch.find, attitude)
+        found = proven(top, start, instants, digits, which, watch.find, attitude)
     if json:
         print_json(found)
     else:
@@ -140,7 +146,14 @@ class _Watch:
 
 
 def _motion(
-    inertia: str, weight: str, centre: str, omega: str, gamma: str, normalize: bool, of_any_size: bool = False
+    inertia: str,
+    weight: str,
+    centre: str,
+    omega: str,
+    gamma: str,
+    normalize: bool,
+    rotor: str | None,
+    of_any_size: bool = False,
 ) -> Any:
     """The exact top and start of the options; what no rigid body has is a warning.
 
@@ -148,7 +161,7 @@ def _motion(
     """
     from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
-    top = HeavyTop(numbers(inertia), weight, numbers(centre))
+    top = HeavyTop(numbers(inertia), weight, numbers(centre), None if rotor is None else numbers(rotor))
     start = State(numbers(omega), numbers(gamma))
     if not of_any_size:
         require_physical(top, start)

@@ -6,8 +6,8 @@ the top (I, r), then
     Ω~ = d QΩ,   γ~ = Qγ    solve those of the top (QI, Qr):
     M~' = d QM' = QM × QΩ + P Qγ × Qr = M~ × Ω~ + P γ~ × r~,    γ~' = d Qγ × QΩ = γ~ × Ω~
 
-without a reversal of the time.  Likewise the gyrostat, where Q keeps axis 2 and λ = P b/(M·γ) goes to d λ.  A vector
-fixed in space goes to its image under Q.
+without a reversal of the time.  Likewise the gyrostat, where Q keeps axis 2 and λ = P b/(M·γ) goes to d λ, and the
+heavy gyrostat, whose k goes to d Qk as M does.  A vector fixed in space goes to its image under Q.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ def permuted(vector: Sequence[Any], axes: Axes) -> tuple[Any, Any, Any]:
 
 def renamed_top(top: HeavyTop, axes: Axes) -> HeavyTop:
     """The same top with its axis ``axes[k]`` called k."""
-    return HeavyTop(permuted(top.inertia, axes), top.weight, permuted(top.centre, axes))
+    d = orientation(axes)
+    rotor = None if top.rotor is None else [d * k for k in permuted(top.rotor, axes)]
+    return HeavyTop(permuted(top.inertia, axes), top.weight, permuted(top.centre, axes), rotor)
 
 
 def renamed_state(state: State, axes: Axes) -> State:

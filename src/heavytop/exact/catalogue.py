@@ -35,7 +35,7 @@ from heavytop.exact.staude import Staude
 from heavytop.exact.steklov import Steklov
 from heavytop.exact.validated import Validated
 from heavytop.precision import shown
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 Case = Callable[[HeavyTop, State], ExactSolution]
@@ -64,6 +64,10 @@ def _same(found: ExactSolution, top: HeavyTop, start: State) -> ExactSolution:
 
 def _permanent_gyrostat(top: HeavyTop, start: State) -> ExactSolution:
     return Staude(top, start, GYROSTAT)
+
+
+def _permanent_heavy_gyrostat(top: HeavyTop, start: State) -> ExactSolution:
+    return Staude(top, start, HEAVY_GYROSTAT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +122,9 @@ _GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (Gyrostat.of, _KEEP),
 )
 
+_HEAVY_GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = ((_permanent_heavy_gyrostat, _KEEP),)
+_CASES = {HEAVY_TOP.name: _HEAVY_TOP, GYROSTAT.name: _GYROSTAT, HEAVY_GYROSTAT.name: _HEAVY_GYROSTAT}
+
 
 def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator[ExactSolution]:
     """Every closed form of this motion, the simplest first; none for a motion that has none here.
@@ -131,7 +138,7 @@ def _attempts(top: HeavyTop, start: State, system: System) -> Iterator[ExactSolu
     """:func:`matches`, and why there is none where a class has the motion but does not cover its level."""
     require_handy(top, start)
     system.parameters(top, start)
-    for case, namings in _GYROSTAT if system is GYROSTAT else _HEAVY_TOP:
+    for case, namings in _CASES[system.name]:
         for axes in namings:
             try:
                 found = case(renamed_top(top, axes), renamed_state(start, axes))

@@ -47,8 +47,7 @@ def taylor(
     field: Callable[[Parameters, Any], tuple[Any, ...]], parameters: Parameters, start: Sequence[Fraction], length: int
 ) -> list[list[Fraction]]:
     """The exact derivatives (not divided by factorials) of each component at the start, from the field itself."""
-    inertia, moment, rotor = parameters
-    exact = Parameters([rational(i) for i in inertia], [rational(n) for n in moment], rational(rotor))
+    exact = parameters.mapped(rational)
     rows = [[rational(value)] for value in start]
     with series_length(length):
         for order in range(1, length):

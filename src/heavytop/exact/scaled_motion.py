@@ -47,7 +47,9 @@ class ScaledMotion:
         """The motion of (Ω, γ), or of (Ω, γ, ξ), from ``y``."""
         scaled = Scaled.of(system, p, y, bounded=True)
         unit, gamma = scaled.rate, scaled.sizes[3]
-        own = Parameters(p.inertia, [gamma * n / unit**2 for n in p.moment], Fraction(p.rotor) / unit)
+        own = p.mapped(lambda value: Fraction(value) / unit)._replace(
+            inertia=p.inertia, moment=tuple(gamma * n / unit**2 for n in p.moment)
+        )
         sign = 1 if forwards else -1
 
         def given(state: tuple[Any, ...]) -> list[Any]:

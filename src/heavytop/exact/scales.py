@@ -19,7 +19,7 @@ _ORDINARY = 16
 
 def require_handy(top: HeavyTop, start: State, times: Iterable[Fraction] = ()) -> None:
     """Raises OutOfReach for numbers whose exact arithmetic would take longer than anyone waits."""
-    for value in (*top.inertia, *top.moment, *start.flat, *times):
+    for value in (*top.inertia, *top.moment, *(top.rotor or ()), *start.flat, *times):
         length = max(value.numerator.bit_length(), value.denominator.bit_length())
         if length > _LONGEST:
             raise OutOfReach(
@@ -31,9 +31,9 @@ def require_handy(top: HeavyTop, start: State, times: Iterable[Fraction] = ()) -
 def unit_of_time(parameters: Parameters, start: tuple[Fraction, ...]) -> int:
     """k such that the motion changes at about the rate 2^k; 0 for ordinary rates, from 2^-16 to 2^16.
 
-    The rates are |Ω|, |λ| and the root of |P r||γ|/I, whichever is largest.
+    The rates are |Ω|, |λ| or |k|/I, and the root of |P r||γ|/I, whichever is largest.
     """
-    turning = max(*map(abs, start[:3]), abs(Fraction(parameters.rotor)))
+    turning = max(*map(abs, start[:3]), parameters.rotor_rate)
     weight = max(map(abs, parameters.moment)) * max(map(abs, start[3:6])) / min(parameters.inertia)
     rates = [exponent(turning)] * (turning > 0) + [exponent(weight) // 2] * (weight > 0)
     largest = max(rates, default=None)

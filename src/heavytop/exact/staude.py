@@ -24,7 +24,7 @@ from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball, rational, to_bits
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, rotate
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, Parameters, System
+from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot, vector
 
 
@@ -172,7 +172,7 @@ def staude_stability(motion: Staude) -> str:
     part where any of them is negative; where one is 0 and none negative, first order does not decide.
     """
     p = motion.system.parameters(motion.top, motion.start)
-    exact = Parameters([rational(i) for i in p.inertia], [rational(n) for n in p.moment], rational(Fraction(p.rotor)))
+    exact = p.mapped(lambda value: rational(Fraction(value)))
     columns = []
     for moved in range(6):
         y = [fmpq_poly([rational(v), int(axis == moved)]) for axis, v in enumerate(motion.start.flat)]

@@ -90,7 +90,7 @@ class Validated:
 
     @property
     def parameters(self) -> Parameters:
-        """I, P r and λ, exactly."""
+        """I, P r and the rotor, exactly."""
         if self.rotor is not None and self.system is GYROSTAT:
             return Parameters(self.top.inertia, self.top.moment, self.rotor)
         return self.system.parameters(self.top, self.start)

@@ -18,7 +18,7 @@ from heavytop.errors import InputError
 from heavytop.integrate.selfcheck import check
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, number, require, usable_tolerance
-from heavytop.top.equations import GYROSTAT, VARIABLES, Parameters, System
+from heavytop.top.equations import HEAVY_GYROSTAT, VARIABLES, Parameters, System
 
 # A machine-code cache on disk is not protected against corruption: a flipped bit there gives wrong numbers silently.
 heyoka.llvm_state.set_diskcache_enabled(False)
@@ -62,17 +62,14 @@ _compiling: dict[tuple[Any, ...], RLock] = {}
 
 
 def expressions(system: System, attitude: bool, constants: Parameters | None = None) -> list[tuple[Any, Any]]:
-    """The field as heyoka expressions with par[0..2] = I and par[3..5] = P r, or par[3] = λ for the gyrostat.
+    """The field as heyoka expressions with par[0..2] = I and par[3..5] = P r, or par[3] = λ for the gyrostat; par[6..8]
+    = k for the heavy gyrostat.
 
     constants: doubles in the place of all par[i].
     """
     names = VARIABLES + (_XI if attitude else ())
     y = heyoka.make_vars(*names)
-    p = constants or Parameters(
-        [heyoka.par[i] for i in range(3)],
-        [heyoka.par[i] for i in range(3, 6)],
-        heyoka.par[3] if system is GYROSTAT else None,
-    )
+    p = constants or system.taken_in([heyoka.par[i] for i in range(_count(system))])
     rates = system.field(p, y[:6])
     if attitude:
         rates = (*rates, *system.attitude(p, y[:6], y[6:]))
@@ -136,7 +133,7 @@ def _built(
         options["prec"] = precision.bits
     build, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))
     if constants is None:
-        options["pars"] = numpy.full((4 if system is GYROSTAT else 6, *shape), one)
+        options["pars"] = numpy.full((_count(system), *shape), one)
     before = perf_counter()
     engine = build(
         expressions(system, attitude, constants and _doubles(constants)),
@@ -147,8 +144,13 @@ def _built(
     return engine, perf_counter() - before
 
 
+def _count(system: System) -> int:
+    """How many numbers enter the field."""
+    return len(system.entering(Parameters((1, 1, 1), (0, 0, 0), (0, 0, 0) if system is HEAVY_GYROSTAT else 0)))
+
+
 def _doubles(p: Parameters) -> Parameters:
-    return Parameters([float(v) for v in p.inertia], [float(v) for v in p.moment], float(p.rotor))
+    return p.mapped(float)
 
 
 def _flags(engine: Any) -> dict[str, str]:
@@ -182,6 +184,6 @@ def load(engine: Any, problem: Problem) -> None:
 def arrays(problem: Problem) -> tuple[Any, Any]:
     """The parameters and the state that an engine is given, as native arrays."""
     p = problem.parameters
-    numbers = [*p.inertia, p.rotor] if problem.system is GYROSTAT else [*p.inertia, *p.moment]
+    numbers = list(problem.system.entering(p))
     start = [*problem.start.flat, *(problem.xi or ())]
     return numpy.array(problem.native(numbers)), numpy.array(problem.native(start))

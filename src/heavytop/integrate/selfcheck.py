@@ -15,13 +15,14 @@ import numpy
 
 from heavytop.errors import Contradiction
 from heavytop.precision import Precision, exact, number
-from heavytop.top.equations import GYROSTAT, Parameters, System
+from heavytop.top.equations import HEAVY_GYROSTAT, Parameters, System
 
 # Ω in multiples of I1 I2 I3 and γ in multiples of its square keep every division by a moment whole
 PARAMETERS = Parameters((3, 2, 1), (2, -1, 3), 6)
 OMEGA = (6, -12, 6)
 GAMMA = (36, 72, -36)
 XI = (1, 2, -5)
+_ROTOR = (6, -12, 18)
 _MOST_DERIVATIVES = 100
 _COEFFICIENT_EPS = 8
 _COEFFICIENT_EPS_AN_ORDER = Fraction(1, 4)
@@ -62,13 +63,19 @@ class Derivatives:
         return Derivatives(at)
 
 
-def derivatives(system: System, attitude: bool, count: int, p: Parameters = PARAMETERS) -> Iterator[list[Exact]]:
+def known_parameters(system: System) -> Parameters:
+    """Those of the known step."""
+    return PARAMETERS._replace(rotor=_ROTOR) if system is HEAVY_GYROSTAT else PARAMETERS
+
+
+def derivatives(system: System, attitude: bool, count: int, p: Parameters | None = None) -> Iterator[list[Exact]]:
     """y, y', y'', ... at the known start, from the field: ``count`` lists of six exact numbers, or nine with ξ."""
     values: list[list[Exact]] = [[first] for first in (*OMEGA, *GAMMA, *(XI if attitude else ()))]
     y = [Derivatives(column.__getitem__) for column in values]
-    rates = system.field(p, y[:6])
+    given = p or known_parameters(system)
+    rates = system.field(given, y[:6])
     if attitude:
-        rates = (*rates, *system.attitude(p, y[:6], y[6:]))
+        rates = (*rates, *system.attitude(given, y[:6], y[6:]))
     for n in range(count):
         yield [column[n] for column in values]
         following = [rate.at(n) for rate in rates]
@@ -83,7 +90,7 @@ def check(engine: Any, system: System, precision: Precision, constants: Paramete
     the new state and the dense output against the polynomial summed here.  Raises Contradiction.
     constants: exact parameters that were compiled in; None where the engine takes any.
     """
-    p = constants or PARAMETERS
+    p = constants or known_parameters(system)
     lanes = engine.state.shape[1:]
     size = engine.state.shape[0]
 
@@ -93,7 +100,7 @@ def check(engine: Any, system: System, precision: Precision, constants: Paramete
 
     _reset(engine, precision)
     if constants is None:
-        set_to((*p.inertia, p.rotor) if system is GYROSTAT else (*p.inertia, *p.moment), engine.pars)
+        set_to(system.entering(p), engine.pars)
     set_to((*OMEGA, *GAMMA, *XI)[:size], engine.state)
     engine.step(write_tc=True)
     eps, order = precision.eps, engine.order

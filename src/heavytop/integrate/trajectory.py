@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from heavytop.display import Lines, Table, Tabular
 from heavytop.errors import InputError
 from heavytop.precision import Precision, decimal_text, exact, native, native_text, number, rounded
-from heavytop.top.equations import HEAVY_TOP, NAMES, Parameters, System
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import Integral, holding
 
@@ -56,7 +56,7 @@ class Outcome(Enum):
 class Problem:
     """A top, a start and a system, rounded to a format: exactly what an integrator of that format is given.
 
-    parameters: inertia, moment of the weight n = P r and rotor λ, each component rounded once.
+    parameters: inertia, moment of the weight n = P r and rotor λ or k, each component rounded once.
     start: rounded state; γ is in general off the unit sphere by a rounding.
     given: the exact top and start, which decide what holds; None where the rounded ones are all there is.
     """
@@ -75,7 +75,8 @@ class Problem:
     @property
     def top(self) -> HeavyTop:
         """The rounded top; its weight is 1 and its centre n."""
-        return HeavyTop(self.parameters.inertia, 1, self.parameters.moment)
+        p = self.parameters
+        return HeavyTop(p.inertia, 1, p.moment, p.rotor if self.system is HEAVY_GYROSTAT else None)
 
     @classmethod
     def of(
@@ -92,7 +93,7 @@ class Problem:
         def both(values: Any) -> tuple[Fraction, ...]:
             return tuple(rounded(value, precision) for value in values)
 
-        parameters = Parameters(both(given.inertia), both(given.moment), rounded(Fraction(given.rotor), precision))
+        parameters = given.mapped(lambda value: rounded(Fraction(value), precision))
         return cls(
             system,
             precision,

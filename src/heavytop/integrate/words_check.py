@@ -7,8 +7,8 @@ from fractions import Fraction
 from math import factorial
 
 from heavytop.errors import Contradiction
-from heavytop.integrate.selfcheck import GAMMA, OMEGA, PARAMETERS, XI, derivatives
-from heavytop.top.equations import Parameters, System
+from heavytop.integrate.selfcheck import GAMMA, OMEGA, XI, derivatives, known_parameters
+from heavytop.top.equations import System
 from heavytop.words.run import Status, Steps
 from heavytop.words.scaled import Scaled
 
@@ -23,8 +23,7 @@ def check(system: System, attitude: bool, begin: Callable[[Scaled], Steps], bits
     begin: a run of a problem at its start.  bits: of its arithmetic.  bounded: the units it wants.
     Raises Contradiction.
     """
-    moments, weights = (tuple(map(Fraction, part)) for part in (PARAMETERS.inertia, PARAMETERS.moment))
-    given = Parameters(moments, weights, Fraction(PARAMETERS.rotor))
+    given = known_parameters(system).mapped(Fraction)
     start = tuple(map(Fraction, (*OMEGA, *GAMMA, *(XI if attitude else ()))))
     scaled = Scaled.of(system, given, start, bounded)
     run = begin(scaled)

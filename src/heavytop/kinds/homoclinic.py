@@ -35,7 +35,6 @@ from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import computed_row, time_metric
 from heavytop.suite.sampling import samples, signed
 from heavytop.suite.task import Task, computed
-from heavytop.top.equations import Parameters
 
 NAME = "homoclinic"
 ESCAPED = Fraction(1, 1000)
@@ -117,7 +116,7 @@ class Homoclinic(Kind):
         assert closed is not None
         problem = Problem.of(case.top, case.start, precision, case.system)
         given = case.system.parameters(case.top, case.start)
-        exactly = Parameters(tuple(given.inertia), tuple(given.moment), Fraction(given.rotor))
+        exactly = given.mapped(Fraction)
         if (problem.parameters, problem.start) != (exactly, case.start):
             raise ValueError(f"{case.name} is not exact in {precision.name}: its data must be dyadic")
         early = Fraction(_CERTIFIED_AT if task.times[-1] > 0 else -_CERTIFIED_AT)

@@ -102,7 +102,7 @@ def _refuses(source: ExactSolution, time: Fraction, bits: int) -> bool:
 
 def enclosure_of(solution: ExactSolution, start: State | None = None, effort: float = _EFFORT) -> Validated:
     """The validated integration of the same motion, or from another start with the same parameters."""
-    rotor = Fraction(_parameters(solution).rotor)
+    rotor = _parameters(solution).rotor
     return Validated(solution.top, start or solution.start, solution.system, rotor=rotor, effort=effort)
 
 
@@ -138,7 +138,7 @@ def _integral_digits(solution: ExactSolution, values: Sequence[arb], bits: int) 
     exact = _parameters(solution)
     digits = []
     with working_precision(bits + 64):
-        p = Parameters([ball(i) for i in exact.inertia], [ball(n) for n in exact.moment], ball(Fraction(exact.rotor)))
+        p = exact.mapped(lambda value: ball(Fraction(value)))
         for integral in holding(solution.top, solution.start, solution.system):
             known = Fraction(integral.value(exact, solution.start.flat))
             drift = integral.value(p, values) - ball(known)

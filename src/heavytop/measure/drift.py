@@ -157,12 +157,9 @@ class Drift:
 
 @whole_evaluation
 def parameter_balls(problem: Problem, bits: int) -> Parameters:
-    """I, P r and λ of a problem as balls of ``bits`` bits."""
-    exact = problem.parameters
+    """I, P r and the rotor of a problem as balls of ``bits`` bits."""
     with working_precision(bits):
-        return Parameters(
-            [ball(value) for value in exact.inertia], [ball(value) for value in exact.moment], ball(exact.rotor)
-        )
+        return problem.parameters.mapped(ball)
 
 
 def _xi_squared(_: Parameters, y: Any) -> Any:

@@ -17,6 +17,7 @@ from heavytop.measure.computed_reference import agreement, of_rounded
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.truth import Known, Truth, certified, closed_form
 from heavytop.records import Against
+from heavytop.top.equations import GYROSTAT
 
 _CERTIFIED_AT = Fraction(2)
 """|t| at which the closed form of every start is certified; that of the first start is at the horizon too."""
@@ -69,7 +70,9 @@ def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least:
 def _motion(problem: Problem) -> tuple[Any, ...]:
     """What the motion depends on: inertia and weight times a common factor are the same motion."""
     p = problem.parameters
-    return problem.system.name, *(value / p.inertia[0] for value in (*p.inertia, *p.moment)), p.rotor, problem.start
+    own = p.mapped(lambda value: value / p.inertia[0])
+    rotor = p.rotors if problem.system is GYROSTAT else own.rotors
+    return problem.system.name, *own.inertia, *own.moment, *rotor, problem.start
 
 
 def _none(starts: int, reason: str) -> Reference:

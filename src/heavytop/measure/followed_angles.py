@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import exact, number
 from heavytop.top.angles import euler_angles, unwrap
-from heavytop.top.heavy_top import cross, dot
+from heavytop.top.equations import GYROSTAT
+from heavytop.top.heavy_top import cross
 
 Angles = tuple[float, float, float]
 
@@ -97,9 +98,13 @@ class FollowedAngles:
 
 
 def _fastest(problem: Problem) -> Fraction:
-    """Not less than |ω| at any time: |Ω|² <= (Ω·M + 4 |P r|)/min I by the energy (heavy top), or by |M| (gyrostat)."""
-    top, omega = problem.top, problem.start.omega
-    least, most = min(top.inertia), max(top.inertia)
-    square = (dot(omega, top.angular_momentum(omega)) + 4 * sum(map(abs, top.moment))) * most / least**2
+    """Not less than |ω| at any time: |Ω|² <= (Ω·IΩ + 4 |P r|)/min I by the energy (heavy top and heavy gyrostat), or by
+    |M| (gyrostat).  The rotor is added: |λ|, or |k|/min I, by which it bends the path.
+    """
+    p, omega = problem.parameters, problem.start.omega
+    least, most = min(p.inertia), max(p.inertia)
+    twice = sum((i * w * w for i, w in zip(p.inertia, omega, strict=True)), Fraction(0))
+    square = (twice + 4 * sum(map(abs, p.moment))) * most / least**2
     root = Fraction(math.isqrt(square.numerator * square.denominator << 40) + 1, square.denominator << 20)
-    return root + abs(Fraction(problem.parameters.rotor))
+    rotor = sum(abs(Fraction(part)) for part in p.rotors)
+    return root + (rotor if problem.system is GYROSTAT else rotor / least)

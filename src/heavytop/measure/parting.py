@@ -23,7 +23,6 @@ from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.validated import Validated
 from heavytop.precision import decimal_text, shown
-from heavytop.top.equations import Parameters
 
 PARTED = Fraction(1, 100)
 """Claim and truth have parted when the largest component of |ΔΩ| reaches this, in units of α."""
@@ -127,8 +126,7 @@ class _Motion:
         self.state = cache(lambda time: solution.state(time, _BITS))
         given = solution.system.parameters(solution.top, solution.start)
         with working_precision(_BITS):
-            inertia, moment = ([ball(value) for value in part] for part in (given.inertia, given.moment))
-            self.parameters = Parameters(inertia, moment, ball(given.rotor))
+            self.parameters = given.mapped(ball)
             # ½ I Ω² <= C1 + |P r| along the truth, and along the claim as well, which keeps (1.3)
             most = 2 * (case.c1 + sum(map(abs, given.moment)))
             omega = [ball(most / each).sqrt().abs_upper() for each in given.inertia]

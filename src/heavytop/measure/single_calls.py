@@ -125,9 +125,9 @@ def _parting(problem: Problem, until: Fraction) -> Fraction:
 
 
 def _rate_squared(problem: Problem) -> Fraction:
-    """The square of the largest rate of the motion: |Ω|, or the root of |P r||γ|/I."""
+    """The square of the largest rate of the motion: |Ω|, that of the rotor, or the root of |P r||γ|/I."""
     p, start = problem.parameters, problem.start.flat
-    turning: Fraction = max(*map(abs, start[:3]), abs(Fraction(p.rotor))) ** 2
+    turning: Fraction = max(*map(abs, start[:3]), p.rotor_rate) ** 2
     falling: Fraction = max(map(abs, p.moment)) * max(map(abs, start[3:])) / max(p.inertia)
     return max(turning, falling)
 

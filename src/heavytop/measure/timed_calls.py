@@ -215,7 +215,7 @@ def _impossible_counts(run: Trajectory, setting: tuple[str, Fraction] | None, er
 def _rate(problem: Problem, states: Any) -> float:
     """The angular rate of the motion: the median over states of |y'|/|y| of Ω or of γ, whichever is faster."""
     p = problem.parameters
-    plain = p._replace(inertia=tuple(map(float, p.inertia)), moment=tuple(map(float, p.moment)), rotor=float(p.rotor))
+    plain = p.mapped(float)
     rates = numpy.array([problem.system.field(plain, state) for state in states], dtype=float)
     parts = [
         (numpy.linalg.norm(rates[:, i : i + 3], axis=1), numpy.linalg.norm(states[:, i : i + 3], axis=1))

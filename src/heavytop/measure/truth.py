@@ -150,7 +150,7 @@ def closed_form(problem: Problem) -> ExactSolution | None:
     if problem.system is GYROSTAT:
         # rounded, γ is no longer parallel to M: the rotor is that of the exact data
         return Gyrostat(problem.top, problem.start, problem.parameters.rotor)
-    return next(matches(problem.top, problem.start), None)
+    return next(matches(problem.top, problem.start, problem.system), None)
 
 
 @lru_cache(maxsize=32)

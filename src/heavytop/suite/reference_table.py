@@ -50,7 +50,7 @@ class Entry(msgspec.Struct, frozen=True):
 class Motion(msgspec.Struct, frozen=True):
     """A top, a start at t = 0 and certified states; exact numbers are integers or fractions, as text.
 
-    rotor: λ of the gyrostat, 0 for the heavy top.
+    rotor: λ of the gyrostat, k1,k2,k3 of the heavy gyrostat, 0 for the heavy top.
     """
 
     case: str
@@ -154,7 +154,7 @@ def motion(case: Case, digits: int) -> Motion:
         [str(i) for i in case.top.inertia],
         str(case.top.weight),
         [str(r) for r in case.top.centre],
-        str(p.rotor),
+        ",".join(map(str, p.rotors)),
         [str(w) for w in case.start.omega],
         [str(g) for g in case.start.gamma],
         solution.method,

@@ -162,9 +162,6 @@ def failed(task: Task, cause: str, kind: type[HeavyTopError] = PeerFailed) -> Ro
 def input_rounding(top: HeavyTop, start: State, problem: Problem) -> Fraction:
     """The largest relative rounding of the data that the run was given: not charged to it, but said."""
     given = problem.system.parameters(top, start)
-    pairs = zip(
-        (*given.inertia, *given.moment, Fraction(given.rotor), *start.flat),
-        (*problem.parameters.inertia, *problem.parameters.moment, problem.parameters.rotor, *problem.start.flat),
-        strict=True,
-    )
+    rounded = problem.parameters.numbers, problem.start.flat
+    pairs = zip((*given.mapped(Fraction).numbers, *start.flat), sum(rounded, ()), strict=True)
     return max(abs(b - a) / abs(a) if a else Fraction(0) for a, b in pairs)

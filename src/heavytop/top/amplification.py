@@ -30,11 +30,12 @@ _LARGEST = 1e300
 
 
 def rate(system: System, parameters: Parameters, start: Sequence[Fraction]) -> Fraction:
-    """The largest of |Ω_i|, |λ| and √(|P r|/I_min), of the start, rounded up to a power of 2; 0 of a top at rest.
+    """The largest of |Ω_i|, |λ| or |k|/I_min, and √(|P r|/I_min), of the start, rounded up to a power of 2;
+    0 of a top at rest.
 
     start: six exact numbers.  One over this is the motion's own unit of time.
     """
-    fastest = max(*(abs(Fraction(value)) for value in start[:3]), abs(Fraction(parameters.rotor)))
+    fastest: Fraction = max(*(abs(Fraction(value)) for value in start[:3]), parameters.mapped(Fraction).rotor_rate)
     pull = Fraction(0) if system.name == "gyrostat" else max(abs(Fraction(n)) for n in parameters.moment)
     square = max(fastest**2, pull / min(Fraction(value) for value in parameters.inertia))
     if not square:
@@ -82,7 +83,7 @@ def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[NDArra
     import numpy
 
     units = _units(scale)
-    exactly = Parameters(tuple(map(Fraction, p.inertia)), tuple(map(Fraction, p.moment)), Fraction(p.rotor))
+    exactly = p.mapped(Fraction)
 
     def field(*places: int) -> NDArray[Any]:
         y = [places.count(k) * unit for k, unit in enumerate(units)]

@@ -71,6 +71,8 @@ class HeavyTop:
     inertia: principal moments (I1, I2, I3) at the fixed point, all positive.
     weight: P.
     centre: r = (a, b, c), the centre of mass on the principal axes.
+    rotor: k = (k1, k2, k3), the constant angular momentum, relative to the body, of a rotor that it carries: the system
+    is then `heavy_gyrostat`.  None for no rotor, which is another top than one with k = 0.
 
     Each is read by :func:`heavytop.precision.exact`; raises InputError for a moment that is not positive.
     """
@@ -78,8 +80,11 @@ class HeavyTop:
     inertia: Vector
     weight: Fraction
     centre: Vector
+    rotor: Vector | None
 
-    def __init__(self, inertia: Iterable[Any], weight: Any, centre: Iterable[Any]) -> None:
+    def __init__(
+        self, inertia: Iterable[Any], weight: Any, centre: Iterable[Any], rotor: Iterable[Any] | None = None
+    ) -> None:
         moments = vector(inertia, "inertia")
         for axis, value in enumerate(moments, 1):
             if value <= 0:
@@ -94,9 +99,12 @@ class HeavyTop:
         object.__setattr__(self, "inertia", moments)
         object.__setattr__(self, "weight", load)
         object.__setattr__(self, "centre", vector(centre, "centre"))
+        object.__setattr__(self, "rotor", None if rotor is None else vector(rotor, "rotor"))
 
     def __repr__(self) -> str:
-        return f"HeavyTop(inertia={_text(self.inertia)}, weight={_text(self.weight)}, centre={_text(self.centre)})"
+        rotor = "" if self.rotor is None else f", rotor={_text(self.rotor)}"
+        data = f"inertia={_text(self.inertia)}, weight={_text(self.weight)}, centre={_text(self.centre)}"
+        return f"HeavyTop({data}{rotor})"
 
     @property
     def moment(self) -> Vector:
@@ -105,8 +113,11 @@ class HeavyTop:
         return self.weight * a, self.weight * b, self.weight * c
 
     def angular_momentum(self, omega: Any) -> tuple[Any, Any, Any]:
-        """M = (I1 Ω1, I2 Ω2, I3 Ω3) over any ring that rationals act on."""
-        return self.inertia[0] * omega[0], self.inertia[1] * omega[1], self.inertia[2] * omega[2]
+        """M = IΩ, and k where there is a rotor, over any ring that rationals act on."""
+        own = self.inertia[0] * omega[0], self.inertia[1] * omega[1], self.inertia[2] * omega[2]
+        if self.rotor is None:
+            return own
+        return own[0] + self.rotor[0], own[1] + self.rotor[1], own[2] + self.rotor[2]
 
     def warnings(self) -> list[str]:
         """What no rigid body can have, though the equations do not mind: a moment larger than the sum of the others."""
@@ -123,7 +134,7 @@ class HeavyTop:
 
 def require_physical(top: HeavyTop, start: State) -> None:
     """Raises InputError for data beyond 10^150, and moments below 10^-150, which overflow in some float on the way."""
-    named = {"inertia": top.inertia, "weight": (top.weight,), "centre": top.centre}
+    named = {"inertia": top.inertia, "weight": (top.weight,), "centre": top.centre, "rotor": top.rotor or ()}
     for what, values in (named | {"omega": start.omega, "gamma": start.gamma}).items():
         for value in values:
             physical(value, what)
@@ -189,12 +200,15 @@ class State:
 
 
 def data_texts(top: HeavyTop, start: State) -> dict[str, str | list[str]]:
-    """The data as exact text, by the keys of every file and document: inertia, weight, centre, omega, gamma."""
+    """The data as exact text, by the keys of every file and document: inertia, weight, centre, omega, gamma; and rotor
+    where the top has one.
+    """
     inertia, centre, omega, gamma = (
         [exact_text(value) for value in part] for part in (top.inertia, top.centre, start.omega, start.gamma)
     )
     weight = exact_text(top.weight)
-    return {"inertia": inertia, "weight": weight, "centre": centre, "omega": omega, "gamma": gamma}
+    rotor = {} if top.rotor is None else {"rotor": [exact_text(value) for value in top.rotor]}
+    return {"inertia": inertia, "weight": weight, "centre": centre, **rotor, "omega": omega, "gamma": gamma}
 
 
 def _text(value: Fraction | Vector) -> str:

@@ -12,8 +12,8 @@ from functools import partial
 from itertools import permutations
 from typing import Any
 
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
-from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
+from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 
 Axes = tuple[int, ...]
 
@@ -102,6 +102,48 @@ def moment_along_centre(p: Parameters, y: Any) -> Any:
     return dot(momentum(p, y), p.moment)
 
 
+def momentum_with_rotor(p: Parameters, y: Any) -> tuple[Any, Any, Any]:
+    """M = I Ω + k of `heavy_gyrostat`."""
+    first, second, third = momentum(p, y)
+    return first + p.rotor[0], second + p.rotor[1], third + p.rotor[2]
+
+
+def area_with_rotor(p: Parameters, y: Any) -> Any:
+    """M·γ with M = I Ω + k."""
+    return dot(momentum_with_rotor(p, y), y[3:6])
+
+
+def momentum_with_rotor_squared(p: Parameters, y: Any) -> Any:
+    """|M|² with M = I Ω + k: P r = 0, the gyrostat of Zhukovsky and Volterra."""
+    m = momentum_with_rotor(p, y)
+    return dot(m, m)
+
+
+def _equatorial_square(y: Any, axes: Axes) -> Any:
+    return y[axes[0]] * y[axes[0]] + y[axes[1]] * y[axes[1]]
+
+
+def kovalevskaya_yehia(p: Parameters, y: Any, axes: Axes) -> Any:
+    """|ξ|² of :func:`kovalevskaya_xi` + 2λ (Ω3 − λ)(Ω1² + Ω2²) − 4λ (n1 Ω1 + n2 Ω2) γ3, λ = k3/I3, n = P r/I3.
+
+    The rotor lies on the axis of the small moment, ``axes[2]``.  Source: H. M. Yehia, Mech. Res. Comm. 13 (1986) 169.
+    """
+    i, j, k = axes
+    rotor = p.rotor[k] / p.inertia[k]
+    along = (p.moment[i] * y[i] + p.moment[j] * y[j]) * y[3 + k] / p.inertia[k]
+    half = rotor * ((y[k] - rotor) * _equatorial_square(y, axes) - (along + along))
+    return kovalevskaya(p, y, axes) + half + half
+
+
+def sretensky(p: Parameters, y: Any, axes: Axes) -> Any:
+    """(Ω3 − λ)(Ω1² + Ω2²) − (n1 Ω1 + n2 Ω2) γ3, λ = k3/I3, n = P r/I3, conserved on M·γ = 0.
+
+    The rotor lies on the axis of the small moment, ``axes[2]``.  Source: L. N. Sretensky, Vestn. Mosk. Univ. 3 (1963).
+    """
+    rotor = p.rotor[axes[2]] / p.inertia[axes[2]]
+    return goryachev_chaplygin(p, y, axes) - rotor * _equatorial_square(y, axes)
+
+
 class _Magnitude:
     """A bound of |x| in a ring: that of a difference is a sum, so that no terms cancel."""
 
@@ -123,8 +165,7 @@ class _Magnitude:
 
 def largest(integral: Integral, p: Parameters, omega: Any) -> Any:
     """The sum of the absolute terms of a first integral where every |Ω_i| is ``omega`` and every |γ_i| is 1."""
-    bounds = Parameters(tuple(map(_Magnitude, p.inertia)), tuple(map(_Magnitude, p.moment)), _Magnitude(p.rotor))
-    return integral.value(bounds, [*map(_Magnitude, (omega,) * 3), *map(_Magnitude, (1, 1, 1))]).size
+    return integral.value(p.mapped(_Magnitude), [*map(_Magnitude, (omega,) * 3), *map(_Magnitude, (1, 1, 1))]).size
 
 
 def holding(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> tuple[Integral, ...]:
@@ -132,14 +173,14 @@ def holding(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> tuple[In
 
     Invariant relations (Goryachev-Chaplygin, Hess) are offered only for starts on them.
     """
-    common = (
-        Integral("gamma_squared", gamma_squared, "every motion"),
-        Integral("area", area, "every motion"),
-    )
+    square = Integral("gamma_squared", gamma_squared, "every motion")
     if system is GYROSTAT:
-        return (*common, *_of_gyrostat(top))
+        return (square, Integral("area", area, "every motion"), *_of_gyrostat(top))
+    with_rotor = system is HEAVY_GYROSTAT
+    about_gamma = Integral("area", area_with_rotor if with_rotor else area, "every motion")
+    more = _of_heavy_gyrostat if with_rotor else _of_heavy_top
     p = system.parameters(top, start)
-    return (*common, Integral("energy", energy, "every motion"), *_of_heavy_top(p, start.flat))
+    return (square, about_gamma, Integral("energy", energy, "every motion"), *more(p, start.flat))
 
 
 def _of_gyrostat(top: HeavyTop) -> Iterator[Integral]:
@@ -174,3 +215,25 @@ def _of_heavy_top(p: Parameters, y: tuple[Any, ...]) -> Iterator[Integral]:
             relation = partial(hess, axes=axes)
             if relation(p, y) == 0:
                 yield Integral("hess", relation, "Hess, on its invariant relation")
+
+
+def _of_heavy_gyrostat(p: Parameters, y: tuple[Any, ...]) -> Iterator[Integral]:
+    n, rotor = p.moment, p.rotor
+    if not any(n):
+        yield Integral("momentum_squared", momentum_with_rotor_squared, "Zhukovsky-Volterra: P r = 0")
+    if p.inertia[0] == p.inertia[1] == p.inertia[2] and any(n) and not any(cross(rotor, n)):
+        yield Integral("moment_along_centre", moment_along_centre, "I1 = I2 = I3, the rotor along r")
+    for axes in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        i, j, k = axes
+        if p.inertia[i] != p.inertia[j] or rotor[i] != 0 or rotor[j] != 0:
+            continue
+        if n[i] == n[j] == 0:
+            yield Integral(f"spin{k + 1}", partial(spin, axes=axes), f"Lagrange's gyrostat about axis {k + 1}")
+        if n[k] != 0 or not any(n):
+            continue
+        if p.inertia[i] == 2 * p.inertia[k]:
+            relation = partial(kovalevskaya_yehia, axes=axes)
+            yield Integral("kovalevskaya_yehia", relation, f"Kovalevskaya-Yehia about axis {k + 1}")
+        if p.inertia[i] == 4 * p.inertia[k] and area_with_rotor(p, y) == 0:
+            condition = f"Sretensky about axis {k + 1}, on M·gamma = 0"
+            yield Integral("sretensky", partial(sretensky, axes=axes), condition)

@@ -50,7 +50,7 @@ def most_orders(grid: Grid) -> int:
 class Series:
     """Writes ``series(state, constants, inverses, rows, sums, places, seen, factor, raises, result)``.
 
-    state, result: K words of each vector.  constants: K words of A and each B (or of the one of
+    state, result: K words of each vector.  constants: K words of A and each B (or of those of
     :attr:`heavytop.words.lanes.Coefficients.beside`, where the grid is bounded), for each vector.  inverses: 1/(n + 1).
     rows, sums, places, seen: scratch, see :class:`heavytop.words.rows.Rows`.  factor, raises: from one order to the
     next coefficients are multiplied by factor 16^raises; factor is ± a power of two, at most 1.
@@ -158,16 +158,21 @@ class Series:
         return [self.code.load(self.made.args[1], 8 * (words * row + i)) for i in range(words)]
 
     def _bounded_rates(self, vector: int, gathered: list[Any], y: list[Any]) -> list[Any]:
-        code, grid, (lanes, second) = self.code, self.grid, beside(self.system)
-        found = bounded_product(code, grid, self._constants(2 * vector), gathered)
+        code, grid, (permutations, second) = self.code, self.grid, beside(self.system)
+        place = (1 + len(permutations)) * vector
+        found = bounded_product(code, grid, self._constants(place), gathered)
         if vector and second:
-            return found  # no weight turns an attitude
-        moved = [code.shuffle(word, code.zero, lanes) for word in y]
-        linear = bounded_product(code, grid, self._constants(2 * vector + 1), moved)
-        if second:
-            parts = [[code.shuffle(word, code.zero, lanes) for lanes in _HALVES] for word in linear]
-            linear = [code.add(one, other) for one, other in parts]
-        return [code.add(a, b) for a, b in zip(found, linear, strict=True)]
+            return found  # neither weight nor rotor turns an attitude
+        for k, lanes in enumerate(permutations, 1):
+            moved = [code.shuffle(word, code.zero, lanes) for word in y]
+            linear = bounded_product(code, grid, self._constants(place + k), moved)
+            if second:
+                parts = [[code.shuffle(word, code.zero, half) for half in _HALVES] for word in linear]
+                linear = [code.add(one, other) for one, other in parts]
+            if k > 1:  # sums of more products than two beside the first would outgrow their words
+                found = carried(code, grid, found)
+            found = [code.add(a, b) for a, b in zip(found, linear, strict=True)]
+        return found
 
     def _watched_rates(self, vector: int, gathered: list[Any], y: list[Any]) -> list[Any]:
         code, b, grid, seen, linear = self.code, self.code.builder, self.grid, self.made.args[6], turned(self.system)

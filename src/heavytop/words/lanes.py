@@ -1,4 +1,4 @@
-"""Where in eight lanes the products of the two fields are.
+"""Where in eight lanes the products of the three fields are.
 
 A state vector holds Ω1 Ω2 Ω3 γ1 γ2 γ3 in lanes 0 to 5; an attitude vector ξ lies in lanes 3 to 5 of a second one, whose
 other lanes are 0.  Lanes 6 and 7 are 0.  The products of Taylor series that the fields need are then, lane by lane,
@@ -48,26 +48,32 @@ GATHERED: tuple[tuple[tuple[int, int], ...], ...] = (
 )
 """Four lists of (lane of S, sign), one for each lane 0 to 5 of the derivative; they are added."""
 
-# γ × n for the heavy top; λ terms for the gyrostat
+_NONE = (ZERO,) * 5
+_TORQUE, _TURNING = ((4, 5, 3, *_NONE), (5, 3, 4, *_NONE)), ((2, 0, 1, *_NONE), (1, 2, 0, *_NONE))
+# γ × n for the heavy top; λ terms for the gyrostat; γ × n and k × Ω for the heavy gyrostat
 _TURNED: dict[str, tuple[tuple[int, ...], ...]] = {
-    "heavy_top": ((4, 5, 3, ZERO, ZERO, ZERO, ZERO, ZERO), (5, 3, 4, ZERO, ZERO, ZERO, ZERO, ZERO)),
+    "heavy_top": _TORQUE,
     "gyrostat": ((2, ZERO, 0, 5, ZERO, 3, ZERO, ZERO),),
+    "heavy_gyrostat": (*_TORQUE, *_TURNING),
+}
+_TORQUES = {"heavy_top": 2, "gyrostat": 0, "heavy_gyrostat": 2}
+"""How many of them, the first, are of γ in the rate of Ω."""
+
+
+_BESIDE: dict[str, tuple[tuple[int, ...], ...]] = {
+    "heavy_top": ((4, 5, 3, 5, 3, 4, ZERO, ZERO),),
+    "gyrostat": _TURNED["gyrostat"],
+    "heavy_gyrostat": ((4, 5, 3, 5, 3, 4, ZERO, ZERO), (2, 0, 1, 1, 2, 0, ZERO, ZERO)),
 }
 
 
-_BESIDE: dict[str, tuple[int, ...]] = {
-    "heavy_top": (4, 5, 3, 5, 3, 4, ZERO, ZERO),
-    "gyrostat": _TURNED["gyrostat"][0],
-}
-
-
-def beside(system: System) -> tuple[tuple[int, ...], bool]:
-    """The permutations of y in the linear part as one; whether its lanes 3 to 5, the second, are added to 0 to 2."""
-    return _BESIDE[system.name], len(_TURNED[system.name]) == 2
+def beside(system: System) -> tuple[tuple[tuple[int, ...], ...], bool]:
+    """The permutations of y in the linear part, two as one; whether lanes 3 to 5, the second, are added to 0 to 2."""
+    return _BESIDE[system.name], len(_TURNED[system.name]) > 1
 
 
 def turned(system: System) -> tuple[tuple[int, ...], ...]:
-    """The permutations of y in the linear part, one or two."""
+    """The permutations of y in the linear part, one, two or four."""
     return _TURNED[system.name]
 
 
@@ -75,11 +81,14 @@ def turned(system: System) -> tuple[tuple[int, ...], ...]:
 class Coefficients:
     """A and B_l of each state vector, eight exact numbers each: shape (vectors, 1 + number of permutations, 8).
 
-    linear: the largest |B_l| of the first.
+    torques: how many B_l, the first, are of γ in the rate of Ω.  torque, turning: the largest |coefficient| of the
+    first vector in those and in the others.
     """
 
     vectors: tuple[tuple[tuple[Fraction, ...], ...], ...]
-    linear: Fraction
+    torques: int
+    torque: Fraction
+    turning: Fraction
 
     @property
     def largest(self) -> Fraction:
@@ -88,16 +97,25 @@ class Coefficients:
 
     @property
     def beside(self) -> tuple[tuple[tuple[Fraction, ...], ...], ...]:
-        """A and one B of each vector, for the permutation of :func:`beside`."""
+        """A and one B of each vector for each permutation of :func:`beside`."""
         return tuple(
-            (first, one if not other else (*one[:3], *other[0][:3], *one[6:])) for first, one, *other in self.vectors
+            (first, *linear)
+            if len(linear) == 1
+            else (first, *((*a[:3], *b[:3], *a[6:]) for a, b in zip(linear[::2], linear[1::2], strict=True)))
+            for first, *linear in self.vectors
         )
 
-    def with_linear(self, factor: Fraction) -> Coefficients:
-        """The same with every B multiplied."""
+    def with_linear(self, torque: Fraction, turning: Fraction) -> Coefficients:
+        """The same with every B multiplied: those of γ in the rate of Ω by ``torque``, the others by ``turning``."""
+        factors = [Fraction(1), *(torque if k < self.torques else turning for k in range(len(self.vectors[0]) - 1))]
         return Coefficients(
-            tuple((rows[0], *(tuple(c and c * factor for c in row) for row in rows[1:])) for rows in self.vectors),
-            self.linear * factor,
+            tuple(
+                tuple(tuple(c and c * factor for c in row) for row, factor in zip(rows, factors, strict=True))
+                for rows in self.vectors
+            ),
+            self.torques,
+            self.torque * torque,
+            self.turning * turning,
         )
 
 
@@ -118,12 +136,14 @@ def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
     linear = [[(a - b) / 2 for a, b in zip(*pair, strict=True)] for pair in zip(at, against, strict=True)]
     permuted = [[Fraction(0) if j == ZERO else linear[j][k] for k, j in enumerate(row[:6])] for row in turned(system)]
     rows = [_eight(row) for row in ([*products, half, half, half], *permuted)]
-    largest = max(abs(c) for row in rows[1:] for c in row)
+    torques = _TORQUES[system.name]
+    sizes = [[abs(c) for row in part for c in row] for part in (rows[1 : 1 + torques], rows[1 + torques :])]
+    largest = [max(part, default=Fraction(0)) for part in sizes]
     if not attitude:
-        return Coefficients((tuple(rows),), largest)
+        return Coefficients((tuple(rows),), torques, *largest)
     # ξ' = ξ × ω turns as γ does
     third = [[Fraction(0)] * 3 + list(row[3:6]) for row in rows]
-    return Coefficients((tuple(rows), tuple(_eight(row) for row in third)), largest)
+    return Coefficients((tuple(rows), tuple(_eight(row) for row in third)), torques, *largest)
 
 
 def _eight(row: Sequence[Any]) -> tuple[Fraction, ...]:

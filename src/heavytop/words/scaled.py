@@ -1,7 +1,8 @@
 """A problem in units in which its numbers are near 1, exactly.
 
-Ω = s ω, t = τ/s, γ = g γ', ξ = x ξ' with powers of two s, g, x: then ω' = A ω ω + (B/s²) g γ', and the equations keep
-their form.  All of it is exact, and whatever the units of the data, the arithmetic sees numbers of moderate size.
+Ω = s ω, t = τ/s, γ = g γ', ξ = x ξ' with powers of two s, g, x: then ω' = A ω ω + (B/s²) g γ' + (C/s) ω, and the
+equations keep their form.  All of it is exact, and whatever the units of the data, the arithmetic sees numbers of
+moderate size.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
 
-from heavytop.top.equations import GYROSTAT, Parameters, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System
 from heavytop.words.lanes import Coefficients, coefficients
 
 _ROOT_BITS = 24
@@ -40,7 +41,7 @@ class Scaled:
         gamma = _power_above(max(map(abs, y[3:6])))
         rate = _bound(system, p, y) / 4 if bounded else _rate(system, given, p, y, gamma)
         sizes = [rate] * 3 + [gamma] * 3 + ([_power_above(max(map(abs, y[6:])))] * 3 if len(y) == 9 else [])
-        scaled = given.with_linear(1 / rate if system is GYROSTAT else gamma / rate**2)
+        scaled = given.with_linear(gamma / rate**2, 1 / rate)
         state = tuple(value / size for value, size in zip(y, sizes, strict=True))
         return cls(system, scaled, state, rate, tuple(sizes), _rests(system, p, y))
 
@@ -65,11 +66,9 @@ def _parallel(a: Sequence[Fraction], b: Sequence[Fraction]) -> bool:
 
 
 def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction) -> Fraction:
-    """A power of two near the rate of the motion: the larger of |Ω| and √(torque per moment), or |λ|."""
-    speed = max(map(abs, y[:3]))
-    if system is GYROSTAT:
-        return _power_above(max(speed, abs(p.rotor), given.linear))
-    return max((_power_above(speed) if speed else Fraction(0), _root_above(given.linear * gamma))) or Fraction(1)
+    """A power of two near the rate of the motion: the largest of |Ω|, √(torque per moment), and |λ| or |k|/I."""
+    speed = max(*map(abs, y[:3]), given.turning, abs(p.rotor) if system is GYROSTAT else Fraction(0))
+    return max((_power_above(speed) if speed else Fraction(0), _root_above(given.torque * gamma))) or Fraction(1)
 
 
 def _bound(system: System, p: Parameters, y: tuple[Fraction, ...]) -> Fraction:
@@ -81,7 +80,9 @@ def _bound(system: System, p: Parameters, y: tuple[Fraction, ...]) -> Fraction:
         return _root_above(max(square, Fraction(p.rotor) ** 2)) or Fraction(1)
     kinetic = sum(i * w * w for i, w in zip(p.inertia, omega, strict=True)) / 2
     torque = _root(sum(n * n for n in p.moment) * sum(g * g for g in gamma))
-    return _root_above(2 * (kinetic + 2 * torque) / least) or Fraction(1)
+    turning = max(map(abs, p.rotor)) / least if system is HEAVY_GYROSTAT else Fraction(0)
+    by_rotor = _power_above(turning) if turning else Fraction(0)
+    return max(_root_above(2 * (kinetic + 2 * torque) / least), by_rotor) or Fraction(1)
 
 
 def _root(value: Fraction) -> Fraction:

@@ -13,7 +13,6 @@ from heavytop.errors import InputError
 from heavytop.integrate.peers.contract import with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import exact, number
-from heavytop.top.equations import Parameters
 from heavytop.top.times import check_times
 
 
@@ -44,8 +43,7 @@ def odefun(problem: Problem, times: Sequence[Fraction], tolerance: Fraction | No
         evaluations += 1
         return list(system.field(p, y))
 
-    given = problem.parameters
-    p = Parameters([big(v) for v in given.inertia], [big(v) for v in given.moment], big(given.rotor))
+    p = problem.parameters.mapped(lambda value: big(Fraction(value)))
     wanted = None if tolerance is None else big(tolerance)
     solve = own.odefun(rates, 0, [big(v) for v in problem.start.flat], tol=wanted)
     values = [[exact(v) for v in solve(big(time))] for time in grid]
