@@ -12,9 +12,10 @@ from heavytop.errors import InputError, quoted
 from heavytop.measure.conventions import WIDTHS, Convention
 from heavytop.precision import Precision
 from heavytop.suite.given import Given
-from heavytop.suite.observed_body import Body
 from heavytop.suite.observed_given import of_observed_arrays, require_system
 from heavytop.suite.observed_start import raw_start
+from heavytop.top.attitude import Attitude
+from heavytop.top.bodies import Body
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, ordered, vector
 
@@ -56,8 +57,8 @@ def is_plain(top: object, start: object, arrays: Mapping[str, Any], states: bool
     return states and set(arrays) == {"omega", "gamma"} and isinstance(top, HeavyTop) and _attitude(start) is None
 
 
-def _attitude(start: object) -> Any:
-    return getattr(start, "attitude", None)
+def _attitude(start: object) -> Attitude | None:
+    return start.attitude if isinstance(start, State) else None
 
 
 def convention(

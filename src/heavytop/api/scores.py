@@ -22,8 +22,8 @@ from heavytop.records import Metric, Row
 from heavytop.report.diagnosis_text import diagnosis_text
 from heavytop.report.text import short
 from heavytop.suite.given import of_arrays
-from heavytop.suite.observed_body import Body
 from heavytop.suite.score import Assessment, Peer, assess, passed, required
+from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
 from heavytop.top.times import check_times

@@ -17,6 +17,7 @@ from heavytop.errors import HeavyTopError
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
 Array = NDArray[numpy.float64]
@@ -32,7 +33,7 @@ class BodyData:
 
     inertia: the tensor, shape (3, 3), about the fixed point or, where ``about_centre``, about the centre of mass.
     centre: from the fixed point.  mass: None where a weight alone is known.  gravity: acceleration, or the weight where
-    there is no mass.
+    there is no mass.  rotor: its constant angular momentum, None for none.
     """
 
     inertia: Array
@@ -40,6 +41,7 @@ class BodyData:
     mass: float | None
     gravity: float
     about_centre: bool = False
+    rotor: Array | None = None
 
     @property
     def force(self) -> float:
@@ -101,11 +103,19 @@ def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Cou
     rows, omega, moment = start.rotation @ axes, axes.T @ start.omega, body.force * (axes.T @ body.centre)
     rate, size = _power(_rate(moments, moment, omega)), _power(float(moments.max()))
     try:
-        top = HeavyTop([Fraction(m / size) for m in moments], 1, [Fraction(n / size / rate / rate) for n in moment])
+        whirl = None if body.rotor is None or not body.rotor.any() else axes.T @ body.rotor / (size * rate)
+        top = HeavyTop(
+            [Fraction(m / size) for m in moments],
+            1,
+            [Fraction(n / size / rate / rate) for n in moment],
+            rotor=None if whirl is None else [Fraction(k) for k in whirl],
+        )
+        system = HEAVY_TOP if whirl is None else HEAVY_GYROSTAT
         state = State([Fraction(w / rate) for w in omega], [Fraction(g) for g in rows[2]])
         xi = (Fraction(rows[0, 0]), Fraction(rows[0, 1]), Fraction(rows[0, 2]))
         scaled = [time * Fraction(rate) for time in times]
-        run = propagate(top, state, [t for t in scaled if t], DOUBLE, xi=xi, step_limit=_STEPS) if any(scaled) else None
+        later = [t for t in scaled if t]
+        run = propagate(top, state, later, DOUBLE, system=system, xi=xi, step_limit=_STEPS) if later else None
     except (HeavyTopError, OverflowError, ValueError):
         return None
     if run is not None and run.outcome is not Outcome.SUCCESS:

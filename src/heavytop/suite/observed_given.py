@@ -15,11 +15,10 @@ from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.conventions import Convention, space_to_body
 from heavytop.measure.observations import Posed
-from heavytop.measure.supposed_motion import BodyData
 from heavytop.measure.supposed_readings import Reading, Seen, Start
 from heavytop.precision import Precision
 from heavytop.suite.given import Given, bits_of, component, named, require_states, rounded_state
-from heavytop.suite.observed_body import Body, principal, rounded_body
+from heavytop.suite.observed_body import AnyBody, body_data, in_principal_axes, rounded_body, system_of
 from heavytop.suite.observed_start import (
     RawStart,
     body_omega,
@@ -28,8 +27,8 @@ from heavytop.suite.observed_start import (
     require_rows,
     rotation,
 )
-from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State, Vector, require_physical
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
+from heavytop.top.heavy_top import State, Vector, require_physical
 
 _SPARE_BITS = 160
 """Bits of principal axes beyond those of the format."""
@@ -47,7 +46,7 @@ class Observed:
     columns: Mapping[str, list[tuple[Fraction, ...]]]
     said: Convention
     posed: Posed
-    body: HeavyTop | Body
+    body: AnyBody
     start: RawStart
 
     @property
@@ -78,17 +77,6 @@ class Observed:
         return Seen(tuple(times[:count]), columns, body, start, said, of, pivot, count) if count else None
 
 
-def body_data(body: HeavyTop | Body) -> BodyData:
-    """A body in double."""
-    if isinstance(body, HeavyTop):
-        inertia = numpy.diag([float(value) for value in body.inertia])
-        return BodyData(inertia, numpy.array([float(v) for v in body.centre]), None, float(body.weight))
-    inertia = numpy.array([[float(value) for value in row] for row in body.inertia])
-    centre = numpy.array([float(value) for value in body.centre])
-    about = body.about == "centre of mass"
-    return BodyData(inertia, centre, float(body.mass), float(body.gravity), about)
-
-
 def _start(raw: RawStart, posed: Posed) -> Start:
     omega = numpy.array([float(value) for value in raw.omega])
     if raw.form != "gamma":
@@ -107,11 +95,11 @@ def _cross(a: Sequence[Fraction], b: Sequence[Fraction]) -> list[Fraction]:
 
 
 def posed(
-    body: HeavyTop | Body, raw: RawStart, said: Convention, precision: Precision, normalize: bool
-) -> tuple[HeavyTop | Body, RawStart, Posed]:
+    body: AnyBody, raw: RawStart, said: Convention, precision: Precision, normalize: bool
+) -> tuple[AnyBody, RawStart, Posed]:
     """Body and start rounded to the format, and both in principal axes."""
     body, start = rounded_body(body, precision), raw.rounded(precision)
-    top, axes = principal(body, precision.bits + _SPARE_BITS)
+    top, axes = in_principal_axes(body, precision.bits + _SPARE_BITS)
     rows = rotation(start, said, precision, normalize)
     omega = body_omega(start, said, rows)
     in_principal = [space_to_body(axes, v) for v in (omega, rows[2], rows[0])]
@@ -125,7 +113,7 @@ def _vector(values: Sequence[Fraction]) -> Vector:
 
 
 def observed(
-    body: HeavyTop | Body,
+    body: AnyBody,
     raw: RawStart,
     said: Convention,
     values: Mapping[str, Sequence[tuple[Fraction, ...] | None]],
@@ -185,7 +173,7 @@ def _joined(parts: Sequence[tuple[Fraction, ...] | None]) -> tuple[Fraction, ...
 
 
 def of_observed_arrays(
-    body: HeavyTop | Body,
+    body: AnyBody,
     raw: RawStart,
     said: Convention,
     times: list[Fraction],
@@ -211,7 +199,21 @@ def of_observed_arrays(
     name, integrator = named(names[0], "name"), named(names[1], "integrator")
     top, start = found.posed.top, found.posed.start
     require_physical(top, start)
-    return Given(name, integrator, top, start, HEAVY_TOP, form, times, states, outcome, 0, {}, "", observed=found)
+    return Given(
+        name,
+        integrator,
+        top,
+        start,
+        system_of(body, HEAVY_TOP),
+        form,
+        times,
+        states,
+        outcome,
+        0,
+        {},
+        "",
+        observed=found,
+    )
 
 
 def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:
@@ -225,7 +227,7 @@ def _row(row: Sequence[Any], where: str) -> tuple[Fraction, ...] | None:
 
 def require_system(system: System) -> None:
     """Raises InputError for a system whose attitude is not scored."""
-    if system is not HEAVY_TOP:
+    if system not in (HEAVY_TOP, HEAVY_GYROSTAT):
         raise InputError(
             f"Attitudes and positions are not scored in the system {system.name}.", 'Use "heavy_top", or give Ω and γ.'
         )

@@ -26,7 +26,6 @@ from heavytop.precision import Precision, decimal_text, round_to, shown
 from heavytop.records import Metric, Quantity, by_name
 from heavytop.suite.given import Given
 from heavytop.suite.observed_given import Observed
-from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import dot
 
 _WORTH_ASKING = 1e-10
@@ -50,7 +49,7 @@ def exact_problem(given: Given) -> Problem:
     found = observed_of(given)
     top, start = found.posed.top, found.posed.start
     attitude = set(found.columns) - {"omega", "gamma"}
-    parameters = Parameters(top.inertia, top.moment, Fraction(0))
+    parameters = given.system.parameters(top, start)
     xi = found.posed.xi if attitude else None
     return Problem(given.system, given.precision, parameters, start, xi, (top, start))
 

@@ -7,15 +7,11 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from flint import arb
-
 from heavytop.errors import InputError
-from heavytop.exact.balls import FUNCTIONS, ball, midpoint, working_precision
-from heavytop.exact.flint_context import whole_evaluation
 from heavytop.measure.conventions import Convention, space_to_body
-from heavytop.measure.observations import ball_functions
 from heavytop.precision import Precision, decimal_text, round_to
 from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import Angle, Attitude
 from heavytop.top.heavy_top import State, Vector, cross, dot
 
 _SLACK = 8
@@ -102,27 +98,19 @@ def _of_gamma(raw: RawStart, slack: Fraction, normalize: bool) -> Rows:
     return xi, (a, b, c), gamma
 
 
-@whole_evaluation
-def _orthogonal(raw: RawStart, said: Convention, precision: Precision) -> list[list[Fraction]]:
-    """R of a matrix that is off by roundings, or of angles: by the quaternion next to it, whose R is orthogonal."""
-    if raw.form == "plain":
-        return of_quaternion(nearest_quaternion([raw.values[0:3], raw.values[3:6], raw.values[6:9]]))
-    if raw.form == "matrix":
-        return of_quaternion(nearest_quaternion(said.rotation("matrix", raw.values, None)))
-    bits = precision.bits + _SPARE_BITS
-    angles = replace(said, angles="degrees" if raw.degrees else "radians")
-    with working_precision(bits):
-        found = angles.rotation("euler", [ball(value) for value in raw.values], ball_functions())
-        rows = [
-            [midpoint(1 * entry) if not isinstance(entry, int) else Fraction(entry) for entry in row] for row in found
-        ]
-    return of_quaternion([round_to(part, bits) for part in nearest_quaternion(rows)])
+def _orthogonal(raw: RawStart, said: Convention, precision: Precision) -> Rows:
+    """R of a matrix that is off by roundings, or of angles: of the quaternion next to it, so that it is orthogonal."""
+    if raw.form == "euler":
+        angles = tuple(Angle(value, raw.degrees) for value in raw.values)
+        return Attitude("euler", angles=angles, sequence=said.sequence).rational_rows(precision.bits + _SPARE_BITS)
+    plain = replace(said, matrix="body_to_space") if raw.form == "plain" else said
+    return of_quaternion(nearest_quaternion(plain.rotation("matrix", raw.values, None)))
 
 
-def of_quaternion(q: Sequence[Fraction]) -> list[list[Fraction]]:
+def of_quaternion(q: Sequence[Fraction]) -> Rows:
     """R of a quaternion w, x, y, z of any length, exactly."""
-    found: list[list[Fraction]] = Convention().rotation("quaternion", q, None)
-    return found
+    first, second, third = (tuple(row) for row in Convention().rotation("quaternion", q, None))
+    return first, second, third
 
 
 def nearest_quaternion(rows: Sequence[Sequence[Fraction]]) -> list[Fraction]:
@@ -194,17 +182,9 @@ def body_omega(raw: RawStart, said: Convention, rows: Rows) -> Vector:
 
 def raw_start(start: State) -> RawStart:
     """The start of a program: by its attitude where it has one, else by γ."""
-    attitude = getattr(start, "attitude", None)
-    if attitude is None:
-        return RawStart("gamma", start.gamma, start.omega)
-    known = attitude.exact_rows()
-    if known is None:
-        with working_precision(_IRRATIONAL_BITS):
-            rows = attitude.rows(FUNCTIONS, ball)
-            known = [[_middle(entry) for entry in row] for row in rows]
-    return RawStart("plain", tuple(entry for row in known for entry in row), start.omega)
-
-
-def _middle(value: Any) -> Fraction:
-    """Of a ball, or an exact number."""
-    return midpoint(value) if isinstance(value, arb) else Fraction(value)
+    omega = start.omega if start.omega_space is None else start.omega_space
+    space = start.omega_space is not None
+    if start.attitude is None:
+        return RawStart("gamma", start.gamma, omega, space)
+    rows = start.attitude.rational_rows(_IRRATIONAL_BITS)
+    return RawStart("plain", tuple(entry for row in rows for entry in row), omega, space)

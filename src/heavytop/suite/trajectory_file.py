@@ -17,12 +17,12 @@ from heavytop.suite import observed_file
 from heavytop.suite.cases import Case
 from heavytop.suite.files import read_whole, without_repeats
 from heavytop.suite.given import LONGEST_NAME, MOST, Given, named, require_states, rounded_state, too_many
-from heavytop.suite.observed_body import Body
-from heavytop.suite.observed_body import body as body_of
+from heavytop.suite.observed_body import AnyBody, system_of
 from heavytop.suite.observed_given import observed, require_system
 from heavytop.suite.observed_start import RawStart
 from heavytop.suite.trajectory_case import require_case
 from heavytop.suite.trajectory_table import REMEDY, VECTORS, Table, unknown
+from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.equations import system
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 from heavytop.top.times import check_times
@@ -165,7 +165,7 @@ def _observed(
     return Given(
         top=found.posed.top,
         start=found.posed.start,
-        system=which,
+        system=system_of(body, which),
         precision=precision,
         times=times,
         states=rows,
@@ -200,7 +200,7 @@ def _raw_start(
     return observed_file.start(document, table, at_start, said)
 
 
-def _body(document: dict[str, Any], case: Case | None) -> HeavyTop | Body:
+def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
     """The body of a file with its mass, or a top by its weight."""
     given = [key for key in ("mass", "gravity") if key in document]
     if not given:
@@ -214,7 +214,7 @@ def _body(document: dict[str, Any], case: Case | None) -> HeavyTop | Body:
     inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)
     flat = [each for row in inertia for each in (row if isinstance(row, list) else [row])]
     rotor = document.get("rotor")
-    return body_of(mass=mass, gravity=gravity, centre=centre, inertia=flat, about=about or None, rotor=rotor)
+    return Body(mass, gravity, centre, flat, {"centre": CENTRE}.get(about, about or None), rotor)
 
 
 def _top(document: dict[str, Any], case: Case | None) -> HeavyTop:
