@@ -18,9 +18,11 @@ form of the same induction, |y_n| ≤ R Kⁿ with K = q R + l for |y(0)| ≤ R, 
 first step.  The form with the defect uses the coefficients that are there and allows steps about six times longer.
 
 *The set of errors.*  With V' = J V, V(0) = 1, variation of constants gives w(τ) = V(τ) w0 + v,
-|v| ≤ e^Λ (D + h q W²).  V is computed as a polynomial in binary64; with E its own defect,
-|V − V̂| ≤ e^Λ ∫|E|.  Errors are kept as w0 ∈ {Q x: |x_i| ≤ r_i} with Q nearly orthogonal; the next Q comes from a QR
-factorisation of V̂ Q diag(r) with its columns ordered by length (Lohner), and Q'^T Q' = 1 + F is paid for with |F|.
+|v| ≤ e^Λ (D + h q W²).  Where the field is not known
+exactly, y' = f(y) + δ with |δ| ≤ s on the motion (:attr:`heavytop.exact.quadratic.Quadratic.slack`), D is h s more, and
+all of it holds.  V is computed as a polynomial in binary64; with E its own defect, |V − V̂| ≤ e^Λ ∫|E|.  Errors are kept
+as w0 ∈ {Q x: |x_i| ≤ r_i} with Q nearly orthogonal; the next Q comes from a QR factorisation of V̂ Q diag(r) with its
+columns ordered by length (Lohner), and Q'^T Q' = 1 + F is paid for with |F|.
 binary64 is used here with round to nearest; every bound carries the rounding of its own evaluation (``_UP``).
 
 Measured on the generic top of the tests at 400 bits, bits lost by t = 8, 30, 100, 300:
@@ -59,6 +61,8 @@ _VARIATIONAL_ORDER = 32
 # the size c of an error beyond which an enclosure counts as lost
 CAP = 2.0**-16
 _LARGEST_SLOPE = 2.0
+_FAR_OFF = 2**900
+"""Ulps that no start may be off by: such an enclosure is lost at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,11 +217,16 @@ def coefficient_bound(field: Quadratic, size: Fraction) -> Fraction:
     return field.q * size + field.l
 
 
-def start_node(field: Quadratic, start: tuple[Fraction, ...], precision: int) -> Node:
-    """The node at time 0 of the motion from exact ``start``, rounded to ulps of 2^-precision."""
+def start_node(field: Quadratic, start: tuple[Fraction, ...], precision: int, off: Sequence[Fraction] = ()) -> Node:
+    """The node at time 0 of the motion from ``start``, rounded to ulps of 2^-precision.
+
+    off: how far each component of the true start may be from it; none where it is exact.
+    """
     scaled = [value * 2**precision for value in start]
     centre = tuple(mpz(round(value)) for value in scaled)
     radii = np.array([0.0 if value.denominator == 1 else 0.5 for value in scaled])
+    if any(off):
+        radii += np.array([float(min(value * 2**precision, _FAR_OFF)) * _UP + _TINY for value in off])
     bound = coefficient_bound(field, max(map(abs, start)))
     # the first step has K h < 1/4
     halvings = 2 + int(bound).bit_length() if bound >= 1 else 2 - int(1 / (bound + Fraction(1, 16))).bit_length()
@@ -256,7 +265,10 @@ def _prove(field: Quadratic, node: Node, series: StepSeries, precision: int) -> 
         return None
     factor = exp(growth) * _UP
     scale = node.errors.exponent
-    defect = np.ldexp(_defect(series, precision, h * q, h * slope), -scale) + _TINY
+    defect = _defect(series, precision, h * q, h * slope)
+    # what the field itself lacks: |y' − f(y)| on the true motion
+    lacking, exponent = field.slack
+    defect = np.ldexp(defect, -scale) + np.ldexp(h * lacking * _UP, exponent + precision - scale) + _TINY
     variation, powers, variation_error = _variation(field, series, h, h * 2 * q * sizes)
     bound = (float(node.errors.sizes().max()) + defect) * factor * _UP
     square = np.ldexp(h * q * bound * bound, max(scale - precision, -2000)) + _TINY

@@ -30,6 +30,7 @@ class Quadratic:
     q, l: the largest row sums of absolute coefficients of the two parts, so |f(y)| ≤ q |y|² + l |y| and the Jacobian
     has |J(y)| ≤ 2 q |y| + l, in the maximum norm.
     jacobian: J(y)_ij = Σ_k jacobian[i, j, k] y_k + slope[i, j], rounded to binary64; infinite where it has no such.
+    slack: (a, b): the true field differs from this one by at most a 2^b, in the maximum norm, wherever its motion goes.
     """
 
     pairs: tuple[tuple[int, int], ...]
@@ -38,6 +39,7 @@ class Quadratic:
     l: Fraction  # noqa: E741 - the letter of the theorem
     jacobian: Matrix
     slope: Matrix
+    slack: tuple[float, int] = (0.0, 0)
 
     @property
     def dimension(self) -> int:

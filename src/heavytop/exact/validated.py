@@ -18,7 +18,7 @@ time, so that t = 10,000 would need some 1,900 bits, more than there are words f
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import inf, log10
 
@@ -36,6 +36,18 @@ from heavytop.precision import decimal_text
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """How far the true motion is from the rational data that stand for it.
+
+    start: of each component of (Ω, γ, ξ) at t = 0.  rate: of each component of Ω', at any time of the true motion.
+    """
+
+    start: tuple[Fraction, ...]
+    rate: Fraction
+
 
 _PILOT_BITS = 128
 _PILOT_ROOM = 72
@@ -58,6 +70,7 @@ class Validated:
 
     top, start, system: any.  rotor: λ of the gyrostat where the start is rounded and (2.1) no longer holds exactly;
     None for P b/(M·γ).  xi: the attitude vector at time 0; None for :func:`heavytop.top.angles.perpendicular`.
+    uncertainty: what the data lack; the motion enclosed is the true one.  None for exact data.
     effort: what a request may cost, in seconds of the cost model; beyond it the request is refused.
     unit: the motion changes at about the rate 2^unit (:func:`heavytop.exact.scales.unit_of_time`).
     Raises InputError where the system does not admit the top and start, OutOfReach where they are too large.
@@ -70,6 +83,7 @@ class Validated:
     xi: Vector | None = None
     effort: float = 900.0
     method: str = "validated: Taylor enclosure"
+    uncertainty: Uncertainty | None = None
     unit: int = field(default=0, init=False, repr=False, compare=False)
     _runs: dict[tuple[int, int, bool, int], Run] = field(default_factory=dict, init=False, repr=False, compare=False)
     _pilots: dict[tuple[int, int, bool, int], Pilot] = field(
@@ -154,7 +168,10 @@ class Validated:
         """That of ``start``: of y, or of y and ξ."""
         key = (direction, len(start))
         if key not in self._motions:
-            self._motions[key] = ScaledMotion.of(self.system, self.parameters, start, direction > 0)
+            motion = ScaledMotion.of(self.system, self.parameters, start, direction > 0)
+            if self.uncertainty is not None:
+                motion.field = replace(motion.field, slack=_rounded_up(self.uncertainty.rate / motion.scaled.rate**2))
+            self._motions.setdefault(key, motion)
         return self._motions[key]
 
     def _run(self, direction: int, start: tuple[Fraction, ...], precision: int, in_words: bool) -> Run:
@@ -162,13 +179,15 @@ class Validated:
         if key not in self._runs:
             motion = self._motion(direction, start)
             carrier = motion.carrier(precision) if in_words else None
-            node = start_node(motion.field, motion.scaled.state, precision)
+            off = () if self.uncertainty is None else self.uncertainty.start[: len(start)]
+            lacking = [value / size for value, size in zip(off, motion.scaled.sizes[: len(off)], strict=True)]
+            node = start_node(motion.field, motion.scaled.state, precision, lacking)
             self._runs.setdefault(key, Run(motion.field, precision, (node,), carrier))
         return self._runs[key]
 
     def _enclosure(self, time: Fraction, bits: int, start: tuple[Fraction, ...]) -> list[arb]:
         if time == 0:
-            return _rounded(start, bits + 8)
+            return _rounded(start, bits + 8, () if self.uncertainty is None else self.uncertainty.start)
         direction = 1 if time > 0 else -1
         motion = self._motion(direction, start)
         span, sizes = abs(time) * motion.scaled.rate, motion.scaled.sizes
@@ -246,9 +265,20 @@ class Validated:
 
 
 @whole_evaluation
-def _rounded(start: tuple[Fraction, ...], bits: int) -> list[arb]:
+def _rounded(start: tuple[Fraction, ...], bits: int, off: tuple[Fraction, ...]) -> list[arb]:
     with working_precision(bits):
-        return [ball(value) for value in start]
+        if not off:
+            return [ball(value) for value in start]
+        wide = [arb(0, ball(value).abs_upper()) for value in off[: len(start)]]
+        return [ball(value) + more for value, more in zip(start, wide, strict=True)]
+
+
+def _rounded_up(value: Fraction) -> tuple[float, int]:
+    """(a, b) with value ≤ a 2^b, a below 4."""
+    if value == 0:
+        return 0.0, 0
+    power = exponent(value)
+    return float(value / Fraction(2) ** power) * (1 + 2.0**-50), power
 
 
 @whole_evaluation

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
-from heavytop.top.heavy_top import Vector, cross
+from heavytop.top.vectors import Vector, cross
 
 
 def gamma_from_angles(phi: Any, theta: Any, lib: Any) -> tuple[Any, Any, Any]:

@@ -23,7 +23,7 @@ from typing import Any
 
 from heavytop.errors import InputError, quoted
 from heavytop.precision import decimal_text, exact, exact_text, round_to
-from heavytop.top.heavy_top import Vector, cross, dot, ordered, vector
+from heavytop.top.vectors import Vector, cross, dot, ordered, vector
 
 Rows = Sequence[Sequence[Any]]
 Number = Callable[[Fraction], Any]
@@ -31,6 +31,7 @@ Number = Callable[[Fraction], Any]
 SEQUENCES = tuple("".join(letters) for letters in product("XYZ", repeat=3) if letters[0] != letters[1] != letters[2])
 """The twelve sequences of Euler angles."""
 _SHOWN_BITS = 64
+_GUARD_BITS = 16
 _DEGREES = "deg"
 _NORMALIZE = "Normalize it (--normalize on the command line, normalize=True in Python), or give exact numbers."
 
@@ -66,6 +67,13 @@ def matrix_of_quaternion(q: Sequence[Any]) -> tuple[Any, Any, Any]:
         (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
         (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
     )
+
+
+def rotation_of(q: Sequence[Fraction]) -> tuple[Vector, Vector, Vector]:
+    """R of a rational quaternion of any length but 0, in exact rationals."""
+    square = sum(value * value for value in q)
+    first, second, third = (tuple(value / square for value in row) for row in matrix_of_quaternion(q))
+    return first, second, third
 
 
 def _multiple_of_quaternion(rows: Rows) -> tuple[Any, Any, Any, Any]:
@@ -275,11 +283,34 @@ class Attitude:
             return f"{self.sequence}:{','.join(map(str, self.angles))}"
         return ",".join(texts)
 
+    def __repr__(self) -> str:
+        if self.kind == "euler":
+            return f"Attitude.euler({self.sequence!r}, {', '.join(repr(str(angle)) for angle in self.angles)})"
+        texts = ", ".join(repr(exact_text(value)) for value in self.numbers)
+        if self.kind == "axis_angle":
+            return f"Attitude.axis_angle(({texts}), {str(self.angles[0])!r})"
+        unit = self.kind == "matrix" or sum(value * value for value in self.numbers) == 1
+        values = f"({texts})" if self.kind == "matrix" else texts
+        return f"Attitude.{self.kind}({values}{'' if unit else ', normalize=True'})"
+
+    def rational_rows(self, bits: int) -> tuple[Vector, Vector, Vector]:
+        """R where it is rational; else a rational rotation, exactly orthogonal, within 2^-bits of it."""
+        known = self.exact_rows()
+        return known if known is not None else rotation_of(self._near_quaternion(bits + _GUARD_BITS))
+
+    def _near_quaternion(self, bits: int) -> tuple[Fraction, ...]:
+        import mpmath
+
+        # mpmath.mp is shared by all threads
+        lib = mpmath.MPContext()
+        lib.prec = bits
+        rows = self.rows(lib, lambda value: lib.mpf(value.numerator) / value.denominator)
+        return tuple(exact(value) for value in _multiple_of_quaternion(rows))
+
     def exact_rows(self) -> tuple[Vector, Vector, Vector] | None:
         """R in exact rationals; None where some entry may be irrational."""
         if self.kind == "quaternion":
-            square = sum(value * value for value in self.numbers)
-            return tuple(tuple(value / square for value in row) for row in matrix_of_quaternion(self.numbers))  # type: ignore[return-value]
+            return rotation_of(self.numbers)
         if self.kind == "matrix":
             return self.numbers[:3], self.numbers[3:6], self.numbers[6:]  # type: ignore[return-value]
         quarters = [angle.quarters() for angle in self.angles]

@@ -2,66 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import islice
 from math import isqrt
 from typing import Any
 
-from heavytop.errors import HeavyTopError, InputError, quoted
+from heavytop.errors import InputError, quoted
 from heavytop.precision import decimal_text, exact, exact_text, physical, round_to, shown
+from heavytop.top.attitude import Attitude, rotated, transposed
+from heavytop.top.vectors import Vector as Vector
+from heavytop.top.vectors import cross as cross
+from heavytop.top.vectors import dot as dot
+from heavytop.top.vectors import ordered as ordered
+from heavytop.top.vectors import vector as vector
 
-Vector = tuple[Fraction, Fraction, Fraction]
 _SHOWN_BITS = 64
+_ATTITUDE_BITS = 256
 _NEAR_BITS = 10
 """Bits of the unit vector that an error suggests: enough to show which one was meant."""
 _NORMALIZE = (
     "Give rational components such as 3/5,0,4/5, or move gamma onto the sphere: --normalize on the command line, "
     "State.normalized() in Python."
 )
-_MOST = 10_000_000
-"""Members of a list; a generator may have no end."""
-
-
-def vector(values: Iterable[Any], what: str) -> Vector:
-    """Three exact rationals out of anything :func:`heavytop.precision.exact` reads; raises InputError otherwise."""
-    parts = ordered(values, what, "Give three numbers, one for each principal axis: x,y,z.")
-    if len(parts) != 3:
-        raise InputError(f"{what} has {len(parts)} numbers.", "Give three, one for each principal axis: x,y,z.")
-    try:
-        first, second, third = (exact(part) for part in parts)
-    except InputError as error:
-        raise InputError(f"{what}: {error.cause}", error.remedy) from None
-    return first, second, third
-
-
-def ordered(values: Any, what: str, remedy: str) -> list[Any]:
-    """The members of a list, a tuple, an array or another iterable with an order of its own.
-
-    Raises InputError for text, whose characters are no list of numbers, for sets and mappings, and for what is none.
-    """
-    if not isinstance(values, str | bytes | bytearray | Set | Mapping):
-        try:
-            found = list(islice(values, _MOST + 1))
-            if len(found) > _MOST:
-                raise InputError(f"{what} has more than {_MOST} members.", remedy)
-            return found
-        except HeavyTopError:
-            raise
-        except Exception:  # what is no iterable, an array without dimensions, a generator that fails
-            pass
-    raise InputError(f"{what} = {quoted(values)} is not a list.", remedy)
-
-
-def dot(a: Any, b: Any) -> Any:
-    """a · b over any ring."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Any, b: Any) -> tuple[Any, Any, Any]:
-    """a × b over any ring."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @dataclass(frozen=True, slots=True, init=False)
@@ -147,18 +110,58 @@ class State:
 
     Up: the equations are M' = M × Ω + P γ × r, γ' = γ × Ω and the energy is ½ Ω·M + P r·γ, higher with r along γ.
 
-    omega, gamma: three numbers each, read by :func:`heavytop.precision.exact`.
+    omega: Ω in body axes, or omega_space: R Ω, which needs an attitude.  gamma: γ, or attitude: R, whose last row γ is.
+    Numbers are read by :func:`heavytop.precision.exact`.  Of an attitude with irrational entries, γ and Ω = Rᵀ Ω_space
+    here are those of a rational rotation within 2^-250 of it; what computes with the state takes the attitude itself,
+    to the bits that it needs (:mod:`heavytop.exact.bodies`).
+
+    Raises InputError where two of them contradict each other, or one is missing.
     """
 
     omega: Vector
     gamma: Vector
+    attitude: Attitude | None
+    omega_space: Vector | None
 
-    def __init__(self, omega: Iterable[Any], gamma: Iterable[Any]) -> None:
-        object.__setattr__(self, "omega", vector(omega, "omega"))
-        object.__setattr__(self, "gamma", vector(gamma, "gamma"))
+    def __init__(
+        self,
+        omega: Iterable[Any] | None = None,
+        gamma: Iterable[Any] | None = None,
+        *,
+        attitude: Attitude | None = None,
+        omega_space: Iterable[Any] | None = None,
+    ) -> None:
+        if (omega is None) == (omega_space is None):
+            both = "both omega and omega_space were" if omega is not None else "neither omega nor omega_space was"
+            raise InputError(f"Of the angular velocity {both} given.", "Give one of them: body axes, or space axes.")
+        if attitude is None:
+            if gamma is None:
+                raise InputError("Neither gamma nor an attitude was given.", "Give gamma, or an Attitude.")
+            if omega_space is not None:
+                raise InputError("omega_space without an attitude.", "Give an Attitude, or omega in body axes.")
+            up = vector(gamma, "gamma")
+        else:
+            if not isinstance(attitude, Attitude):
+                raise InputError(
+                    f"attitude = {quoted(attitude)} is not an Attitude.",
+                    "Use Attitude.quaternion(w, x, y, z) or another.",
+                )
+            up = attitude.rational_rows(_ATTITUDE_BITS)[2]
+            if gamma is not None:
+                _require_same_gamma(vector(gamma, "gamma"), up, attitude)
+        space = None if omega_space is None else vector(omega_space, "omega_space")
+        if space is not None and attitude is not None:
+            spin = rotated(transposed(attitude.rational_rows(_ATTITUDE_BITS)), space)
+        else:
+            spin = vector(() if omega is None else omega, "omega")
+        for name, value in (("omega", spin), ("gamma", up), ("attitude", attitude), ("omega_space", space)):
+            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
-        return f"State(omega={_text(self.omega)}, gamma={_text(self.gamma)})"
+        spin = f"omega={_text(self.omega)}" if self.omega_space is None else f"omega_space={_text(self.omega_space)}"
+        return (
+            f"State({spin}, {f'gamma={_text(self.gamma)}' if self.attitude is None else f'attitude={self.attitude!r}'})"
+        )
 
     @property
     def flat(self) -> tuple[Fraction, ...]:
@@ -217,3 +220,13 @@ def _text(value: Fraction | Vector) -> str:
         return f"({', '.join(map(_text, value))})"
     text = shown(value)
     return text if text.lstrip("-").isdigit() else repr(text)
+
+
+def _require_same_gamma(gamma: Vector, up: Vector, attitude: Attitude) -> None:
+    """Raises InputError where γ is not the last row of the attitude; of an irrational one, to 1e-15."""
+    slack = Fraction(0) if attitude.exact_rows() is not None else Fraction(1, 10**15)
+    if max(abs(a - b) for a, b in zip(gamma, up, strict=True)) > slack:
+        raise InputError(
+            f"gamma = {_text(gamma)} contradicts the attitude, whose gamma is {_text(up)}.",
+            "Give one of them: the last row of R is gamma.",
+        )

@@ -1,0 +1,319 @@
+"""The motion of a body in the axes in which it was given: principal axes, attitudes and what is irrational of them.
+
+Everything is computed in principal axes, from exact rationals.  Where the principal axes of a tensor, or an attitude
+given by angles, are irrational, rational data stand for them: a rational rotation A near the principal axes, a rational
+rotation near the attitude.  What they lack is known and bounded (:class:`heavytop.exact.validated.Uncertainty`):
+
+the true tensor in the axes A is D + E with D diagonal and E = Aᵀ J A − D, exactly, so that with X = (D + E)⁻¹
+
+    Ω' = D⁻¹ ((D Ω + k) × Ω + γ × n) + δ,
+    |δ| ≤ |X| |E| |D⁻¹| ((|J| |Ω| + |k|) |Ω| + |n|) + |D⁻¹| ((|E| |Ω| + |δk|) |Ω| + |δn|),
+
+and |Ω| is bounded for all times by the energy, |Ω|² ≤ 2 (½ Ω·JΩ + 2 |n|)/min J.  The enclosure takes δ as a part of its
+defect and the error of the start as the radii of its first node, so that its balls hold the *true* motion.  Algebraic
+motions (:mod:`heavytop.exact.algebraic`) are known in themselves, and need none of this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from math import isqrt, log2
+from typing import Any
+
+from flint import arb
+
+from heavytop.errors import OutOfReach
+from heavytop.exact.attitude import attitude_of
+from heavytop.exact.balls import FUNCTIONS, ball, midpoint, radius, relative_bits, to_bits, working_precision
+from heavytop.exact.catalogue import find
+from heavytop.exact.flint_context import whole_evaluation
+from heavytop.exact.solution import ExactSolution
+from heavytop.exact.validated import Uncertainty, Validated
+from heavytop.precision import round_to
+from heavytop.top.amplification import amplification
+from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import Attitude, Rows, rotated, transposed
+from heavytop.top.bodies import Body
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.principal import IDENTITY, PrincipalAxes
+from heavytop.top.vectors import Vector, cross, dot
+
+Finder = Callable[[HeavyTop, State, System], ExactSolution]
+_DATA_BITS = 256
+_GUARD_BITS = 96
+_ATTEMPTS = 4
+_MOST_BITS = 1 << 15
+_MARGIN = Fraction(1, 2**200)
+
+
+@dataclass(frozen=True, slots=True)
+class Resolved:
+    """A motion in principal axes, in exact rationals.
+
+    top, start: in principal axes.  xi: ξ at t = 0 in these; None where γ is no unit vector and no attitude was given.
+    axes: the rows of A, v_given = A v_principal.  uncertainty: what the data lack; None where they are exact.
+    """
+
+    top: HeavyTop
+    start: State
+    xi: Vector | None
+    axes: tuple[Vector, Vector, Vector]
+    uncertainty: Uncertainty | None
+
+    @property
+    def turned(self) -> bool:
+        """Whether the axes given are not these."""
+        return self.axes != IDENTITY
+
+    def given(self, state: Any) -> list[Any]:
+        """A state, (Ω, γ) or (Ω, γ, ξ), in the axes given, over any ring that rationals act on."""
+        return [value for place in range(0, len(state), 3) for value in rotated(self.axes, state[place : place + 3])]
+
+
+def resolve(body: Body | HeavyTop, start: State, bits: int = 256) -> Resolved:
+    """The motion of a body, or of a top, from ``start``, in principal axes.
+
+    bits: to which what is irrational is rounded, relative to the largest of its kind.
+    """
+    spin, rows, off = _start(start, bits)
+    up = rows[2] if rows is not None else start.gamma
+    if isinstance(body, HeavyTop):
+        return _resolved(body, IDENTITY, None, (spin, up, rows), off, bits)
+    principal = body.principal(bits)
+    return _resolved(body.top_in(principal), principal.axes, (body, principal), (spin, up, rows), off, bits)
+
+
+def _start(start: State, bits: int) -> tuple[Vector, tuple[Vector, Vector, Vector] | None, tuple[Fraction, Fraction]]:
+    """Ω, the rows of R (None where only γ is known), and how far Ω and each row may be off."""
+    attitude = start.attitude
+    if attitude is None:
+        return start.omega, None, (Fraction(0), Fraction(0))
+    known = attitude.exact_rows()
+    rows = known or attitude.rational_rows(bits)
+    off = Fraction(0) if known else _distance(attitude, rows, bits)
+    if start.omega_space is None:
+        return start.omega, rows, (Fraction(0), off)
+    turned = rotated(transposed(rows), start.omega_space)
+    return turned, rows, (off * sum(map(abs, start.omega_space), Fraction(0)), off)
+
+
+@whole_evaluation
+def _distance(attitude: Attitude, near: Rows, bits: int) -> Fraction:
+    """A bound of every entry of R − ``near``."""
+    with working_precision(bits + _GUARD_BITS):
+        rows = attitude.rows(FUNCTIONS, ball)
+        gaps = [rows[i][j] - ball(near[i][j]) for i in range(3) for j in range(3)]
+        return max(abs(midpoint(gap)) + radius(gap) for gap in gaps)
+
+
+def _resolved(
+    top: HeavyTop,
+    axes: tuple[Vector, Vector, Vector],
+    given: tuple[Body, PrincipalAxes] | None,
+    start: tuple[Vector, Vector, Any],
+    off: tuple[Fraction, Fraction],
+    bits: int,
+) -> Resolved:
+    spin, up, rows = start
+    back = transposed(axes)
+    unit = dot(up, up) == 1
+    xi = rows[0] if rows is not None else perpendicular(up) if unit else None
+    exact = given is None or given[1].exact
+    if exact and not any(off):
+        state = State(rotated(back, spin), rotated(back, up))
+        return Resolved(top, state, None if xi is None else rotated(back, xi), axes, None)
+    # short numbers in place of long ones, where they are not exact anyway
+    rounding = Fraction(1, 2**bits)
+    omega, speed = _shortened(rotated(back, spin), bits)
+    rounded, lacks = (top, None) if exact else _rounded_top(top, bits)
+    rate = Fraction(0)
+    if given is not None and not exact:
+        fastest = _root(dot(spin, spin)) + 2 * (off[0] + speed)
+        rate = _field_error(given, rounded, lacks, fastest)
+    # a vector turned by A moves by at most √3 times the largest of its components
+    errors = (*[2 * off[0] + speed] * 3, *[2 * off[1] + rounding] * 6)
+    state = State(omega, rotated(back, up))
+    return Resolved(rounded, state, None if xi is None else rotated(back, xi), axes, Uncertainty(errors, rate))
+
+
+def _shortened(values: Vector, bits: int) -> tuple[Vector, Fraction]:
+    """The vector with components of ``bits`` bits, and a bound of how far each has moved."""
+    first, second, third = (round_to(value, bits) for value in values)
+    return (first, second, third), max(abs(a - b) for a, b in zip((first, second, third), values, strict=True))
+
+
+def _rounded_top(top: HeavyTop, bits: int) -> tuple[HeavyTop, tuple[Vector, Vector]]:
+    """The top with short numbers, and what its n and k lack."""
+    centre = tuple(round_to(value, bits) for value in top.centre)
+    rotor = None if top.rotor is None else tuple(round_to(value, bits) for value in top.rotor)
+    short = HeavyTop(top.inertia, top.weight, centre, rotor=rotor)
+    missing = [
+        tuple(a - b for a, b in zip(one or (Fraction(0),) * 3, other or (Fraction(0),) * 3, strict=True))
+        for one, other in ((top.moment, short.moment), (top.rotor, short.rotor))
+    ]
+    return short, (missing[0], missing[1])  # type: ignore[return-value]
+
+
+def _field_error(
+    given: tuple[Body, PrincipalAxes], top: HeavyTop, lacks: tuple[Vector, Vector] | None, start_speed: Fraction
+) -> Fraction:
+    """A bound of every component of δ: see the head of this file.  Norms are Frobenius' and Euclid's, rounded up."""
+    body, principal = given
+    rest = _root(sum(value * value for row in principal.left for value in row))
+    tensor = _root(sum(value * value for row in body.tensor for value in row))
+    pull, whirl = _root(dot(body.moment, body.moment)), _root(dot(body.rotor or (0, 0, 0), body.rotor or (0, 0, 0)))
+    short, slow = (_root(dot(vector, vector)) for vector in lacks or ((0, 0, 0), (0, 0, 0)))
+    # |D⁻¹| and |X| as norms of matrices; |γ| is 1 within _MARGIN
+    least = min(principal.moments) - rest
+    inverse = 1 / least
+    square = 2 * (tensor * start_speed**2 / 2 + (2 + _MARGIN) * pull) / least
+    fastest = _root(square)
+    torque = (tensor * fastest + whirl) * fastest + (1 + _MARGIN) * pull
+    return inverse**2 * rest * torque + inverse * ((rest * fastest + slow) * fastest + (1 + _MARGIN) * short)
+
+
+def _root(square: Any) -> Fraction:
+    """Not less than the root of a rational, and at most 2^-30 larger relatively; 0 for 0."""
+    value = Fraction(square)
+    if value == 0:
+        return value
+    shift = max(0, 64 - (value.numerator.bit_length() - value.denominator.bit_length()))
+    shift += shift % 2
+    return Fraction(isqrt((value.numerator << shift) // value.denominator) + 1, 1 << (shift // 2))
+
+
+Evaluate = Callable[[tuple[Resolved, ExactSolution], int], list[arb]]
+
+
+@dataclass(frozen=True, slots=True)
+class BodyMotion:
+    """The known motion of a body or a top, in the axes in which it was given.
+
+    body, start: as given, any attitude included.  system: of the motion.  finder: of the motion in principal axes.
+    Its balls hold the true motion, irrational data included: proven, not assumed.
+    """
+
+    body: Body | HeavyTop
+    start: State
+    system: System = HEAVY_TOP
+    finder: Finder = find
+    _made: dict[int, tuple[Resolved, ExactSolution]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+
+    @property
+    def method(self) -> str:
+        """How it is known."""
+        return self.solution.method
+
+    @property
+    def resolved(self) -> Resolved:
+        """The motion in principal axes; irrational data to 256 bits."""
+        return self._known(_DATA_BITS)[0]
+
+    @property
+    def solution(self) -> ExactSolution:
+        """The motion in principal axes; with its uncertainty where the data are irrational."""
+        return self._known(_DATA_BITS)[1]
+
+    def state(self, time: Fraction, bits: int) -> list[arb]:
+        """(Ω, γ) at ``time`` in the axes given: six balls of ``bits`` bits.
+
+        Raises OutOfReach where they cannot be proven.
+        """
+        return self._evaluated(time, bits, lambda known, working: known[1].state(time, working))
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ at ``time`` in the axes given: three balls.
+
+        It starts at the first row of the attitude given, or at :func:`heavytop.top.angles.perpendicular` of γ.
+        Raises OutOfReach where it cannot be proven, InputError for |γ| ≠ 1 where no attitude was given.
+        """
+        return self._evaluated(time, bits, lambda known, working: _xi(*known, time, working))
+
+    def _evaluated(self, time: Fraction, bits: int, evaluate: Evaluate) -> list[arb]:
+        """The vectors of ``evaluate`` in the axes given, with so many bits."""
+        known = self._known(_DATA_BITS)
+        resolved = known[0]
+        if resolved.uncertainty is None:
+            return _turned(known, bits, evaluate)
+        parameters = self.system.parameters(resolved.top, resolved.start)
+        lost = log2(max(1.0, amplification(self.system, parameters, resolved.start.flat, time)))
+        data_bits = 64 * -(-(bits + _GUARD_BITS + int(2 * lost)) // 64)
+        while True:
+            try:
+                return _turned(self._known(data_bits), bits, evaluate)
+            except OutOfReach:
+                data_bits *= 4
+                if data_bits > _MOST_BITS:
+                    raise
+
+    def _known(self, bits: int) -> tuple[Resolved, ExactSolution]:
+        if bits not in self._made:
+            resolved = resolve(self.body, self.start, bits)
+            if resolved.uncertainty is None:
+                found = self.finder(resolved.top, resolved.start, self.system)
+            else:
+                found = Validated(
+                    resolved.top,
+                    resolved.start,
+                    self.system,
+                    xi=resolved.xi,
+                    method="validated: Taylor enclosure of irrational data",
+                    uncertainty=resolved.uncertainty,
+                )
+            self._made.setdefault(bits, (resolved, found))
+        return self._made[bits]
+
+
+def _turned(known: tuple[Resolved, ExactSolution], bits: int, evaluate: Evaluate) -> list[arb]:
+    """What is evaluated, in the axes given, with ``bits`` bits."""
+    if not known[0].turned:
+        return evaluate(known, bits)
+    working = bits + 4
+    for _ in range(_ATTEMPTS):
+        values = _given(known[0], evaluate(known, working), working + _GUARD_BITS)
+        reached = min(map(relative_bits, values))
+        if reached >= bits:
+            return values
+        working += bits - reached + 4
+    raise OutOfReach(f"Only {reached} of {bits} bits could be proven in the axes given.", "Ask for fewer digits.")
+
+
+@whole_evaluation
+def _given(resolved: Resolved, values: list[arb], bits: int) -> list[arb]:
+    with working_precision(bits):
+        return [
+            sum((ball(a) * x for a, x in zip(row, values[place : place + 3], strict=True)), arb(0))
+            for place in range(0, len(values), 3)
+            for row in resolved.axes
+        ]
+
+
+def _xi(resolved: Resolved, solution: ExactSolution, time: Fraction, bits: int) -> list[arb]:
+    """ξ in principal axes, from the start that was given."""
+    if isinstance(solution, Validated) and solution.xi is not None:
+        return solution.attitude(time, bits)
+    _, attitude = attitude_of(solution, time, bits)
+    began = perpendicular(solution.start.gamma)
+    if resolved.xi is None or resolved.xi == began:
+        return list(attitude(time, bits))
+    turn = dot(resolved.xi, began), dot(resolved.xi, cross(solution.start.gamma, began))
+    return _turned_about(solution, attitude, turn, time, bits)
+
+
+def _turned_about(
+    solution: ExactSolution, attitude: Any, turn: tuple[Fraction, Fraction], time: Fraction, bits: int
+) -> list[arb]:
+    """ξ turned about γ by a constant angle of rational (cos, sin)."""
+    cosine, sine = turn
+
+    def evaluate(working: int) -> list[arb]:
+        xi, gamma = attitude(time, working), solution.state(time, working)[3:]
+        eta = cross(gamma, xi)
+        return [ball(cosine) * x + ball(sine) * y for x, y in zip(xi, eta, strict=True)]
+
+    return to_bits(evaluate, bits)
