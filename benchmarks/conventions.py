@@ -3,7 +3,7 @@
 ``python benchmarks/conventions.py [bodies] [seed]`` writes each motion as a file of quaternions, matrices, Euler
 angles, positions or Ω in space, in random conventions, and as a file of Ω and γ beside it; prints how many digits
 `score` finds right in both, whether any right file is accused, and which of the planted mistakes are named.  The
-motions are computed here: Taylor series in extended precision on the full tensor in body axes, no principal axes, no heavytop.
+motions are computed here: Taylor series in extended precision on the full tensor in body axes, by no part of heavytop.
 """
 
 from __future__ import annotations

@@ -27,6 +27,7 @@ _EULER = {
     **dict.fromkeys(("psi", "ψ"), 3),
 }
 _TAIT_BRYAN = {"roll": "X", "pitch": "Y", "yaw": "Z", "heading": "Z"}
+_AXES = {"x": "1", "y": "2", "z": "3"}
 _CLASSIC = {"p": "1", "q": "2", "r": "3"}
 
 
@@ -61,7 +62,9 @@ def header(names: Sequence[str]) -> Header:
             continue
         quantity, component = meaning
         if component in found.setdefault(quantity, {}):
-            raise InputError(f"The column {quoted(name)} stands twice.", "Give each column once.")
+            plainly = quantity in ("omega", "gamma")
+            said = f"{quantity}{_AXES.get(component, component)}" if plainly else quoted(name)
+            raise InputError(f"The column {said} stands twice.", "Give each column once.")
         found[quantity][component] = place
         degrees = degrees or (quantity == "euler" and bool(_DEGREES.search(name.strip())))
     return Header(time, found, degrees, tuple(others))

@@ -126,10 +126,10 @@ def observed(
     normalize: take quaternions and matrices of any length for their rotations, at the start and in the rows.
     Raises InputError for quaternions and matrices that are none, with their place.
     """
-    for form in ("quaternion", "matrix"):
-        if form in values:
-            require_rows(form, values[form], places, normalize)
     rounded = {name: [_rounded(row, precision) for row in rows] for name, rows in values.items()}
+    for form in ("quaternion", "matrix"):
+        if form in rounded:
+            require_rows(form, rounded[form], places, normalize)
     count = max(map(len, rounded.values()))
     rows = [_joined([part[i] for part in rounded.values()]) for i in range(count)]
     done = next((i for i, row in enumerate(rows) if row is None), count)
