@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from heavytop.integrate.trajectory import Outcome, Trajectory
     from heavytop.measure.reference import Reference
     from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, available, real
+    from heavytop.top.attitude import Attitude
+    from heavytop.top.bodies import Body
     from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
     from heavytop.top.heavy_top import HeavyTop, State
     from heavytop.top.integrals import holding
@@ -30,6 +32,8 @@ _PLACES = {
     "integrate.trajectory": ("Outcome", "Trajectory"),
     "measure.reference": ("Reference",),
     "precision": ("DOUBLE", "DOUBLE_DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),
+    "top.attitude": ("Attitude",),
+    "top.bodies": ("Body",),
     "top.equations": ("GYROSTAT", "HEAVY_GYROSTAT", "HEAVY_TOP", "System"),
     "top.heavy_top": ("HeavyTop", "State"),
     "top.integrals": ("holding",),
@@ -44,7 +48,9 @@ __all__ = [
     "HEAVY_GYROSTAT",
     "HEAVY_TOP",
     "QUAD",
+    "Attitude",
     "Audit",
+    "Body",
     "Comparison",
     "Contradiction",
     "HeavyTop",

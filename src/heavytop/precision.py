@@ -308,7 +308,7 @@ def numbers(values: Sequence[Fraction], precision: Precision) -> Sequence[Any]:
         import numpy
 
         nearest = getattr(values, "doubles", None)
-        if nearest:
+        if nearest is not None and len(nearest):
             return cast(Sequence[Any], numpy.array(nearest))
     return [number(value, precision) for value in values]
 

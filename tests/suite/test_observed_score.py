@@ -1,7 +1,7 @@
-"""Files of quaternions, matrices, Euler angles, positions and Ω in space: scored to the digits that they have, mistakes of
-convention named, right ones not accused, bad input refused by its place.
+"""Files of quaternions, matrices, Euler angles, positions and Ω in space: scored to the digits that they have, mistakes
+of convention named, right ones not accused, bad input refused by its place.
 
-The motions are those of benchmarks/conventions.py: Taylor series on the full tensor in body axes, in extended precision.
+The motions are those of benchmarks/conventions.py: Taylor series on the full tensor, in extended precision.
 """
 
 import importlib.util
@@ -199,8 +199,8 @@ def test_json_says_the_same_as_csv(tmp_path: Path) -> None:
     }  # fmt: skip
     one, two = scored(lines(), tmp_path), scored(json.dumps(document), tmp_path, "motion.json")
     assert one.row.metrics == two.row.metrics
-    matrix = [[[str(np.cos(3.0 * t)), str(-np.sin(3.0 * t)), 0], [str(np.sin(3.0 * t)), str(np.cos(3.0 * t)), 0], [0, 0, 1]]
-              for t in (1, 2)]  # fmt: skip
+    pairs = [(str(np.cos(3.0 * t)), str(np.sin(3.0 * t))) for t in (1, 2)]
+    matrix = [[[c, f"-{s}".replace("--", ""), 0], [s, c, 0], [0, 0, 1]] for c, s in pairs]
     del document["quaternions"], document["start_quaternion"]
     as_matrices = document | {"matrix": matrix, "start_matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
     assert scored(json.dumps(as_matrices), tmp_path, "motion.json").digits_right > 15

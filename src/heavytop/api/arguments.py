@@ -11,6 +11,7 @@ from typing import Any, SupportsIndex, TypeAlias, TypeVar
 
 from heavytop.errors import InputError, quoted
 from heavytop.precision import DOUBLE, Precision, exact, parse, physical, require, shown, usable_tolerance, whole
+from heavytop.top.bodies import Body
 from heavytop.top.equations import SYSTEMS, WHICH_SYSTEM, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, dot, ordered, require_physical, vector
 
@@ -36,16 +37,17 @@ def is_a(value: object, kind: type[_Kind], what: str) -> _Kind:
 
 def motion(
     top: object, start: object, precision: Precision = DOUBLE, *, of_any_size: bool = False
-) -> tuple[HeavyTop, State]:
-    """A top and a start that a body can have.
+) -> tuple[HeavyTop | Body, State]:
+    """A top, or a body, and a start that it can have.
 
     of_any_size: for what computes with exact numbers alone, which no format bounds.
     Raises InputError for other types, data beyond 1e150, and a γ off the unit sphere by more than rounding to
     ``precision`` explains.
     """
-    body, state = is_a(top, HeavyTop, "top"), is_a(start, State, "start")
+    body: HeavyTop | Body = top if isinstance(top, Body) else is_a(top, HeavyTop, "top")
+    state = is_a(start, State, "start")
     if not of_any_size:
-        require_physical(body, state)
+        require_physical(body.top if isinstance(body, Body) else body, state)
     remedy = 'Give rational components such as ("3/5", 0, "4/5"), or use start.normalized().'
     return body, state.require_unit_gamma(slack_of(precision), remedy)
 
@@ -55,7 +57,7 @@ def slack_of(precision: Precision) -> Fraction:
     return max(precision.eps, DOUBLE.eps) * (1 << SLACK_BITS)
 
 
-def system(value: System | str | None, *tops: HeavyTop) -> System:
+def system(value: System | str | None, *tops: HeavyTop | Body) -> System:
     """The system, or the one of that name; for None heavy_gyrostat where a top has a rotor, else heavy_top.
 
     Raises InputError for a system that does not know the rotor of a top.
@@ -158,7 +160,15 @@ def text(value: object, what: str) -> str:
 
 
 def listed(values: object, kind: type[_Kind], what: str) -> Sequence[_Kind]:
-    """One top or start, or several, as a sequence."""
+    """One start or another thing, or several, as a sequence."""
     if isinstance(values, kind):
         return [values]
     return [is_a(value, kind, f"{what}[{i}]") for i, value in enumerate(ordered(values, what, _TYPES))]
+
+
+def bodies(values: object, what: str) -> Sequence[HeavyTop | Body]:
+    """One top or body, or several, as a sequence."""
+    if isinstance(values, HeavyTop | Body):
+        return [values]
+    listed = ordered(values, what, _TYPES)
+    return [v if isinstance(v, Body) else is_a(v, HeavyTop, f"{what}[{i}]") for i, v in enumerate(listed)]

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, TypeAlias, cast
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
+from heavytop.api.setup import Setup
 from heavytop.errors import InputError
 from heavytop.integrate import registry
 from heavytop.integrate.peers.source import named
-from heavytop.integrate.trajectory import Problem, Trajectory
+from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.reference import Reference
 from heavytop.measure.reference import reference as proven
 from heavytop.precision import DOUBLE, Precision, whole
+from heavytop.top.bodies import Body
 from heavytop.top.equations import System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import HeavyTop, State, ordered
 from heavytop.top.times import check_times
 
 Observer: TypeAlias = Callable[[Fraction, Any], object]
@@ -24,7 +27,7 @@ EnsembleObserver: TypeAlias = Callable[[int, Fraction, Any], object]
 
 
 def propagate(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     times: Numbers,
     precision: Precision | str = DOUBLE,
@@ -32,6 +35,7 @@ def propagate(
     integrator: str | Callable[..., Any] = "heyoka",
     system: System | str | None = None,
     xi: Numbers | None = None,
+    attitude: bool | None = None,
     tolerance: Number | None = None,
     high_accuracy: bool | None = None,
     compact_mode: bool | None = None,
@@ -41,8 +45,8 @@ def propagate(
     """The motion from ``start`` at t = 0, computed in a number format.
 
     Arguments:
-        top: the body: principal moments I, weight P, centre of mass r on the principal axes.
-        start: Ω in 1/time unit and γ at t = 0.
+        top: principal moments I, weight P, centre of mass r on the principal axes; or a :class:`Body`, in any axes.
+        start: Ω in 1/time unit and γ, or an :class:`Attitude`, at t = 0, in the axes of the body.
         times: shape (n,), exact numbers of one sign, strictly monotone away from 0; 0 itself may come first.
         precision: DOUBLE, EXTENDED, QUAD, real(BITS), or the name of one.
         integrator: "heyoka" or another name that `heavytop list` shows; a file, "mine.toml" of a program or
@@ -50,6 +54,10 @@ def propagate(
         system: "heavy_top", "gyrostat" or "heavy_gyrostat"; None for "heavy_gyrostat" where the top has a rotor, else
             "heavy_top".
         xi: shape (3,), a unit vector ⟂ γ, the space axis x in body components at t = 0, to ride along.
+        attitude: True to have ξ ride along beside the states, from the attitude of the start, or else from
+            :func:`heavytop.top.angles.perpendicular` of γ, where no ``xi`` says otherwise: for ``quaternions()``,
+            ``matrices()``, ``positions()``, ``omega_space()`` and ``euler("ZXZ")`` of the run; an observer is given
+            nine numbers.  None for True where the start has an attitude.
         tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; words: from there to
             1e-6, where None finer than the format; splittings have none.
         high_accuracy: compensated summation of heyoka's Taylor series, off where None.
@@ -59,7 +67,7 @@ def propagate(
 
     Returns:
         A :class:`Trajectory`: ``outcome``, ``times``, ``states`` as an array (n, 6) of the format's numbers in the
-        order Ω1 Ω2 Ω3 γ1 γ2 γ3, or (n, 9) with ξ; ``to_numpy()`` in double, ``texts()`` in full.  A run that fails is
+        order Ω1 Ω2 Ω3 γ1 γ2 γ3, or (n, 9) with ξ, in the axes in which the body was given; ``to_numpy()`` in double, ``texts()`` in full.  A run that fails is
         an outcome, not an exception.
 
     Raises:
@@ -71,15 +79,23 @@ def propagate(
     """
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)
-    options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
-    options |= {} if xi is None else {"xi": arguments.attitude(xi, state, form)}
+    setup = Setup.of(body, state, form, arguments.system(system, body))
+    options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, setup.watched(observer))
+    wanted = arguments.flag(attitude, "attitude")
+    beside = xi is None and (state.attitude is not None if wanted is None else wanted)
+    if xi is not None:
+        options["xi"] = setup.own(arguments.attitude(xi, state, form))
+    elif beside:
+        options["xi"] = setup.xi
     run = registry.propagator(named(integrator), options)
-    about, instants = arguments.system(system, body), check_times(times)
-    return cast(Trajectory, run(body, state, instants, form, system=about))
+    found = cast(Trajectory, run(setup.top, setup.start, check_times(times), form, system=setup.system))
+    if beside:
+        found = replace(found, states=found.states[:, :6], attitude=found.states[:, 6:])
+    return setup.given(found)
 
 
 def ensemble(
-    tops: HeavyTop | Iterable[HeavyTop],
+    tops: HeavyTop | Body | Iterable[HeavyTop | Body],
     starts: State | Iterable[State],
     times: Numbers,
     precision: Precision | str = DOUBLE,
@@ -110,23 +126,24 @@ def ensemble(
         InputError: as :func:`propagate`, naming the motion; for no motions, and for counts that differ.
         OutOfReach: as :func:`propagate`.
     """
-    form, bodies = arguments.precision(precision), arguments.listed(tops, HeavyTop, "tops")
+    form, bodies = arguments.precision(precision), arguments.bodies(tops, "tops")
     states = arguments.listed(starts, State, "starts")
-    problems = _problems(bodies, states, form, arguments.system(system, *bodies))
-    options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, observer)
+    setups = _setups(bodies, states, form, arguments.system(system, *bodies))
+    options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, _watching(setups, observer))
     options |= {} if threads is None else {"threads": arguments.count(threads, "threads")}
     run = registry.ensemble_propagator(named(integrator), options)
-    return cast("list[Trajectory]", run(problems, check_times(times)))
+    found = run([setup.problem for setup in setups], check_times(times))
+    return [setup.given(member) for setup, member in zip(setups, found, strict=True)]
 
 
 def reference(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     times: Numbers,
     digits: int = 50,
     *,
     system: System | str | None = None,
-    attitude: bool = False,
+    attitude: bool | None = None,
 ) -> Reference:
     """The known motion: proven states, from a closed form where there is one, else from a validated enclosure.
 
@@ -136,7 +153,8 @@ def reference(
         digits: 1 to 20,000; relative above 1, absolute below.
         system: "heavy_top", "gyrostat" or "heavy_gyrostat"; None for "heavy_gyrostat" where the top has a rotor, else
             "heavy_top".
-        attitude: give ξ as well, fixed in space and ⟂ γ, in body components.
+        attitude: give ξ as well, fixed in space and ⟂ γ, in body components; None for True where the start has an
+            attitude.
 
     Returns:
         A :class:`Reference`: ``method``, ``states[i][j].value`` and ``.radius`` as decimal text (the true number is
@@ -148,26 +166,34 @@ def reference(
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
     body, state = arguments.motion(top, start, of_any_size=True)
-    about, instants = arguments.system(system, body), arguments.any_times(times)
-    return proven(
-        body, state, instants, whole(digits, "digits"), about, attitude=bool(arguments.flag(attitude, "attitude"))
-    )
+    about, given = arguments.system(system, body), ordered(times, "times", "Give a list such as [1, 2, 5].")
+    arguments.any_times(given)
+    wanted = arguments.flag(attitude, "attitude")
+    told = state.attitude is not None if wanted is None else wanted
+    return proven(body, state, given, whole(digits, "digits"), about, attitude=told)
 
 
-def _problems(tops: Sequence[HeavyTop], starts: Sequence[State], form: Precision, system: System) -> list[Problem]:
-    """The problems of an ensemble; a single top or start serves all of the others."""
+def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Precision, system: System) -> list[Setup]:
+    """The motions of an ensemble; a single top or start serves all of the others."""
     size = max(len(tops), len(starts))
     if not tops or not starts or {len(tops), len(starts)} - {1, size}:
         remedy = "Give as many of each, or one for all the others."
         raise InputError(f"There are {len(tops)} tops and {len(starts)} starts.", remedy)
-    problems = []
+    setups = []
     for index in range(size):
         try:
-            top, start = arguments.motion(tops[index % len(tops)], starts[index % len(starts)], form)
-            problems.append(Problem.of(top, start, form, system))
+            body, start = arguments.motion(tops[index % len(tops)], starts[index % len(starts)], form)
+            setups.append(Setup.of(body, start, form, system))
         except InputError as error:
             raise InputError(f"Motion {index}: {error.cause}", error.remedy) from None
-    return problems
+    return setups
+
+
+def _watching(setups: Sequence[Setup], observer: EnsembleObserver | None) -> EnsembleObserver | None:
+    """An observer that is given the states in the axes given."""
+    if observer is None or not callable(observer) or all(setup.frame is None for setup in setups):
+        return observer
+    return lambda index, time, state: observer(index, time, setups[index].turned(state))
 
 
 def _options(

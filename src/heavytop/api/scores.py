@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
@@ -164,7 +164,7 @@ def score(
     """
     needed = None if require is None else required(require)
     form = None if precision is None else arguments.precision(precision)
-    about, instants = arguments.system(system), check_times(times)
+    about, instants = arguments.system(system), list(check_times(times))
     names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
     arrays = columns(
         {
@@ -180,7 +180,7 @@ def score(
     )
     if is_plain(top, start, arrays, states is not None):
         body, state = arguments.motion(top, start)
-        given = of_arrays(body, state, about, instants, _rows(states), form, *names)
+        given = of_arrays(cast(HeavyTop, body), state, about, instants, _rows(states), form, *names)
     else:
         said = convention(quaternion_order, quaternion, matrix, sequence, angles, up, pivot, point)
         given = observed_arrays(top, start, about, said, instants, arrays, form, names, normalize)
@@ -239,9 +239,11 @@ def drift(run: Trajectory) -> Drifts:
         raise InputError(f"run = {quoted(run)} is not a Trajectory.", "Give what heavytop.propagate returned.")
     if len(run.states) != len(run.times):
         raise InputError("The states of this run went to its observer.", "Propagate without an observer.")
+    computed = run.principal or run
     measure = Drift(run.problem, run.problem.integrals())
-    for time, state in zip(run.times, run.states, strict=True):
-        measure(time, state)
+    beside: Any = computed.attitude if computed.attitude is not None else [()] * len(run.times)
+    for time, state, xi in zip(run.times, computed.states, beside, strict=True):
+        measure(time, [*state, *xi])
     return Drifts(_summaries(measure.metrics(), DRIFT))
 
 

@@ -7,8 +7,8 @@ starts at :func:`heavytop.exact.motion.initial_xi`, for ξ and η = γ × ξ/|γ
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import partial
 from typing import Any
 
 from flint import arb
@@ -21,43 +21,76 @@ from heavytop.exact.validated import Validated
 from heavytop.top.heavy_top import cross, dot
 
 Attitude = Callable[[Fraction, int], Sequence[Any]]
-"""ξ at (time, bits): three balls."""
+"""ξ at (time, bits): three balls; or Ω, γ, ξ: nine."""
+_KEPT = 8
+"""Working precisions whose turn at the start is remembered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turned:
+    """Ω, γ and ξ of a motion from any attitude ``own`` of it, turned so that ξ(0) is ``initial_xi`` of its γ.
+
+    Called with (time, bits): nine balls of ``bits`` bits, Ω and γ of the same evaluation as ξ.
+    Raises OutOfReach where they cannot be proven, InputError for γ = 0.
+    """
+
+    solution: ExactSolution
+    own: Attitude
+    _turns: dict[int, tuple[arb, arb, arb]] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __call__(self, time: Fraction, bits: int) -> list[arb]:
+        def evaluate(working: int) -> list[arb]:
+            cosine, sine, length = self._turn(working)
+            state, xi = self.solution.state(time, working), self.own(time, working)
+            eta = cross([g / length for g in state[3:]], xi)
+            return [*state, *(cosine * x + sine * y for x, y in zip(xi, eta, strict=True))]
+
+        return to_bits(evaluate, bits)
+
+    def _turn(self, working: int) -> tuple[arb, arb, arb]:
+        """Cosine and sine of the turn from the own ξ(0), and |γ|: the same at every time."""
+        found = self._turns.get(working)
+        if found is None:
+            gamma = self.solution.start.gamma
+            wanted, began = initial_xi(gamma), self.own(Fraction(0), working)
+            length = ball(dot(gamma, gamma)).sqrt()
+            across = cross([ball(g) / length for g in gamma], began)
+            turn = dot(wanted, began), dot(wanted, across), length
+            if len(self._turns) >= _KEPT:
+                self._turns.clear()
+            self._turns[working] = turn
+            return turn
+        return found
 
 
 def turned_to_start(solution: ExactSolution, own: Attitude, time: Fraction, bits: int) -> list[arb]:
-    """ξ at ``time`` from any attitude ``own`` of the motion, so that ξ(0) is ``initial_xi`` of its γ.
-
-    Three balls of ``bits`` bits.  Raises OutOfReach where they cannot be proven, InputError for γ = 0.
-    """
-    gamma = solution.start.gamma
-
-    def evaluate(working: int) -> list[arb]:
-        wanted, began = initial_xi(gamma), own(Fraction(0), working)
-        length = ball(dot(gamma, gamma)).sqrt()
-        cosine = dot(wanted, began)
-        sine = dot(wanted, cross([ball(g) / length for g in gamma], began))
-        xi = own(time, working)
-        eta = cross([g / length for g in solution.state(time, working)[3:]], xi)
-        return [cosine * x + sine * y for x, y in zip(xi, eta, strict=True)]
-
-    return to_bits(evaluate, bits)
+    """ξ of :class:`Turned` at ``time``: three balls of ``bits`` bits."""
+    return Turned(solution, own)(time, bits)[6:]
 
 
-def attitude_of(solution: ExactSolution, latest: Fraction, bits: int) -> tuple[str, Attitude]:
-    """How the attitude of ``solution`` is known, and ξ at (time, bits), from ``initial_xi`` of its γ.
+def state_and_attitude(solution: ExactSolution, latest: Fraction, bits: int) -> tuple[str, Attitude]:
+    """How the attitude of ``solution`` is known, and Ω, γ, ξ at (time, bits), ξ from ``initial_xi`` of its γ.
 
     By the closed form where that gives so many bits at the time ``latest``, else by the validated enclosure of the same
-    motion up to its reach.
-    ξ raises OutOfReach where the bits cannot be proven, InputError for an enclosure of |γ| ≠ 1.
+    motion up to its reach; the state of a motion that has a closed form is always of it.
+    It raises OutOfReach where the bits cannot be proven, InputError for an enclosure of |γ| ≠ 1.
     """
-    own: Attitude | None = getattr(solution, "attitude", None)
+    if isinstance(solution, Validated):
+        return solution.method, solution.with_attitude
+    own: Attitude | None = getattr(solution, "own_attitude", getattr(solution, "attitude", None))
     if own is not None:
-        attitude = partial(turned_to_start, solution, own)
+        whole = Turned(solution, own)
         try:
-            attitude(latest, bits)
+            whole(latest, bits)
         except (NotInClass, OutOfReach):
             pass
         else:
-            return solution.method, attitude
+            return solution.method, whole
     enclosure = Validated(solution.top, solution.start, solution.system)
-    return enclosure.method, enclosure.attitude
+    return enclosure.method, lambda time, bits: [*solution.state(time, bits), *enclosure.attitude(time, bits)]
+
+
+def attitude_of(solution: ExactSolution, latest: Fraction, bits: int) -> tuple[str, Attitude]:
+    """How the attitude of ``solution`` is known, and ξ alone of :func:`state_and_attitude`."""
+    method, whole = state_and_attitude(solution, latest, bits)
+    return method, lambda time, bits: whole(time, bits)[6:]

@@ -113,11 +113,11 @@ class Renamed:
 
         Raises NotInClass where the solution has no attitude.
         """
+        return turned_to_start(self, self.own_attitude, time, bits)
+
+    def own_attitude(self, time: Fraction, bits: int) -> Sequence[arb]:
+        """ξ in the new names, starting where the solution's does.  Raises NotInClass where it has no attitude."""
         attitude = getattr(self.solution, "attitude", None)
         if attitude is None:
             raise NotInClass(f"{self.method} has no attitude in closed form.", "Integrate the attitude along with it.")
-
-        def own(at: Fraction, working: int) -> Sequence[arb]:
-            return permuted(attitude(at, working), self.axes)
-
-        return turned_to_start(self, own, time, bits)
+        return permuted(attitude(time, bits), self.axes)

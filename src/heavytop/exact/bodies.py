@@ -16,16 +16,16 @@ motions (:mod:`heavytop.exact.algebraic`) are known in themselves, and need none
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import isqrt, log2
-from typing import Any
+from typing import Any, cast
 
 from flint import arb
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.attitude import attitude_of
+from heavytop.exact.attitude import state_and_attitude
 from heavytop.exact.balls import FUNCTIONS, ball, midpoint, radius, relative_bits, to_bits, working_precision
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint_context import whole_evaluation
@@ -185,7 +185,8 @@ def _root(square: Any) -> Fraction:
     return Fraction(isqrt((value.numerator << shift) // value.denominator) + 1, 1 << (shift // 2))
 
 
-Evaluate = Callable[[tuple[Resolved, ExactSolution], int], list[arb]]
+Whole = Callable[[Fraction, int], Sequence[arb]]
+Evaluate = Callable[[tuple[Resolved, ExactSolution], int], Sequence[arb]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,13 +227,44 @@ class BodyMotion:
         """
         return self._evaluated(time, bits, lambda known, working: known[1].state(time, working))
 
-    def attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """ξ at ``time`` in the axes given: three balls.
+    def with_attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """Ω, γ and ξ at ``time`` in the axes given: nine balls.
 
-        It starts at the first row of the attitude given, or at :func:`heavytop.top.angles.perpendicular` of γ.
+        ξ starts at the first row of the attitude given, or at :func:`heavytop.top.angles.perpendicular` of γ.
         Raises OutOfReach where it cannot be proven, InputError for |γ| ≠ 1 where no attitude was given.
         """
-        return self._evaluated(time, bits, lambda known, working: _xi(*known, time, working))
+        return list(self.whole(time, bits)[1](time, bits))
+
+    def whole(self, latest: Fraction, bits: int) -> tuple[str, Whole]:
+        """How the attitude is known, and Ω, γ, ξ at (time, bits) as :meth:`with_attitude` gives them.
+
+        The closed form of the attitude is taken where it gives so many bits at the time ``latest``.
+        """
+        known = self._known(_DATA_BITS)
+        if known[0].uncertainty is not None:
+            return self.method, self._enclosed
+        method, inner = state_and_attitude(known[1], latest, bits)
+        inner = _from_start(known, inner)
+        if not known[0].turned:
+            return method, inner
+        return method, lambda time, bits: _turned(known, bits, lambda _known, working: inner(time, working))
+
+    def _enclosed(self, time: Fraction, bits: int) -> list[arb]:
+        def evaluate(known: tuple[Resolved, ExactSolution], working: int) -> Sequence[arb]:
+            return cast(Validated, known[1]).with_attitude(time, working)
+
+        return self._evaluated(time, bits, evaluate)
+
+    @property
+    def start_gamma(self) -> Vector:
+        """γ at t = 0 in the axes given; of an irrational attitude to 256 bits."""
+        return self.start.gamma
+
+    @property
+    def start_xi(self) -> Vector | None:
+        """ξ at t = 0 in the axes given, as :attr:`start_gamma`; None for |γ| ≠ 1 where no attitude was given."""
+        xi = self.resolved.xi
+        return None if xi is None else rotated(self.resolved.axes, xi)
 
     def _evaluated(self, time: Fraction, bits: int, evaluate: Evaluate) -> list[arb]:
         """The vectors of ``evaluate`` in the axes given, with so many bits."""
@@ -272,7 +304,7 @@ class BodyMotion:
 def _turned(known: tuple[Resolved, ExactSolution], bits: int, evaluate: Evaluate) -> list[arb]:
     """What is evaluated, in the axes given, with ``bits`` bits."""
     if not known[0].turned:
-        return evaluate(known, bits)
+        return list(evaluate(known, bits))
     working = bits + 4
     for _ in range(_ATTEMPTS):
         values = _given(known[0], evaluate(known, working), working + _GUARD_BITS)
@@ -284,7 +316,7 @@ def _turned(known: tuple[Resolved, ExactSolution], bits: int, evaluate: Evaluate
 
 
 @whole_evaluation
-def _given(resolved: Resolved, values: list[arb], bits: int) -> list[arb]:
+def _given(resolved: Resolved, values: Sequence[arb], bits: int) -> list[arb]:
     with working_precision(bits):
         return [
             sum((ball(a) * x for a, x in zip(row, values[place : place + 3], strict=True)), arb(0))
@@ -293,27 +325,17 @@ def _given(resolved: Resolved, values: list[arb], bits: int) -> list[arb]:
         ]
 
 
-def _xi(resolved: Resolved, solution: ExactSolution, time: Fraction, bits: int) -> list[arb]:
-    """ξ in principal axes, from the start that was given."""
-    if isinstance(solution, Validated) and solution.xi is not None:
-        return solution.attitude(time, bits)
-    _, attitude = attitude_of(solution, time, bits)
-    began = perpendicular(solution.start.gamma)
-    if resolved.xi is None or resolved.xi == began:
-        return list(attitude(time, bits))
-    turn = dot(resolved.xi, began), dot(resolved.xi, cross(solution.start.gamma, began))
-    return _turned_about(solution, attitude, turn, time, bits)
+def _from_start(known: tuple[Resolved, ExactSolution], whole: Whole) -> Whole:
+    """Ω, γ and ξ in principal axes, ξ from the start that was given, out of ξ from :func:`perpendicular` of γ."""
+    resolved, solution = known
+    gamma = solution.start.gamma
+    if resolved.xi is None or resolved.xi == (began := perpendicular(gamma)):
+        return whole
+    cosine, sine = dot(resolved.xi, began), dot(resolved.xi, cross(gamma, began))
+    # turned about γ by the constant angle between the two starts, whose cosine and sine are rational
+    return lambda time, bits: to_bits(lambda working: _about_gamma(whole(time, working), cosine, sine), bits)
 
 
-def _turned_about(
-    solution: ExactSolution, attitude: Any, turn: tuple[Fraction, Fraction], time: Fraction, bits: int
-) -> list[arb]:
-    """ξ turned about γ by a constant angle of rational (cos, sin)."""
-    cosine, sine = turn
-
-    def evaluate(working: int) -> list[arb]:
-        xi, gamma = attitude(time, working), solution.state(time, working)[3:]
-        eta = cross(gamma, xi)
-        return [ball(cosine) * x + ball(sine) * y for x, y in zip(xi, eta, strict=True)]
-
-    return to_bits(evaluate, bits)
+def _about_gamma(values: Sequence[arb], cosine: Fraction, sine: Fraction) -> list[arb]:
+    gamma, xi = values[3:6], values[6:]
+    return [*values[:6], *(ball(cosine) * x + ball(sine) * y for x, y in zip(xi, cross(gamma, xi), strict=True))]

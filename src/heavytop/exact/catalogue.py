@@ -91,6 +91,10 @@ class OnLevel(Validated):
         """See :meth:`Validated.attitude`."""
         return self._named(Validated.attitude, time, bits)
 
+    def with_attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """See :meth:`Validated.with_attitude`."""
+        return self._named(Validated.with_attitude, time, bits)
+
     def _named(self, evaluate: Callable[[Validated, Fraction, int], list[arb]], time: Fraction, bits: int) -> list[arb]:
         try:
             return evaluate(self, time, bits)

@@ -130,10 +130,10 @@ class Validated:
 
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
         """ξ: three balls.  Raises InputError where |γ| is not 1 exactly and no ``xi`` was given."""
-        return self.state_and_attitude(time, bits)[6:]
+        return self.with_attitude(time, bits)[6:]
 
-    def state_and_attitude(self, time: Fraction, bits: int) -> list[arb]:
-        """Ω, γ and ξ from one enclosure: nine balls.  Raises as :meth:`attitude`."""
+    def with_attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """Ω, γ and ξ of one enclosure: nine balls; raises as :meth:`attitude`."""
         xi = self.xi
         if xi is None:
             self.start.require_unit_gamma()

@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 from heavytop.display import Lines, Table, Tabular
 from heavytop.errors import InputError
 from heavytop.precision import Precision, decimal_text, exact, native, native_text, number, rounded
+from heavytop.top.bodies import Frame
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import Integral, holding
+from heavytop.top.outputs import Output, output
 
 _FEW_DIGITS = 3.0
 """An amplification that costs fewer digits is not mentioned."""
@@ -186,6 +188,9 @@ class Trajectory(Tabular):
     seconds: ``compile`` and ``run`` apart.
     flags: everything that can change bits, as text.
     evaluations: of the field, where the engine counts them.
+    attitude: ξ, native numbers, shape (n, 3), where it was computed beside ``states`` and is no part of them.
+    frame: the axes in which the body was given, and which ``states`` and ``attitude`` are in; None for those of the
+    problem, the principal axes.  principal: then the run as it was computed.
     """
 
     problem: Problem
@@ -199,11 +204,14 @@ class Trajectory(Tabular):
     seconds: dict[str, float] = field(default_factory=dict)
     flags: dict[str, str] = field(default_factory=dict)
     evaluations: int | None = None
+    attitude: Any = None
+    frame: Frame | None = None
+    principal: Trajectory | None = None
 
     def __post_init__(self) -> None:
         import numpy
 
-        width = 6 if self.problem.xi is None else 9
+        width = 6 if self.problem.xi is None or self.attitude is not None else 9
         given = self.states
         states = (
             (given if isinstance(given, numpy.ndarray) else numpy.array(given))
@@ -212,9 +220,65 @@ class Trajectory(Tabular):
         )
         object.__setattr__(self, "states", states)
 
-    def texts(self) -> list[list[str]]:
-        """The states as full-precision decimal strings, ``nan`` and ``inf`` where they are."""
+    def texts(self, of: str | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
+        """The states as full-precision decimal strings, ``nan`` and ``inf`` where they are, shape (n, 6) or (n, 9).
+
+        of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for one of these in place of the states, in
+            the shape of its array; each number is rounded once, from exact arithmetic on the native numbers.
+        point, pivot: as in :meth:`positions`.
+
+        Raises InputError for another output, and for a run without attitude.
+        """
+        if of is not None:
+            return self._texts(output(of, point, pivot))
         return [[native_text(value, self.problem.precision) for value in state] for state in self.states]
+
+    def quaternions(self) -> NDArray[np.float64]:
+        """(w, x, y, z) at every sample, body to space, of length 1, shape (n, 4).
+
+        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0 (:mod:`heavytop.top.outputs`).
+        Raises InputError for a run without attitude.
+        """
+        return self._in_double(output("quaternion"))
+
+    def matrices(self) -> NDArray[np.float64]:
+        """R at every sample, v_space = R v_body, shape (n, 3, 3); its rows are ξ, γ × ξ, γ.
+
+        Raises InputError for a run without attitude.
+        """
+        return self._in_double(output("matrix"))
+
+    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[np.float64]:
+        """Where a point of the body stands in space, pivot + R p, shape (n, 3); third component upwards.
+
+        point: three exact numbers in body axes; None for the centre of mass.
+        pivot: where the fixed point stands in space; None for the origin.
+        Raises InputError for a run without attitude.
+        """
+        return self._in_double(output("position", point, pivot))
+
+    def omega_space(self) -> NDArray[np.float64]:
+        """R Ω, the angular velocity in space axes, shape (n, 3); raises InputError for a run without attitude."""
+        return self._in_double(output("omega-space"))
+
+    def euler(self, sequence: str) -> NDArray[np.float64]:
+        """(a, b, c) with R = R_I(a) R_J(b) R_K(c) for the sequence "IJK", in radians, shape (n, 3).
+
+        a and c in (−π, π], b in [0, π], or in [−π/2, π/2] for three different letters.  a and c are ``nan`` at gimbal
+        lock, where they are not defined: b within 16 eps of an end of its interval.
+        Raises InputError for an unknown sequence and for a run without attitude.
+        """
+        return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
+
+    def _in_double(self, what: Output) -> NDArray[np.float64]:
+        from heavytop.integrate.attitude_outputs import in_double
+
+        return in_double(self, what)
+
+    def _texts(self, what: Output) -> list[Any]:
+        from heavytop.integrate.attitude_outputs import as_texts
+
+        return as_texts(self, what)
 
     def to_numpy(self) -> NDArray[np.float64]:
         """The states rounded to double, shape (n, 6), or (n, 9) with the attitude vector."""
@@ -254,7 +318,7 @@ class Trajectory(Tabular):
         rows = Lines(min(len(self.times), len(self.states)), line)
         steps = f"{self.steps} steps" + (f" of order {self.order}" if self.order else "")
         title = f"{self.problem.system.name} in {precision.name} by {self.integrator}: {self.outcome.message}, {steps}"
-        names = NAMES if self.problem.xi is None else (*NAMES, "ξ1", "ξ2", "ξ3")
+        names = NAMES if self.problem.xi is None or self.attitude is not None else (*NAMES, "ξ1", "ξ2", "ξ3")
         notes = []
         if self.times and not rows:
             notes.append(f"{len(self.times)} states went to the observer")

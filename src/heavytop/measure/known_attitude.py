@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache, partial
-from typing import Any
 
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass, OutOfReach
-from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.attitude import state_and_attitude
+from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.solution import ExactSolution
 from heavytop.exact.validated import Validated
 from heavytop.integrate.trajectory import Problem
@@ -19,10 +19,10 @@ from heavytop.measure.computed_reference import of_rounded
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.measure.truth import Evaluate, Known, Truth, clause, known_motion, truth
 from heavytop.precision import time_text
+from heavytop.top.angles import perpendicular
 from heavytop.top.heavy_top import Vector, cross, dot
 
-Attitude = Callable[[Fraction, int], Sequence[Any]]
-"""ξ at (time, bits): three balls."""
+_SPARE_BITS = 8
 
 
 def truth_with_attitude(problem: Problem, times: Sequence[Fraction], effort: float | None = None) -> Truth | str:
@@ -56,43 +56,30 @@ def _nine(solution: ExactSolution, problem: Problem, horizon: Fraction) -> Evalu
     xi = problem.xi
     assert xi is not None
     start: Vector = (xi[0], xi[1], xi[2])
-    enclosure = Validated(solution.top, solution.start, solution.system, xi=start)
-    own: Attitude | None = getattr(solution, "attitude", None)
-    found: list[Evaluate] = []
+    whole: Evaluate
     if isinstance(solution, Validated):
-        found.append(enclosure.state_and_attitude)
+        whole = Validated(solution.top, solution.start, solution.system, xi=start).with_attitude
     else:
-        if own is not None:
-            found.append(_beside(solution, _turned(solution, own, start)))
-        found.append(_beside(solution, enclosure.attitude))
-    for each in found:
-        try:
-            each(horizon, bits)
-        except (NotInClass, OutOfReach):
-            continue
-        return each
-    return None
+        known = state_and_attitude(solution, horizon, bits)[1]
+        whole = _turned(solution.start.gamma, start, lambda time, working: list(known(time, working)))
+    try:
+        whole(horizon, bits)
+    except (NotInClass, OutOfReach):
+        return None
+    return whole
 
 
-def _beside(solution: ExactSolution, xi: Attitude) -> Evaluate:
-    return lambda time, bits: [*solution.state(time, bits), *xi(time, bits)]
+def _turned(gamma: Vector, xi: Vector, whole: Evaluate) -> Evaluate:
+    """Ω, γ and ξ with the attitude turned about γ by the constant angle with which it begins at ``xi``; |γ| = 1."""
+    began = perpendicular(gamma)
+    cosine, sine = dot(xi, began), dot(xi, cross(gamma, began))
 
+    @whole_evaluation
+    def evaluate(time: Fraction, bits: int) -> list[arb]:
+        known = list(whole(time, bits + _SPARE_BITS))
+        with working_precision(bits + _SPARE_BITS):
+            eta = cross(known[3:6], known[6:9])
+            along = [ball(cosine) * x + ball(sine) * y for x, y in zip(known[6:9], eta, strict=True)]
+        return [*known[:6], *along]
 
-def _turned(solution: ExactSolution, own: Attitude, xi: Vector) -> Attitude:
-    """Any attitude of a motion, turned about γ by the constant angle with which it begins at ``xi``."""
-    gamma = solution.start.gamma
-
-    @cache
-    def angle(working: int) -> tuple[arb, arb, arb]:
-        began = own(Fraction(0), working)
-        length = ball(dot(gamma, gamma)).sqrt()
-        wanted = [ball(x) for x in xi]
-        return dot(wanted, began), dot(wanted, cross([ball(g) / length for g in gamma], began)), length
-
-    def evaluate(time: Fraction, working: int) -> list[arb]:
-        cosine, sine, length = angle(working)
-        along = own(time, working)
-        eta = cross([g / length for g in solution.state(time, working)[3:]], along)
-        return [cosine * x + sine * y for x, y in zip(along, eta, strict=True)]
-
-    return lambda time, bits: to_bits(partial(evaluate, time), bits)
+    return evaluate

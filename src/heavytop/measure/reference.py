@@ -11,15 +11,23 @@ import msgspec
 
 from heavytop.display import Table, Tabular
 from heavytop.errors import InputError, OutOfReach, quoted
-from heavytop.exact.attitude import attitude_of
-from heavytop.exact.balls import radius_text, value_text
+from heavytop.exact.balls import radius_text, value_text, working_precision
+from heavytop.exact.bodies import BodyMotion
 from heavytop.exact.catalogue import find
+from heavytop.exact.flint_context import whole_evaluation
+from heavytop.exact.motion import initial_xi
 from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
+from heavytop.measure import reference_outputs as outputs_of
 from heavytop.measure.certify import bits_of
+from heavytop.measure.reference_outputs import GUARD_BITS, KnownMotion
 from heavytop.precision import decimal_text, exact, exact_text, shown
+from heavytop.top.angles import perpendicular
+from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
+from heavytop.top.outputs import Output, output, shaped
+from heavytop.top.times import TimeText
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,25 +48,121 @@ class Ball(msgspec.Struct, frozen=True):
     radius: str
 
 
-class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True):
+class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=True, kw_only=True):
     """Proven states; its JSON is that of ``heavytop reference``.
 
-    times: exact, as decimals or fractions.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
+    written_times: ``times`` in JSON, as they were given.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
-    :func:`heavytop.top.angles.perpendicular` of γ; attitude_method: how it is known.
+    :func:`heavytop.top.angles.perpendicular` of γ; attitude_method: how it is known; xi: ξ at t = 0.
+    inertia, weight, centre, rotor, omega, gamma: the data, exactly.
     """
 
     method: str
     digits: int
-    times: list[str]
+    written_times: list[str] = msgspec.field(name="times")
     states: list[list[Ball]]
     system: str
     attitude: list[list[Ball]] | None = None
     attitude_method: str | None = None
+    inertia: list[str] | None = None
+    weight: str | None = None
+    centre: list[str] | None = None
+    rotor: list[str] | None = None
+    omega: list[str] | None = None
+    gamma: list[str] | None = None
+    xi: list[str] | None = None
+    mass: str | None = None
+    gravity: str | None = None
+    start_attitude: str | None = None
+    start_omega_space: list[str] | None = None
 
-    def texts(self) -> list[list[str]]:
-        """The values as decimal text, shape (n, 6)."""
+    @property
+    def times(self) -> list[TimeText]:
+        """Exact text, as it was given, which ``float`` and ``Fraction`` read."""
+        return [TimeText(time) for time in self.written_times]
+
+    def texts(self, of: str | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
+        """The values as decimal text, shape (n, 6).
+
+        of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for the values of that in place of the
+            states, in the shape of its array.
+        point, pivot: as in :meth:`positions`.
+
+        Raises InputError for another output, and for a reference without attitude.
+        """
+        if of is not None:
+            return self._outputs(output(of, point, pivot), lambda value: outputs_of.text(value, self.digits)[0])
         return [[ball.value for ball in state] for state in self.states]
+
+    def balls(self, of: str, *, point: Any = None, pivot: Any = None) -> list[Any]:
+        """An output as :class:`Ball`, in the shape of its array; "nan" within "inf" for what is not defined.
+
+        of, point, pivot: as in :meth:`texts`.  Each number is proven to ``digits``, relative to a size above 1; a
+        position relative to |p|.
+        """
+        return self._outputs(output(of, point, pivot), lambda value: Ball(*outputs_of.text(value, self.digits)))
+
+    def quaternions(self) -> NDArray[np.float64]:
+        """(w, x, y, z) at every time, body to space, of length 1, rounded to double, shape (n, 4).
+
+        The sign is continuous from one time to the next and w ≥ 0 at t = 0 (:mod:`heavytop.top.outputs`).
+        Raises InputError for a reference without attitude.
+        """
+        return self._in_double(output("quaternion"))
+
+    def matrices(self) -> NDArray[np.float64]:
+        """R at every time, v_space = R v_body, shape (n, 3, 3); its rows are ξ, γ × ξ, γ.
+
+        Raises InputError for a reference without attitude.
+        """
+        return self._in_double(output("matrix"))
+
+    def positions(self, point: Any = None, pivot: Any = None) -> NDArray[np.float64]:
+        """Where a point of the body stands in space, pivot + R p, shape (n, 3); third component upwards.
+
+        point: three exact numbers in body axes; None for the centre of mass.
+        pivot: where the fixed point stands in space; None for the origin.
+        Raises InputError for a reference without attitude.
+        """
+        return self._in_double(output("position", point, pivot))
+
+    def omega_space(self) -> NDArray[np.float64]:
+        """R Ω, the angular velocity in space axes, shape (n, 3); raises InputError for a reference without attitude."""
+        return self._in_double(output("omega-space"))
+
+    def euler(self, sequence: str) -> NDArray[np.float64]:
+        """(a, b, c) with R = R_I(a) R_J(b) R_K(c) for the sequence "IJK", in radians, shape (n, 3).
+
+        a and c in (−π, π], b in [0, π], or in [−π/2, π/2] for three different letters; ``nan`` at gimbal lock, where a
+        and c are not defined.
+        Raises InputError for an unknown sequence and for a reference without attitude.
+        """
+        return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
+
+    def _in_double(self, what: Output) -> NDArray[np.float64]:
+        import numpy
+
+        found = numpy.array(self._outputs(what, outputs_of.nearest), dtype=float)
+        return found.reshape(-1, *what.shape)
+
+    def _outputs(self, what: Output, write: Callable[[Any], Any]) -> list[Any]:
+        """The output at every time in its shape, each number as ``write`` makes it of a ball, or of None."""
+        found = self._known().balls(what)
+        return [shaped([write(value) for value in line], what.shape) for line in found]
+
+    def _known(self) -> KnownMotion:
+        """The motion behind the states; of a reference that was read or copied, the balls that are written in it."""
+        found: KnownMotion | None = self.__dict__.get("_motion")
+        if found is None:
+            if self.attitude is None or self.centre is None or self.gamma is None or self.xi is None:
+                raise InputError(
+                    "The attitude was not computed: gamma alone does not fix it.",
+                    "Give attitude=True: xi then starts where docs/outputs.md says.",
+                )
+            start = self.centre, self.gamma, self.xi
+            found = outputs_of.as_written(self.states, self.attitude, self.times, self.digits, *start)
+            self.__dict__["_motion"] = found
+        return found
 
     def to_numpy(self) -> NDArray[np.float64]:
         """The values rounded to double, shape (n, 6)."""
@@ -75,7 +179,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True):
     def _table(self) -> Table:
         worst = max((Fraction(ball.radius) for state in self.states for ball in state), default=Fraction(0))
         rows = [
-            [time[:_SHOWN], *(decimal_text(Fraction(ball.value), min(_SHOWN, self.digits)) for ball in state)]
+            [time, *(decimal_text(Fraction(ball.value), min(_SHOWN, self.digits)) for ball in state)]
             for time, state in zip(self.times, self.states, strict=True)
         ]
         title = f"{self.system}, known to {self.digits} digits: {self.method}"
@@ -88,7 +192,7 @@ def _rounded_up(text: str) -> float:
 
 
 def reference(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     times: Sequence[Any],
     digits: int,
@@ -105,19 +209,84 @@ def reference(
     if digits not in DIGITS:
         raise InputError(f"{quoted(digits)} digits are not available.", "References have 1 to 20000 digits.")
     instants = [exact(time) for time in times]
-    require_handy(top, start, instants)
-    solution = finder(top, start, system)
-    latest = max(instants, key=abs, default=Fraction(0))
-    method, xi = attitude_of(solution, latest, bits_of(digits)) if attitude else (None, None)
-    return Reference(
-        method=solution.method,
+    known = BodyMotion(top, start, system, finder)
+    require_handy(known.resolved.top, known.resolved.start, instants)
+    found = Reference(
+        method=known.method,
         digits=digits,
-        times=[exact_text(time) for time in instants],
-        states=[ball_texts(solution.state, solution.method, time, digits) for time in instants],
+        written_times=[str(TimeText.of(time)) for time in times],
+        states=[],
         system=system.name,
-        attitude=None if xi is None else [ball_texts(xi, str(method), time, digits) for time in instants],
-        attitude_method=method,
+        **_body_texts(top, digits),
+        **_start_texts(start, digits),
     )
+    if not attitude:
+        states = [ball_texts(known.state, known.method, time, digits) for time in instants]
+        return msgspec.structs.replace(found, states=states)
+    latest = max(instants, key=abs, default=Fraction(0))
+    method, whole = known.whole(latest, bits_of(digits) + GUARD_BITS)
+    motion = KnownMotion(whole, instants, digits, top.centre, start.gamma, method)
+    parts = [known_texts(motion.at(place), method, time, digits) for place, time in enumerate(instants)]
+    found = msgspec.structs.replace(
+        found,
+        states=[part[:6] for part in parts],
+        attitude=[part[6:] for part in parts],
+        attitude_method=method,
+        xi=xi_texts(start, digits),
+    )
+    found.__dict__["_motion"] = motion
+    return found
+
+
+def _body_texts(body: HeavyTop | Body, digits: int) -> dict[str, Any]:
+    """The body as exact text, by the keys of the JSON document."""
+    found: dict[str, Any] = {
+        "centre": list(map(exact_text, body.centre)),
+        "rotor": None if body.rotor is None else list(map(exact_text, body.rotor)),
+        "weight": exact_text(body.weight),
+    }
+    if isinstance(body, HeavyTop):
+        return found | {"inertia": list(map(exact_text, body.inertia))}
+    tensor = [exact_text(value) for row in body.tensor for value in row]
+    return found | {"mass": exact_text(body.mass), "gravity": exact_text(body.gravity), "inertia": tensor}
+
+
+def _start_texts(start: State, digits: int) -> dict[str, Any]:
+    """The start as exact text; γ and Ω of an irrational attitude to the digits asked."""
+    known = start.attitude is None or start.attitude.exact_rows() is not None
+
+    def texts(values: Vector, known: bool) -> list[str]:
+        return [exact_text(value) if known else decimal_text(value, digits + 1) for value in values]
+
+    found: dict[str, Any] = {
+        "omega": texts(start.omega, known or start.omega_space is None),
+        "gamma": texts(start.gamma, known),
+    }
+    if start.attitude is not None:
+        found["start_attitude"] = f"{start.attitude.kind}:{start.attitude}"
+    if start.omega_space is not None:
+        found["start_omega_space"] = texts(start.omega_space, True)
+    return found
+
+
+def xi_texts(start: State, digits: int) -> list[str]:
+    """ξ at t = 0: of the attitude given, else of γ alone; exact where it is rational, else to that many digits."""
+    if start.attitude is not None:
+        rows = start.attitude.exact_rows()
+        if rows is not None:
+            return [exact_text(value) for value in rows[0]]
+        near = start.attitude.rational_rows(bits_of(digits) + GUARD_BITS)
+        return [decimal_text(value, digits + 1) for value in near[0]]
+    if dot(start.gamma, start.gamma) == 1:
+        return [exact_text(value) for value in perpendicular(start.gamma)]
+    return start_texts(start.gamma, digits)
+
+
+@whole_evaluation
+def start_texts(gamma: Vector, digits: int) -> list[str]:
+    """The same of a γ that is not of length 1, in balls."""
+    with working_precision(bits_of(digits) + GUARD_BITS):
+        return [value_text(value, digits + 1)[0] for value in initial_xi(gamma)]
 
 
 def ball_texts(evaluate: Evaluate, method: str, time: Fraction, digits: int) -> list[Ball]:
@@ -127,7 +296,12 @@ def ball_texts(evaluate: Evaluate, method: str, time: Fraction, digits: int) -> 
     wrong by five units of the digit that was promised.  Raises OutOfReach where a printed radius exceeds 10^-digits,
     relative to a value above 1.
     """
-    found = [Ball(*value_text(value, digits + 1)) for value in evaluate(time, bits_of(digits))]
+    return known_texts(evaluate(time, bits_of(digits)), method, time, digits)
+
+
+def known_texts(values: Sequence[Any], method: str, time: Fraction, digits: int) -> list[Ball]:
+    """:func:`ball_texts` of balls that are known already."""
+    found = [Ball(*value_text(value, digits + 1)) for value in values]
     for component, ball in enumerate(found, 1):
         if exact(ball.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(ball.value))):
             raise OutOfReach(

@@ -112,7 +112,7 @@ def _given(
     which = system(_text(document, "system", "heavy_top" if case is None else case.system.name))
     top, at_start = _top(document, case), _row_of_start(document)
     start = _start(document, case, at_start)
-    times = check_times([written_numbers.finite(value, "a time") for value in _list(document, "times")])
+    times = list(check_times([written_numbers.finite(value, "a time") for value in _list(document, "times")]))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
     if case is not None:
@@ -149,7 +149,7 @@ def _observed(
     which = system(_text(document, "system", "heavy_top" if case is None else case.system.name))
     require_system(which)
     listed = _list(document, "times") if "lines" not in document else observed_file.times(document)
-    times = check_times([written_numbers.finite(v, "a time") if isinstance(v, str) else v for v in listed])
+    times = list(check_times([written_numbers.finite(v, "a time") if isinstance(v, str) else v for v in listed]))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
     said = observed_file.convention(document, document.get("header"))

@@ -76,21 +76,21 @@ def rotation_of(q: Sequence[Fraction]) -> tuple[Vector, Vector, Vector]:
     return first, second, third
 
 
-def _multiple_of_quaternion(rows: Rows) -> tuple[Any, Any, Any, Any]:
-    """4 c q with c the largest component of q: linear in R, so exact over the rationals.
-
-    c² is at least 1/4, so that no digits are lost.
-    """
+def quaternion_products(rows: Rows) -> tuple[tuple[Any, ...], ...]:
+    """4 q qᵀ, row by row: each row is a multiple of q; linear in R, so exact over the rationals."""
     (a, b, c), (d, e, f), (g, h, i) = rows
-    first = (a + e + i, a - e - i, e - a - i, i - a - e)
-    # 4 q qᵀ, row by row
-    products = (
-        (1 + first[0], h - f, c - g, d - b),
-        (h - f, 1 + first[1], b + d, c + g),
-        (c - g, b + d, 1 + first[2], f + h),
-        (d - b, c + g, f + h, 1 + first[3]),
+    return (
+        (1 + (a + e + i), h - f, c - g, d - b),
+        (h - f, 1 + (a - e - i), b + d, c + g),
+        (c - g, b + d, 1 + (e - a - i), f + h),
+        (d - b, c + g, f + h, 1 + (i - a - e)),
     )
-    return products[max(range(4), key=lambda place: float(first[place]))]
+
+
+def _multiple_of_quaternion(rows: Rows) -> tuple[Any, ...]:
+    """4 c q with c the largest component of q: c² is at least 1/4, so that no digits are lost."""
+    products = quaternion_products(rows)
+    return products[max(range(4), key=lambda place: float(products[place][place]))]
 
 
 def quaternion_of_rows(rows: Rows, lib: Any) -> tuple[Any, Any, Any, Any]:

@@ -112,6 +112,19 @@ class Body:
         return self.top.warnings()
 
 
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The axes in which a motion was given, where they are not the principal axes.
+
+    axes: the rows of A, v_given = A v_principal.  centre: of mass; gamma, xi: γ and ξ at t = 0; all in the axes given.
+    """
+
+    axes: Tensor
+    centre: Vector
+    gamma: Vector
+    xi: Vector | None
+
+
 def _texts(values: Vector) -> str:
     return f"({', '.join(repr(exact_text(value)) for value in values)})"
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from heavytop.errors import InputError
 from heavytop.precision import shown
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
 VARIABLES = ("omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3")
 NAMES = ("Ω1", "Ω2", "Ω3", "γ1", "γ2", "γ3")
@@ -197,7 +197,14 @@ def system(name: str) -> System:
     raise InputError(f"Unknown system {name[:60]!r}.", f"Use {WHICH_SYSTEM}.")
 
 
-def system_of(given: System | str | None, *tops: HeavyTop) -> System:
+class WithRotor(Protocol):
+    """A top or a body, as far as the choice of the system goes."""
+
+    @property
+    def rotor(self) -> Vector | None: ...
+
+
+def system_of(given: System | str | None, *tops: WithRotor) -> System:
     """The system asked for; where none is, `heavy_gyrostat` if a top has a rotor, else `heavy_top`.
 
     Raises InputError for an unknown name, and for a system that does not know the rotor of a top.
@@ -210,7 +217,7 @@ def system_of(given: System | str | None, *tops: HeavyTop) -> System:
     return found
 
 
-def require_no_other_rotor(asked: System, top: HeavyTop) -> None:
+def require_no_other_rotor(asked: System, top: WithRotor) -> None:
     """Raises InputError where the top has a rotor and the system another one, or none."""
     if top.rotor is not None and asked is not HEAVY_GYROSTAT:
         why = "takes its rotor from the start" if asked is GYROSTAT else "has no rotor"

@@ -11,7 +11,7 @@ from heavytop.errors import HeavyTopError, InputError, quoted
 from heavytop.precision import exact
 
 Vector = tuple[Fraction, Fraction, Fraction]
-_MOST = 10_000_000
+MOST_MEMBERS = 10_000_000
 """Members of a list; a generator may have no end."""
 
 
@@ -34,9 +34,9 @@ def ordered(values: Any, what: str, remedy: str) -> list[Any]:
     """
     if not isinstance(values, str | bytes | bytearray | Set | Mapping):
         try:
-            found = list(islice(values, _MOST + 1))
-            if len(found) > _MOST:
-                raise InputError(f"{what} has more than {_MOST} members.", remedy)
+            found = list(islice(values, MOST_MEMBERS + 1))
+            if len(found) > MOST_MEMBERS:
+                raise InputError(f"{what} has more than {MOST_MEMBERS} members.", remedy)
             return found
         except HeavyTopError:
             raise
