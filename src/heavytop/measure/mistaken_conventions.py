@@ -187,16 +187,22 @@ def _readings(seen: Seen) -> Iterator[Named]:
     """Readings without a number, the likeliest first."""
     said, forms = seen.said, _forms(seen)
     if "quaternion" in forms:
-        yield "scalar_last", {}, replace(said, scalar_last=not said.scalar_last)
-        yield "conjugate", {}, replace(said, conjugate=not said.conjugate)
+        order, other = "wxyz" if said.scalar_last else "xyzw", _other(said.conjugate)
+        yield "scalar_last", {"quaternion_order": order}, replace(said, scalar_last=not said.scalar_last)
+        yield "conjugate", {"quaternion": other}, replace(said, conjugate=not said.conjugate)
     if "matrix" in forms:
-        yield "transposed", {}, replace(said, transposed=not said.transposed)
+        yield "transposed", {"matrix": _other(said.transposed)}, replace(said, transposed=not said.transposed)
     if "euler" in forms:
         yield from _angles(said)
     yield from _vectors(said, forms)
     if "quaternion" in forms:
         both = replace(said, scalar_last=not said.scalar_last, conjugate=not said.conjugate)
         yield "scalar_last_conjugate", {}, both
+
+
+def _other(inverse: bool) -> str:
+    """The direction that is not said."""
+    return "body_to_space" if inverse else "space_to_body"
 
 
 def _axes_of_space(seen: Seen) -> Iterator[Named]:

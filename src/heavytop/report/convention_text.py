@@ -8,10 +8,10 @@ from heavytop.measure.diagnosis import Diagnosis
 from heavytop.measure.suspects import FLOOR
 
 _SENTENCES = {
-    "scalar_last": "The quaternions have their scalar part in the other place: {order}",
-    "conjugate": "The quaternions are conjugate: of body_to_space and space_to_body they are the one that is not said",
+    "scalar_last": "The quaternions have their scalar part in the other place: quaternion_order = {quaternion_order}",
+    "conjugate": "The quaternions are conjugate: quaternion = {quaternion}",
     "scalar_last_conjugate": "The quaternions are conjugate and have their scalar part in the other place",
-    "transposed": "The matrices are transposed: of body_to_space and space_to_body they are the one that is not said",
+    "transposed": "The matrices are transposed: matrix = {matrix}",
     "degrees": "The angles are in {unit}",
     "sequence": "The Euler angles are those of the sequence {sequence}",
     "extrinsic": "The Euler angles are about axes of space (extrinsic): those of {sequence}, one after the other",
@@ -87,5 +87,4 @@ def sentence(found: Diagnosis) -> str:
 
 
 def _one(kind: str, numbers: dict[str, str]) -> str:
-    order = "x, y, z, w where w, x, y, z is said, or the other way round (quaternion_order = wxyz, xyzw)"
-    return _SENTENCES[kind].format(**{"order": order, **numbers})
+    return _SENTENCES[kind].format(**numbers)

@@ -129,7 +129,12 @@ def _wanted(quantity: str, there: set[str], scalar_last: bool, sequence: str) ->
         first = 0 if any("0" in name for name in there) else 1
         return [f"{i}{j}" for i in range(first, first + 3) for j in range(first, first + 3)]
     if quantity == "euler" and there & set("XYZ"):
-        return list(sequence) if sorted(sequence) == ["X", "Y", "Z"] else list("XYZ")
+        if sorted(sequence) != ["X", "Y", "Z"]:
+            raise InputError(
+                f"roll, pitch and yaw are angles of a sequence about three axes, not of {sequence or 'none that is said'}.",
+                'Give sequence, such as "ZYX", or call the columns euler1, euler2, euler3.',
+            )
+        return list(sequence)
     if there & set("xyz"):
         return list("xyz")
     return list("012" if "0" in there else "123")
