@@ -9,13 +9,13 @@ from typing import Any, TypeAlias, cast
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
-from heavytop.api.setup import Setup
 from heavytop.errors import InputError
 from heavytop.integrate import registry
 from heavytop.integrate.peers.source import named
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.reference import Reference
 from heavytop.measure.reference import reference as proven
+from heavytop.measure.setup import Setup
 from heavytop.precision import DOUBLE, Precision, whole
 from heavytop.top.bodies import Body
 from heavytop.top.equations import System
@@ -58,7 +58,7 @@ def propagate(
             :func:`heavytop.top.angles.perpendicular` of γ, where no ``xi`` says otherwise: for ``quaternions()``,
             ``matrices()``, ``positions()``, ``omega_space()`` and ``euler("ZXZ")`` of the run; an observer is given
             nine numbers.  None for True where the start has an attitude.
-        tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; words: from there to
+        tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; multiword: from there to
             1e-6, where None finer than the format; splittings have none.
         high_accuracy: compensated summation of heyoka's Taylor series, off where None.
         compact_mode: heyoka's, slower but quick to compile; None for off in double and extended, on elsewhere.
@@ -67,8 +67,8 @@ def propagate(
 
     Returns:
         A :class:`Trajectory`: ``outcome``, ``times``, ``states`` as an array (n, 6) of the format's numbers in the
-        order Ω1 Ω2 Ω3 γ1 γ2 γ3, or (n, 9) with ξ, in the axes in which the body was given; ``to_numpy()`` in double, ``texts()`` in full.  A run that fails is
-        an outcome, not an exception.
+        order Ω1 Ω2 Ω3 γ1 γ2 γ3, or (n, 9) with ``xi``, in the axes in which the body was given; ``to_numpy()`` in
+        double, ``texts()`` in full.  A run that fails is an outcome, not an exception.
 
     Raises:
         InputError: for what is no motion, time, format or option.

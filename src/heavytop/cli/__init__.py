@@ -12,6 +12,7 @@ import sys
 
 from heavytop.cli import output
 from heavytop.cli.app import app
+from heavytop.cli.motion_output import with_file_of_latex
 from heavytop.errors import HeavyTopError
 
 # the commands, in the order of `heavytop --help`
@@ -47,7 +48,7 @@ def run_command_line() -> int:
 def _run() -> int:
     """The exit code of the command; what it raises but for exits passes."""
     try:
-        app(prog_name="heavytop")
+        app(args=with_file_of_latex(sys.argv[1:]), prog_name="heavytop")
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else 0 if ended.code is None else 2
     return 0

@@ -2,27 +2,56 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal
-from heavytop.cli.output import say
+from heavytop.cli.app import Json, command, numbers
+from heavytop.cli.motion_output import made_by, require_one_output, write_motion
+from heavytop.cli.output import say, say_former
 from heavytop.cli.progress import reaching, watched
 from heavytop.errors import InputError
 
-Inertia = Annotated[str, typer.Option(help="Principal moments A,B,C at the fixed point.")]
-Weight = Annotated[str, typer.Option(help="Weight P.")]
-Centre = Annotated[str, typer.Option(help="Centre of mass a,b,c.")]
-Omega = Annotated[str, typer.Option(help="Angular velocity x,y,z at t = 0.")]
-Gamma = Annotated[str, typer.Option(help="x,y,z at t = 0: unit vector pointing vertically up, in body axes.")]
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from heavytop.report.motion_table import MotionTable
+    from heavytop.top.outputs import Output
+
+Inertia = Annotated[
+    str | None,
+    typer.Option(help="Principal moments A,B,C at the fixed point; with --mass 3, 6 (11,22,33,12,13,23) or 9 numbers."),
+]
+Weight = Annotated[str | None, typer.Option(help="Weight P.")]
+Mass = Annotated[str | None, typer.Option(help="In place of --weight: the mass, of a body in any axes.")]
+Gravity = Annotated[str | None, typer.Option(help="With --mass: the acceleration of gravity, such as 9.81, or 0.")]
+About = Annotated[str | None, typer.Option(help="With --mass: what --inertia is about, 'pivot' or 'centre of mass'.")]
+Centre = Annotated[str | None, typer.Option(help="Centre of mass a,b,c.")]
+CaseName = Annotated[str | None, typer.Option("--case", help="A case of `heavytop list` in place of body and start.")]
+Omega = Annotated[str | None, typer.Option(help="Angular velocity x,y,z at t = 0, in body axes.")]
+OmegaSpace = Annotated[str | None, typer.Option(help="The same in space axes, with an attitude.")]
+Gamma = Annotated[str | None, typer.Option(help="x,y,z at t = 0: unit vector pointing vertically up, in body axes.")]
+Quaternion = Annotated[str | None, typer.Option(help="Attitude w,x,y,z at t = 0, body to space.")]
+Euler = Annotated[str | None, typer.Option(help="Attitude as ZXZ:a,b,c or another sequence; radians, or 30deg.")]
+Matrix = Annotated[str | None, typer.Option(help="Attitude R row by row, 9 numbers: v_space = R v_body.")]
 Times = Annotated[str, typer.Option(help="Times t1,t2,..., of one sign, strictly away from 0.")]
 Rotor = Annotated[str | None, typer.Option(help="Momentum k1,k2,k3 of a rotor: the system is heavy_gyrostat.")]
 SystemName = Annotated[
     str | None,
     typer.Option(help="heavy_top, gyrostat or heavy_gyrostat; without it heavy_top, or heavy_gyrostat with --rotor."),
 ]
-Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma onto the unit sphere first.")]
+Show = Annotated[
+    str | None,
+    typer.Option(metavar="WHAT", help="Also quaternion, matrix, euler:ZXZ (any sequence), position, omega-space."),
+]
+Point = Annotated[str | None, typer.Option(help="Point x,y,z of the body, in place of the centre of mass.")]
+Pivot = Annotated[str | None, typer.Option(help="Place x,y,z of the fixed point in space, 0,0,0 without it.")]
+Csv = Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table as CSV, which `score` reads.")]
+Latex = Annotated[
+    Path | None, typer.Option(metavar="[FILE]", help="Write it as LaTeX (siunitx, booktabs); print it without FILE.")
+]
+Normalize = Annotated[bool, typer.Option("--normalize", help="Move gamma, quaternion or matrix to length 1 first.")]
 
 _PROPAGATE_SECONDS, _REFERENCE_SECONDS = 1.0, 3.0
 """Expected of a run and of an enclosure, before anything is known of them."""
@@ -32,14 +61,22 @@ _SLOW_BITS = 2000
 
 @command
 def propagate(
-    inertia: Inertia,
-    weight: Weight,
-    centre: Centre,
-    omega: Omega,
-    gamma: Gamma,
     times: Times,
+    inertia: Inertia = None,
+    weight: Weight = None,
+    centre: Centre = None,
+    omega: Omega = None,
+    gamma: Gamma = None,
+    case: CaseName = None,
+    mass: Mass = None,
+    gravity: Gravity = None,
+    about: About = None,
+    omega_space: OmegaSpace = None,
+    quaternion: Quaternion = None,
+    euler: Euler = None,
+    matrix: Matrix = None,
     precision: Annotated[
-        str, typer.Option(help="double, extended, double-double (of words), quad, real:BITS.")
+        str, typer.Option(help="double, extended, double-double (of multiword), quad, real:BITS.")
     ] = "double",
     integrator: Annotated[str, typer.Option(help="One of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
     rotor: Rotor = None,
@@ -47,6 +84,11 @@ def propagate(
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     normalize: Normalize = False,
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
+    show: Show = None,
+    point: Point = None,
+    pivot: Pivot = None,
+    csv: Csv = None,
+    latex: Latex = None,
     json: Json = False,
 ) -> int:
     """Integrate one motion and print its states.
@@ -55,14 +97,33 @@ def propagate(
     Numbers are exact: 3, 0.25, 1e-3, -2/5.
     """
     from heavytop import precision as formats
+    from heavytop.top.bodies import Body
     from heavytop.top.equations import system_of
     from heavytop.top.times import check_times
 
-    top, start = _motion(inertia, weight, centre, omega, gamma, normalize, rotor)
+    given = {
+        "inertia": inertia,
+        "weight": weight,
+        "centre": centre,
+        "mass": mass,
+        "gravity": gravity,
+        "about": about,
+        "rotor": rotor,
+        "omega": omega,
+        "omega_space": omega_space,
+        "gamma": gamma,
+        "quaternion": quaternion,
+        "euler": euler,
+        "matrix": matrix,
+    }
+    top, start, system = _motion(given, case, system, normalize)
     form, which, instants = formats.parse(precision), system_of(system, top), check_times(numbers(times))
+    wanted = _outputs(show, point, pivot)
+    require_one_output(csv, latex, json)
     if max_steps is not None and max_steps < 1:
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
-    which.parameters(top, start)
+    which.parameters(top.top if isinstance(top, Body) else top, start)
+    say_former([integrator])
     if form.bits >= _SLOW_BITS and integrator == "heyoka":
         say(
             f"warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
@@ -76,30 +137,59 @@ def propagate(
     end, which_one = instants[-1] or 1, named(integrator)
     with reaching("integration", _PROPAGATE_SECONDS) as reach:
         motion = compute(
-            top, start, instants, form, which, attitude, max_steps, which_one, lambda time: reach(float(time / end))
+            top,
+            start,
+            instants,
+            form,
+            which,
+            attitude,
+            max_steps,
+            which_one,
+            lambda time: reach(float(time / end)),
+            wanted,
+            numbers(times),
         )
-    if json:
-        print_json(motion.to_json())
-    else:
+
+    def table() -> MotionTable:
+        from heavytop.report.motion_table import of_motion
+
+        return of_motion(motion, *made_by())
+
+    def text(shown: MotionTable) -> RenderableType:
         from heavytop.report.motion_text import motion_text
 
-        show_on_terminal(motion_text(motion))
+        return motion_text(motion, shown)
+
+    write_motion(motion.to_json, table, text, csv, latex, json)
     return 0 if motion.complete else 3
 
 
 @command
 def reference(
-    inertia: Inertia,
-    weight: Weight,
-    centre: Centre,
-    omega: Omega,
-    gamma: Gamma,
     times: Times,
+    inertia: Inertia = None,
+    weight: Weight = None,
+    centre: Centre = None,
+    omega: Omega = None,
+    gamma: Gamma = None,
+    case: CaseName = None,
+    mass: Mass = None,
+    gravity: Gravity = None,
+    about: About = None,
+    omega_space: OmegaSpace = None,
+    quaternion: Quaternion = None,
+    euler: Euler = None,
+    matrix: Matrix = None,
     digits: Annotated[int, typer.Option(help="Proven digits, 1 to 20000.")] = 50,
     rotor: Rotor = None,
     system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Give xi too, fixed in space and across gamma.")] = False,
     normalize: Normalize = False,
+    show: Show = None,
+    point: Point = None,
+    pivot: Pivot = None,
+    csv: Csv = None,
+    latex: Latex = None,
     json: Json = False,
 ) -> int:
     """Print proven states of one motion.
@@ -111,18 +201,52 @@ def reference(
     from heavytop.top.equations import system_of
     from heavytop.top.times import check_times
 
-    top, start = _motion(inertia, weight, centre, omega, gamma, normalize, rotor, of_any_size=True)
+    given = {
+        "inertia": inertia,
+        "weight": weight,
+        "centre": centre,
+        "mass": mass,
+        "gravity": gravity,
+        "about": about,
+        "rotor": rotor,
+        "omega": omega,
+        "omega_space": omega_space,
+        "gamma": gamma,
+        "quaternion": quaternion,
+        "euler": euler,
+        "matrix": matrix,
+    }
+    top, start, system = _motion(given, case, system, normalize, of_any_size=True)
     which, instants = system_of(system, top), check_times(numbers(times))
+    wanted = _outputs(show, point, pivot)
+    require_one_output(csv, latex, json)
     watch = _Watch([abs(time) for time in instants])
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        found = proven(top, start, instants, digits, which, watch.find, attitude)
-    if json:
-        print_json(found)
-    else:
+        found = proven(top, start, numbers(times), digits, which, watch.find, attitude or bool(wanted))
+        found.require_outputs(wanted)
+
+    def table() -> MotionTable:
+        from heavytop.report.motion_table import of_reference
+
+        return of_reference(found, wanted, *made_by())
+
+    def text(shown: MotionTable) -> RenderableType:
         from heavytop.report.motion_text import reference_text
 
-        show_on_terminal(reference_text(found))
+        return reference_text(found, shown)
+
+    write_motion(lambda: found.document(wanted), table, text, csv, latex, json)
     return 0
+
+
+def _outputs(show: str | None, point: str | None, pivot: str | None) -> tuple[Output, ...]:
+    """The outputs asked for; raises InputError for one that is unknown, and for a point or pivot without a position."""
+    from heavytop.top.outputs import outputs
+
+    places = [None if each is None else numbers(each) for each in (point, pivot)]
+    if show is None and places == [None, None]:
+        return ()
+    return outputs("" if show is None else show, *places)
 
 
 class _Watch:
@@ -146,26 +270,46 @@ class _Watch:
 
 
 def _motion(
-    inertia: str,
-    weight: str,
-    centre: str,
-    omega: str,
-    gamma: str,
+    texts: dict[str, str | None],
+    case: str | None,
+    system: str | None,
     normalize: bool,
-    rotor: str | None,
     of_any_size: bool = False,
 ) -> Any:
-    """The exact top and start of the options; what no rigid body has is a warning.
+    """The exact top or body, the start and the name of the system; what no rigid body has is a warning.
 
+    texts: the options, by the keys of a plan.  case: in place of them.
     of_any_size: for what computes with exact numbers alone, which no format bounds.
     """
-    from heavytop.top.heavy_top import HeavyTop, State, require_physical
+    from heavytop.top.bodies import Body
+    from heavytop.top.heavy_top import require_physical
 
-    top = HeavyTop(numbers(inertia), weight, numbers(centre), None if rotor is None else numbers(rotor))
-    start = State(numbers(omega), numbers(gamma))
+    if case is None:
+        from heavytop.suite.given_motion import motion_of
+
+        given = {key: _value(key, text) for key, text in texts.items()}
+        top, start = motion_of(given, normalize)
+    else:
+        top, start, system = _of_case(case, system, [key for key, text in texts.items() if text is not None])
     if not of_any_size:
-        require_physical(top, start)
-    start = (start.normalized() if normalize else start).require_unit_gamma()
+        require_physical(top.top if isinstance(top, Body) else top, start)
+    start.require_unit_gamma()
     for warning in top.warnings():
         say(f"warning: {warning}")
-    return top, start
+    return top, start, system
+
+
+def _value(key: str, text: str | None) -> Any:
+    return text if text is None or key in ("weight", "mass", "gravity", "about", "euler") else numbers(text)
+
+
+def _of_case(name: str, system: str | None, others: list[str]) -> Any:
+    """Body, start and system of a case; raises InputError where options say them too."""
+    from heavytop.suite.cases import case
+
+    if others:
+        raise InputError(f"--case {name} and --{others[0].replace('_', '-')} were given.", "Give one of them.")
+    found = case(name)
+    if system not in (None, found.system.name):
+        raise InputError(f"The case {name} is of the system {found.system.name}, not {system}.", "Leave --system out.")
+    return found.body or found.top, found.given_start or found.start, found.system.name

@@ -46,6 +46,8 @@ _DATA_BITS = 256
 _GUARD_BITS = 96
 _ATTEMPTS = 4
 _MOST_BITS = 1 << 15
+_FOLLOWED_BITS = 512
+"""An amplification beyond it is out of reach anyway, or nearly."""
 _MARGIN = Fraction(1, 2**200)
 
 
@@ -275,13 +277,12 @@ class BodyMotion:
         parameters = self.system.parameters(resolved.top, resolved.start)
         lost = log2(max(1.0, amplification(self.system, parameters, resolved.start.flat, time)))
         data_bits = 64 * -(-(bits + _GUARD_BITS + int(2 * lost)) // 64)
-        while True:
-            try:
-                return _turned(self._known(data_bits), bits, evaluate)
-            except OutOfReach:
-                data_bits *= 4
-                if data_bits > _MOST_BITS:
-                    raise
+        try:
+            return _turned(self._known(data_bits), bits, evaluate)
+        except OutOfReach:
+            if lost > _FOLLOWED_BITS or 4 * data_bits > _MOST_BITS:
+                raise
+            return _turned(self._known(4 * data_bits), bits, evaluate)  # the amplification is an estimate
 
     def _known(self, bits: int) -> tuple[Resolved, ExactSolution]:
         if bits not in self._made:

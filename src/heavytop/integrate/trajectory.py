@@ -220,7 +220,7 @@ class Trajectory(Tabular):
         )
         object.__setattr__(self, "states", states)
 
-    def texts(self, of: str | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
+    def texts(self, of: str | Output | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
         """The states as full-precision decimal strings, ``nan`` and ``inf`` where they are, shape (n, 6) or (n, 9).
 
         of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for one of these in place of the states, in

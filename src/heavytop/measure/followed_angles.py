@@ -37,15 +37,18 @@ class _Seen(NamedTuple):
 
 
 class FollowedAngles:
-    """(φ, θ, ψ) in rad at the samples that were seen, in any order."""
+    """(φ, θ, ψ) in rad at the samples that were seen, in any order.
 
-    def __init__(self, problem: Problem) -> None:
+    problem: of the run.  start: (Ω, γ, ξ) at t = 0, in the axes whose angles these are, as are all states seen.
+    """
+
+    def __init__(self, problem: Problem, start: Sequence[Fraction]) -> None:
         self._problem = problem
         self._rate = _fastest(problem)
         inertia = problem.parameters.inertia
         self._bend = 2 + max(inertia) / min(inertia)
         self._seen: dict[Fraction, _Seen] = {}
-        self.see(Fraction(0), (*problem.start.flat, *(problem.xi or ())))
+        self.see(Fraction(0), start)
 
     def see(self, time: Fraction, state: Any) -> None:
         """Keep the angles of a state (Ω, γ, ξ)."""

@@ -19,12 +19,15 @@ from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.drift import Drift
 from heavytop.measure.followed_angles import FollowedAngles
 from heavytop.measure.scalar import GUARD_BITS, text, to_ball
-from heavytop.precision import Precision, decimal_text, exact, number
+from heavytop.measure.setup import Setup, motion_texts, xi_texts
+from heavytop.precision import Precision, decimal_text, exact, exact_text, number
 from heavytop.records import Metric
-from heavytop.top.angles import euler_angles, perpendicular
+from heavytop.top.angles import euler_angles
+from heavytop.top.bodies import Body
 from heavytop.top.equations import System
-from heavytop.top.heavy_top import HeavyTop, State, data_texts
+from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import Integral, holding
+from heavytop.top.outputs import Output, document_of
 
 Reached = Callable[[Fraction], None]
 _PARTS = 50
@@ -33,15 +36,24 @@ _STEPS_A_PART = 100
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A trajectory from an exact start, with drift, and on request ξ and continuous Euler angles as text."""
+    """A trajectory from an exact start, with drift, and on request ξ and continuous Euler angles as text.
 
-    top: HeavyTop
+    written_times: those reached, as they were given.  outputs: what else was asked for, of :meth:`output_texts`.
+    """
+
+    top: HeavyTop | Body
     start: State
     trajectory: Trajectory
     states: list[list[str]]
     drift: dict[str, Metric]
     attitude: list[list[str]] | None
     angles: list[list[str]] | None
+    written_times: list[str]
+    outputs: tuple[Output, ...] = ()
+
+    def output_texts(self, output: Output) -> list[Any]:
+        """An output at every time, in its shape, each number rounded once to the digits of the format."""
+        return self.trajectory.texts(output)
 
     @property
     def complete(self) -> bool:
@@ -61,17 +73,19 @@ class Motion:
             "states": self.states,
             "time_reached": decimal_text(run.time_reached, precision.digits),
             "order": run.order,
-            **data_texts(self.top, self.start),
+            **motion_texts(self.top, self.start, precision.digits),
             "integrator": run.integrator,
             "flags": run.flags,
             "seconds": run.seconds,
             "amplification": run.amplification if math.isfinite(run.amplification) else None,
             "metrics": {name: {"value": m.value, "log10": m.log10} for name, m in self.drift.items()},
         }
+        if run.problem.xi is not None:
+            document["xi"] = xi_texts(self.start, precision.digits)
         if self.attitude is not None:
             document["attitude"] = self.attitude
             document["angles"] = self.angles
-        return document
+        return document | {"times_given": self.written_times} | document_of(self.outputs, self.output_texts)
 
 
 class _Watcher:
@@ -80,25 +94,32 @@ class _Watcher:
     """
 
     def __init__(
-        self, problem: Problem, integrals: Sequence[Integral], wanted: frozenset[Fraction], reached: Reached
+        self,
+        problem: Problem,
+        integrals: Sequence[Integral],
+        wanted: frozenset[Fraction],
+        reached: Reached,
+        follow: bool,
+        setup: Setup,
     ) -> None:
-        self.reached = reached
+        self.reached, self.setup = reached, setup
         self.drift = Drift(problem, integrals)
         self.wanted = wanted
         self.kept: list[tuple[Fraction, Any]] = []
-        self.angles = FollowedAngles(problem) if problem.xi is not None else None
+        start = (*problem.start.flat, *(problem.xi or ()))
+        self.angles = FollowedAngles(problem, setup.turned_exactly(start)) if follow else None
 
     def __call__(self, time: Fraction, state: Any) -> None:
         self.reached(time)
         if self.angles is not None:
-            self.angles.see(time, state)
+            self.angles.see(time, self.setup.turned(state))
         if time in self.wanted:
             self.kept.append((time, state))
             self.drift(time, state)
 
 
 def compute(
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     times: Sequence[Fraction],
     precision: Precision,
@@ -107,37 +128,47 @@ def compute(
     step_limit: int | None = None,
     integrator: str | Source = "heyoka",
     reached: Reached | None = None,
+    outputs: tuple[Output, ...] = (),
+    written: Sequence[str] = (),
 ) -> Motion:
     """The motion at ``times`` (exact, checked), with the drift of every integral that holds.
 
     attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
     integrator: a name that `heavytop list` shows, or a source.
-    reached: called with the times on the way, some fifty and one for each doubling; by others than heyoka and words at
-    the end.
+    outputs: told beside the states; written: the times as they were given, none for their exact text.
+    reached: called with the times on the way, some fifty and one for each doubling; by others than heyoka and multiword
+    at the end.
 
     Raises InputError for another integrator, OutOfReach where the run would take more steps than anyone waits for.
     """
-    xi = perpendicular(start.gamma) if attitude else None
-    problem = Problem.of(top, start, precision, system, xi)
-    wanted = frozenset(exact(number(time, precision)) for time in times)
-    watcher = _Watcher(problem, holding(top, start, system), wanted, reached or (lambda time: None))
+    setup = Setup.of(top, start, precision, system)
+    xi = setup.xi if attitude or outputs else None
+    problem = Problem.of(setup.top, setup.start, precision, system, xi)
+    texts_of = written or [exact_text(time) for time in times]
+    wanted = {exact(number(time, precision)): text for time, text in zip(times, texts_of, strict=True)}
+    integrals = holding(setup.top, setup.start, system)
+    watcher = _Watcher(problem, integrals, frozenset(wanted), reached or (lambda time: None), attitude, setup)
     samples = times if watcher.angles is None else watcher.angles.samples(times)
     if reached is not None and integrator in registry.INTEGRATORS:
         on_the_way = {exact(number(time, precision)) for time in _on_the_way(problem, times[-1])}
-        samples = sorted({*samples, *(on_the_way - wanted)}, key=abs)
+        samples = sorted({*samples, *(on_the_way - wanted.keys())}, key=abs)
     options = {name: value for name, value in (("xi", xi), ("step_limit", step_limit)) if value is not None}
     propagate = registry.watched(integrator, options, watcher)
-    run = propagate(top, start, samples, precision, system=system)
+    run = propagate(setup.top, setup.start, samples, precision, system=system)
     run = replace(run, times=tuple(time for time, _ in watcher.kept), states=tuple(state for _, state in watcher.kept))
+    run = setup.given(run)
     texts = run.texts()
     attitudes = angles = None
     if watcher.angles is not None:
-        again = registry.watched(integrator, options, watcher.angles.see)
-        followed = watcher.angles.complete(lambda more: again(top, start, more, precision, system=system))
+        angles_of = watcher.angles
+        again = registry.watched(integrator, options, lambda time, state: angles_of.see(time, setup.turned(state)))
+        followed = watcher.angles.complete(lambda more: again(setup.top, setup.start, more, precision, system=system))
         attitudes = [line[6:] for line in texts]
-        angles = [_angles(state, followed[time], precision) for time, state in watcher.kept]
-    return Motion(top, start, run, [line[:6] for line in texts], watcher.drift.metrics(), attitudes, angles)
+        angles = [_angles(state, followed[time], precision) for time, state in zip(run.times, run.states, strict=True)]
+    reached_times = [str(wanted[time]) for time, _ in watcher.kept]
+    states, drift = [line[:6] for line in texts], watcher.drift.metrics()
+    return Motion(top, start, run, states, drift, attitudes, angles, reached_times, outputs)
 
 
 def _on_the_way(problem: Problem, end: Fraction) -> list[Fraction]:

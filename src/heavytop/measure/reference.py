@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import msgspec
 
@@ -21,12 +21,12 @@ from heavytop.exact.solution import ExactSolution
 from heavytop.measure import reference_outputs as outputs_of
 from heavytop.measure.certify import bits_of
 from heavytop.measure.reference_outputs import GUARD_BITS, KnownMotion
-from heavytop.precision import decimal_text, exact, exact_text, shown
-from heavytop.top.angles import perpendicular
+from heavytop.measure.setup import motion_texts, xi_texts
+from heavytop.precision import decimal_text, exact, shown
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
-from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
-from heavytop.top.outputs import Output, output, shaped
+from heavytop.top.heavy_top import HeavyTop, State, Vector
+from heavytop.top.outputs import Output, document_of, output, shaped
 from heavytop.top.times import TimeText
 
 if TYPE_CHECKING:
@@ -73,15 +73,18 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     xi: list[str] | None = None
     mass: str | None = None
     gravity: str | None = None
-    start_attitude: str | None = None
-    start_omega_space: list[str] | None = None
+    about: str | None = None
+    start_quaternion: list[str] | None = None
+    start_matrix: list[str] | None = None
+    start_euler: list[str] | None = None
+    start_sequence: str | None = None
 
     @property
     def times(self) -> list[TimeText]:
         """Exact text, as it was given, which ``float`` and ``Fraction`` read."""
         return [TimeText(time) for time in self.written_times]
 
-    def texts(self, of: str | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
+    def texts(self, of: str | Output | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
         """The values as decimal text, shape (n, 6).
 
         of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for the values of that in place of the
@@ -94,13 +97,23 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
             return self._outputs(output(of, point, pivot), lambda value: outputs_of.text(value, self.digits)[0])
         return [[ball.value for ball in state] for state in self.states]
 
-    def balls(self, of: str, *, point: Any = None, pivot: Any = None) -> list[Any]:
+    def balls(self, of: str | Output, *, point: Any = None, pivot: Any = None) -> list[Any]:
         """An output as :class:`Ball`, in the shape of its array; "nan" within "inf" for what is not defined.
 
         of, point, pivot: as in :meth:`texts`.  Each number is proven to ``digits``, relative to a size above 1; a
         position relative to |p|.
         """
         return self._outputs(output(of, point, pivot), lambda value: Ball(*outputs_of.text(value, self.digits)))
+
+    def document(self, outputs: Sequence[Output] = ()) -> dict[str, Any]:
+        """The document of `reference --json`, with these outputs in it."""
+        values = document_of(outputs, lambda what: msgspec.to_builtins(self.balls(what)))
+        return cast("dict[str, Any]", msgspec.to_builtins(self)) | values
+
+    def require_outputs(self, outputs: Sequence[Output]) -> None:
+        """Evaluates them, so that they are there when they are asked for; raises OutOfReach as :meth:`balls` does."""
+        for what in outputs:
+            self._known().balls(what)
 
     def quaternions(self) -> NDArray[np.float64]:
         """(w, x, y, z) at every time, body to space, of length 1, rounded to double, shape (n, 4).
@@ -217,8 +230,7 @@ def reference(
         written_times=[str(TimeText.of(time)) for time in times],
         states=[],
         system=system.name,
-        **_body_texts(top, digits),
-        **_start_texts(start, digits),
+        **motion_texts(top, start, digits),
     )
     if not attitude:
         states = [ball_texts(known.state, known.method, time, digits) for time in instants]
@@ -232,54 +244,10 @@ def reference(
         states=[part[:6] for part in parts],
         attitude=[part[6:] for part in parts],
         attitude_method=method,
-        xi=xi_texts(start, digits),
+        xi=xi_texts(start, digits) or start_texts(start.gamma, digits),
     )
     found.__dict__["_motion"] = motion
     return found
-
-
-def _body_texts(body: HeavyTop | Body, digits: int) -> dict[str, Any]:
-    """The body as exact text, by the keys of the JSON document."""
-    found: dict[str, Any] = {
-        "centre": list(map(exact_text, body.centre)),
-        "rotor": None if body.rotor is None else list(map(exact_text, body.rotor)),
-        "weight": exact_text(body.weight),
-    }
-    if isinstance(body, HeavyTop):
-        return found | {"inertia": list(map(exact_text, body.inertia))}
-    tensor = [exact_text(value) for row in body.tensor for value in row]
-    return found | {"mass": exact_text(body.mass), "gravity": exact_text(body.gravity), "inertia": tensor}
-
-
-def _start_texts(start: State, digits: int) -> dict[str, Any]:
-    """The start as exact text; γ and Ω of an irrational attitude to the digits asked."""
-    known = start.attitude is None or start.attitude.exact_rows() is not None
-
-    def texts(values: Vector, known: bool) -> list[str]:
-        return [exact_text(value) if known else decimal_text(value, digits + 1) for value in values]
-
-    found: dict[str, Any] = {
-        "omega": texts(start.omega, known or start.omega_space is None),
-        "gamma": texts(start.gamma, known),
-    }
-    if start.attitude is not None:
-        found["start_attitude"] = f"{start.attitude.kind}:{start.attitude}"
-    if start.omega_space is not None:
-        found["start_omega_space"] = texts(start.omega_space, True)
-    return found
-
-
-def xi_texts(start: State, digits: int) -> list[str]:
-    """ξ at t = 0: of the attitude given, else of γ alone; exact where it is rational, else to that many digits."""
-    if start.attitude is not None:
-        rows = start.attitude.exact_rows()
-        if rows is not None:
-            return [exact_text(value) for value in rows[0]]
-        near = start.attitude.rational_rows(bits_of(digits) + GUARD_BITS)
-        return [decimal_text(value, digits + 1) for value in near[0]]
-    if dot(start.gamma, start.gamma) == 1:
-        return [exact_text(value) for value in perpendicular(start.gamma)]
-    return start_texts(start.gamma, digits)
 
 
 @whole_evaluation

@@ -70,7 +70,10 @@ class KnownMotion:
         if output.name == "quaternion" and found:
             turns = self.signs(found)
             # a ball is negated exactly: the minus sign would round it to FLINT's precision of the moment
-            return [[v.neg(exact=True) if s < 0 else v for v in q] for q, s in zip(found, turns, strict=True)]
+            return [
+                [part.neg(exact=True) if part is not None and sign < 0 else part for part in q]
+                for q, sign in zip(found, turns, strict=True)
+            ]
         return found
 
     def signs(self, quaternions: Sequence[Sequence[Any]]) -> list[int]:

@@ -25,12 +25,14 @@ from heavytop.suite.trajectory_table import REMEDY, VECTORS, Table, unknown
 from heavytop.top.bodies import CENTRE, Body
 from heavytop.top.equations import system
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
+from heavytop.top.outputs import SHAPES, key_of
 from heavytop.top.times import check_times
 
 _FLAGS = ("language", "tolerance", "step")
 _KEYS = {*VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
 _KEYS |= {"outcome", "steps", *observed_file.KEYS}
 _NOT_READ = {"time_reached", "order", "flags", "seconds", "amplification", "metrics", "attitude", "angles"}
+_NOT_READ |= {"times_given", "xi", "command", "version", "sequence", "point", "pivot", *map(key_of, SHAPES)}
 """What else `heavytop propagate --json` writes."""
 _SLACK = 8
 """γ may be off the unit sphere by so many bits of rounding."""

@@ -13,7 +13,7 @@ from fractions import Fraction
 from typing import Any
 
 from heavytop.errors import InputError, quoted
-from heavytop.precision import physical
+from heavytop.precision import exact_text, physical
 from heavytop.top.attitude import euler_of_rows, quaternion_of_rows, require_sequence, rotated, rows_of
 from heavytop.top.heavy_top import Vector, vector
 
@@ -35,6 +35,11 @@ _ORIGIN = (Fraction(0), Fraction(0), Fraction(0))
 _REMEDY = "Use quaternion, matrix, euler:ZXZ (or another sequence), position, omega-space."
 
 
+def key_of(name: str) -> str:
+    """The key of an output in a JSON document."""
+    return name.replace("-", "_")
+
+
 @dataclass(frozen=True, slots=True)
 class Output:
     """One of :data:`SHAPES`; Euler angles with their sequence, a position with its point and pivot.
@@ -50,7 +55,7 @@ class Output:
     @property
     def key(self) -> str:
         """In a JSON document."""
-        return self.name.replace("-", "_")
+        return key_of(self.name)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -60,7 +65,7 @@ class Output:
     @property
     def columns(self) -> tuple[str, ...]:
         """In a CSV file."""
-        return _COLUMNS.get(self.name) or tuple(f"{self.sequence}{place}" for place in (1, 2, 3))
+        return _COLUMNS.get(self.name) or tuple(f"euler{place}" for place in (1, 2, 3))
 
     def at(
         self, omega: Any, gamma: Any, xi: Any, centre: Vector, lib: Any, number: Callable[[Fraction], Any]
@@ -88,12 +93,14 @@ class Output:
         return centre if self.point is None else self.point
 
 
-def output(text: str, point: Any = None, pivot: Any = None) -> Output:
-    """The output of that name, "euler:ZXZ" with its sequence.
+def output(text: str | Output, point: Any = None, pivot: Any = None) -> Output:
+    """The output of that name, "euler:ZXZ" with its sequence; one that was read before, as it is.
 
     point, pivot: three exact numbers each, of a position alone.
     Raises InputError for an unknown name or sequence, and for a point or pivot of another output.
     """
+    if isinstance(text, Output) and point is None and pivot is None:
+        return text
     name, colon, sequence = (text if isinstance(text, str) else "").strip().partition(":")
     name = name.replace("_", "-").lower()
     if name not in SHAPES or (colon and name != "euler"):
@@ -163,3 +170,17 @@ def signs(start: Sequence[float], quaternions: Any) -> Any:
 
     chain = numpy.concatenate([[start], quaternions])
     return numpy.cumprod(numpy.where((chain[1:] * chain[:-1]).sum(axis=1) < 0, -1.0, 1.0))
+
+
+def document_of(outputs: Sequence[Output], values: Callable[[Output], Any]) -> dict[str, Any]:
+    """The keys of a JSON document for these outputs."""
+    found: dict[str, Any] = {}
+    for output in outputs:
+        found[output.key] = values(output)
+        if output.name == "euler":
+            found["sequence"] = output.sequence
+        if output.point is not None:
+            found["point"] = [exact_text(value) for value in output.point]
+        if any(output.pivot):
+            found["pivot"] = [exact_text(value) for value in output.pivot]
+    return found

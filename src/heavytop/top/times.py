@@ -19,8 +19,9 @@ _LONGEST = 60
 
 
 class TimeText(str):
-    """A time as exact text, as it was given: ``12345.678``, ``1e3`` or ``1/3``; ``float`` of each is the nearest double,
-    ``Fraction`` the number itself.
+    """A time as exact text, as it was given: ``12345.678``, ``1e3`` or ``1/3``.
+
+    ``float`` of it is the nearest double, ``Fraction`` of it the number itself.
     """
 
     __slots__ = ()

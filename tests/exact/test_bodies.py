@@ -1,0 +1,218 @@
+"""Bodies in any axes, irrational data included: known motions against an independent integration."""
+
+from fractions import Fraction
+from itertools import permutations
+from random import Random
+from typing import Any
+
+import pytest
+from flint import arb
+
+import heavytop as ht
+from full_tensor import integrate, rotation
+from heavytop.errors import InputError, OutOfReach
+from heavytop.exact.balls import midpoint, radius
+from heavytop.exact.bodies import BodyMotion, resolve
+from heavytop.top.attitude import Attitude, multiplied, transposed
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
+from heavytop.top.principal import IDENTITY, principal_axes
+
+BITS = 110
+TILTED = [["0.5", "0.1", "-0.05"], ["0.1", "0.7", "0.02"], ["-0.05", "0.02", "0.9"]]
+TOP = ht.Body("15", "9.81", (0, 1, 0), ("0.234375", "0.46875", "0.234375"), "centre of mass")
+SPINNING = ht.State(omega=("0", "150", "-4.61538"), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
+LOPSIDED = ht.Body("2", "9.81", ("0.1", "-0.2", "0.3"), TILTED, "pivot")
+
+
+def contains(values: list[arb], others: list[Fraction], slack: Fraction) -> bool:
+    return all(abs(midpoint(v) - x) <= radius(v) + slack for v, x in zip(values, others, strict=True))
+
+
+def independent(body: Any, start: Any, time: Fraction) -> list[Fraction]:
+    """(Ω, γ, ξ) at ``time`` by Taylor series of q and Ω in the axes given, no principal axes; to some 1e-40."""
+    rows = start.attitude.rational_rows(300)
+    return integrate(body.tensor, body.moment, body.rotor or (0, 0, 0), rows, start.omega, time)
+
+
+@pytest.mark.parametrize(
+    ("body", "start", "time"),
+    [
+        (TOP, SPINNING, Fraction(1, 10)),
+        (LOPSIDED, ht.State((1, 2, -3), attitude=ht.Attitude.quaternion("1/2", "1/2", "-1/2", "1/2")), Fraction(1)),
+        (LOPSIDED, ht.State((1, 2, -3), attitude=ht.Attitude.euler("ZYX", "30deg", "0.2", "1")), Fraction(-1, 2)),
+        (
+            ht.Body(
+                2,
+                "9.81",
+                ("0.1", "-0.2", "0.3"),
+                ["0.5", "0.7", "0.9", "-0.1", "0.05", "-0.02"],
+                "centre of mass",
+                rotor=("0.3", 0, -1),
+            ),
+            ht.State(omega_space=("1.5", -2, "0.25"), attitude=ht.Attitude.axis_angle((1, 2, -2), "0.7")),
+            Fraction(1),
+        ),
+        (
+            ht.Body(1, 0, (0, 0, 0), [[2, 1, 1], [1, 2, 1], [1, 1, 2]]),
+            ht.State((1, "1/2", "-1/3"), attitude=ht.Attitude.quaternion(1, 0, 0, 0)),
+            Fraction(2),
+        ),
+    ],
+    ids=["bruels-cardona-arnold", "full tensor", "angles, backwards", "rotor, about the centre of mass", "free"],
+)
+def test_a_body_is_known_as_an_independent_integration_has_it(body: Any, start: Any, time: Fraction) -> None:
+    system = HEAVY_TOP if body.rotor is None else HEAVY_GYROSTAT
+    found = BodyMotion(body, start, system).with_attitude(time, BITS)
+    assert contains(found, independent(body, start, time), Fraction(1, 10**36))
+    assert max(map(radius, found)) < Fraction(1, 2) ** (BITS - 10)
+
+
+def test_the_state_at_t_0_is_what_was_given() -> None:
+    start = ht.State(omega_space=(1, 2, 3), attitude=ht.Attitude.euler("XYZ", "0.1", "0.2", "0.3"))
+    values = BodyMotion(LOPSIDED, start).with_attitude(Fraction(0), BITS)
+    rows = start.attitude.rational_rows(400)
+    spin = [sum(rows[i][j] * w for i, w in enumerate((1, 2, 3))) for j in range(3)]
+    assert contains(values, [*spin, *rows[2], *rows[0]], Fraction(1, 2**390))
+
+
+def test_principal_axes_diagonalize_exactly_but_for_what_is_left() -> None:
+    random = Random(4)
+    for _ in range(10):
+        root = [[Fraction(random.randint(-9, 9)) for _ in range(3)] for _ in range(3)]
+        tensor = [[x + (i == j) for j, x in enumerate(row)] for i, row in enumerate(multiplied(root, transposed(root)))]
+        found = principal_axes(tensor, 200)
+        assert multiplied(found.axes, transposed(found.axes)) == IDENTITY
+        whole = [[found.left[i][j] + (found.moments[i] if i == j else 0) for j in range(3)] for i in range(3)]
+        assert multiplied(found.axes, multiplied(whole, transposed(found.axes))) == tuple(map(tuple, tensor))
+        largest = max(abs(x) for row in tensor for x in row)
+        assert max(abs(x) for row in found.left for x in row) <= largest / 2**190
+
+
+@pytest.mark.parametrize("moments", [(3, 2, 1), (3, 3, 1), (1, 4, 4)])
+def test_rational_principal_axes_are_found_exactly(moments: Any) -> None:
+    rows = Attitude.quaternion(1, 2, -3, 5, normalize=True).exact_rows()
+    assert rows is not None
+    diagonal = [[Fraction(moments[i] * (i == j)) for j in range(3)] for i in range(3)]
+    found = principal_axes(multiplied(rows, multiplied(diagonal, transposed(rows))), 200)
+    assert found.exact
+    assert sorted(found.moments) == sorted(moments)
+
+
+def test_moments_that_are_nearly_equal_are_told_apart_and_huge_ones_scaled() -> None:
+    near = Fraction(1, 10**45)
+    tensor = [[(1 + (i == 0) * Fraction(1, 10**40)) if i == j else near for j in range(3)] for i in range(3)]
+    for size in (Fraction(1), Fraction(10) ** 100, Fraction(1, 10**100)):
+        found = principal_axes([[size * x for x in row] for row in tensor], 200)
+        assert max(abs(x) for row in found.left for x in row) <= size / 2**190
+
+
+def test_axes_under_every_renaming_give_the_same_motion() -> None:
+    """The body with its axes permuted (and one reversed, where that keeps them right-handed) moves as before."""
+    start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion("1/2", "1/2", "-1/2", "1/2"))
+    wanted = BodyMotion(LOPSIDED, start).state(Fraction(1), 80)
+    for order in permutations(range(3)):
+        turn = [[Fraction(int(order[i] == j)) for j in range(3)] for i in range(3)]
+        sign = 1 if order in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1
+        turn[0] = [sign * x for x in turn[0]]
+        back = transposed(turn)
+        tensor = multiplied(turn, multiplied(LOPSIDED.tensor, back))
+        centre = [sum(a * c for a, c in zip(row, LOPSIDED.centre, strict=True)) for row in turn]
+        body = ht.Body(LOPSIDED.mass, LOPSIDED.gravity, centre, tensor, "pivot")
+        turned = [
+            [sum(a * x for a, x in zip(row, part, strict=True)) for row in turn] for part in (start.omega, start.gamma)
+        ]
+        found = BodyMotion(body, ht.State(*turned)).state(Fraction(1), 80)
+        moved = [
+            sum((float(a) * x for a, x in zip(row, wanted[k : k + 3], strict=True)), arb(0))
+            for k in (0, 3)
+            for row in turn
+        ]
+        assert all((a - b).contains(0) or abs(float(a - b)) < 1e-14 for a, b in zip(found, moved, strict=True))
+
+
+@pytest.mark.parametrize("bits", [80, 400])
+def test_what_rounding_moves_is_bounded_and_small(bits: int) -> None:
+    found = resolve(LOPSIDED, ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0)), bits)
+    assert found.uncertainty is not None
+    assert 0 < found.uncertainty.rate < Fraction(1, 2) ** (bits - 20)
+    assert 0 < max(found.uncertainty.start) < Fraction(1, 2) ** (bits - 8)
+
+
+def test_an_enclosure_that_ignores_the_rounding_misses_the_true_motion() -> None:
+    """A planted fault: data rounded to 40 bits without their uncertainty give balls that do not hold the truth."""
+    from heavytop.exact.validated import Validated
+
+    start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
+    true = BodyMotion(LOPSIDED, start).state(Fraction(2), 120)
+    coarse = resolve(LOPSIDED, start, 40)
+    blind = coarse.given([midpoint(x) for x in Validated(coarse.top, coarse.start).state(Fraction(2), 120)])
+    assert not contains(true, blind, Fraction(1, 10**25))
+    honest = Validated(coarse.top, coarse.start, xi=coarse.xi, uncertainty=coarse.uncertainty)
+    values = honest.state(Fraction(2), 12)
+    found = coarse.given([midpoint(x) for x in values])
+    widest = max(map(radius, values)) * 2
+    assert all(abs(midpoint(t) - x) <= widest for t, x in zip(true, found, strict=True))
+
+
+def test_a_run_of_a_body_comes_back_in_its_axes() -> None:
+    start = ht.State((1, 2, -3), attitude=ht.Attitude.euler("ZYX", "30deg", "0.2", "1"))
+    for form, eps in ((ht.DOUBLE, 1e-13), (ht.QUAD, 1e-31)):
+        run, known = ht.propagate(LOPSIDED, start, [1, 2], form), ht.reference(LOPSIDED, start, [1, 2], 34)
+        off = [
+            abs(Fraction(a) - Fraction(b))
+            for x, y in zip(run.texts(), known.texts(), strict=True)
+            for a, b in zip(x, y, strict=True)
+        ]
+        assert max(off) < eps
+        assert abs(run.quaternions() - known.quaternions()).max() < 1e-13
+        assert abs(run.positions() - known.positions()).max() < 1e-13
+        assert max(summary.max for summary in ht.drift(run).values()) < 100 * eps
+    member = ht.ensemble(LOPSIDED, [start, start], [1, 2])[1]
+    assert abs(member.to_numpy() - known.to_numpy()).max() < 1e-13
+    seen: list[Any] = []
+    ht.propagate(LOPSIDED, start, [1], observer=lambda time, state: seen.append([float(x) for x in state[:6]]))
+    assert seen[0] == pytest.approx(list(known.to_numpy()[0]), abs=1e-13)
+
+
+def test_principal_axes_change_no_bit_and_permutations_round_nothing() -> None:
+    top, start = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+    body = ht.Body(1, 1, ("1/2", "1/3", "1/5"), (3, 2, 1), "pivot")
+    plain, given = ht.propagate(top, start, [1, 5]), ht.propagate(body, start, [1, 5])
+    assert plain.states.tolist() == given.states.tolist()
+    assert ht.reference(body, start, [5], 20).method == ht.reference(top, start, [5], 20).method
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ht.Body(0, 1, (0, 0, 0), (1, 1, 1)), "mass = 0"),
+        (lambda: ht.Body(1, "-9.81", (0, 0, 0), (1, 1, 1)), "negative"),
+        (lambda: ht.Body(1, 1, (0, 0, 1), (1, 1, 1)), "which point"),
+        (lambda: ht.Body(1, 1, (0, 0, 1), (1, 1, 1), "the end"), "'the end'"),
+        (lambda: ht.Body(1, 1, (0, 0, 0), (1, 1)), "2 numbers"),
+        (lambda: ht.Body(1, 1, (0, 0, 0), [[1, 2, 0], [0, 1, 0], [0, 0, 1]]), "not symmetric: I12 = 2, I21 = 0"),
+        (lambda: ht.Body(1, 1, (0, 0, 0), (1, 1, 1, 2, 0, 0)), "not that of a body"),
+        (lambda: ht.Body(1, 1, (0, 0, 0), (1, -1, 1)), "not that of a body"),
+        (lambda: ht.Body("nan", 1, (0, 0, 0), (1, 1, 1)), "nan"),
+        (lambda: ht.State((0, 0, 1)), "Neither gamma"),
+        (lambda: ht.State(gamma=(0, 0, 1)), "neither omega"),
+        (lambda: ht.State((0, 0, 1), (0, 0, 1), omega_space=(0, 0, 1)), "both omega"),
+        (lambda: ht.State(gamma=(0, 0, 1), omega_space=(0, 0, 1)), "without an attitude"),
+        (lambda: ht.State((0, 0, 1), (1, 0, 0), attitude=ht.Attitude.quaternion(1, 0, 0, 0)), "contradicts"),
+        (lambda: ht.State((0, 0, 1), attitude="up"), "not an Attitude"),  # type: ignore[arg-type]
+    ],
+)
+def test_what_is_no_body_or_start_is_refused(make: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_a_time_beyond_the_enclosure_is_out_of_reach_by_name() -> None:
+    start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
+    with pytest.raises(OutOfReach):
+        ht.reference(LOPSIDED, start, ["1e7"], 30)
+
+
+def test_rotations_of_the_independent_integration_are_rotations() -> None:
+    rows = rotation([Fraction(1), Fraction(2), Fraction(3), Fraction(4)])
+    assert multiplied(rows, transposed(rows)) == IDENTITY
