@@ -131,7 +131,7 @@ def _wanted(quantity: str, there: set[str], scalar_last: bool, sequence: str) ->
     if quantity == "euler" and there & set("XYZ"):
         if sorted(sequence) != ["X", "Y", "Z"]:
             raise InputError(
-                f"roll, pitch and yaw are angles of a sequence about three axes, not of {sequence or 'none that is said'}.",
+                f"roll, pitch and yaw are of a sequence about three axes, not of {sequence or 'none that is said'}.",
                 'Give sequence, such as "ZYX", or call the columns euler1, euler2, euler3.',
             )
         return list(sequence)
