@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy
 
@@ -15,6 +15,9 @@ from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, number, round_to, shown
 from heavytop.top.equations import VARIABLES, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
+
+if TYPE_CHECKING:
+    from heavytop.suite.observed_given import Observed
 
 MOST = 100_000
 """States that are scored."""
@@ -34,6 +37,8 @@ class Given:
     times: exact, as written.  states: six exact numbers each, rounded to the format; None for a state that is not
     finite.  name, integrator: as the row will call them.  flags: what else the file says.  sha256: of the file.
     format_guessed: whether the format was read off the digits written.  notes: what reading the file took for granted.
+    observed: what it gives in place of Ω and γ in principal axes; the states are then all numbers of a row, and top and
+    start are those in principal axes.
     """
 
     name: str
@@ -50,10 +55,13 @@ class Given:
     sha256: str
     format_guessed: bool = False
     notes: tuple[str, ...] = ()
+    observed: Observed | None = None
 
     def warnings(self) -> list[str]:
         """What no rigid body can have, and a γ so far off the unit sphere that the columns may be in another order."""
         found = [*self.notes, *self.top.warnings()]
+        if self.observed is not None:
+            return found
         for time, state in zip(self.times, self.states, strict=True):
             if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
                 found.append(
