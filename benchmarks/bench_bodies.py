@@ -70,7 +70,7 @@ def samples(repeats: int) -> None:
     many = numpy.linspace(0, END, 20001)[1:]
     print(f"run to T = {END} in double: seconds")
     print(f"{'':10}{'1 sample':>12}{'20,000':>12}{'ratio':>8}{'attitude, 1':>14}{'quaternions':>14}{'ratio':>8}")
-    for integrator in ("heyoka", "words"):
+    for integrator in ("heyoka", "multiword"):
 
         def run(times: object, attitude: bool = False, integrator: str = integrator) -> ht.Trajectory:
             return ht.propagate(*GENERIC, times, integrator=integrator, attitude=attitude)

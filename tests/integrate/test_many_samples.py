@@ -188,3 +188,16 @@ def test_times_are_exact_and_checked_once() -> None:
     close = check_times([1, 1 + Fraction(1, 10**30), 1 + Fraction(2, 10**30)])
     assert close[2] - close[1] == Fraction(1, 10**30)
     assert close.doubles == []
+
+
+@pytest.mark.parametrize("last", [40, -500])
+def test_many_samples_by_heyoka_have_the_bits_of_an_observed_run(last: int) -> None:
+    top, start = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+    times = [Fraction(k * last, 1000) for k in range(1001)]
+    states: list[np.ndarray] = []
+    one_by_one = propagate(top, start, times, DOUBLE, observer=lambda _, state: states.append(state))
+    found = propagate(top, start, np.array(times, dtype=float), DOUBLE)
+    exact_times = propagate(top, start, times, DOUBLE)
+    assert np.array_equal(exact_times.states, np.array(states))
+    assert np.array_equal(found.states, exact_times.states)
+    assert (found.steps, found.outcome) == (one_by_one.steps, one_by_one.outcome)

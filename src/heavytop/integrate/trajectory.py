@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from heavytop.display import Lines, Table, Tabular, path_picture
 from heavytop.errors import InputError
@@ -219,6 +219,12 @@ class Trajectory(Tabular):
             else numpy.empty((0, width))
         )
         object.__setattr__(self, "states", states)
+
+    @overload
+    def texts(self, of: None = None) -> list[list[str]]: ...
+
+    @overload
+    def texts(self, of: str | Output, *, point: Any = None, pivot: Any = None) -> list[Any]: ...
 
     def texts(self, of: str | Output | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
         """The states as full-precision decimal strings, ``nan`` and ``inf`` where they are, shape (n, 6) or (n, 9).

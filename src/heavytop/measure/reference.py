@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast, overload
 
 import msgspec
 
@@ -88,6 +88,12 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     def times(self) -> list[TimeText]:
         """Exact text, as it was given, which ``float`` and ``Fraction`` read."""
         return [TimeText(time) for time in self.written_times]
+
+    @overload
+    def texts(self, of: None = None) -> list[list[str]]: ...
+
+    @overload
+    def texts(self, of: str | Output, *, point: Any = None, pivot: Any = None) -> list[Any]: ...
 
     def texts(self, of: str | Output | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
         """The values as decimal text, shape (n, 6).
