@@ -10,7 +10,7 @@ from heavytop.kinds import KINDS
 ALSO_WORDS = {"drift", "growth", "audit", "score", "local_error"}
 """Names that are quantities, sections or commands as well."""
 SOURCE = Path(__file__).parents[1] / "src" / "heavytop"
-GROUND = {"display", "errors", "precision", "processes", "records", "version", "written_numbers"}
+GROUND = {"display", "errors", "former_names", "precision", "processes", "records", "version", "written_numbers"}
 MOTIONS = GROUND | {"top", "exact", "claims", "integrate"}
 MAY_IMPORT = {
     "errors": set(),
@@ -18,6 +18,7 @@ MAY_IMPORT = {
     "display": set(),
     "processes": set(),
     "records": set(),
+    "former_names": {"records"},
     "version": set(),
     "written_numbers": {"errors", "precision"},
     "top": GROUND,
@@ -26,14 +27,15 @@ MAY_IMPORT = {
     "claims": GROUND | {"top", "exact"},
     "integrate": GROUND | {"top", "words"},
     "measure": MOTIONS,
+    "event_times": GROUND | {"top", "words", "exact", "integrate", "measure"},
     "suite": MOTIONS | {"measure"},
-    "report": MOTIONS | {"measure", "suite"},
+    "report": MOTIONS | {"measure", "event_times", "suite"},
     "kinds": MOTIONS | {"measure", "suite", "report"},
-    "api": MOTIONS | {"measure", "suite", "report", "kinds"},
-    "cli": MOTIONS | {"measure", "suite", "report", "kinds", "api"},
+    "api": MOTIONS | {"measure", "event_times", "suite", "report", "kinds"},
+    "cli": MOTIONS | {"measure", "event_times", "suite", "report", "kinds", "api"},
     "__main__": {"cli"},
     "pytest_plugin": GROUND | {"suite", "api"},
-    "__init__": GROUND | {"top", "integrate", "measure", "api"},
+    "__init__": GROUND | {"top", "integrate", "measure", "event_times", "api"},
 }
 
 

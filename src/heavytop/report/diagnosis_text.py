@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from heavytop.measure.diagnosis import AS_AT_START, VARIES, Diagnosis
 from heavytop.measure.suspects import FLOOR
+from heavytop.report.convention_text import is_convention, sentence
 from heavytop.report.text import short
 
 _SENTENCES = {
@@ -40,6 +41,8 @@ _OWNERS = {"inertia_axes": "moments of inertia", "centre_axes": "centre of mass"
 
 def diagnosis_text(found: Diagnosis, system: str = "heavy_top") -> str:
     """One or two sentences: what fits, and how far the error falls with it."""
+    if is_convention(found):
+        return _scope(found) + sentence(found)
     said = _scope(found) + _said(found, system)
     if found.left is None or found.error is None:
         return said
