@@ -65,7 +65,7 @@ def test_the_plan_in_the_documentation_is_one_and_every_kind_is_there(tmp_path: 
     (example,) = re.findall(r"```toml\n(.*?)```", text, re.S)
     (tmp_path / "plan.toml").write_text(example, "utf-8")
     tasks = expand(load(str(tmp_path / "plan.toml"))[0])
-    assert len(tasks) == 2 * (1 + 1 + 6 + 100)
+    assert len(tasks) == 2 * (1 + 2 + 6 + 100)
     assert {"mine", "faster[1,2]", "many[99]"} <= {task.title for task in tasks}
     kinds = {kind.name for kind in KINDS.values() if kind.table is not None}
     assert kinds == set(re.findall(r"^\| `(\w+)` \|", text, re.M))
