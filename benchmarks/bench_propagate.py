@@ -95,7 +95,7 @@ def test_samples_do_not_change_the_end(benchmark) -> None:
     assert number(times[-1], DOUBLE) == 10000
 
 
-@pytest.mark.parametrize("integrator", [propagate, propagate_words], ids=["heyoka", "words"])
+@pytest.mark.parametrize("integrator", [propagate, propagate_words], ids=["heyoka", "multiword"])
 def test_twenty_thousand_samples_against_one(benchmark, integrator) -> None:
     """T = 1000 in double: 20,000 regular samples, and the last alone, interleaved; processor seconds, least of 15."""
     times = [Fraction(k, 20) for k in range(1, 20001)]

@@ -260,7 +260,7 @@ class Inputs:
         more = {
             "propagate": (["--precision", random_.choice(("double", "quad", "extended", "double-double", "real:40",
             *ODD_TEXT))],
-                          ["--integrator", random_.choice(("words", "splitting:2", "scipy:LSODA", *ODD_TEXT))],
+                          ["--integrator", random_.choice(("multiword", "splitting:2", "scipy:LSODA", *ODD_TEXT))],
                           ["--max-steps", random_.choice(("3", "0", *ODD_TEXT))], ["--attitude"]),
             "reference": (["--digits", random_.choice(("1", "30", "200", "0", "x", "1e3", "-1"))], ["--attitude"]),
         }[which]  # fmt: skip
@@ -279,7 +279,7 @@ class Inputs:
                           "integrator": "heyoka", "system": "heavy_top", "step_limit": 50, "tolerance": None,
                           "xi": None}),
             "ensemble": (ht.ensemble, {"tops": [TOP, TOP], "starts": START, "times": times, "precision": "double",
-                         "integrator": "words", "threads": 2, "step_limit": 50, "system": "heavy_top"}),
+                         "integrator": "multiword", "threads": 2, "step_limit": 50, "system": "heavy_top"}),
             "reference": (ht.reference, {"top": TOP, "start": START, "times": times, "digits": 20,
             "system": "heavy_top",
                           "attitude": False}),

@@ -52,7 +52,7 @@ def draw(rows: list[tuple[int, float, float | None]], out: Path) -> None:
     """The picture, as SVG without a date."""
     figure = Figure(figsize=(7, 4.5))
     axes = figure.subplots()
-    for place, name, colour, marker in ((2, "heyoka", _ORANGE, "s"), (1, "words", _BLUE, "o")):
+    for place, name, colour, marker in ((2, "heyoka", _ORANGE, "s"), (1, "multiword", _BLUE, "o")):
         points = [(row[0], row[place]) for row in rows if row[place] is not None]
         axes.loglog(*zip(*points, strict=True), marker=marker, color=colour, label=name)
     axes.set_xlabel("bits of the format")

@@ -1,4 +1,4 @@
-"""Random tops by the integrator words: is every result right, or an outcome that says why not?
+"""Random tops by the integrator multiword: is every result right, or an outcome that says why not?
 
 Run: python benchmarks/words_random_tops.py capacity [--runs 3000]   word sizes, good and bad, against more words
      python benchmarks/words_random_tops.py formats [--runs 300] [--first 0]

@@ -299,7 +299,7 @@ def test_an_interrupted_run_goes_on_where_it_was(tmp_path: Path, finished: Path)
 
 
 @pytest.mark.parametrize(
-    ("after", "integrator"), [(0.5, "heyoka"), (1.0, "heyoka"), (2.0, "heyoka"), (6.0, "heyoka"), (5.0, "words")]
+    ("after", "integrator"), [(0.5, "heyoka"), (1.0, "heyoka"), (2.0, "heyoka"), (6.0, "heyoka"), (5.0, "multiword")]
 )
 def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130(after: float, integrator: str) -> None:
     """While libraries load, while heyoka compiles, while it integrates."""
@@ -397,10 +397,12 @@ def test_reference_refuses_what_it_cannot_prove(changes, more, code, message) ->
 @pytest.mark.parametrize("precision", ["double", "double-double", "quad", "real:300"])
 def test_propagate_by_words_says_what_it_is(precision: str) -> None:
     common = "--inertia 3,2,1 --weight 1 --centre 1/2,1/3,1/5 --omega 1/10,2/5,9/10 --gamma 3/5,0,4/5 --times -1,-2"
-    done = run("propagate", *common.split(), "--precision", precision, "--integrator", "words", "--attitude", "--json")
+    done = run(
+        "propagate", *common.split(), "--precision", precision, "--integrator", "multiword", "--attitude", "--json"
+    )
     assert done.returncode == 0
     document = json.loads(done.stdout)
-    assert document["integrator"] == "words"
+    assert document["integrator"] == "multiword"
     assert document["precision"] == precision
     assert document["outcome"] == "success"
     assert {"words", "bits", "step_rule", "tolerance"} <= set(document["flags"])
@@ -412,5 +414,5 @@ def test_an_integrator_that_is_none_and_a_format_that_heyoka_lacks_are_refused()
     for options in ("--integrator euler", "--precision double-double"):
         done = run("propagate", *common.split(), *options.split())
         assert done.returncode == 2
-        assert "words" in done.stderr
+        assert "multiword" in done.stderr
         assert "Traceback" not in done.stderr

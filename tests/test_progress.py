@@ -236,7 +236,7 @@ def test_a_third_party_integrator_cannot_silence_it() -> None:
 
 def test_an_integration_reports_often_enough_and_its_states_stay_the_same() -> None:
     top, start = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
-    for integrator in ("heyoka", "words"):
+    for integrator in ("heyoka", "multiword"):
         heard: list[Fraction] = []
         times = [Fraction(7), Fraction(2000)]
         plain, told = (

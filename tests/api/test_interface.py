@@ -72,7 +72,7 @@ def test_an_ensemble_is_its_motions_and_every_integrator_has_the_same_call() -> 
     tops = [TOP, ht.HeavyTop((3, 2, 1), 1, (0, 1, 0))]
     runs = ht.ensemble(tops, START, TIMES, threads=2)
     for top, run in zip(tops, runs, strict=True):
-        for integrator in ("heyoka", "words", "scipy:DOP853"):
+        for integrator in ("heyoka", "multiword", "scipy:DOP853"):
             alone = ht.propagate(top, START, TIMES, integrator=integrator)
             np.testing.assert_allclose(run.to_numpy(), alone.to_numpy(), rtol=0, atol=1e-9)
     seen = []

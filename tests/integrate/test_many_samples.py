@@ -20,7 +20,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import RoundedTimes, check_times
 
 CASE = CASES["kovalevskaya"]
-INTEGRATORS = {"heyoka": propagate, "words": propagate_words}
+INTEGRATORS = {"heyoka": propagate, "multiword": propagate_words}
 
 
 def irregular(count: int, last: int, seed: int) -> list[Fraction]:
@@ -58,8 +58,8 @@ def require_same(many: Trajectory, single: tuple[Trajectory, list, list]) -> Non
         ("heyoka", DOUBLE, 1),
         ("heyoka", EXTENDED, 1),
         ("heyoka", QUAD, 20),
-        ("words", DOUBLE, 1),
-        ("words", EXTENDED, 5),
+        ("multiword", DOUBLE, 1),
+        ("multiword", EXTENDED, 5),
     ],
     ids=lambda value: getattr(value, "name", value),
 )
@@ -121,7 +121,7 @@ def test_a_run_of_few_steps_between_many_times_is_one_call(monkeypatch: pytest.M
     assert taken == []
 
 
-@pytest.mark.parametrize(("name", "most"), [("heyoka", 5), ("words", 8)])
+@pytest.mark.parametrize(("name", "most"), [("heyoka", 5), ("multiword", 8)])
 def test_a_sample_costs_few_calls_of_python(name: str, most: int) -> None:
     times = regular(2000, 100)
     INTEGRATORS[name](CASE.top, CASE.start, times, DOUBLE)

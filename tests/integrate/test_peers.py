@@ -58,7 +58,7 @@ def test_every_peer_and_heyoka_agree_to_the_tolerance(name: str, case: str) -> N
     assert many.integrator == name
     assert distance(many, ours) < (Fraction(1, 10**7) if name == "scipy:Radau" else Fraction(1, 10**9))
     np.testing.assert_allclose(many.states[-1], alone.states[-1], rtol=0, atol=1e-9)
-    assert alone.steps > (3 if name == "words" else 5)
+    assert alone.steps > (3 if name == "multiword" else 5)
     assert alone.seconds["run"] > 0
     assert alone.seconds["compile"] >= 0
 

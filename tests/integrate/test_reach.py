@@ -78,7 +78,7 @@ def test_a_gyrostat_is_not_driven_by_its_weight_but_by_its_rotor() -> None:
     assert square_of_rate(ht.GYROSTAT, ht.GYROSTAT.parameters(*light), heavy[1].flat) == 1
 
 
-@pytest.mark.parametrize("name", ["heyoka", "words", "splitting:4", "mpmath:odefun"])
+@pytest.mark.parametrize("name", ["heyoka", "multiword", "splitting:4", "mpmath:odefun"])
 def test_every_integrator_is_refused_from_python(name: str) -> None:
     with pytest.raises(ht.OutOfReach, match="takes some 1e16 steps"):
         ht.propagate(TOP, START, [1, "2e16"], integrator=name)
@@ -95,7 +95,7 @@ def test_what_rests_and_what_a_limit_ends_is_taken() -> None:
     with pytest.raises(ht.OutOfReach):
         ht.propagate(TOP, START, ["1e140"], step_limit=10**15)
     slow = in_units(TOP, START, Fraction(1, 10**20))
-    assert ht.propagate(*slow, ["2e20"], integrator="words").outcome is Outcome.SUCCESS
+    assert ht.propagate(*slow, ["2e20"], integrator="multiword").outcome is Outcome.SUCCESS
 
 
 @pytest.mark.parametrize(("omega", "time"), [("1/10,2/5,9/10", "9e18"), ("1e-6,1,0", "-9e12"), ("0,0,1e150", "10")])

@@ -1,4 +1,4 @@
-"""The integrator words behind the same call as heyoka's: proven accuracy, the same bits however it is cut, outcomes."""
+"""The integrator multiword behind heyoka's call: proven accuracy, the same bits however it is cut, outcomes."""
 
 import json
 import math
@@ -278,7 +278,7 @@ def test_a_tolerance_it_cannot_do_is_refused(tolerance) -> None:
 
 
 def test_heyoka_refuses_double_double() -> None:
-    with pytest.raises(InputError, match="words"):
+    with pytest.raises(InputError, match="multiword"):
         propagate(TOP, START, [1], DOUBLE_DOUBLE)
 
 

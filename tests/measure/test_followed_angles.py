@@ -17,7 +17,7 @@ TIMES = [Fraction(1), Fraction(10)]
 
 @pytest.mark.parametrize("tilt", ["1/2", "1/1000", "100"])
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize(("unit", "integrator"), [(Fraction(1), "heyoka"), (Fraction(2) ** 300, "words")])
+@pytest.mark.parametrize(("unit", "integrator"), [(Fraction(1), "heyoka"), (Fraction(2) ** 300, "multiword")])
 def test_precession_of_a_free_symmetric_top(tilt: str, sign: int, unit: Fraction, integrator: str) -> None:
     # I = (2, 2, 1) with M = 10 γ: ψ' = |M|/2 = 5 and φ' = Ω3 - cos θ ψ' = 5 cos θ, however near the pole γ is
     m = Fraction(tilt)
@@ -33,7 +33,7 @@ def test_precession_of_a_free_symmetric_top(tilt: str, sign: int, unit: Fraction
     assert theta == pytest.approx(2 * math.atan(m), rel=1e-6)
 
 
-@pytest.mark.parametrize("integrator", ["heyoka", "words"])
+@pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
 def test_turns_through_a_swing_beside_the_pole_are_told_apart(integrator: str) -> None:
     # a pendulum pushed a little aside passes the poles of θ on one side: half a turn of φ, not three halves or none
     top = HeavyTop((1, 1, 1), 1, (0, 0, -1))

@@ -114,14 +114,16 @@ def test_an_error_of_a_call_is_that_of_one_step_from_where_it_starts() -> None:
 
 def test_an_integrator_with_a_tolerance_is_called_over_its_mean_step_and_shows_no_order() -> None:
     case = CASES["lagrange"]
-    run, calls = single_calls(Integrator("words"), case.top, case.start, Fraction(4), EXTENDED, case.system)
+    run, calls = single_calls(Integrator("multiword"), case.top, case.start, Fraction(4), EXTENDED, case.system)
     found = examined(run, calls)
     assert float(calls[0][1].length) == pytest.approx(4 / run.steps)
     assert found.keys() == {"local_error_ulp_max", "local_error_ulp_rms"}
     assert 0 < float(found["local_error_ulp_max"].value) < 2
 
 
-@pytest.mark.parametrize(("name", "times"), [("splitting:2", 1000), ("words", 1000), ("splitting:2", 2), ("words", 0)])
+@pytest.mark.parametrize(
+    ("name", "times"), [("splitting:2", 1000), ("multiword", 1000), ("splitting:2", 2), ("multiword", 0)]
+)
 def test_a_count_of_steps_that_cannot_be_is_refused(name, times, monkeypatch) -> None:
     """Steps a thousand times too many make calls so short that each is right to an ulp."""
     propagate, propagate_many = Integrator.propagate, Integrator.propagate_many

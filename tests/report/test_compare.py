@@ -3,13 +3,14 @@
 import math
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import Against, Law, Metric, Row, Series
-from heavytop.report.policy import Policy, Timings
+from heavytop.records import Against, Data, Law, Metric, Row, Series
+from heavytop.report.policy import Policy, Rule, Timings
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict, judge_seconds
 from reports import compare, replace, store
@@ -55,17 +56,25 @@ def test_errors_below_the_floor_are_rounding_luck() -> None:
     assert verdicts(with_metric(error("0")), with_metric(error("1e-14")))["drift_energy_max"] is Verdict.WORSE
 
 
-@pytest.mark.parametrize("value", ["nan", "missing"])
-def test_what_is_no_number_is_never_the_same_not_even_as_itself(value: str) -> None:
-    bad = with_metric(Metric(value, None))
-    for old, new in ((row(), bad), (bad, row()), (bad, bad)):
-        assert verdicts(old, new)["drift_energy_max"] is Verdict.INCOMPARABLE
+def test_what_is_no_number_is_worse_than_any_and_never_the_same_not_even_as_itself() -> None:
+    bad, unmeasured = (with_metric(Metric(value, None)) for value in ("nan", "missing"))
+    name = "drift_energy_max"
+    assert verdicts(row(), bad)[name] is Verdict.WORSE
+    assert verdicts(bad, row())[name] is Verdict.BETTER
+    for old, new in ((bad, bad), (row(), unmeasured), (unmeasured, row()), (bad, unmeasured), (unmeasured, unmeasured)):
+        assert verdicts(old, new)[name] is Verdict.INCOMPARABLE
+
+
+def test_a_number_in_the_place_of_nan_is_not_better_beyond_its_limit() -> None:
+    policy = Policy(rule=[Rule(metric="drift_energy_max", limit="1e-11")])
+    for old in (with_metric(Metric("nan", None)), ended("failed")):
+        for size, verdict in (("1e-12", "better"), ("1e-10", "worse")):
+            assert compare(report(old), report(with_metric(error(size))), policy).verdict == verdict
 
 
 @pytest.mark.parametrize(
     "change",
     [
-        {"outcome": "non_finite", "time_reached": "3"},
         {"horizon": "200", "time_reached": "200"},
         {"bits": 64},
         {"flags": {"tolerance": "1e-9"}},
@@ -74,17 +83,88 @@ def test_what_is_no_number_is_never_the_same_not_even_as_itself(value: str) -> N
         {"measured": "computed: something else"},
     ],
 )
-def test_a_failure_another_horizon_format_flag_or_reference_is_incomparable(change) -> None:
+def test_another_horizon_format_flag_or_reference_is_incomparable(change) -> None:
     for old, new in ((row(), row(**change)), (row(**change), row())):
         result = compare(report(old), report(new), Policy())
         assert {f.verdict for f in result.findings} == {Verdict.INCOMPARABLE}
         assert result.exit_code == 3
-    if "outcome" in change:
-        assert verdicts(row(**change), row(**change)) == {"": Verdict.INCOMPARABLE}
 
 
-def test_a_row_that_is_no_longer_finite_is_not_the_same() -> None:
-    assert compare(report(row()), report(row(finite=False)), Policy()).verdict == "incomparable"
+MEASURED_IN_PART = ("non_finite", "step_limit", "step_too_small", "capacity", "incomplete")
+
+
+def ended(outcome: str, **changes: object) -> Row:
+    """A row that did not reach its horizon."""
+    if outcome in MEASURED_IN_PART:
+        return row(**({"outcome": outcome, "time_reached": "30", "finite": False} | changes))
+    nothing = {"time_reached": "0", "finite": False, "metrics": {}, "bits": 53, "flags": {}, "steps": 0}
+    return row(**(nothing | {"outcome": outcome, "reference": Against("none", reason="it hangs")} | changes))
+
+
+@pytest.mark.parametrize("outcome", [*MEASURED_IN_PART, "failed", "out_of_time"])
+def test_a_run_that_no_longer_reaches_its_horizon_is_worse_and_says_why(outcome: str) -> None:
+    result = compare(report(row()), report(ended(outcome)), Policy())
+    assert (result.verdict, result.exit_code) == ("worse", 1)
+    (finding,) = result.findings
+    assert finding.reason.startswith(f"the candidate ended as {outcome} at t = ")
+    assert ("it hangs" in finding.reason) == (outcome not in MEASURED_IN_PART)
+    assert compare(report(ended(outcome)), report(row()), Policy()).verdict == "better"
+    assert compare(report(ended(outcome)), report(ended(outcome)), Policy()).verdict == "same"
+    others = row(case="grioli"), ended(outcome)
+    ignored = compare(report(others[0], row()), report(*others), Policy(rule=[Rule(case="euler", ignore=True)]))
+    assert ignored.verdict == "same"
+
+
+@pytest.mark.parametrize("outcome", ["out_of_reach", "contradiction", "unsupported"])
+def test_what_is_not_measured_for_another_reason_proves_no_failure(outcome: str) -> None:
+    for other in ("failed", "out_of_time", "non_finite"):
+        for pair in ((ended(outcome), ended(other)), (ended(other), ended(outcome))):
+            assert compare(*map(report, pair), Policy()).exit_code == 3
+    if outcome != "unsupported":
+        for pair in ((row(), ended(outcome)), (ended(outcome), row()), (ended(outcome), ended(outcome))):
+            assert compare(*map(report, pair), Policy()).exit_code == 3
+
+
+def test_two_failures_of_different_kinds_are_incomparable() -> None:
+    for pair in (("failed", "out_of_time"), ("non_finite", "failed"), ("step_limit", "non_finite")):
+        for old, new in (pair, pair[::-1]):
+            assert compare(report(ended(old)), report(ended(new)), Policy()).verdict == "incomparable"
+
+
+@pytest.mark.parametrize(
+    ("reached", "verdict"), [("30", "same"), ("28.6", "same"), ("28.4", "worse"), ("15", "worse"), ("60", "same")]
+)
+def test_a_run_that_stops_earlier_than_it_did_is_worse(reached: str, verdict: str) -> None:
+    old, new = ended("step_limit"), ended("step_limit", time_reached=reached)
+    assert compare(report(old), report(new), Policy()).verdict == verdict
+
+
+def test_numbers_of_runs_that_stopped_alike_are_compared() -> None:
+    old, new = (ended("step_limit", metrics={"drift_energy_max": error(size)}) for size in ("1e-12", "1e-10"))
+    assert compare(report(old), report(new), Policy()).verdict == "worse"
+    assert compare(report(new), report(old), Policy()).verdict == "better"
+
+
+@pytest.mark.parametrize("word", ["nan", "missing"])
+def test_what_neither_of_two_runs_that_stopped_reached_is_no_difference(word: str) -> None:
+    metrics = {"drift_energy_max": error("1e-12"), "drift_energy_final": Metric(word, None)}
+    stopped = ended("step_limit", metrics=metrics)
+    result = compare(report(stopped), report(stopped), Policy())
+    assert result.verdict == "same"
+    assert result.sentences[1].startswith("1 row of heyoka failed in both reports on euler")
+    assert compare(report(ended("step_limit")), report(stopped), Policy()).verdict == "incomparable"
+
+
+def test_a_failure_of_another_motion_says_nothing_of_this_one() -> None:
+    data = Data(("2", "2", "1"), "1", ("0", "0", "1"), ("0", "0", "1"), ("1", "0", "0"))
+    other = msgspec.structs.replace(data, weight="2")
+    assert compare(report(row(data=data)), report(ended("non_finite", data=other)), Policy()).exit_code == 3
+    assert compare(report(row(data=data)), report(ended("non_finite", data=data)), Policy()).exit_code == 1
+    assert compare(report(row(data=data)), report(ended("failed")), Policy()).exit_code == 1
+
+
+def test_a_row_that_is_no_longer_finite_is_worse() -> None:
+    assert compare(report(row()), report(row(finite=False)), Policy()).verdict == "worse"
     assert compare(report(row(finite=False)), report(row()), Policy()).verdict == "same"
 
 

@@ -44,7 +44,7 @@ def test_an_order_leads_then_failures_digits_laws_and_that_nothing_else_changed(
     ]
     said = found(healthy, faulty)
     assert said[0] == "Order observed 5 → 2 in single steps on euler (mine:rk5, double)."
-    assert said[1] == "1 row of mine:rk5 failed: it returned NaN."
+    assert said[1] == "1 row of mine:rk5 failed on delone at T = 100 (mine:rk5, double): it returned NaN."
     assert said[2] == "Digits right 8.9 → 7.5 on lagrange at T = 100 (mine:rk5, double), fewer on 1 other row too."
     assert said[3].startswith("The error along the flow grows like t (was t^0.5) on grioli")
     assert said[-1] == "Nothing else changed."
@@ -113,3 +113,34 @@ def test_a_last_state_that_is_as_it_was_points_to_the_dense_output(last: str, be
     old = rk5(metrics={DIGITS: error("1e-12"), "solution_error_omega_final": error("1e-12")})
     new = replace(old, metrics={DIGITS: error("1e-6"), "solution_error_omega_final": error(last)})
     assert ("errors are between steps" in found([old], [new])[0]) is between
+
+
+def failing(row: Row, outcome: str = "failed", reason: str = "it returned NaN") -> Row:
+    return replace(row, outcome=outcome, time_reached="0", metrics={}, reference=Against("none", reason=reason))
+
+
+def test_rows_that_failed_are_counted_with_the_first_and_its_reason() -> None:
+    old = [rk5(case=case) for case in ("euler", "lagrange", "grioli")]
+    new = [old[0], failing(old[1], "out_of_time", "not done within 40 s"), failing(old[2], "out_of_time", "later")]
+    assert found(old, new) == [
+        "2 rows of mine:rk5 failed, first on lagrange at T = 100 (mine:rk5, double): "
+        "out_of_time, not done within 40 s.",
+        "Nothing else changed.",
+    ]
+    assert found(new, old)[0].startswith("2 rows of mine:rk5 are better, first on lagrange")
+
+
+def test_a_row_that_failed_in_both_reports_is_the_same_and_said() -> None:
+    pair = [rk5(), failing(rk5(case="delone"))]
+    said = "1 row of mine:rk5 failed in both reports on delone at T = 100 (mine:rk5, double): it returned NaN."
+    assert found(pair, pair) == ["Nothing changed: 2 metrics are the same within rounding noise.", said]
+    assert found(pair[1:], pair[1:]) == [said]
+    worse = [replace(pair[0], metrics={"drift_energy_max": error("1")}), pair[1]]
+    assert said in found(pair, worse)
+
+
+def test_a_run_that_stops_earlier_says_where() -> None:
+    old = rk5(outcome="step_limit", time_reached="80", finite=False)
+    new = replace(old, time_reached="40")
+    said = "1 row of mine:rk5 stops earlier on euler at T = 100 (mine:rk5, double): step_limit, at t = 40 of 100."
+    assert found([old], [new])[0] == said

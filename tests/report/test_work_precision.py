@@ -143,11 +143,11 @@ def test_formats_beyond_extended_are_compared_where_double_ends() -> None:
 
 
 def test_whoever_is_fastest_is_named() -> None:
-    words = [row(f"words tolerance=1e{n}", n, 0.25, precision="double-double") for n in (-25, -31)]
+    words = [row(f"multiword tolerance=1e{n}", n, 0.25, precision="double-double") for n in (-25, -31)]
     heyoka = row("heyoka tolerance=eps", -33, 4.0, precision="quad")
     (lead,) = leads([heyoka, *words])
-    assert lead.text.startswith("top/T=9: the fastest at error 1e-30 is words double-double (250 ms); ")
-    assert lead.short == "At 1e-30 words double-double is 16.0 × as fast as heyoka quad"
+    assert lead.text.startswith("top/T=9: the fastest at error 1e-30 is multiword double-double (250 ms); ")
+    assert lead.short == "At 1e-30 multiword double-double is 16.0 × as fast as heyoka quad"
 
 
 def test_cases_formats_and_failures_are_kept_apart() -> None:
@@ -256,14 +256,14 @@ def test_a_hostile_name_is_text() -> None:
 def test_whoever_is_faster_stands_first() -> None:
     wide = [
         row("heyoka tolerance=eps", -33, 4.0, precision="quad"),
-        row("words tolerance=eps", -34, 0.5, precision="quad"),
+        row("multiword tolerance=eps", -34, 0.5, precision="quad"),
     ]
     (lead,) = leads(wide)
-    assert lead.short == "At 1e-30 words quad is 8.0 × as fast as heyoka quad"
-    (alone,) = leads([OURS[0], row("words tolerance=eps", -15, 0.5)])
+    assert lead.short == "At 1e-30 multiword quad is 8.0 × as fast as heyoka quad"
+    (alone,) = leads([OURS[0], row("multiword tolerance=eps", -15, 0.5)])
     assert (
         alone.text
-        == "top/T=9: heyoka double at error 1e-10: not reached; the fastest that gets there is words (500 ms)"
+        == "top/T=9: heyoka double at error 1e-10: not reached; the fastest that gets there is multiword (500 ms)"
     )
 
 

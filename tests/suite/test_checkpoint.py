@@ -191,7 +191,7 @@ def forged(content: object, path: tuple, value: object) -> object:
     return copy
 
 
-@pytest.mark.parametrize("which", ["heyoka", "words"])
+@pytest.mark.parametrize("which", ["heyoka", "multiword"])
 def test_a_forged_place_with_its_checksum_is_measured_from_the_beginning(tmp_path: Path, which: str) -> None:
     (tmp_path / "plan.toml").write_text(
         f'name = "p"\n[[measure]]\nkind = "drift"\ncases = ["euler"]\nintegrator = "{which}"\n'

@@ -52,18 +52,18 @@ def labels(name: str, integrator: str = "") -> list[tuple[str, str, str]]:
 
 
 def test_whatever_heyoka_measures_is_measured_beside_it(plan: str) -> None:
-    before, after = labels(plan), labels(plan, "words")
+    before, after = labels(plan), labels(plan, "multiword")
     assert after[: len(before)] == before
     assert after[len(before) :] == [
-        ("drift", "words", ""),
-        ("homoclinic", "words", ""),
-        ("local_error", "words", ""),
-        *(("work_precision", "words", f"tolerance={each}") for each in ("1e-6", "1e-9", "1e-12", "eps")),
-        ("growth", "words", ""),
+        ("drift", "multiword", ""),
+        ("homoclinic", "multiword", ""),
+        ("local_error", "multiword", ""),
+        *(("work_precision", "multiword", f"tolerance={each}") for each in ("1e-6", "1e-9", "1e-12", "eps")),
+        ("growth", "multiword", ""),
     ]
 
 
-@pytest.mark.parametrize("integrator", ["words", "splitting:8"])
+@pytest.mark.parametrize("integrator", ["multiword", "splitting:8"])
 def test_its_rows_are_scored_like_those_of_heyoka(plan: str, integrator: str) -> None:
     tasks = read(plan, KINDS, integrator=integrator)[2]
     rows = [measure(task) for task in tasks if task.key.subject.name == integrator]
@@ -71,7 +71,7 @@ def test_its_rows_are_scored_like_those_of_heyoka(plan: str, integrator: str) ->
     assert all(row.finite and row.reference.how == "proven" for row in rows)
     assert all(row.integrator.startswith(integrator) for row in rows)
     kept = float(rows[0].metrics["solution_error_relative_max"])
-    assert kept < (1e-15 if integrator == "words" else 1e-8)
+    assert kept < (1e-15 if integrator == "multiword" else 1e-8)
 
 
 def test_what_it_cannot_do_is_a_row_that_failed(tmp_path: Path) -> None:
@@ -84,7 +84,7 @@ def test_what_it_cannot_do_is_a_row_that_failed(tmp_path: Path) -> None:
     assert row.reference.reason.startswith("scipy:DOP853 has no quad in euler")
 
 
-@pytest.mark.parametrize("integrator", ["words", "splitting:8"])
+@pytest.mark.parametrize("integrator", ["multiword", "splitting:8"])
 def test_an_option_of_heyoka_that_it_lacks_fails_its_own_row(tmp_path: Path, integrator: str) -> None:
     (tmp_path / "growth.toml").write_text(
         PLAN[: PLAN.index("[[measure]]")]
@@ -108,7 +108,7 @@ def test_who_stands_beside_heyoka_is_another_that_is_known(plan: str, tmp_path: 
     for name, integrator, cause in (
         (plan, "heyoka", "what others are compared with"),
         (plan, "rk4", "Unknown integrator"),
-        (str(tmp_path / "claims.toml"), "words", "does not measure heyoka"),
+        (str(tmp_path / "claims.toml"), "multiword", "does not measure heyoka"),
     ):
         with pytest.raises(InputError, match=cause) as caught:
             read(name, KINDS, integrator=integrator)

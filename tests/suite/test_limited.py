@@ -51,7 +51,7 @@ def stuck(given):  # in one call of C that holds the interpreter
 forward = double_peer("forward", 2, solve, directions=["forward"], systems=["heavy_top"], precisions=["double"])
 """
 PLAN = """name = "faults"
-row_timeout = "7"
+row_timeout = "5"
 integrators = ["mine.py:solve", "mine.py:sleeps", "mine.py:stuck", "mine.py:forward"]
 [[integrator]]
 name = "silent"
@@ -107,8 +107,8 @@ def test_rows_that_do_not_end_are_ended_and_all_others_are_measured(tmp_path: Pa
     expected = ("success", "out_of_time", "out_of_time")
     assert outcomes == dict(zip(names, expected, strict=True))
     against = {row["integrator"]: row["against"] for row in report["rows"]}
-    assert against["mine.py:stuck"] == "nothing: mine.py:stuck was stopped after 7 s in euler"
-    assert "mine.py:stuck was stopped after 7 s in euler in double" in done.stdout
+    assert against["mine.py:stuck"] == "nothing: mine.py:stuck was stopped after 5 s in euler"
+    assert "mine.py:stuck was stopped after 5 s in euler in double" in done.stdout
     assert report["environment"]["integrators"] == {"silent": "faulty 1.2"}
     for words in ((str(PROGRAM),), ("sleep", "987")):
         assert gone(*words)
@@ -219,7 +219,7 @@ def test_integrators_of_a_plan_that_cannot_be_are_refused(tmp_path: Path, old: s
 
 
 def test_progress_names_the_row_that_is_running(tmp_path: Path) -> None:
-    tasks = read(str(plan(tmp_path, "heyoka", "words")), KINDS)[2]
+    tasks = read(str(plan(tmp_path, "heyoka", "multiword")), KINDS)[2]
     heard: list[str] = []
     for index, _ in rows(tasks, 1, begun=lambda task: heard.append(task.label)):
         assert heard[-1] == tasks[index].label

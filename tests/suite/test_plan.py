@@ -51,7 +51,7 @@ def test_the_default_plan_holds_what_it_promises() -> None:
     tasks = expand(load("default")[0])
     drifts = [t for t in tasks if t.key.kind == "drift"]
     horizons = {(t.case.name, t.key.precision): t.times[-1] for t in drifts if t.subject == "heyoka"}
-    in_words = {(t.case.name, t.key.precision): t.times[-1] for t in drifts if t.subject == "words"}
+    in_words = {(t.case.name, t.key.precision): t.times[-1] for t in drifts if t.subject == "multiword"}
     for name in ("euler", "kovalevskaya"):
         for format, horizon in (("double", 10**5), ("extended", 10**5), ("quad", 10**4), ("real:237", 10**3)):
             assert in_words[name, format] == horizon
@@ -234,11 +234,11 @@ def test_one_case_may_stand_at_several_horizons_and_each_has_a_name_of_its_own()
 
 @pytest.mark.parametrize("kind", ["drift", "growth", "homoclinic", "local_error"])
 def test_every_kind_that_propagates_takes_any_integrator(kind: str) -> None:
-    table: dict = {"kind": kind, "cases": ["delone" if kind == "homoclinic" else "euler"], "integrator": "words"}
+    table: dict = {"kind": kind, "cases": ["delone" if kind == "homoclinic" else "euler"], "integrator": "multiword"}
     run = {"precision": "double", "horizon": "10"}
     table |= {"runs": [run]} if kind in ("drift", "growth") else {"precisions": ["double"]}
     table |= {"horizon": "1"} if kind == "local_error" else {}
     (task, *_) = expand(plan_from({"name": "x", "measure": [table]}))
-    assert task.key.subject.name == task.integrator.name == "words"
+    assert task.key.subject.name == task.integrator.name == "multiword"
     with pytest.raises(InputError, match="Unknown integrator"):
         expand(plan_from({"name": "x", "measure": [table | {"integrator": "nobody"}]}))

@@ -271,8 +271,9 @@ def test_a_worker_with_other_versions_is_refused(tasks, cluster: str, monkeypatc
 
 
 @dask
-def test_a_scheduler_that_does_not_answer_is_a_clear_error(tasks) -> None:
+def test_a_scheduler_that_does_not_answer_is_a_clear_error(tasks, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
+    monkeypatch.setattr(workers, "_ANSWER", 1.0)
     for address in ("tcp://127.0.0.1:9", "nonsense"):
         with pytest.raises(InputError, match="No scheduler answers"):
             measured(tasks, 1, address)

@@ -1,4 +1,4 @@
-"""The picture of docs/words.md can be drawn anew."""
+"""The picture of docs/multiword.md can be drawn anew."""
 
 from pathlib import Path
 

@@ -58,7 +58,7 @@ def propagate(
             :func:`heavytop.top.angles.perpendicular` of γ, where no ``xi`` says otherwise: for ``quaternions()``,
             ``matrices()``, ``positions()``, ``omega_space()`` and ``euler("ZXZ")`` of the run; an observer is given
             nine numbers.  None for True where the start has an attitude.
-        tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; words: from there to
+        tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; multiword: from there to
             1e-6, where None finer than the format; splittings have none.
         high_accuracy: compensated summation of heyoka's Taylor series, off where None.
         compact_mode: heyoka's, slower but quick to compile; None for off in double and extended, on elsewhere.

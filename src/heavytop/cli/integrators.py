@@ -26,14 +26,17 @@ def check_integrator(
     from dataclasses import asdict
 
     from heavytop.api.integrators import check_integrator as check
+    from heavytop.cli.output import say_former
     from heavytop.cli.progress import waiting
+    from heavytop.former_names import current
 
+    say_former([integrator])
     with waiting("each part of the contract", 60):
         found = check(integrator)
     violated = [each for each in found if each.verdict == "violated"]
     if json:
         verdict = "violated" if violated else "kept"
-        print_json({"integrator": integrator, "verdict": verdict, "checks": [asdict(each) for each in found]})
+        print_json({"integrator": current(integrator), "verdict": verdict, "checks": [asdict(each) for each in found]})
     else:
         width = max(len(each.check) for each in found)
         for each in found:

@@ -34,6 +34,8 @@ def list_(
         return 0
     print("Cases (--case NAME shows the data)")
     _lines({each["name"]: f"{each['system']:10} {each['about']}" for each in listed["cases"]}, indent=11)
+    print("Bodies (cases too: the standard tests of other programs)")
+    _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["bodies"]}, indent=15)
     print(f"Plans\n  {', '.join(listed['plans'])}, or a TOML file")
     print(f"Systems\n  {', '.join(listed['systems'])}")
     print("Number formats")
@@ -53,15 +55,18 @@ def _lines(notes: dict[str, str], indent: int = 0) -> None:
 def _everything() -> dict[str, Any]:
     from heavytop.integrate import peers, registry
     from heavytop.precision import FORMATS, available
-    from heavytop.suite.cases import CASES
+    from heavytop.suite.cases import CASES, named_bodies
     from heavytop.suite.plan import BUILT_IN
 
     notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
-    said = {"heyoka": "every format but double-double", "words": "every format"}
+    said = {"heyoka": "every format but double-double", "multiword": "every format"}
     own = {name: said.get(name, "installed") for name in registry.INTEGRATORS}
     others = {name: "installed" if reason is None else reason for name, reason in peers.available().items()}
     return {
         "cases": [{"name": case.name, "system": case.system.name, "about": case.about} for case in CASES.values()],
+        "bodies": [
+            {"name": case.name, "system": case.system.name, "about": case.about} for case in named_bodies().values()
+        ],
         "plans": list(BUILT_IN),
         "systems": ["heavy_top", "gyrostat"],
         "formats": {
@@ -81,11 +86,13 @@ def _one_case(name: str, json: bool) -> int:
     if json:
         print_json(
             case_data(found)
-            | {"about": found.about}
+            | {"about": found.about, "source": found.source, "units": found.units}
             | {key: forms(found)[key] for key in ("command", "csv", "toml", "python")}
         )
         return 0
-    print(f"{found.name}: {found.about}")
+    print(fill(f"{found.name}: {found.about}", 80))
+    if found.source:
+        print(fill(f"Source: {found.source}. Units: {found.units}.", 80))
     for form, text in forms(found).items():
         print(f"\n{_FORMS[form]}\n{text}")
     return 0

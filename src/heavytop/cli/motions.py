@@ -10,7 +10,7 @@ import typer
 from heavytop.cli.app import Json, command, numbers
 from heavytop.cli.events import EventDirection, Events, computed, known_ones, requested, with_events
 from heavytop.cli.motion_output import made_by, require_one_output, write_motion
-from heavytop.cli.output import say
+from heavytop.cli.output import say, say_former
 from heavytop.cli.progress import reaching, watched
 from heavytop.errors import InputError
 
@@ -77,7 +77,7 @@ def propagate(
     euler: Euler = None,
     matrix: Matrix = None,
     precision: Annotated[
-        str, typer.Option(help="double, extended, double-double (of words), quad, real:BITS.")
+        str, typer.Option(help="double, extended, double-double (of multiword), quad, real:BITS.")
     ] = "double",
     integrator: Annotated[str, typer.Option(help="One of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
     rotor: Rotor = None,
@@ -127,6 +127,7 @@ def propagate(
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top.top if isinstance(top, Body) else top, start)
     functions = requested(events, event_direction, instants[-1])
+    say_former([integrator])
     if form.bits >= _SLOW_BITS and integrator == "heyoka":
         say(
             f"warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "

@@ -6,8 +6,10 @@ import errno
 import io
 import os
 import sys
+from collections.abc import Iterable
 from typing import Any, TextIO
 
+from heavytop import former_names
 from heavytop.errors import HeavyTopError
 
 READER_GONE = 141
@@ -95,6 +97,13 @@ def messages() -> TextIO:
 def say(text: str) -> None:
     """A message for people."""
     print(f"heavytop: {text}", file=messages(), flush=True)
+
+
+def say_former(names: Iterable[str]) -> None:
+    """A line for each name among these that an integrator had before."""
+    for name in sorted(set(names)):
+        if text := former_names.notice(name):
+            say(f"note: {text}")
 
 
 def printable(document: str) -> str:

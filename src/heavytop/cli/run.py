@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import absolute, command, plans
-from heavytop.cli.output import say
+from heavytop.cli.output import say, say_former
 from heavytop.cli.progress import Progress
 
 
@@ -42,6 +42,7 @@ def run(
     from heavytop.kinds import KINDS
     from heavytop.report.store import FILE as REPORT
     from heavytop.suite.checkpoint import FILE as ROWS
+    from heavytop.suite.plan import former
 
     asked = prepare(
         plan,
@@ -57,6 +58,7 @@ def run(
         row_timeout=row_timeout,
     )
     directory = asked.directory
+    say_former({integrator} | former(plan))
     for warning in asked.warnings:
         say(f"warning: {warning}")
     if asked.is_finished:

@@ -100,7 +100,7 @@ def compiled(
     """
     require(precision)
     if precision == DOUBLE_DOUBLE:
-        raise InputError("heyoka has no double-double.", "Use the integrator words for it, or quad.")
+        raise InputError("heyoka has no double-double.", "Use the integrator multiword for it, or quad.")
     compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
     if constants is not None and precision != DOUBLE:
         raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")

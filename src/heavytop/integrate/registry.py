@@ -35,7 +35,7 @@ class Integrator(NamedTuple):
 
 INTEGRATORS = {
     "heyoka": Integrator(f"{HERE}.taylor:propagate", f"{HERE}.ensemble:propagate_ensemble"),
-    "words": Integrator(f"{HERE}.words:propagate_words", f"{HERE}.words_ensemble:propagate_words_ensemble"),
+    "multiword": Integrator(f"{HERE}.words:propagate_words", f"{HERE}.words_ensemble:propagate_words_ensemble"),
 }
 
 

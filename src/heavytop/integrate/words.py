@@ -129,7 +129,7 @@ def _trajectory(
     reached = times[-1] if outcome is Outcome.SUCCESS and times else pace.time
     return Trajectory(
         problem,
-        "words",
+        "multiword",
         times if isinstance(times, RoundedTimes) else tuple(times),
         states,
         outcome,

@@ -163,7 +163,7 @@ def wanted_tolerance(precision: Precision, tolerance: Fraction | None) -> Fracti
     wanted = finest if tolerance is None else tolerance
     if not finest <= wanted <= LOOSEST:
         raise InputError(
-            f"The integrator words has no tolerance {decimal_text(wanted, 6)} in {precision.name}.",
+            f"The integrator multiword has no tolerance {decimal_text(wanted, 6)} in {precision.name}.",
             f"Give one from its eps, {decimal_text(precision.eps, 3)}, to 1e-6, or none.",
         )
     return wanted

@@ -203,7 +203,7 @@ class WordsLanes:
             motion.index,
             Trajectory(
                 motion.problem,
-                "words",
+                "multiword",
                 tuple(motion.times),
                 tuple(motion.states),
                 outcome,

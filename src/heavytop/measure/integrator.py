@@ -20,7 +20,7 @@ from heavytop.precision import Precision
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
-HEYOKA, WORDS = "heyoka", "words"
+HEYOKA, MULTIWORD = "heyoka", "multiword"
 _AGAIN_SECONDS = 1.0
 """A longer call of an integrator of another package is made once."""
 
@@ -149,7 +149,7 @@ def _given(problem: Problem) -> tuple[HeavyTop, State]:
     if problem.system is HEAVY_TOP:
         return problem.top, problem.start
     if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system) != problem:
-        raise PeerFailed("A gyrostat off its exact data is integrated side by side only, by heyoka and words")
+        raise PeerFailed("A gyrostat off its exact data is integrated side by side only, by heyoka and multiword")
     return problem.given
 
 

@@ -137,8 +137,8 @@ def compute(
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
     integrator: a name that `heavytop list` shows, or a source.
     outputs: told beside the states; written: the times as they were given, none for their exact text.
-    reached: called with the times on the way, some fifty and one for each doubling; by others than heyoka and words at
-    the end.
+    reached: called with the times on the way, some fifty and one for each doubling; by others than heyoka and multiword
+    at the end.
 
     Raises InputError for another integrator, OutOfReach where the run would take more steps than anyone waits for.
     """

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from heavytop.measure.digits import digits_kept, digits_of, digits_text
 from heavytop.measure.drift import DRIFT
-from heavytop.measure.integrator import HEYOKA, WORDS
+from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import exact
 from heavytop.records import Law, Quantity, Row
@@ -21,16 +21,17 @@ _HOW = {"exponential": "exponentially", "bounded": "within a bound", "unresolved
 
 def digits_headline(rows: Sequence[Row]) -> tuple[str, str] | None:
     """The fewest digits left at the longest horizon: of an integrator of others beside heyoka's, else of heyoka beside
-    those of words.  A motion whose truth ends before, for the format has no digit left, counts where there is no other.
+    those of multiword.  A motion whose truth ends before, for the format has no digit left, counts where there is no
+    other.
     """
     finished = [row for row in rows if row.outcome == "success"]
     known = [(row, kept) for row in finished if (kept := digits_kept(row)) is not None]
     at_least = "" if known else "at least "
     known = known or [(row, kept) for row in finished if (kept := _at_least(row)) is not None]
     known = [each for each in known if not each[0].reference.until] or known
-    theirs = [each for each in known if each[0].key.subject.name not in (HEYOKA, WORDS)]
+    theirs = [each for each in known if each[0].key.subject.name not in (HEYOKA, MULTIWORD)]
     ours = [each for each in known if each[0].key.subject.name == HEYOKA]
-    beside = HEYOKA if theirs else WORDS
+    beside = HEYOKA if theirs else MULTIWORD
     second = {_place(row): kept for row, kept in known if row.key.subject.name == beside}
     own = theirs or ours or known
     chosen = [each for each in own if theirs and _place(each[0]) in second] or own
@@ -88,7 +89,7 @@ def laws_headline(rows: Sequence[Row]) -> tuple[str, str] | None:
     """The laws that most of the healthy runs follow, of integrators of others where there are any, and how many of the
     planted faults have another law than these.
     """
-    theirs = [row for row in rows if row.key.subject.name not in (HEYOKA, WORDS)]
+    theirs = [row for row in rows if row.key.subject.name not in (HEYOKA, MULTIWORD)]
     healthy = theirs or [row for row in rows if not row.key.subject.variant] or rows
     parts = [_followed(healthy, drifts=False), _followed(healthy, drifts=True)]
     said = ", ".join(part for part in parts if part)
@@ -112,7 +113,7 @@ def _followed(rows: Sequence[Row], drifts: bool) -> str:
     law = _HOW.get(growth, f"like {growth}") + (f" ({count} of {of} ensembles)" if of > 1 else "")
     law += "".join(f" or {_HOW.get(other, f'like {other}')} ({times})" for other, times in others)
     name = rows[0].key.subject.name
-    whose = "" if name in (HEYOKA, WORDS) else f" of {clip(name, 40)}"
+    whose = "" if name in (HEYOKA, MULTIWORD) else f" of {clip(name, 40)}"
     return f"first integrals drift {law}" if drifts else f"errors{whose} along the flow grow {law}"
 
 

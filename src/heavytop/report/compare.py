@@ -114,7 +114,7 @@ def compare(
         _differences({"plan": baseline.plan}, {"plan": candidate.plan})
         + _differences(baseline.environment, candidate.environment),
         rows.same,
-        sentences(changes, same),
+        sentences(changes, same, rows.failed),
         changes.worst_first,
     )
 

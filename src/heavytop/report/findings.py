@@ -17,7 +17,7 @@ import msgspec
 from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.measure.local_error import ORDER
 from heavytop.measure.solution_error import SOLUTION_ERROR
-from heavytop.records import FAILED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
+from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
 from heavytop.report.row_comparison import Finding
 from heavytop.report.section import clip
 from heavytop.report.text import short
@@ -160,28 +160,49 @@ class Sentence(NamedTuple):
     rows: frozenset[Identity]
 
 
-def sentences(changes: Changes, same: int) -> list[str]:
+def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[str]:
     """At most eight sentences, the most telling first; what is worse before what is better.
 
-    same: how many metrics are the same.
+    same: how many metrics are the same, each row that came to nothing in both reports counted as one.
+    failed: rows that failed in both reports, in the same way.
     """
     if not changes.rows:
-        return [f"Nothing changed: {_count(same, 'metric is', 'metrics are')} the same within rounding noise."]
+        counted = same - sum(row.outcome in UNMEASURED for row in failed)
+        numbers = f"{_count(counted, 'metric is', 'metrics are')} the same within rounding noise"
+        return [*([f"Nothing changed: {numbers}."] if counted else []), *_still_failed(failed)]
     orders = list(_orders(changes))
     found = [sentence for moved, sentence in orders if moved < 0]
-    found += _whole_rows(changes.rows, Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
+    by_rank = sorted(changes.rows, key=lambda change: RANK.index(change.verdict))
+    found += _whole_rows(by_rank, Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
     for verdicts in ({Verdict.WORSE, Verdict.INCOMPARABLE}, {Verdict.BETTER}):
         rows = [change for change in changes.worst_first if change.verdict in verdicts]
         for make in (_digits_moved, _steps_moved, _laws_moved, _others_moved):
             found += make(rows, verdicts)
     found += [sentence for moved, sentence in orders if moved > 0]
-    found = [*found, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1]
+    still = _still_failed(failed)
+    found = [*found, *_whole_rows(changes.rows, Verdict.BETTER, Verdict.NEW)][: MOST - 1 - len(still)]
     told = frozenset[Identity]().union(*(each.rows for each in found))
     rest = [change for change in changes.rows if change.identity not in told]
     end = f"{_count(len(rest), 'other row')} changed." if rest else "Nothing else changed."
     if not same and all(change.verdict in (Verdict.MISSING, Verdict.NEW) for change in changes.rows):
         end = "The two have no row in common. Were they made with the same plan?"
-    return [clip(text, _LONGEST) for text in (*(each.text for each in found), end)]
+    return [clip(text, _LONGEST) for text in (*(each.text for each in found), *still, end)]
+
+
+def _still_failed(rows: Sequence[Row]) -> list[str]:
+    """A sentence for the rows that failed in both reports; none where there is no such row."""
+    if not rows:
+        return []
+    whose, on = _whose([row.identity for row in rows]), _on([row.identity for row in rows])
+    return [f"{_count(len(rows), 'row')}{whose} failed in both reports{on}: {clip(_why(rows[0]), 160)}."]
+
+
+def _why(row: Row) -> str:
+    """What ended a row: the reason that its integrator gives, or its outcome and how far it came."""
+    if row.outcome == FAILED:
+        return row.reference.reason
+    stopped = f"at t = {short(row.time_reached)} of {short(row.horizon)}"
+    return f"{row.outcome}, {row.reference.reason if row.outcome in UNMEASURED else stopped}"
 
 
 def line(change: Change) -> str:
@@ -242,18 +263,23 @@ def _digits(row: Row | None) -> float | None:
     return None if error is None or error.log10 is None else -error.log10
 
 
-def _where(change: Change, at: bool = True) -> str:
+def _where(row: Identity, at: bool = True) -> str:
     """``lagrange at T = 100 (mine:rk4, step 1/100, double)``."""
-    key = change.identity.key
-    subject = key.subject
-    asked = subject.setting.replace("=", " ")
-    inside = ", ".join(part for part in (clip(subject.name, 40), asked, change.identity.precision) if part)
+    key = row.key
+    asked = key.subject.setting.replace("=", " ")
+    inside = ", ".join(part for part in (clip(key.subject.name, 40), asked, row.precision) if part)
     end = f" at T = {short(key.horizon.removeprefix('-'))}" if at and key.horizon not in ("", "0") else ""
-    return f"{clip(change.identity.case.split('/T=')[0], 40)}{end} ({inside})"
+    return f"{clip(row.case.split('/T=')[0], 40)}{end} ({inside})"
 
 
-def _whose(changes: Sequence[Change]) -> str:
-    names = list(dict.fromkeys(clip(change.identity.key.subject.name, 40) for change in changes))
+def _on(rows: Sequence[Identity]) -> str:
+    """`` on lagrange at T = 100 (...)`` of one row; of several the first."""
+    return f"{', first' if len(rows) > 1 else ''} on {_where(rows[0])}"
+
+
+def _whose(rows: Sequence[Identity]) -> str:
+    """`` of mine:rk4, mine:rk5``."""
+    names = list(dict.fromkeys(clip(row.key.subject.name, 40) for row in rows))
     return f" of {', '.join(names[:3])}" + (" and others" if len(names) > 3 else "") if names else ""
 
 
@@ -272,7 +298,7 @@ def _orders_of_steps(changes: Changes) -> Iterator[tuple[str, float, Sentence]]:
         metrics = [change.metric(row, ORDER.text) for row in (change.old, change.new)]
         before, after = (math.nan if metric is None else float(metric) for metric in metrics)
         if abs(after - before) > 0:
-            said = f"Order observed {before:g} → {after:g} in single steps on {_where(change, at=False)}."
+            said = f"Order observed {before:g} → {after:g} in single steps on {_where(change.identity, at=False)}."
             yield change.identity.key.subject.name, after - before, Sentence(said, frozenset({change.identity}))
 
 
@@ -306,16 +332,21 @@ def _whole_rows(rows: Sequence[Change], *verdicts: Verdict) -> Iterator[Sentence
             found.setdefault(became, []).append((reason, change))
     for became, cases in found.items():
         reason, _ = Counter(reason for reason, _ in cases).most_common(1)[0]
-        names = list(dict.fromkeys(clip(change.identity.key.subject.name, 40) for _, change in cases))
-        whose = f" of {', '.join(names[:3])}{' and others' if len(names) > 3 else ''}"
-        said = f"{_count(len(cases), 'row')}{whose} {became if len(cases) > 1 else _SINGULAR.get(became, became)}"
-        yield Sentence(f"{said}{': ' if reason else ''}{clip(reason, 160)}.", frozenset(c.identity for _, c in cases))
+        cases.sort(key=lambda case: case[0] != reason)
+        named = [change.identity for _, change in cases]
+        whose, on = _whose(named), _on(named) if became in _NAMED else ""
+        said = f"{_count(len(cases), 'row')}{whose} {became if len(cases) > 1 else _SINGULAR.get(became, became)}{on}"
+        yield Sentence(f"{said}{': ' if reason else ''}{clip(reason, 160)}.", frozenset(named))
 
 
+_NAMED = ("failed", "stop earlier", "are worse", "are better")
+"""What became of rows where the sentence says of which."""
 _SINGULAR = {
     "are missing": "is missing",
     "are new": "is new",
     "are better": "is better",
+    "are worse": "is worse",
+    "stop earlier": "stops earlier",
     "are no longer supported": "is no longer supported",
 }
 
@@ -327,13 +358,13 @@ def _became(change: Change) -> tuple[str, str]:
     if change.verdict is Verdict.NEW:
         return "are new", ""
     if change.new is None or change.new.outcome == "success":
-        return ("are better" if change.verdict is Verdict.BETTER else "cannot be compared"), change.findings[0].reason
+        became = {Verdict.BETTER: "are better", Verdict.WORSE: "are worse"}
+        return became.get(change.verdict, "cannot be compared"), change.findings[0].reason
     if change.new.outcome == UNSUPPORTED:
         return "are no longer supported", change.new.reference.reason
-    before = change.old is not None and change.old.outcome != "success"
-    reason = change.new.reference.reason or f"at t = {short(change.new.time_reached)} of {short(change.new.horizon)}"
-    how = "" if change.new.outcome == FAILED else f"{change.new.outcome}, "
-    return "failed in both reports" if before else "failed", f"{how}{reason}"
+    if change.old is None or change.old.outcome == "success":
+        return "failed", _why(change.new)
+    return ("stop earlier" if change.verdict is Verdict.WORSE else "failed in both reports"), _why(change.new)
 
 
 def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
@@ -348,7 +379,9 @@ def _digits_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
         more = f", {'fewer' if sign > 0 else 'more'} on {_count(also, 'other row')} too" if also else ""
         if worst.lost > _ENDS_AS_BEFORE and sign > 0 and all(_ends_as_before(change) for change in changes):
             more += "; the last state is as it was: errors are between steps, of the dense output"
-        yield Sentence(f"Digits right {old} → {new} on {_where(worst)}{more}.", frozenset(c.identity for c in changes))
+        yield Sentence(
+            f"Digits right {old} → {new} on {_where(worst.identity)}{more}.", frozenset(c.identity for c in changes)
+        )
 
 
 def _steps_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sentence]:
@@ -359,7 +392,7 @@ def _steps_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sen
         most = max(changes, key=lambda change: abs(_steps(change)))
         assert most.old is not None
         assert most.new is not None
-        text = f"Steps {most.old.steps} → {most.new.steps} at the same setting on {_where(most)}."
+        text = f"Steps {most.old.steps} → {most.new.steps} at the same setting on {_where(most.identity)}."
         yield Sentence(text, frozenset(change.identity for change in changes))
 
 
@@ -397,7 +430,7 @@ def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sent
                 )
     for (_, what, said), changes in found.items():
         also = f" and {_count(len(changes) - 1, 'other row')}" if len(changes) > 1 else ""
-        text = f"The {what} {said} on {_where(changes[0], at=False)}{also}."
+        text = f"The {what} {said} on {_where(changes[0].identity, at=False)}{also}."
         yield Sentence(text, frozenset(change.identity for change in changes))
 
 
@@ -437,7 +470,7 @@ def _others_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
         why = f", {finding.reason}" if finding.reason and change.decades(finding) is None else ""
         together = frozenset(c.identity for _, c, _ in cases)
         also = f"; also on {_count(len(together) - 1, 'other row')}" if len(together) > 1 else ""
-        yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change)}{why}{also}.", together)
+        yield Sentence(f"{what[0].upper()}{what[1:]}{values} on {_where(change.identity)}{why}{also}.", together)
 
 
 def _told_elsewhere(change: Change, finding: Finding, quantity: Quantity | None) -> bool:

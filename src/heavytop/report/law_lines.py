@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from textwrap import wrap
 
 from heavytop.measure.drift import DRIFT
-from heavytop.measure.integrator import HEYOKA, WORDS
+from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.records import Quantity, Row, Series
 from heavytop.report.brief import wrapped
@@ -14,7 +14,7 @@ from heavytop.report.section import points
 from heavytop.report.text import short
 from heavytop.report.verdicts import size
 
-_OWN = (HEYOKA, WORDS)
+_OWN = (HEYOKA, MULTIWORD)
 _MEANS = {
     "t^0.5": "less than rounding noise that adds up",
     "t": "a frequency that is off by a constant, by truncation or a wrong coefficient",

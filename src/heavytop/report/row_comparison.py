@@ -9,18 +9,19 @@ import msgspec
 
 from heavytop.measure.rounding_noise import least
 from heavytop.precision import exact
-from heavytop.records import UNMEASURED, UNSUPPORTED, Identity, Metric, Quantity, Row
+from heavytop.records import UNSUPPORTED, Identity, Metric, Quantity, Row
 from heavytop.report.against import weaker
 from heavytop.report.consistency import contradictions
 from heavytop.report.kind import Kinds, kind_of
 from heavytop.report.laws import judge_law, law_text
 from heavytop.report.motion_data import other_data
 from heavytop.report.noise import allowed_loss, irreproducible, noisier, of_starts, reaches_further, seldom_apart
+from heavytop.report.outcomes import SUCCESS, judge_outcomes
 from heavytop.report.policy import BITS, Limits, Lookup, Policy
 from heavytop.report.rounding_bound import RoundingBound
 from heavytop.report.series import judge_series
 from heavytop.report.timings import BAND, judge_repeated
-from heavytop.report.verdicts import Judged, Verdict, beyond_limit, judge, judge_seconds
+from heavytop.report.verdicts import MISSING, NAN, SAME, Judged, Verdict, beyond_limit, judge, judge_seconds
 
 _STEPS = 2
 """The same method with the same setting takes as many steps, and evaluates the field as often: a factor beyond this is
@@ -58,6 +59,7 @@ class RowComparison:
 
     timed: whether seconds are compared; repeated: whether those of runs that were repeated for it are.
     list_same: False to count what plainly stayed the same, in :attr:`same`.
+    failed: rows of the candidate that failed in both reports, in the same way.
     checked: of the baseline and of the candidate, whether each row was found consistent as it was read.
     """
 
@@ -75,6 +77,7 @@ class RowComparison:
         self.list_same = list_same
         self.checked = checked
         self.same = 0
+        self.failed: list[Row] = []
         self.lookup = Lookup(policy)
         self.timed = timed
         self.repeated = repeated
@@ -87,11 +90,15 @@ class RowComparison:
         """All findings about a row that both reports have."""
         key = old.identity
         if UNSUPPORTED in (old.outcome, new.outcome) and (verdict := _support(old, new)) is not None:
-            return [] if self.ignores(old) else self._supported(key, old, new, *verdict)
+            return [] if self.ignores(old) else self._whole(key, old, new, *verdict)
+        if (judged := self._outcomes(old, new)) is not None:
+            return [] if self.ignores(old) else [*self._whole(key, old, new, *judged), *self._limits(key, old, new)]
         if reason := self._incomparable(old, new):
             if self.ignores(old):
                 return []
             return [Finding(key, "", Verdict.INCOMPARABLE, old.outcome, new.outcome, reason)]
+        if new.outcome != SUCCESS and not self.ignores(old):
+            self.failed.append(new)
         rules = self.lookup.row(old.key.kind, old.case) if self.policy.rule else ()
         found = self._metrics(key, rules, old, new)
         if old.laws or new.laws:
@@ -106,11 +113,32 @@ class RowComparison:
             found += self._seconds(key, rules, old, new)
         return found
 
-    def _supported(self, key: Identity, old: Row, new: Row, verdict: Verdict, why: str) -> list[Finding]:
+    def _whole(self, key: Identity, old: Row, new: Row, verdict: Verdict, why: str) -> list[Finding]:
+        """The finding about a row that is judged by its outcome."""
+        if verdict is Verdict.SAME and new.outcome != UNSUPPORTED:
+            self.failed.append(new)
         if verdict is Verdict.SAME and not self.list_same:
             self.same += 1
             return []
         return [Finding(key, "", verdict, old.outcome, new.outcome, why)]
+
+    def _outcomes(self, old: Row, new: Row) -> Judged | None:
+        """The verdict of rows of one motion of which one, or both, did not reach the horizon; None else."""
+        if old.outcome == new.outcome == SUCCESS or old.key.horizon != new.key.horizon:
+            return None
+        if None not in (old.data, new.data) and other_data(old.data, new.data):
+            return None
+        judged = judge_outcomes(old, new, self.lookup.metric((), "").duration)
+        return judged if judged is None or not (why := self._inconsistent(old, new)) else (Verdict.INCOMPARABLE, why)
+
+    def _limits(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
+        """What is beyond its limit in a row that has no numbers in the baseline."""
+        if new.outcome == SUCCESS and self.policy.rule:
+            rules = self.lookup.row(old.key.kind, old.case)
+            for name, metric in new.metrics.items():
+                limits = self.lookup.metric(rules, name)
+                if not limits.ignore and (judged := beyond_limit(metric, limits)) is not None:
+                    yield Finding(key, name, judged[0], None, metric.value, judged[1])
 
     def _metrics(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> list[Finding]:
         loss = self.lookup.metric((), "").loss
@@ -151,6 +179,8 @@ class RowComparison:
         """The noise of the baseline first, then the values, then the noise of the candidate, which is worse where it is
         more than chance and reaches further than that of the baseline.
         """
+        if new.outcome != SUCCESS and metric.value == match.value in (NAN, MISSING):
+            return SAME  # both stopped before there was one
         least_of = least(old.metrics, metric), least(new.metrics, match)
         kind = kind_of(old, self.kinds)
         bound = RoundingBound(old, kind) if (metric.band or match.band) and kind.noise_is_reruns(metric) else None
@@ -217,7 +247,7 @@ class RowComparison:
     def _row(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
         """What makes numbers of a row incomparable beside the numbers themselves."""
         if old.finite and not new.finite:
-            yield Finding(key, "", Verdict.INCOMPARABLE, "finite", "not finite", "a value is no longer finite")
+            yield Finding(key, "", Verdict.WORSE, "finite", "not finite", "a value is no longer finite")
         if old.steps != new.steps and self.policy.flags != "ignore":
             few, many = sorted((old.steps, new.steps))
             if few * _STEPS < many:
@@ -258,12 +288,8 @@ class RowComparison:
 
     def _incomparable(self, old: Row, new: Row) -> str:
         """Why two rows cannot be compared; empty where they can."""
-        for row, which, checked in zip((old, new), ("baseline", "candidate"), self.checked, strict=True):
-            if row.outcome != "success":
-                why = f": {row.reference.reason}" if row.outcome in UNMEASURED else ""
-                return f"the {which} ended as {row.outcome} at t = {row.time_reached}{why}"
-            if not checked and (problem := next(contradictions(row, kind_of(row, self.kinds)), "")):
-                return f"the {which} contradicts itself: {problem}"
+        if reason := self._inconsistent(old, new):
+            return reason
         if old.horizon != new.horizon and exact(old.horizon) != exact(new.horizon):
             return f"horizon {old.horizon} against {new.horizon}"
         if old.bits != new.bits:
@@ -280,6 +306,13 @@ class RowComparison:
         if old.measured != new.measured:
             return f"{old.measured or 'nothing'} is measured, and {new.measured or 'nothing'}"
         return weaker(old.reference, new.reference)
+
+    def _inconsistent(self, old: Row, new: Row) -> str:
+        """What in one of the rows contradicts something else in it."""
+        for row, which, checked in zip((old, new), ("baseline", "candidate"), self.checked, strict=True):
+            if not checked and (problem := next(contradictions(row, kind_of(row, self.kinds)), "")):
+                return f"the {which} contradicts itself: {problem}"
+        return ""
 
     def _eps(self, quantity: Quantity | None, row: Row) -> float:
         """log10 of the eps of a row, or of what its roundings add up to."""

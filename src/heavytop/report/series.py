@@ -10,9 +10,9 @@ from heavytop.precision import exact
 from heavytop.records import Series
 from heavytop.report.consistency import log_size
 from heavytop.report.policy import BITS
-from heavytop.report.verdicts import SAME, Judged, Verdict
+from heavytop.report.verdicts import MISSING, NAN, SAME, Judged, Verdict
 
-_NO_NUMBER = ("nan", "missing")
+_NO_NUMBER = (NAN, MISSING)
 _LOST_SHARE = 10
 """One in so many samples, and two, may no longer be resolved."""
 
@@ -26,8 +26,10 @@ def judge_series(old: Series, new: Series, allowed: float, floor: float, exactly
     if old.times != new.times and list(map(exact, old.times)) != list(map(exact, new.times)):
         return Verdict.INCOMPARABLE, "other times"
     pairs = list(zip(old.values, new.values, strict=True))
-    if any(b in _NO_NUMBER and a not in _NO_NUMBER for a, b in pairs):
-        return Verdict.INCOMPARABLE, "a value is no longer a number"
+    if any(b == NAN and a not in _NO_NUMBER for a, b in pairs):
+        return Verdict.WORSE, "a value is no longer a number"
+    if any(b == MISSING and a not in _NO_NUMBER for a, b in pairs):
+        return Verdict.INCOMPARABLE, "a value is no longer measured"
     lost = sum(b == UNRESOLVED != a for a, b in pairs)
     if lost > 2 + len(pairs) / _LOST_SHARE:
         return Verdict.INCOMPARABLE, f"{lost} values are no longer resolved"

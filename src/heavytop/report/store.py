@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from heavytop import former_names
 from heavytop.errors import InputError
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report.checks import REMEDY, check_keys, check_rows
@@ -73,7 +74,10 @@ class _Rows:
         self._file = file
         self._kinds = kinds
         self._rows = rows
-        self._decode = msgspec.json.Decoder(Row).decode
+        self._decoder = msgspec.json.Decoder(Row)
+
+    def _decode(self, row: msgspec.Raw) -> Row:
+        return former_names.of_row(self._decoder.decode(row))
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -110,6 +114,7 @@ def read(path: Path, kinds: Kinds) -> Report:
     (where its checksum lies beside it), or inconsistent in itself.
     """
     file, report = _read(path, Report)
+    report.rows = [former_names.of_row(row) for row in report.rows]
     check_keys(file, report.rows)
     check_rows(file, report.rows, kinds)
     return report
@@ -145,6 +150,7 @@ def _read(path: Path, kind: type[_Content]) -> tuple[Path, _Content]:
         _check_repeats(file, content)
     if not isinstance(report.environment.get("packages", {}), dict):
         raise InputError(f"{file} does not say which packages it was made with.", REMEDY)
+    report.plan = former_names.of_plan(report.plan)
     return file, report
 
 

@@ -32,6 +32,8 @@ class Verdict(Enum):
     INCOMPARABLE = "incomparable"
 
 
+NAN, MISSING = "nan", "missing"
+"""Words in the place of a number: the value is none, or it was not measured."""
 Judged = tuple[Verdict, str]
 """A verdict and why."""
 SAME: Judged = (Verdict.SAME, "")
@@ -53,16 +55,29 @@ def judge(
     """
     if old.kind != new.kind:
         return Verdict.INCOMPARABLE, f"kind {old.kind} against {new.kind}"
-    for metric in (old, new):
-        if metric.value in ("nan", "missing") or (
-            metric.value == UNRESOLVED and old.kind == "error" and not metric.bound
-        ):
-            return Verdict.INCOMPARABLE, f"the value is {metric.value}"
+    if (word := _no_number(old, new, limits)) is not None:
+        return word
     if old.kind == "error":
         return _errors(old, new, limits, limits.floor + eps, suspicious, least, bound)
     if old.kind == "duration":
         return _durations(old, new, limits, bound)
     return _values(old, new, limits)
+
+
+def _no_number(old: Metric, new: Metric, limits: Limits) -> Judged | None:
+    """The verdict where a value is no number in one row or in both; None where both are.
+
+    NaN is worse than any number, and never the same, not even as itself.  What was not measured is incomparable.
+    """
+    if MISSING not in (old.value, new.value) and old.value != new.value:
+        if new.value == NAN:
+            return Verdict.WORSE, "no longer a number"
+        if old.value == NAN:
+            return beyond_limit(new, limits) or (Verdict.BETTER, "now a number")
+    for metric in (old, new):
+        if metric.value in (NAN, MISSING) or (metric.value == UNRESOLVED and old.kind == "error" and not metric.bound):
+            return Verdict.INCOMPARABLE, f"the value is {metric.value}"
+    return None
 
 
 def size(metric: Metric) -> float:

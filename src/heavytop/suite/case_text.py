@@ -5,23 +5,32 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from heavytop.measure.setup import motion_texts
 from heavytop.suite.cases import Case
 from heavytop.suite.trajectory_table import COLUMNS
 from heavytop.top.heavy_top import data_texts
 
 _TIMES = ("1", "5", "10")
+_DIGITS = 40
+"""Of a start whose attitude is irrational."""
 
 
 def case_data(case: Case) -> dict[str, Any]:
-    """Exact data as text, by the keys of a trajectory file."""
-    return {"name": case.name, "system": case.system.name} | data_texts(case.top, case.start)
+    """Exact data as text, by the keys of a trajectory file; of a named body as it was given."""
+    head = {"name": case.name, "system": case.system.name}
+    if case.body is None or case.given_start is None:
+        return head | data_texts(case.top, case.start)
+    return head | motion_texts(case.body, case.given_start, _DIGITS)
 
 
 def forms(case: Case) -> dict[str, str]:
     """The data of a case in each form: ``command`` (line), ``csv``, ``json``, ``toml`` and ``python``."""
     data = case_data(case)
-    texts = {"csv": _csv(data), "json": _json(data), "toml": _toml(data), "python": _python(data)}
-    return {"command": _command(data)} | texts
+    texts = {"csv": _csv(data), "json": _json(data), "toml": _toml(data)}
+    if case.body is None:
+        return {"command": _command(data)} | texts | {"python": _python(data)}
+    command = f"heavytop propagate --case {case.name} --times {','.join(_TIMES)} --show quaternion,position"
+    return {"command": command} | texts | {"python": _python_of_body(case)}
 
 
 def _command(data: dict[str, Any]) -> str:
@@ -66,5 +75,18 @@ def _python(data: dict[str, Any]) -> str:
             f"top = ht.HeavyTop(inertia={numbers('inertia')}, weight={weight}, centre={numbers('centre')})",
             f"start = ht.State(omega={numbers('omega')}, gamma={numbers('gamma')})",
             f"run = ht.propagate(top, start, [{', '.join(_TIMES)}], ht.DOUBLE{system})",
+        ]
+    )
+
+
+def _python_of_body(case: Case) -> str:
+    return "\n".join(
+        [
+            "import heavytop as ht",
+            "",
+            f"body = ht.{case.body!r}",
+            f"start = ht.{case.given_start!r}".replace("attitude=", "attitude=ht."),
+            f"run = ht.propagate(body, start, [{', '.join(_TIMES)}], ht.DOUBLE)",
+            "run.quaternions(), run.positions()",
         ]
     )

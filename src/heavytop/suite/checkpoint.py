@@ -19,6 +19,7 @@ from typing import Any, BinaryIO
 
 import msgspec
 
+from heavytop import former_names
 from heavytop.errors import InputError
 from heavytop.records import Report, Row
 from heavytop.suite.files import line, replace, verified
@@ -121,7 +122,8 @@ class Checkpoint:
             if first is None:
                 raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.")
             try:
-                require_same(msgspec.json.decode(first, type=dict[str, str]), self.identity, self.path)
+                there = msgspec.json.decode(first, type=dict[str, str])
+                require_same(former_names.of_identity(there), self.identity, self.path)
             except msgspec.MsgspecError:
                 raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.") from None
             end = file.tell()
@@ -167,7 +169,7 @@ class Checkpoint:
                 if content is None:
                     raise InputError(f"{self.path} was changed while it was in use.", "Go on with --resume.")
                 try:
-                    yield msgspec.json.decode(content, type=tuple[int, Row])[1]
+                    yield former_names.of_row(msgspec.json.decode(content, type=tuple[int, Row])[1])
                 except msgspec.MsgspecError as error:
                     raise InputError(f"{self.path} has a line that is no row: {error}", "Give another --out.") from None
 

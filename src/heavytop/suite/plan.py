@@ -18,6 +18,7 @@ from typing import Any, cast, get_args
 
 import msgspec
 
+from heavytop import former_names
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers import known as known_integrators
@@ -116,6 +117,14 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
     return plan, hashlib.sha256(text.encode()).hexdigest()
 
 
+def former(name: str) -> set[str]:
+    """The former names of integrators that the plan in that file gives; none of a plan that cannot be read twice."""
+    try:
+        return former_names.in_document(tomllib.loads(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
+    except (OSError, ValueError, RecursionError):
+        return set()
+
+
 def definitions(plan: Plan, folder: Path) -> dict[str, Source]:
     """The integrators that a plan in that folder defines, by name; raises InputError for what is none, and for two of
     one name.
@@ -162,7 +171,7 @@ def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
     any_table = reduce(or_, tables.values())
     measure = ("measure", list[any_table])  # type: ignore[valid-type]
     whole = msgspec.defstruct("Plan", [measure], bases=(Plan,), kw_only=True)
-    plan: Plan = msgspec.convert(document, cast(type[Plan], whole))
+    plan: Plan = msgspec.convert(former_names.of_document(document), cast(type[Plan], whole))
     return plan
 
 

@@ -13,7 +13,7 @@ from heavytop.integrate.peers.source import Source
 from heavytop.integrate.reach import require_reach
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.computed_reference import seconds_a_step as words_seconds
-from heavytop.measure.integrator import HEYOKA, WORDS, Integrator
+from heavytop.measure.integrator import HEYOKA, MULTIWORD, Integrator
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.precision import Precision, exact, parse
 from heavytop.records import EXACT, RowKey, Subject
@@ -97,8 +97,8 @@ class Task:
 
     @property
     def run_seconds(self) -> float:
-        """Seconds that words, or heyoka for all others, take for such a motion, roughly."""
-        step = (words_seconds if self.key.subject.name == WORDS else seconds_a_step)(self.precision.bits)
+        """Seconds that multiword, or heyoka for all others, take for such a motion, roughly."""
+        step = (words_seconds if self.key.subject.name == MULTIWORD else seconds_a_step)(self.precision.bits)
         return float(abs(self.times[-1])) * 4 * step + len(self.times) * 1e-4
 
 

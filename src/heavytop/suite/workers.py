@@ -31,6 +31,8 @@ from heavytop.suite.kind import Kind, Kinds
 from heavytop.suite.task import Task
 
 _AHEAD = 4
+_ANSWER = 10.0
+"""Seconds that a Dask scheduler has to answer."""
 _PATIENCE = 30
 """Seconds without any worker after which a cluster is given up."""
 _RESUME = "Finished rows are kept: run again with --resume"
@@ -303,7 +305,7 @@ def _client(scheduler: str) -> Iterator[Any]:
     except ImportError:
         raise InputError("--scheduler needs Dask.", "Install it with: pip install 'heavytop[cluster]'") from None
     try:
-        client = Client(scheduler, timeout="10s")
+        client = Client(scheduler, timeout=_ANSWER)
     except (OSError, ValueError) as error:
         raise InputError(f"No scheduler answers at {scheduler}: {error}.", "Start one: `dask scheduler`.") from None
     with client:

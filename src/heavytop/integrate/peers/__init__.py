@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, PeerFailed
+from heavytop.former_names import INTEGRATORS as FORMER
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile, Source
@@ -57,7 +58,7 @@ BUILT_IN = {
     "heyoka": BuiltIn("heavytop.integrate.taylor:propagate"),
     "heyoka:constants": BuiltIn(f"{HERE}.heyoka_taylor:constants"),
     "heyoka:lanes": BuiltIn(f"{HERE}.heyoka_taylor:lanes"),
-    "words": BuiltIn("heavytop.integrate.words:propagate_words"),
+    "multiword": BuiltIn("heavytop.integrate.words:propagate_words"),
     "scipy:DOP853": BuiltIn(f"{HERE}.scipy_ivp:dop853", ("scipy",)),
     "scipy:LSODA": BuiltIn(f"{HERE}.scipy_ivp:lsoda", ("scipy",)),
     "scipy:Radau": BuiltIn(f"{HERE}.scipy_ivp:radau", ("scipy",)),
@@ -76,7 +77,8 @@ def known() -> dict[str, EntryPoint]:
     """Every peer by name, not yet imported: the built-in ones, then those of other packages, which replace none."""
     found = {name: EntryPoint(name, built_in.place, GROUP) for name, built_in in BUILT_IN.items()}
     for entry in entry_points(group=GROUP):
-        found.setdefault(entry.name, entry)
+        if entry.name not in FORMER:
+            found.setdefault(entry.name, entry)
     return found
 
 
@@ -87,7 +89,7 @@ def name_of(which: str | Source) -> str:
 
 def is_third_party(name: str) -> bool:
     """Whether an integrator of that name is not one of this program's."""
-    return name not in BUILT_IN
+    return name not in BUILT_IN and name not in FORMER
 
 
 def peer(which: str | Source) -> Peer:

@@ -20,6 +20,8 @@ from typing import Any, Protocol
 import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, quoted
+from heavytop.former_names import INTEGRATORS as FORMER
+from heavytop.former_names import current
 from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import contained, quiet, said
 from heavytop.precision import exact, parse
@@ -164,7 +166,7 @@ def as_peer(call: Any, name: str) -> Callable[..., Any]:
 
 
 def named(integrator: Any, folder: Path | None = None) -> str | Source:
-    """The integrator that a user names: itself where it is the name of one, else its source.
+    """The integrator that a user names: its name of now where it is the name of one, else its source.
 
     folder: what paths are relative to; None for the working directory.
     Raises InputError for a file that describes none, or several.
@@ -173,7 +175,7 @@ def named(integrator: Any, folder: Path | None = None) -> str | Source:
         return of_callable(integrator)
     python, toml = _PYTHON.fullmatch(integrator), _TOML.fullmatch(integrator)
     if python is None and toml is None:
-        return integrator  # the working directory may be gone
+        return current(integrator)  # the working directory may be gone
     base = (folder or Path()).absolute()
     if python is not None:
         return PythonFile(str((base / python[1]).resolve()), python[2])
@@ -234,7 +236,7 @@ def _require_possible(command: Command) -> None:
 
     if not re.fullmatch(_NAME, command.name):
         raise InputError(f"the name {quoted(command.name)} is not letters, digits and ._:+- alone.")
-    if command.name in BUILT_IN:
+    if command.name in BUILT_IN or command.name in FORMER:
         raise InputError(f"the name {command.name} is that of a built-in integrator.")
     if not command.command or not all(part and "\0" not in part for part in command.command[:1]):
         raise InputError("command is empty.")

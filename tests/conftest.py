@@ -1,0 +1,19 @@
+"""Marks the tests of slow.txt as `slow`: whole files, or ``FILE::FUNCTION``, with a call of more than 0.1 s."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+SLOW = frozenset((HERE / "slow.txt").read_text("utf-8").split())
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what the list names, in all its parametrizations."""
+    for item in items:
+        if item.path.is_relative_to(HERE):
+            file = item.path.relative_to(HERE).as_posix()
+            if not SLOW.isdisjoint((file, f"{file}::{getattr(item, 'originalname', item.name)}")):
+                item.add_marker(pytest.mark.slow)
