@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from heavytop.api import plot
     from heavytop.api.claims import Audit, audit
+    from heavytop.api.derivatives import DerivativeScore, score_derivatives
     from heavytop.api.events import events, poincare
     from heavytop.api.motions import ensemble, propagate, reference
     from heavytop.api.reports import Comparison, Report, compare, read_report, run
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "api.claims": ("Audit", "audit"),
+    "api.derivatives": ("DerivativeScore", "score_derivatives"),
     "api.events": ("events", "poincare"),
     "api.motions": ("ensemble", "propagate", "reference"),
     "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
@@ -58,6 +60,7 @@ __all__ = [
     "Body",
     "Comparison",
     "Contradiction",
+    "DerivativeScore",
     "Events",
     "HeavyTop",
     "HeavyTopError",
@@ -90,6 +93,7 @@ __all__ = [
     "reference",
     "run",
     "score",
+    "score_derivatives",
 ]
 
 

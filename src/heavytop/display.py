@@ -51,16 +51,17 @@ class Lines(Sequence[Sequence[str]]):
 class Table:
     """A title, a table below it and notes below that; long tables show their first and last rows.
 
-    header: one text a column.  rows: as many texts each.
+    header: one text a column.  rows: as many texts each.  whole: every row is shown.
     """
 
     title: str
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
     notes: Sequence[str] = ()
+    whole: bool = False
 
     def _abridged(self) -> list[Sequence[str]]:
-        if len(self.rows) <= _MOST:
+        if self.whole or len(self.rows) <= _MOST:
             return list(self.rows)
         gap = [f"... {len(self.rows) - 2 * _ENDS} more", *[""] * (len(self.header) - 1)]
         return [*self.rows[:_ENDS], gap, *self.rows[-_ENDS:]]

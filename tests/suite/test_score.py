@@ -163,7 +163,7 @@ def test_without_a_reference_the_drift_is_scored(tmp_path: Path) -> None:
         ({"name": {}}, "name is a dict"),
         ({"tolerence": "1e-9"}, "Unknown key 'tolerence'"),
         ({"Weight": "1"}, "Unknown key 'Weight'"),
-        ({"mass": "1"}, "Unknown key 'mass'"),
+        ({"mass": "1"}, "weight and mass are both given"),
     ],
 )
 def test_a_file_that_cannot_be_scored_is_refused_in_words(change: dict, message: str, tmp_path: Path) -> None:

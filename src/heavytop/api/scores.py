@@ -4,28 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any, NamedTuple, cast
 
 from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
+from heavytop.api.observed_arrays import columns, convention, is_plain, observed_arrays
 from heavytop.display import Table, Tabular
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.measure.drift import DRIFT, Drift
+from heavytop.measure.observations import ATTITUDE_ERROR, POSITION_ERROR
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import Precision
 from heavytop.records import Metric, Row
 from heavytop.report.diagnosis_text import diagnosis_text
 from heavytop.report.text import short
 from heavytop.suite.given import of_arrays
-from heavytop.suite.score import Peer, assess, passed, required
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.suite.score import Assessment, Peer, assess, passed, required
+from heavytop.top.bodies import Body
+from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
 from heavytop.top.times import check_times
 
 _PARTS = ("omega", "gamma", "along", "across")
-_LABELS = {"omega": "error of Ω", "gamma": "error of γ", "along": "along the flow", "across": "across the flow"}
+_LABELS = {
+    "omega": "error of Ω",
+    "gamma": "error of γ",
+    "along": "along the flow",
+    "across": "across the flow",
+    "attitude": "error of the attitude (rad)",
+    "position": "error of the position",
+    "position_relative": "error of the position, relative",
+}
 _HEADER = ("", "largest", "rms", "final")
 _STATES = "Give an array of shape (n, 6), in the order Ω1 Ω2 Ω3 γ1 γ2 γ3."
 
@@ -48,13 +60,15 @@ class Score(Tabular):
     outcome: ``success``, or ``non_finite`` where a state is NaN or infinite: those before it are scored.
     drift: |I(t) − I(0)| by the name of the first integral, in its units.
     distance: from the known motion, by ``omega`` (1/time unit), ``gamma``, ``along`` the flow (phase) and ``across``
-    it; empty without a reference.
+    it, and where it has such columns by ``attitude`` (an angle in radians), ``position`` (a length) and
+    ``position_relative``; empty without a reference.
     digits_kept: −log10 of the largest |error|/max(1, |value|) of Ω and γ over the samples; None without a reference.
     against: what it was compared with, and how well that is known.  row: the same as `heavytop score --json`.
     of_digits: decimal digits of the format.  peer: heyoka's own run over the same times in the same format; None
     without a reference, and where heyoka does not get there.  diagnosis: what explains the error, a sentence each.
     passed: whether as many digits are right as were required; None, which is no pass, where the run ended early or that
     is not known.
+    used: which columns were scored, in a sentence, where these are not Ω and γ in principal axes.
     """
 
     outcome: str
@@ -67,6 +81,7 @@ class Score(Tabular):
     peer: Peer | None
     diagnosis: tuple[str, ...]
     passed: bool | None = None
+    used: str = ""
 
     @property
     def digits_right(self) -> float | None:
@@ -84,20 +99,41 @@ class Score(Tabular):
         sizes = {_LABELS[part] + until: size for part, size in self.distance.items()}
         sizes |= {f"drift of {name}": size for name, size in self.drift.items()}
         title = f"{row.case} in {row.precision}: {self.outcome}, {kept}"
-        return Table(title, _HEADER, _lines(sizes), [f"compared with {self.against}", *self.diagnosis])
+        return Table(
+            title,
+            _HEADER,
+            _lines(sizes),
+            [*([self.used] if self.used else []), f"compared with {self.against}", *self.diagnosis],
+        )
 
 
 def score(
     times: Numbers,
-    states: Any,
+    states: Any = None,
     *,
-    top: HeavyTop,
+    top: HeavyTop | Body,
     start: State,
     precision: Precision | str | None = None,
-    system: System | str = HEAVY_TOP,
+    system: System | str | None = None,
     name: str = "given",
     integrator: str = "given",
     require: Number | None = None,
+    omega: Any = None,
+    omega_space: Any = None,
+    gamma: Any = None,
+    quaternions: Any = None,
+    matrices: Any = None,
+    euler: Any = None,
+    positions: Any = None,
+    quaternion_order: str = "wxyz",
+    quaternion: str = "body_to_space",
+    matrix: str = "body_to_space",
+    sequence: str = "",
+    angles: str = "radians",
+    up: str = "z",
+    pivot: Numbers = (0, 0, 0),
+    point: Numbers | None = None,
+    normalize: bool = False,
 ) -> Score:
     """A motion that any program computed, scored like our own.
 
@@ -105,11 +141,19 @@ def score(
         times: shape (n,), exact numbers of one sign, strictly monotone away from 0.
         states: shape (n, 6), in the order Ω1 Ω2 Ω3 γ1 γ2 γ3: an array of float64 or longdouble, or lists of numbers of
             any format, or of decimal, fraction or hexadecimal text.  NaN and infinities are an outcome, not an error.
-        top, start: what the program was given; rounded to the format first.
+            None where other arrays fix the motion.
+        top, start: what the program was given; rounded to the format first.  A Body has Ω and γ in its own axes.
         precision: the format in which it computed; None for the narrowest that holds every number as it is given.
-        system: "heavy_top" or "gyrostat".
+        system: as in :func:`propagate`.
         name, integrator: what the row is called.
         require: digits that must be right, as ``passed`` of the result says; None asks that the run reached its end.
+        omega, omega_space, gamma, positions: shape (n, 3): Ω in body axes, Ω in axes of space, γ, and where ``point``
+            (in body axes; the centre of mass if None) stands in the axes of space, the fixed point at ``pivot``.
+        quaternions: shape (n, 4), in ``quaternion_order`` "wxyz" or "xyzw"; ``quaternion`` says what they do,
+            "body_to_space" or "space_to_body".  matrices: shape (n, 3, 3), ``matrix`` in the same words.
+        euler: shape (n, 3), intrinsic angles of ``sequence``, in ``angles`` "radians" or "degrees".
+        up: the axis of space that points up: "z", "-z", "y", ...
+        normalize: take quaternions and matrices of any length for their directions.
 
     Returns:
         A :class:`Score`.
@@ -120,16 +164,40 @@ def score(
     """
     needed = None if require is None else required(require)
     form = None if precision is None else arguments.precision(precision)
-    body, state = arguments.motion(top, start)
-    about, instants = arguments.system(system), list(check_times(times))
-    rows = _rows(states)
+    body = top if isinstance(top, Body) else arguments.is_a(top, HeavyTop, "top")
+    about, instants = arguments.system(system, body), list(check_times(times))
     names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
-    found = assess(of_arrays(cast(HeavyTop, body), state, about, instants, rows, form, *names))
+    arrays = columns(
+        {
+            "omega": omega,
+            "omega_space": omega_space,
+            "gamma": gamma,
+            "quaternion": quaternions,
+            "matrix": matrices,
+            "euler": euler,
+            "position": positions,
+        },
+        None if states is None else _rows(states),
+    )
+    if is_plain(top, start, arrays, states is not None):
+        body, state = arguments.motion(top, start)
+        given = of_arrays(cast(HeavyTop, body), state, about, instants, _rows(states), form, *names)
+    else:
+        said = convention(quaternion_order, quaternion, matrix, sequence, angles, up, pivot, point)
+        given = observed_arrays(top, start, about, said, instants, arrays, form, names, normalize)
+    return _scored(assess(given), needed)
+
+
+def _scored(found: Assessment, needed: Fraction | None) -> Score:
     row = found.row
+    distance = {part: size for part, size in _summaries(row.metrics, SOLUTION_ERROR).items() if part in _PARTS}
+    for name, label in ((ATTITUDE_ERROR, "attitude"), (POSITION_ERROR, "position")):
+        for part, size in _summaries(row.metrics, name).items():
+            distance[f"{label}_{part}" if part else label] = size
     return Score(
         row.outcome,
         _summaries(row.metrics, DRIFT),
-        {part: size for part, size in _summaries(row.metrics, SOLUTION_ERROR).items() if part in _PARTS},
+        distance,
         digits_kept(row),
         row.against,
         row,
@@ -137,6 +205,7 @@ def score(
         found.peer,
         tuple(diagnosis_text(each, row.system) for each in found.diagnoses),
         passed(row, needed),
+        found.used,
     )
 
 

@@ -126,8 +126,8 @@ def propagate(
     if max_steps is not None and max_steps < 1:
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top.top if isinstance(top, Body) else top, start)
-    functions = requested(events, event_direction, instants[-1])
     say_former([integrator])
+    functions = requested(events, event_direction, instants[-1])
     if form.bits >= _SLOW_BITS and integrator == "heyoka":
         say(
             f"warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
@@ -191,6 +191,9 @@ def reference(
     rotor: Rotor = None,
     system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Give xi too, fixed in space and across gamma.")] = False,
+    derivatives: Annotated[
+        str | None, typer.Option(help="Derivatives too: start, data (I1..I3, n = P r) or all.", metavar="WHICH")
+    ] = None,
     normalize: Normalize = False,
     events: Events = None,
     event_direction: EventDirection = 0,
@@ -204,8 +207,10 @@ def reference(
     """Print proven states of one motion.
 
     By a closed form where there is one, at once; else by a validated enclosure: a second up to t = 100, a few seconds
-    up to t = 1000.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
+    up to t = 1000; derivatives take about ten times as long.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω
+    with M = IΩ; γ points up.
     """
+    from heavytop.measure.derivatives import which_derivatives
     from heavytop.measure.reference import reference as proven
     from heavytop.top.equations import system_of
     from heavytop.top.times import check_times
@@ -227,12 +232,12 @@ def reference(
     }
     top, start, system = _motion(given, case, system, normalize, of_any_size=True)
     which, instants = system_of(system, top), check_times(numbers(times))
-    wanted = _outputs(show, point, pivot)
+    wanted, which_ones = _outputs(show, point, pivot), which_derivatives(derivatives)
     require_one_output(csv, latex, json)
     functions = requested(events, event_direction, instants[-1])
     watch = _Watch([abs(time) for time in instants])
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        found = proven(top, start, numbers(times), digits, which, watch.find, attitude or bool(wanted))
+        found = proven(top, start, numbers(times), digits, which, watch.find, attitude or bool(wanted), which_ones)
         found.require_outputs(wanted)
 
     def table() -> MotionTable:

@@ -23,12 +23,17 @@ def score(
     out: Annotated[Path | None, typer.Option(help="New folder for a report with its row.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page about it to that file.")] = None,
     require: Annotated[str | None, typer.Option(help="Exit 1 where fewer digits are right: 9.5.")] = None,
+    normalize: Annotated[
+        bool,
+        typer.Option("--normalize", help="Take quaternions, matrices and gamma of any length."),
+    ] = False,
     json: Json = False,
 ) -> int:
     """Say how many digits of your trajectory are right.
 
     Digits right at every sample, beside heyoka's in the same format; distance from the known motion; drift of the
-    first integrals; what explains the error, where something does.  The file: docs/score.md.  Takes a few seconds.
+    first integrals; what explains the error, where something does.  The file holds Ω and γ, or quaternions, matrices,
+    Euler angles, positions, Ω in axes of space: docs/score.md.  Takes a few seconds.
     """
     from heavytop.suite.cases import case as case_named
     from heavytop.suite.score import assess, passed, required
@@ -38,7 +43,7 @@ def score(
         out = absolute(out)
         require_new(out)
     needed = None if require is None else required(require)
-    given = read(trajectory, None if case is None else case_named(case))
+    given = read(trajectory, None if case is None else case_named(case), normalize)
     for warning in given.warnings():
         say(f"warning: {warning}")
     with counted("score", 2 * len(given.times), "states", _STATE_SECONDS) as advance:

@@ -60,7 +60,7 @@ _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
 
 
-def _seconds_a_step(precision: int, in_words: bool) -> float:
+def seconds_a_step(precision: int, in_words: bool) -> float:
     """A model of the cost, not a measurement: what is refused must not depend on how busy the machine is."""
     return 4e-4 + 1.2e-11 * precision**3 if in_words else 1e-3 + 6e-8 * precision**2
 
@@ -140,7 +140,7 @@ class Validated:
         span = abs(time) * motion.scaled.rate
         loss, steps = self._forecast(direction, span, self.start.flat, bits)
         planned = motion.precision(bits + loss, steps)
-        if steps * _seconds_a_step(*planned) > self.effort:
+        if steps * seconds_a_step(*planned) > self.effort:
             raise self._refusal(time, self._reachable(time, bits, loss, self.start.flat))
         run = self._run(direction, self.start.flat, *planned)
         return motion, _steps_of(run, span)
@@ -181,6 +181,16 @@ class Validated:
                 for component, size in zip(y, sizes, strict=True)
             ]
 
+    def motion(self, direction: int) -> ScaledMotion:
+        """That of (Ω, γ) in units of its own, forwards or backwards in time."""
+        return self._motion(direction, self.start.flat)
+
+    def forecast(self, time: Fraction, bits: int) -> tuple[float, float]:
+        """(bits that will be lost, steps that will be taken) up to ``time``, where ``bits`` are to be left."""
+        direction = 1 if time > 0 else -1
+        span = abs(time) * self.motion(direction).scaled.rate
+        return self._forecast(direction, span, self.start.flat, bits)
+
     def _motion(self, direction: int, start: tuple[Fraction, ...]) -> ScaledMotion:
         """That of ``start``: of y, or of y and ξ."""
         key = (direction, len(start))
@@ -213,7 +223,7 @@ class Validated:
         run = pilot.run if pilot.reaches(span, bits) else None
         for _ in range(_ATTEMPTS):
             planned = motion.precision(bits + loss, steps)
-            if steps * _seconds_a_step(*planned) > self.effort:
+            if steps * seconds_a_step(*planned) > self.effort:
                 raise self._refusal(time, self._reachable(time, bits, loss, start))
             run = run or self._run(direction, start, *planned)
             found = run.at(span)
@@ -247,11 +257,11 @@ class Validated:
         """(bits that will be lost, steps that will be taken) up to ``span``, where ``bits`` are to be left."""
         pilot = self._pilot(direction, start, bits)
         if most is None:
-            a_step = _seconds_a_step(pilot.run.precision, pilot.run.carrier is not None)
+            a_step = seconds_a_step(pilot.run.precision, pilot.run.carrier is not None)
             return pilot.forecast(span, _HOPELESS * self.effort / a_step)
         # the enclosure may take fewer bits than its pilot
         fewest = self._motion(direction, start).precision(bits, inf)
-        return pilot.forecast(span, _SURELY * most / _seconds_a_step(*fewest))
+        return pilot.forecast(span, _SURELY * most / seconds_a_step(*fewest))
 
     def _cost(
         self, time: Fraction, bits: int, start: tuple[Fraction, ...], loss: float = 0.0, most: float | None = None
@@ -260,7 +270,7 @@ class Validated:
         direction = 1 if time > 0 else -1
         motion = self._motion(direction, start)
         forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits, most)
-        return steps * _seconds_a_step(*motion.precision(bits + max(loss, forecast), steps))
+        return steps * seconds_a_step(*motion.precision(bits + max(loss, forecast), steps))
 
     def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:
         """Fewer bits than ``bits``, within the effort."""

@@ -121,13 +121,13 @@ def _computed(problem: Problem, times: Sequence[Fraction], effort: float | None 
     try:
         (found,) = of_rounded([problem], times, effort=effort)
     except (InputError, OutOfReach) as error:
-        return _clause(error)
+        return clause(error)
     if found.ends == times[0]:
         return f"no digit of the format is left at t = {time_text(found.ends)}, the first sample"
     return Truth(found.against, found.state, found.ends)
 
 
-def _clause(error: HeavyTopError) -> str:
+def clause(error: HeavyTopError) -> str:
     """Its cause inside a sentence."""
     return error.cause[:1].lower() + error.cause[1:].removesuffix(".")
 
@@ -169,5 +169,5 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
                 return f"no closed form, and an enclosure to |t| = {time_text(abs(horizon))} takes too long"
         known = certified(found, horizon, bits)
     except OutOfReach as error:
-        return _clause(error)
+        return clause(error)
     return known or "certified to fewer digits than the format has"

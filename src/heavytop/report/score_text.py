@@ -21,6 +21,11 @@ from heavytop.suite.score import Assessment, direction, passed
 
 WIDTH = 80
 _PARTS = {"omega": "Ω", "gamma": "γ", "along": "along the flow", "across": "across the flow"}
+_OBSERVED = {
+    "attitude_error": "attitude (rad)",
+    "position_error": "position",
+    "position_error_relative": "position, relative",
+}
 _DIRECTIONS = {
     "along": "The error is mostly along the flow, that is in phase.",
     "across": "The error is mostly across the flow.",
@@ -79,7 +84,7 @@ def told(found: Assessment) -> list[str]:
     """What explains the error, and what was guessed."""
     said = [diagnosis_text(each, found.row.system) for each in found.diagnoses]
     note = guessed(found)
-    return [*said, *([note] if note else [])]
+    return [*([found.used] if found.used else []), *said, *([note] if note else [])]
 
 
 def to_json(found: Assessment) -> dict[str, Any]:
@@ -87,7 +92,8 @@ def to_json(found: Assessment) -> dict[str, Any]:
     peer = None if found.peer is None else asdict(found.peer)
     said = [asdict(each) | {"sentence": diagnosis_text(each, found.row.system)} for each in found.diagnoses]
     answers = {"digits_kept": found.digits_right, "digits_right": found.digits_right, "of_digits": found.of_digits}
-    more = {"peer": peer, "mostly": found.direction, "format_guessed": found.format_guessed, "diagnosis": said}
+    more: dict[str, Any] = {"scored": found.used} if found.used else {}
+    more |= {"peer": peer, "mostly": found.direction, "format_guessed": found.format_guessed, "diagnosis": said}
     row: dict[str, Any] = msgspec.to_builtins(found.row)
     return row | answers | more
 
@@ -96,6 +102,7 @@ def sizes(row: Row) -> list[list[str]]:
     """Label, largest, root mean square and final value of each error and of the drift of each first integral."""
     until = f" before t = {short(row.reference.until)}" if row.reference.until else ""
     names = {f"solution_error_{key}": f"error{until}, {label}" for key, label in _PARTS.items()}
+    names |= {key: f"error{until}, {label}" for key, label in _OBSERVED.items()}
     names |= {name[:-4]: f"drift, {name[6:-4]}" for name in row.metrics if name[:6] == "drift_" and name[-4:] == "_max"}
     return [
         [label, *(short(row.metrics[f"{name}_{part}"].value) for part in ("max", "rms", "final"))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy
 
@@ -15,6 +15,9 @@ from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, number, round_to, shown
 from heavytop.top.equations import VARIABLES, System
 from heavytop.top.heavy_top import HeavyTop, State, dot
+
+if TYPE_CHECKING:
+    from heavytop.suite.observed_given import Observed
 
 MOST = 100_000
 """States that are scored."""
@@ -34,6 +37,8 @@ class Given:
     times: exact, as written.  states: six exact numbers each, rounded to the format; None for a state that is not
     finite.  name, integrator: as the row will call them.  flags: what else the file says.  sha256: of the file.
     format_guessed: whether the format was read off the digits written.  notes: what reading the file took for granted.
+    observed: what it gives in place of Ω and γ in principal axes; the states are then all numbers of a row, and top and
+    start are those in principal axes.
     """
 
     name: str
@@ -50,10 +55,13 @@ class Given:
     sha256: str
     format_guessed: bool = False
     notes: tuple[str, ...] = ()
+    observed: Observed | None = None
 
     def warnings(self) -> list[str]:
         """What no rigid body can have, and a γ so far off the unit sphere that the columns may be in another order."""
         found = [*self.notes, *self.top.warnings()]
+        if self.observed is not None:
+            return found
         for time, state in zip(self.times, self.states, strict=True):
             if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
                 found.append(
@@ -80,8 +88,8 @@ def of_arrays(
     Raises InputError for what is no number, for counts that differ or are too large, for names that cannot be shown.
     """
     require_states(times, rows)
-    form = precision or written_numbers.of_bits(max(_bits_of(value) for row in rows for value in row))
-    states = [rounded_state([_component(value) for value in row], form) for row in rows]
+    form = precision or written_numbers.of_bits(max(bits_of(value) for row in rows for value in row))
+    states = [rounded_state([component(value) for value in row], form) for row in rows]
     outcome = Outcome.NON_FINITE if None in states else Outcome.SUCCESS
     names = named(name, "name"), named(integrator, "integrator")
     return Given(*names, top, start, which, form, times, states, outcome, 0, {}, "")
@@ -103,7 +111,7 @@ def too_many(count: int) -> InputError:
     )
 
 
-def _component(value: Any) -> Fraction | None:
+def component(value: Any) -> Fraction | None:
     """An exact number out of a number of any format or text; None for NaN and infinities."""
     if isinstance(value, str):
         return written_numbers.component(value)
@@ -115,7 +123,7 @@ def _component(value: Any) -> Fraction | None:
         raise
 
 
-def _bits_of(value: Any) -> int:
+def bits_of(value: Any) -> int:
     """Bits of the format of a number in memory; of exact numbers, those that they are written with."""
     kind = type(value).__name__
     if kind in ("real128", "longdouble", "real"):

@@ -14,6 +14,7 @@ from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.diagnosis import Diagnosis, diagnose
 from heavytop.measure.digits import RELATIVE, digits_kept, digits_of, digits_right
+from heavytop.measure.observations import ObservedScorer
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR, SolutionError
 from heavytop.measure.suspects import turning_rate
@@ -21,6 +22,7 @@ from heavytop.measure.truth import truth
 from heavytop.measure.written import rounding
 from heavytop.precision import DOUBLE_DOUBLE, exact, physical, round_to, time_text
 from heavytop.records import Against, Metric, Peer, Row, RowKey, Subject
+from heavytop.suite import observed_score
 from heavytop.suite.cases import Case
 from heavytop.suite.given import Given
 from heavytop.suite.rows import computed_row, data_of
@@ -44,6 +46,7 @@ class Assessment:
     row: what was measured.  peer: heyoka's run; None without a reference, and where heyoka does not get there.
     diagnoses: what explains the error; empty where nothing does.  format_guessed: whether the format is not named in
     the file, but read off the digits written.  single: whether every number of the states is one of single precision.
+    used: which columns were scored, where these are not Ω and γ in principal axes.
     """
 
     row: Row
@@ -51,6 +54,7 @@ class Assessment:
     diagnoses: list[Diagnosis]
     format_guessed: bool = False
     single: bool = False
+    used: str = ""
 
     @property
     def digits_right(self) -> float | None:
@@ -95,7 +99,7 @@ def score(given: Given) -> Row:
     The data are rounded to the trajectory's format first, as a run of that format would be given them.  States from
     the first that is not finite on are not scored; the outcome says so.
     """
-    return _scored(given)[0]
+    return _scored(given)[0] if given.observed is None else _observed_row(given)[0]
 
 
 def assess(given: Given, progress: Progress = lambda: None) -> Assessment:
@@ -103,6 +107,8 @@ def assess(given: Given, progress: Progress = lambda: None) -> Assessment:
 
     progress: called after each state that was compared, of the motion and of heyoka's: twice as often as there are any.
     """
+    if given.observed is not None:
+        return _assess_observed(given, progress)
     row, scorer, errors = _scored(given, progress)
     states = _finite(given)
     times = given.times[: len(states)]
@@ -117,7 +123,6 @@ def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Score
     precision = given.precision
     problem = Problem.of(given.top, given.start, precision, given.system)
     states = _finite(given)
-    count = len(states)
     times = [round_to(time, precision.bits) for time in given.times]
     keep = [times[i - 1] for i in log_spaced(len(times))]
     true = truth(problem, times, _REFERENCE_EFFORT)
@@ -129,6 +134,15 @@ def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Score
         if scorer.error is not None and scorer.error.truth.covers(time):
             errors.append(scorer.error.last(rate))
         progress()
+    return _row(given, problem, times, keep, scorer), scorer, errors
+
+
+def _row(
+    given: Given, problem: Problem, times: list[Fraction], keep: list[Fraction], scorer: Scorer | ObservedScorer
+) -> Row:
+    """The row of what a scorer has taken in.  times: all of them, rounded to the format."""
+    precision, states = given.precision, _finite(given)
+    count = len(states)
     run = Trajectory(
         problem,
         given.integrator,
@@ -146,7 +160,30 @@ def _scored(given: Given, progress: Progress = lambda: None) -> tuple[Row, Score
     task = Task(key, given.name, given.integrator, case, tuple(times), tuple(keep))
     row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
     said = {"measured": f"given: {given.integrator}", "order": None, "time_reached": time_text(run.time_reached)}
-    return msgspec.structs.replace(row, **said, data=data_of(case)), scorer, errors
+    return msgspec.structs.replace(row, **said, data=data_of(case))
+
+
+def _observed_row(given: Given, progress: Progress = lambda: None) -> tuple[Row, observed_score.Scored]:
+    """The row of a trajectory of attitudes, positions or Ω in any axes, and what made it."""
+    times = [round_to(time, given.precision.bits) for time in given.times]
+    keep = [times[i - 1] for i in log_spaced(len(times))]
+    found = observed_score.scored(given, times, keep, _REFERENCE_EFFORT, progress)
+    return _row(given, found.problem, times, keep, found.scorer), found
+
+
+def _assess_observed(given: Given, progress: Progress) -> Assessment:
+    row, found = _observed_row(given, progress)
+    count = len(_finite(given))
+    told = observed_score.diagnoses(given, _size(row), found.errors) if count else []
+    truth = found.scorer.truth
+    peer = None
+    if not isinstance(truth, str) and count and given.precision != DOUBLE_DOUBLE:
+        limit = max(1, int(_EFFORT / seconds_a_step(given.precision.bits)))
+        run = observed_score.peer_metrics(found.problem, truth, given.times[:count], limit, progress)
+        digits = run and digits_kept(_Measured(given.precision.bits, run[0], found.scorer.against))
+        if run is not None and digits is not None:
+            peer = Peer(PEER, given.precision.name, digits, run[1])
+    return Assessment(row, peer, told, given.format_guessed, False, observed_score.used(given))
 
 
 def _finite(given: Given) -> list[tuple[Fraction, ...]]:

@@ -13,19 +13,24 @@ from heavytop import written_numbers
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, exact_text, parse, real, shown
+from heavytop.suite import observed_file
 from heavytop.suite.cases import Case
 from heavytop.suite.files import read_whole, without_repeats
 from heavytop.suite.given import LONGEST_NAME, MOST, Given, named, require_states, rounded_state, too_many
+from heavytop.suite.observed_body import AnyBody
+from heavytop.suite.observed_given import observed, require_system
+from heavytop.suite.observed_start import RawStart
 from heavytop.suite.trajectory_case import require_case
 from heavytop.suite.trajectory_table import REMEDY, VECTORS, Table, unknown
-from heavytop.top.equations import system
+from heavytop.top.bodies import CENTRE, Body
+from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 from heavytop.top.outputs import SHAPES, key_of
 from heavytop.top.times import check_times
 
 _FLAGS = ("language", "tolerance", "step")
 _KEYS = {*VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
-_KEYS |= {"outcome", "steps"}
+_KEYS |= {"outcome", "steps", *observed_file.KEYS}
 _NOT_READ = {"time_reached", "order", "flags", "seconds", "amplification", "metrics", "attitude", "angles"}
 _NOT_READ |= {"times_given", "xi", "command", "version", "sequence", "point", "pivot", *map(key_of, SHAPES)}
 """What else `heavytop propagate --json` writes."""
@@ -35,10 +40,11 @@ _ROW_SLACK = Fraction(1, 100)
 """γ of a row t = 0 may be off by so much: it is written with the digits of the other rows."""
 
 
-def read(path: Path, case: Case | None = None) -> Given:
+def read(path: Path, case: Case | None = None, normalize: bool = False) -> Given:
     """The trajectory in a ``.json`` or ``.csv`` file (or ``.tsv``, ``.dat``), or ``-`` for standard input.
 
     case: gives top, start and system where the file does not.
+    normalize: take quaternions and matrices of any length for their rotations, and γ of the start for its direction.
     Raises InputError for a file that cannot be read or is neither, for a key or column that is missing or unknown, a
     number that is none, times out of order, states of another shape or count, data that no heavy top has, and data
     that are not those of the case.
@@ -56,7 +62,8 @@ def read(path: Path, case: Case | None = None) -> Given:
     try:
         document, notes = (_json(text), []) if is_json else _table(text)
         name = "given" if piped else path.stem
-        return _given(document, name, hashlib.sha256(content).hexdigest(), case, notes)
+        given = _observed if observed_file.is_observed(document) else _given
+        return given(document, name, hashlib.sha256(content).hexdigest(), case, notes, normalize)
     except InputError as error:
         raise InputError(f"{shown_path}: {error.cause}", error.remedy or REMEDY) from None
 
@@ -90,16 +97,23 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
     if text.count("\n") > 2 * MOST:
         raise too_many(text.count("\n"))
     table = Table(text, sorted(_KEYS - {"times", "states"}))
+    if table.header is not None:
+        times = [row[table.header.time or 0] for row in table.cells]
+        more: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
+        notes = [f"columns that are not read: {', '.join(name[:20] for name in table.header.others[:6])}"]
+        return table.keys | more, table.notes + (notes if table.header.others else [])
     columns = {"times": [row[0] for row in table.rows], "states": [row[1:] for row in table.rows]}
     return table.keys | columns, table.notes
 
 
-def _given(document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str]) -> Given:
+def _given(
+    document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str], normalize: bool
+) -> Given:
     if isinstance(document.get("times"), list) and len(document["times"]) > MOST:
         raise too_many(len(document["times"]))
-    which = system(_text(document, "system", "heavy_top" if case is None else case.system.name))
     top, at_start = _top(document, case), _row_of_start(document)
     start = _start(document, case, at_start)
+    which = system_of(_system(document, case), top)
     times = list(check_times([written_numbers.finite(value, "a time") for value in _list(document, "times")]))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
@@ -109,39 +123,113 @@ def _given(document: dict[str, Any], stem: str, sha256: str, case: Case | None, 
     rows = _list(document, "states")
     require_states(times, rows)
     texts = [_list({"state": row}, "state", 6) for row in rows]
-    precision = _precision(document, texts)
+    precision = _precision(document, [str(value) for row in texts for value in row])
     from_row = at_start is not None and start == at_start
     slack = _ROW_SLACK if from_row and "gamma" not in document else 2**_SLACK * precision.eps
-    start.require_unit_gamma(slack, "Give it in full.")
+    if normalize:
+        start = start.normalized()
+    start.require_unit_gamma(slack, "Give it in full, or use --normalize (normalize=True in Python).")
     which.parameters(top, start)
     states = [rounded_state([written_numbers.component(v) for v in row], precision) for row in texts]
+    return Given(
+        top=top,
+        start=start,
+        system=which,
+        precision=precision,
+        times=times,
+        states=states,
+        sha256=sha256,
+        notes=tuple(notes),
+        **_about(document, stem, case, None in states),
+    )
+
+
+def _observed(
+    document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str], normalize: bool
+) -> Given:
+    """The trajectory of a document with attitudes, positions, Ω in any axes, or the data of a body."""
+    listed = _list(document, "times") if "lines" not in document else observed_file.times(document)
+    times = list(check_times([written_numbers.finite(v, "a time") if isinstance(v, str) else v for v in listed]))
+    if not any(times):
+        raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
+    said = observed_file.convention(document, document.get("header"))
+    table = observed_file.columns(document, said)
+    require_states(times, table.places)
+    body = _body(document, case)
+    which = system_of(_system(document, case), body)
+    require_system(which)
+    if case is not None and isinstance(body, HeavyTop):
+        require_case(case, body, case.start, which, None)
+    raw = _raw_start(document, table, not times[0], said, case)
+    precision = _precision(document, table.texts)
+    found, rows = observed(body, raw, said, table.values, table.places, precision, normalize)
+    require_physical(found.posed.top, found.posed.start)
+    return Given(
+        top=found.posed.top,
+        start=found.posed.start,
+        system=which,
+        precision=precision,
+        times=times,
+        states=rows,
+        sha256=sha256,
+        notes=tuple(notes),
+        observed=found,
+        **_about(document, stem, case, None in rows),
+    )
+
+
+def _about(document: dict[str, Any], stem: str, case: Case | None, broken: bool) -> dict[str, Any]:
+    """What a file says of itself: name, integrator, outcome, steps, flags, and whether its format was guessed."""
     word = _text(document, "outcome", "success")
     if word not in [outcome.value for outcome in Outcome]:
         raise InputError(f"Unknown outcome {word[:60]!r}.", f"Use {', '.join(outcome.value for outcome in Outcome)}.")
-    steps = _integer(document.get("steps", "0"), "steps")
-    return Given(
-        named(_text(document, "name", stem if case is None else case.name), "name"),
-        named(_text(document, "integrator", "given"), "integrator"),
-        top,
-        start,
-        which,
-        precision,
-        times,
-        states,
-        Outcome.NON_FINITE if None in states else Outcome(word),
-        steps,
-        {key: named(_text(document, key), key) for key in _FLAGS if key in document},
-        sha256,
-        "precision" not in document and "bits" not in document,
-        tuple(notes),
-    )
+    return {
+        "name": named(_text(document, "name", stem if case is None else case.name), "name"),
+        "integrator": named(_text(document, "integrator", "given"), "integrator"),
+        "outcome": Outcome.NON_FINITE if broken else Outcome(word),
+        "steps": _integer(document.get("steps", "0"), "steps"),
+        "flags": {key: named(_text(document, key), key) for key in _FLAGS if key in document},
+        "format_guessed": "precision" not in document and "bits" not in document,
+    }
+
+
+def _raw_start(
+    document: dict[str, Any], table: observed_file.Table, at_start: bool, said: Any, case: Case | None
+) -> RawStart:
+    """The start of the file, or of the case where the file says nothing of it."""
+    if case is not None and not document.keys() & {"omega", "gamma", *observed_file.STARTS}:
+        return RawStart("gamma", case.start.gamma, case.start.omega)
+    return observed_file.start(document, table, at_start, said)
+
+
+def _body(document: dict[str, Any], case: Case | None) -> AnyBody:
+    """The body of a file with its mass, or a top by its weight."""
+    given = [key for key in ("mass", "gravity") if key in document]
+    if not given:
+        return _top(document, case)
+    if "weight" in document:
+        raise InputError(f"weight and {given[0]} are both given.", "Give the weight, or mass and gravity.")
+    mass, gravity, about = (_text(document, key, "") for key in ("mass", "gravity", "about"))
+    for key, value in (("mass", mass), ("gravity", gravity)):
+        if not value:
+            raise InputError(f"The key {key} is missing.", "A body has mass and gravity, 0 where there is none.")
+    inertia, centre = _list(document, "inertia"), _list(document, "centre", 3)
+    flat = [each for row in inertia for each in (row if isinstance(row, list) else [row])]
+    rotor = document.get("rotor")
+    return Body(mass, gravity, centre, flat, {"centre": CENTRE}.get(about, about or None), rotor)
 
 
 def _top(document: dict[str, Any], case: Case | None) -> HeavyTop:
     """The top of the file, or of the case as far as the file does not say."""
     inertia, centre = (_vector(document, key, case) for key in ("inertia", "centre"))
     weight = _text(document, "weight", None if case is None else exact_text(case.top.weight))
-    return HeavyTop(inertia, weight, centre)
+    rotor = _list(document, "rotor", 3) if "rotor" in document else None if case is None else case.top.rotor
+    return HeavyTop(inertia, weight, centre, rotor)
+
+
+def _system(document: dict[str, Any], case: Case | None) -> str | None:
+    """The name of the system: the file's, else that of the case; None where neither says it."""
+    return _text(document, "system") if "system" in document else None if case is None else case.system.name
 
 
 def _start(document: dict[str, Any], case: Case | None, at_start: State | None) -> State:
@@ -202,8 +290,8 @@ def _integer(value: Any, what: str) -> int:
     return int(number)
 
 
-def _precision(document: dict[str, Any], rows: list[list[Any]]) -> Precision:
-    """The format that the file names, or the narrowest that holds every state as it is written."""
+def _precision(document: dict[str, Any], texts: list[str]) -> Precision:
+    """The format that the file names, or the narrowest that holds every number of the states as it is written."""
     if "precision" in document:
         precision = parse(_text(document, "precision"))
         bits = _integer(document["bits"], "bits") if "bits" in document else precision.bits
@@ -215,4 +303,4 @@ def _precision(document: dict[str, Any], rows: list[list[Any]]) -> Precision:
     if "bits" in document:
         bits = _integer(document["bits"], "bits")
         return next((form for form in (DOUBLE, EXTENDED, QUAD) if bits == form.bits), None) or real(bits)
-    return written_numbers.format_of(str(value) for row in rows for value in row)
+    return written_numbers.format_of(texts)

@@ -8,11 +8,14 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from heavytop.errors import InputError, quoted
+from heavytop.suite import observed_columns
 from heavytop.top.equations import VARIABLES
 
 REMEDY = "docs/score.md shows both forms of the file, `heavytop list --case lagrange` one to paste."
 COLUMNS = ("t", *VARIABLES)
-VECTORS = ("inertia", "centre", "omega", "gamma")
+VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
+LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
+"""Keys whose values are lists of numbers."""
 _COMMENT = ("#", "%", "!", "//")
 _OMEGA = ("omega", "om", "w", "ω", "angularvelocity")
 _GAMMA = ("gamma", "gam", "g", "γ")
@@ -47,22 +50,31 @@ class Table:
         self.keys: dict[str, str | list[str]] = {}
         self.rows: list[list[str]] = []
         self.notes: list[str] = []
+        self.header: observed_columns.Header | None = None
         header: list[str] | None = None
         body: list[str] = []
-        for line in text.splitlines():
+        self.lines: list[int] = []
+        for number, line in enumerate(text.splitlines(), 1):
             stripped = line.strip()
             if stripped.startswith(_COMMENT):
                 comment = stripped.lstrip("#%!/ ")
-                if not body and not self._key(comment, known) and len(_columns(_cells(comment, None))) == len(COLUMNS):
+                if not body and not self._key(comment, known) and _is_header(_cells(comment, None)):
                     header = _cells(comment, None)
             elif stripped:
                 body.append(stripped)
+                self.lines.append(number)
         if not body:
             raise _no_header([])
         separator = _separator(body[0])
         first = _cells(body[0], separator)
         if not _is_number(first[0]):
-            header, body = first, body[1:]
+            header, body, self.lines = first, body[1:], self.lines[1:]
+        if header is not None:
+            found = observed_columns.header(header)
+            if found.time is not None and observed_columns.is_more_than_states(found):
+                self.header, self.width = found, len(header)
+                self.cells = _split(body, self.lines, separator, len(header))
+                return
         places = self._places(header, len(first))
         self.rows = _in_order(body, separator, places, len(header or COLUMNS))
 
@@ -79,7 +91,7 @@ class Table:
             return False
         if key in self.keys:
             raise InputError(f"The key {key} stands twice.", "Give each key once.")
-        self.keys[key] = re.split(r"\s*[,;]\s*|\s+", value.strip("[]() ")) if key in VECTORS else value
+        self.keys[key] = re.split(r"\s*[,;]\s*|\s+", value.strip("[]() ")) if key in LISTS else value
         return True
 
     def _places(self, header: list[str] | None, width: int) -> list[int]:
@@ -138,6 +150,27 @@ def _in_order(body: list[str], separator: str | None, places: list[int], width: 
             raise InputError(f"Row {index} has {len(cells)} columns, not {width}.", remedy)
         # where a semicolon separates, a comma is the point of a decimal
         rows.append([cells[place].replace(",", ".") if separator == ";" else cells[place] for place in places])
+    return rows
+
+
+def _is_header(names: list[str]) -> bool:
+    """Whether the words of a comment name the columns."""
+    if len(_columns(names)) == len(COLUMNS):
+        return True
+    found = observed_columns.header(names) if len(set(names)) == len(names) else None
+    return found is not None and found.time is not None and not found.others and bool(found.places)
+
+
+def _split(body: list[str], lines: list[int], separator: str | None, width: int) -> list[list[str]]:
+    """The cells of every row; raises InputError that names the line of one that has not as many as the header."""
+    rows = []
+    for number, line in zip(lines, body, strict=True):
+        cells = _cells(line, separator)
+        if len(cells) != width:
+            raise InputError(
+                f"Line {number} has {len(cells)} columns, not {width}.", "Give every row all of its columns."
+            )
+        rows.append([each.replace(",", ".") for each in cells] if separator == ";" else cells)
     return rows
 
 

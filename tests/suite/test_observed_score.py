@@ -1,0 +1,247 @@
+"""Files of quaternions, matrices, Euler angles, positions and Ω in space: scored to the digits that they have, mistakes
+of convention named, right ones not accused, bad input refused by its place.
+
+The motions are those of benchmarks/conventions.py: Taylor series on the full tensor, in extended precision.
+"""
+
+import importlib.util
+import json
+import random
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heavytop as ht
+from heavytop.errors import InputError
+from heavytop.report.score_text import to_json
+from heavytop.suite.score import Assessment, assess
+from heavytop.suite.trajectory_file import read
+from heavytop.top.attitude import Attitude
+from heavytop.top.bodies import Body
+
+FILE = Path(__file__).parents[2] / "benchmarks" / "conventions.py"
+SPEC = importlib.util.spec_from_file_location("conventions", FILE)
+conventions = importlib.util.module_from_spec(SPEC)
+sys.modules["conventions"] = conventions
+SPEC.loader.exec_module(conventions)
+Written = conventions.Written
+
+BODY = conventions.general(random.Random(3))
+"""A body, its motion at 20 times, its quaternion and Ω at the start."""
+
+
+def scored(content: str, tmp_path: Path, name: str = "motion.csv", **options: bool) -> Assessment:
+    (tmp_path / name).write_text(content, "utf-8")
+    found = assess(read(tmp_path / name, **options))
+    json.dumps(to_json(found), allow_nan=False)
+    return found
+
+
+def off(size: float) -> "conventions.Motion":
+    """The motion off by a turn of that size about a fixed axis of space, and Ω by as much."""
+    motion, *_ = BODY
+    turn = conventions.turn("X", conventions.REAL(size))
+    return replace(motion, rotation=np.array([turn @ r for r in motion.rotation]), omega=motion.omega + size / 2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_any_conventions_have_the_digits_of_omega_and_gamma(seed: int, tmp_path: Path) -> None:
+    source, (motion, q, omega) = random.Random(seed), BODY
+    how = Written().random(source)
+    found = scored(conventions.as_csv(motion, q, omega, how), tmp_path)
+    assert found.diagnoses == []
+    assert found.digits_right > 14.3  # angles of 180 degrees and positions far from the pivot have fewer in a double
+    wrong = conventions.as_csv(off(1e-9), q, omega, replace(how, start="quaternion"))
+    assert 8.3 < scored(wrong, tmp_path).digits_right < 9.5
+
+
+def test_the_error_of_the_attitude_is_the_angle_and_that_of_the_position_a_length(tmp_path: Path) -> None:
+    _, q, omega = BODY
+    motion = off(1e-12)
+    row = scored(conventions.as_csv(motion, q, omega, Written(("quaternion", "position"))), tmp_path).row
+    np.testing.assert_allclose(float(row.metrics["attitude_error_max"]), 1e-12, rtol=1e-3)
+    np.testing.assert_allclose(float(row.metrics["attitude_error_rms"]), 1e-12, rtol=1e-3)
+    distance = np.linalg.norm(motion.centre)
+    assert float(row.metrics["position_error_max"]) <= 1.001e-12 * distance
+    expected = float(row.metrics["position_error_max"]) / distance
+    np.testing.assert_allclose(float(row.metrics["position_error_relative_max"]), expected, rtol=1e-6)
+    assert set(row.series) >= {"attitude_error", "position_error"}
+    assert not any(name.startswith("drift") for name in row.metrics)  # Ω is not there
+
+
+def test_the_sign_of_a_quaternion_does_not_matter(tmp_path: Path) -> None:
+    signs = iter([1, -1] * 40)
+    flip = conventions.columns(quaternion=lambda q: q * next(signs))
+    assert scored(conventions.as_csv(*BODY, Written(("quaternion",)), flip), tmp_path).digits_right > 15
+
+
+LIGHT = [
+    "scalar last, start and columns",
+    "conjugate, columns",
+    "y up, not said",
+    "inertia about the other point",
+    "degrees for radians, start and columns",
+    "matrix transposed, columns",
+    "displacement for position",
+    "position of another point",
+    "g with the wrong sign",
+    "quaternions not of length 1",
+]
+
+
+@pytest.mark.parametrize("name", LIGHT)
+def test_a_planted_mistake_of_convention_is_named(name: str, tmp_path: Path) -> None:
+    planted, kinds = conventions.PLANTED[name], conventions.named(name, BODY, tmp_path)
+    assert any(kind in planted.kinds or (kind == "refused" and planted.refused) for kind in kinds), kinds
+
+
+def test_the_sentence_says_what_fits_and_the_digits_that_are_right_with_it(tmp_path: Path) -> None:
+    content = conventions.planted("scalar last, columns", *BODY)
+    (apart, told) = scored(content, tmp_path).diagnoses
+    assert apart.kind == "columns_disagree"
+    said = to_json(scored(content, tmp_path))["diagnosis"][1]["sentence"]
+    assert said.startswith("The quaternions have their scalar part in the other place")
+    assert "in the columns but not in the start" in said
+    assert "so that 13.0 digits or more are right" in said or told.left > 1e-13
+
+
+def lines(**changes: str) -> str:
+    """A short right file of a top in principal axes, with some of its lines other."""
+    said = {
+        "inertia": "2, 2, 1",
+        "weight": "1",
+        "centre": "0, 0, 1",
+        "omega": "0, 0, 3",
+        "start_quaternion": "1, 0, 0, 0",
+        "header": "t,qw,qx,qy,qz",
+        "rows": "1,0.070737201667703,0,0,0.99749498660405\n2,-0.98999249660044,0,0,0.14112000805987",
+    } | changes
+    header, rows = said.pop("header"), said.pop("rows")
+    return "\n".join([*(f"# {key}: {value}" for key, value in said.items() if value), header, rows]) + "\n"
+
+
+def test_a_sleeping_top_is_right_in_any_columns(tmp_path: Path) -> None:
+    assert scored(lines(), tmp_path).digits_right > 13.5
+    turned = lines(header="t,x,y,z", rows="1,0,0,1\n2,0,0,1")
+    found = scored(turned, tmp_path)
+    assert (found.digits_right > 15.9, found.used) == (True, "Scored: position of the centre of mass; z points up.")
+    assert scored(lines(header="t,wx,wy,wz", rows="1,0,0,3", frame="space"), tmp_path).digits_right > 15.9
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"start_quaternion": "1, 1, 0, 0"}, r"has not length 1: \|q\|\^2 - 1 = 1\."),
+        ({"start_quaternion": "0, 0, 0, 0"}, "not length 1|is 0, which is no attitude"),
+        ({"start_quaternion": "", "start_matrix": "1,0,0,0,1,0,0,0,-1"}, "is a reflection, not a rotation"),
+        ({"start_quaternion": "", "start_matrix": "1,0.5,0,0,1,0,0,0,1"}, "is not orthogonal: R R.T is off"),
+        ({"start_quaternion": "", "start_matrix": "1,0,0,0,1,0"}, "start_matrix has 6 numbers, not 9"),
+        ({"gamma": "0, 0.6, 0.8"}, "gamma and start_quaternion contradict each other"),
+        ({"start_matrix": "1,0,0,0,1,0,0,0,1"}, "both give the attitude at t = 0"),
+        ({"start_quaternion": ""}, "The attitude at t = 0 is missing"),
+        ({"omega": ""}, "The key omega is missing"),
+        ({"omega_space": "0,0,3"}, "omega and omega_space both give"),
+        (
+            {"header": "t,qw,qx,qy", "rows": "1,0,0,1"},
+            "columns of the quaternion are not complete: component z is missing",
+        ),
+        ({"header": "t,a,b,c,d"}, "The first line is not t,omega1"),
+        ({"header": "t,euler1,euler2,euler3", "rows": "1,0,0,3"}, "nothing says of which sequence"),
+        ({"rows": "1,0.5,0,0,abc"}, "Line 7, column qz: 'abc' is not a finite number"),
+        ({"rows": "1,1,0,0,0\n2,0.5,,0,0"}, "Line 8, column qx is empty"),
+        ({"rows": "1,1,0,0,0\nx,1,0,0,0"}, "Line 8, column t: 'x' is not a finite number"),
+        ({"rows": "1,1,0,0"}, "Line 7 has 4 columns, not 5"),
+        ({"rows": "1,2,0,0,0"}, r"The quaternion of line 7 has not length 1: \|q\|\^2 - 1 = 3"),
+        ({"rows": "1,0,0,0,0"}, "The quaternion of line 7 is 0"),
+        ({"up": "w"}, "up = 'w' is not known"),
+        ({"frame": "moon"}, "frame = 'moon' is not known"),
+        ({"quaternion_order": "zyxw"}, "quaternion_order = 'zyxw' is not known"),
+        ({"sequence": "ZZX"}, "sequence = 'ZZX' is not known"),
+        ({"mass": "1"}, "weight and mass are both given"),
+        ({"mass": "1", "weight": ""}, "The key gravity is missing"),
+        ({"mass": "1", "gravity": "9.81", "weight": ""}, "which point the inertia tensor is about"),
+        ({"system": "gyrostat"}, "not scored in the system gyrostat"),
+        ({"pivot": "1, 2"}, "pivot has 2 numbers"),
+        ({"inertia": "1, 1, nan"}, "nan"),
+    ],
+)
+def test_bad_input_is_refused_with_cause_and_remedy(changes: dict, message: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(lines(**changes), "utf-8")
+    with pytest.raises(InputError, match=message) as caught:
+        read(tmp_path / "a.csv")
+    assert caught.value.remedy
+    assert len(caught.value.cause) < 500
+
+
+def test_normalize_takes_quaternions_and_matrices_of_any_length(tmp_path: Path) -> None:
+    doubled = "1,0.141474403335406,0,0,1.9949899732081\n2,-1.97998499320088,0,0,0.28224001611974"
+    content = lines(start_quaternion="2, 0, 0, 0", rows=doubled)
+    assert scored(content, tmp_path, normalize=True).digits_right > 13
+
+
+@pytest.mark.parametrize("word", ["nan", "inf", "1e400"])
+def test_what_is_not_finite_is_a_verdict(word: str, tmp_path: Path) -> None:
+    first = "1,0.070737201667703,0,0,0.99749498660405"
+    found = scored(lines(rows=f"{first}\n2,1,0,{word},0\n3,1,0,0,0", precision="double"), tmp_path)
+    assert (found.row.outcome, found.row.time_reached) == ("non_finite", "1")
+    none = scored(lines(rows=f"1,1,0,{word},0", precision="double"), tmp_path)
+    assert (none.row.outcome, none.digits_right) == ("non_finite", None)
+
+
+def test_json_says_the_same_as_csv(tmp_path: Path) -> None:
+    rows = [["0.070737201667703", "0", "0", "0.99749498660405"], ["-0.98999249660044", "0", "0", "0.14112000805987"]]
+    document = {
+        "inertia": [2, 2, 1], "weight": 1, "centre": [0, 0, 1], "omega": [0, 0, 3], "times": [1, 2],
+        "start_quaternion": [1, 0, 0, 0], "quaternions": rows,
+    }  # fmt: skip
+    one, two = scored(lines(), tmp_path), scored(json.dumps(document), tmp_path, "motion.json")
+    assert one.row.metrics == two.row.metrics
+    pairs = [(str(np.cos(3.0 * t)), str(np.sin(3.0 * t))) for t in (1, 2)]
+    matrix = [[[c, f"-{s}".replace("--", ""), 0], [s, c, 0], [0, 0, 1]] for c, s in pairs]
+    del document["quaternions"], document["start_quaternion"]
+    as_matrices = document | {"matrix": matrix, "start_matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
+    assert scored(json.dumps(as_matrices), tmp_path, "motion.json").digits_right > 15
+
+
+def test_python_takes_arrays_of_any_kind() -> None:
+    motion, q, omega = BODY
+    body = Body(motion.mass, motion.gravity, motion.centre, motion.inertia, motion.about)
+    start = ht.State(omega=omega, attitude=Attitude.quaternion(*q, normalize=True))
+    how = Written()
+    rows = [how.columns(motion, k, (None, None)) for k in range(len(motion.times))]
+    quaternions, positions = (np.array([row[name] for row in rows], dtype=float) for name in ("quaternion", "position"))
+    score = ht.score(
+        motion.times, top=body, start=start, quaternions=quaternions, positions=positions, precision=ht.DOUBLE
+    )
+    assert score.digits_kept > 15
+    assert set(score.distance) == {"gamma", "attitude", "position", "position_relative"}
+    matrices = motion.rotation.astype(float)
+    whole = ht.score(
+        motion.times, top=body, start=start, matrices=matrices, omega=motion.omega.astype(float), require=14
+    )
+    assert whole.passed
+    assert set(whole.drift) >= {"area", "energy"}
+    states = np.hstack([motion.omega, motion.rotation[:, 2]]).astype(float)
+    assert ht.score(motion.times, states, top=body, start=start).digits_kept > 14.5
+    for wrong in ({"quaternions": positions}, {}, {"euler": positions}, {"positions": positions[:-1]}, {"omega": 3}):
+        with pytest.raises(ht.HeavyTopError):
+            ht.score(motion.times, top=body, start=start, **wrong)
+
+
+@pytest.mark.parametrize("power", [-60, 40])
+def test_units_of_any_size_change_no_diagnosis(power: int, tmp_path: Path) -> None:
+    size = f"1e{power}"
+    rows = f"1e{power},0.070737201667703,0,0,0.99749498660405\n2e{power},-0.98999249660044,0,0,0.14112000805987"
+    right = lines(
+        rows=rows, omega=f"0, 0, 3e{-power}", inertia=f"2{size[1:]}, 2{size[1:]}, 1{size[1:]}", weight=f"1e{-power}"
+    )
+    assert scored(right, tmp_path).digits_right > 13.5
+    assert [each.kind for each in scored(right.replace("1,0,0,0", "1,0,0,0"), tmp_path).diagnoses] == []
+    last = lines(
+        rows=f"1e{power},0,0,0.99749498660405,0.070737201667703\n2e{power},0,0,0.14112000805987,-0.98999249660044",
+        omega=f"0, 0, 3e{-power}", inertia=f"2{size[1:]}, 2{size[1:]}, 1{size[1:]}", weight=f"1e{-power}",
+    )  # fmt: skip
+    assert "scalar_last" in str([(e.kind, e.numbers) for e in scored(last, tmp_path).diagnoses])
