@@ -82,7 +82,7 @@ def test_proven_events_are_those_of_mpmath(name, independent) -> None:
                 assert abs(mpmath.mpf(mine.value) - theirs) <= mpmath.mpf(mine.radius) + mpmath.mpf(10) ** -33
 
 
-@pytest.mark.parametrize("integrator", ["heyoka", "words"])
+@pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
 @pytest.mark.parametrize("precision", ["double", "extended", "quad", "real:150"])
 def test_computed_events_are_right_to_the_format(integrator, precision) -> None:
     for until, name in ((6, FUNCTIONS[2]), (-6, FUNCTIONS[1])):
@@ -153,7 +153,7 @@ def two_close(distance: Fraction) -> tuple[str, float]:
     return f"gamma3 = {level}", float(Fraction(time.value))
 
 
-@pytest.mark.parametrize("integrator", ["heyoka", "words"])
+@pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
 def test_two_roots_a_millionth_apart_inside_a_step_are_both_found(integrator) -> None:
     function, near = two_close(Fraction(1, 10**6))
     for digits in (None, 20):
@@ -282,7 +282,7 @@ def test_odd_scales_and_names_of_axes() -> None:
     assert [Fraction(b.value) * scale for b in other.times] != []
     assert len(plain) == len(other)
     assert other.directions == plain.directions
-    computed = ht.events(heavy, fast, 10 / scale, f"omega1*gamma1 = {scale / 20}", integrator="words")
+    computed = ht.events(heavy, fast, 10 / scale, f"omega1*gamma1 = {scale / 20}", integrator="multiword")
     for mine, ball in zip(computed.times, plain.times, strict=True):
         assert abs(float(Fraction(float(mine)) * scale) - float(ball.value)) < 1e-13
     turned = ht.HeavyTop((1, 3, 2), 1, ("1/5", "1/2", "1/3"))
@@ -293,7 +293,7 @@ def test_odd_scales_and_names_of_axes() -> None:
 
 def test_an_equilibrium_has_no_events() -> None:
     still = ht.State((0, 0, 0), (1, 0, 0))
-    for options in ({}, {"integrator": "words"}, {"digits": 20}):
+    for options in ({}, {"integrator": "multiword"}, {"digits": 20}):
         assert len(ht.events(PENDULUM, still, 10, "omega1 = 1", **options)) == 0
 
 

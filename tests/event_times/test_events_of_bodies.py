@@ -25,7 +25,7 @@ def body() -> ht.Body:
     return ht.Body(1, 1, rotated(TOP.centre), tensor, about="pivot")
 
 
-@pytest.mark.parametrize("options", [{}, {"integrator": "words"}, {"digits": 25}], ids=str)
+@pytest.mark.parametrize("options", [{}, {"integrator": "multiword"}, {"digits": 25}], ids=str)
 def test_turned_axes_have_the_same_events(options) -> None:
     start = ht.State(rotated(START.omega), rotated(START.gamma))
     plain = ht.events(TOP, START, 20, "-gamma1/3 + 2*gamma2/3 + 2*gamma3/3 = 1/4", **options)
@@ -81,7 +81,7 @@ def test_rotors_are_followed(system) -> None:
     for until in (10, -10):
         found = ht.events(top, start, until, function, system=system)
         known = ht.events(top, start, until, function, system=system, digits=20)
-        words = ht.events(top, start, until, function, system=system, integrator="words")
+        words = ht.events(top, start, until, function, system=system, integrator="multiword")
         assert len(known) > 0
         assert list(found.directions) == list(words.directions) == known.directions
         assert abs(found.times - known.times_numpy()).max() < 1e-12

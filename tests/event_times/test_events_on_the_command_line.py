@@ -20,7 +20,7 @@ def call(*arguments: str):
     return CliRunner().invoke(app, [*arguments, *OPTIONS])
 
 
-@pytest.mark.parametrize("integrator", ["heyoka", "words"])
+@pytest.mark.parametrize("integrator", ["heyoka", "multiword"])
 def test_propagate_gives_the_events_of_python(integrator: str) -> None:
     asked = "--events", "gamma3=1/2", "--events", "omega1 = 1/5", "--event-direction", "1"
     done = call("propagate", *asked, "--integrator", integrator, "--json")

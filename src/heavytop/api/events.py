@@ -19,6 +19,7 @@ from heavytop.exact.balls import value_text
 from heavytop.exact.bodies import Resolved, resolve
 from heavytop.exact.scales import require_handy
 from heavytop.exact.validated import Validated
+from heavytop.integrate.peers.source import named
 from heavytop.measure.reference import DIGITS, Ball
 from heavytop.measure.setup import Setup
 from heavytop.precision import DOUBLE, Precision, exact, exact_text, physical, whole
@@ -156,8 +157,9 @@ def computed_events(
     if function.rational:
         own = function if axes is None else turned(function, axes)
         first_term(own, system, system.parameters(setup.top, setup.start), setup.start.flat)
-    run = dense(integrator, setup.problem, until, tolerance, step_limit)
-    return locate(run, integrator, function, direction, limit, reached, axes)
+    name = named(integrator)
+    run = dense(name, setup.problem, until, tolerance, step_limit)
+    return locate(run, str(name), function, direction, limit, reached, axes)
 
 
 def known_events(
