@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -11,6 +12,7 @@ from typing import Any
 
 from heavytop.integrate import peers
 from heavytop.integrate.trajectory import Trajectory
+from heavytop.top.equations import HEAVY_GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 VECTORS = json.loads((Path(__file__).parent / "data" / "vectors.json").read_text("utf-8"))
@@ -52,3 +54,8 @@ def run_peer(name: str, *problem: Any, setting: tuple[str, Fraction] | None = No
 def without_progress(errors: str) -> str:
     """Standard error without the line that says after ten seconds how far a command is."""
     return re.sub(r"(?m)^heavytop: [\w-]+: \d+ s so far.*\n", "", errors)
+
+
+def rotor(system: System, draw: Callable[[], Fraction]) -> Any:
+    """λ, or k in its place for the heavy gyrostat."""
+    return (draw(), draw(), draw()) if system is HEAVY_GYROSTAT else draw()

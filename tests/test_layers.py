@@ -27,14 +27,15 @@ MAY_IMPORT = {
     "claims": GROUND | {"top", "exact"},
     "integrate": GROUND | {"top", "words"},
     "measure": MOTIONS,
+    "event_times": GROUND | {"top", "words", "exact", "integrate", "measure"},
     "suite": MOTIONS | {"measure"},
-    "report": MOTIONS | {"measure", "suite"},
+    "report": MOTIONS | {"measure", "event_times", "suite"},
     "kinds": MOTIONS | {"measure", "suite", "report"},
-    "api": MOTIONS | {"measure", "suite", "report", "kinds"},
-    "cli": MOTIONS | {"measure", "suite", "report", "kinds", "api"},
+    "api": MOTIONS | {"measure", "event_times", "suite", "report", "kinds"},
+    "cli": MOTIONS | {"measure", "event_times", "suite", "report", "kinds", "api"},
     "__main__": {"cli"},
     "pytest_plugin": GROUND | {"suite", "api"},
-    "__init__": GROUND | {"top", "integrate", "measure", "api"},
+    "__init__": GROUND | {"top", "integrate", "measure", "event_times", "api"},
 }
 
 

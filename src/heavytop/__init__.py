@@ -7,11 +7,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from heavytop.api import plot
     from heavytop.api.claims import Audit, audit
+    from heavytop.api.derivatives import DerivativeScore, score_derivatives
+    from heavytop.api.events import events, poincare
     from heavytop.api.motions import ensemble, propagate, reference
     from heavytop.api.reports import Comparison, Report, compare, read_report, run
     from heavytop.api.scores import Score, Summary, drift, score
     from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
+    from heavytop.event_times.records import Events, ReferenceEvents, Section
     from heavytop.integrate.trajectory import Outcome, Trajectory
     from heavytop.measure.reference import Reference
     from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, available, real
@@ -25,10 +29,13 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "api.claims": ("Audit", "audit"),
+    "api.derivatives": ("DerivativeScore", "score_derivatives"),
+    "api.events": ("events", "poincare"),
     "api.motions": ("ensemble", "propagate", "reference"),
     "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
     "api.scores": ("Score", "Summary", "drift", "score"),
     "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
+    "event_times.records": ("Events", "ReferenceEvents", "Section"),
     "integrate.trajectory": ("Outcome", "Trajectory"),
     "measure.reference": ("Reference",),
     "precision": ("DOUBLE", "DOUBLE_DOUBLE", "EXTENDED", "QUAD", "Precision", "available", "real"),
@@ -53,6 +60,8 @@ __all__ = [
     "Body",
     "Comparison",
     "Contradiction",
+    "DerivativeScore",
+    "Events",
     "HeavyTop",
     "HeavyTopError",
     "InputError",
@@ -60,8 +69,10 @@ __all__ = [
     "Outcome",
     "Precision",
     "Reference",
+    "ReferenceEvents",
     "Report",
     "Score",
+    "Section",
     "State",
     "Summary",
     "System",
@@ -72,13 +83,17 @@ __all__ = [
     "compare",
     "drift",
     "ensemble",
+    "events",
     "holding",
+    "plot",
+    "poincare",
     "propagate",
     "read_report",
     "real",
     "reference",
     "run",
     "score",
+    "score_derivatives",
 ]
 
 
@@ -89,6 +104,8 @@ if not TYPE_CHECKING:  # it would tell a type checker that every name is there
             from heavytop.version import version
 
             return version()
+        if name == "plot":
+            return import_module("heavytop.api.plot")
         if name not in _ROOM:
             raise AttributeError(f"module 'heavytop' has no attribute {name!r}")
         found = getattr(import_module(f"heavytop.{_ROOM[name]}"), name)

@@ -1,7 +1,8 @@
-"""A small table as text for a terminal and as HTML for a notebook."""
+"""A small table as text for a terminal and as HTML for a notebook, and a small picture of a path beside it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -50,16 +51,17 @@ class Lines(Sequence[Sequence[str]]):
 class Table:
     """A title, a table below it and notes below that; long tables show their first and last rows.
 
-    header: one text a column.  rows: as many texts each.
+    header: one text a column.  rows: as many texts each.  whole: every row is shown.
     """
 
     title: str
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
     notes: Sequence[str] = ()
+    whole: bool = False
 
     def _abridged(self) -> list[Sequence[str]]:
-        if len(self.rows) <= _MOST:
+        if self.whole or len(self.rows) <= _MOST:
             return list(self.rows)
         gap = [f"... {len(self.rows) - 2 * _ENDS} more", *[""] * (len(self.header) - 1)]
         return [*self.rows[:_ENDS], gap, *self.rows[-_ENDS:]]
@@ -88,3 +90,64 @@ class Table:
             head, body = line(self.header, "th"), "".join(line(row, "td") for row in self._abridged())
             parts.append(f"<table><thead>{head}</thead><tbody>{body}</tbody></table>")
         return "".join([*parts, *(f"<p>{escape(note)}</p>" for note in self.notes)])
+
+
+_MOST_POINTS = 300
+_RADIUS, _EDGE = 70, 5
+_ELEVATION, _AZIMUTH = math.radians(24), math.radians(-50)
+
+
+def path_picture(count: int, point: Callable[[int], Sequence[Any]], caption: str) -> str:
+    """A path on the unit sphere as a small SVG, at most 300 of its points: of one size, however many samples there are.
+
+    count: of the points.  point: gives the nth, three numbers.  caption: what it is the path of.
+    "" for fewer than two points, and where one of those drawn is not finite.
+    """
+    if count < 2:
+        return ""
+    steps = min(count, _MOST_POINTS) - 1
+    try:
+        found = [[float(v) for v in point(round(n * (count - 1) / steps))] for n in range(steps + 1)]
+    except (OverflowError, TypeError, ValueError):
+        return ""
+    if not all(math.isfinite(v) and abs(v) < _EDGE for each in found for v in each):
+        return ""
+    seen = [_projected(each) for each in found]
+    size = 2 * (_RADIUS + _EDGE)
+    middle = _RADIUS + _EDGE
+    begin = f'<circle cx="{seen[0][0]:.1f}" cy="{seen[0][1]:.1f}" r="2.5" fill="#0072b2"/>'
+    return (
+        f'<svg width="{size}" height="{size}" viewBox="0 0 {size} {size}" role="img"><title>{escape(caption)}</title>'
+        f'<circle cx="{middle}" cy="{middle}" r="{_RADIUS}" fill="currentColor" fill-opacity="0.06" '
+        'stroke="currentColor" stroke-opacity="0.4"/>'
+        f"{_lines(seen)}{begin}</svg><p>{escape(caption)}</p>"
+    )
+
+
+def _projected(point: Sequence[float]) -> tuple[float, float, bool]:
+    """Where a point of the unit sphere is seen, and whether on its front; the third axis is upwards."""
+    x, y, z = point
+    across = -x * math.sin(_AZIMUTH) + y * math.cos(_AZIMUTH)
+    ahead = x * math.cos(_AZIMUTH) + y * math.sin(_AZIMUTH)
+    up = z * math.cos(_ELEVATION) - ahead * math.sin(_ELEVATION)
+    front = ahead * math.cos(_ELEVATION) + z * math.sin(_ELEVATION) >= 0
+    middle = _RADIUS + _EDGE
+    return middle + _RADIUS * across, middle - _RADIUS * up, front
+
+
+def _lines(seen: Sequence[tuple[float, float, bool]]) -> str:
+    """The parts of the path on the front and, faint, on the back."""
+    parts: dict[bool, list[str]] = {True: [], False: []}
+    last: bool | None = None
+    for place, (x, y, front) in enumerate(seen):
+        if front is not last and place:
+            before = seen[place - 1]
+            parts[front].append(f"M{before[0]:.1f} {before[1]:.1f}")
+        parts[front].append(f"{'L' if place else 'M'}{x:.1f} {y:.1f}")
+        last = front
+    style = 'fill="none" stroke="#0072b2" stroke-width="1.3"'
+    return "".join(
+        f'<path d="{"".join(parts[front])}" {style}{"" if front else faint}/>'
+        for front, faint in ((False, ' stroke-opacity="0.35"'), (True, ""))
+        if parts[front]
+    )

@@ -346,9 +346,14 @@ def decimal_text(value: Fraction, digits: int) -> str:
 
 def quotient_text(value: Fraction, digits: int, rounding: str) -> str:
     """``value`` as decimal text with ``digits`` significant digits, rounded as asked, a constant of ``decimal``."""
+    return ratio_text(value.numerator, value.denominator, digits, rounding)
+
+
+def ratio_text(above: int, below: int, digits: int, rounding: str) -> str:
+    """:func:`quotient_text` of above/below, which may have common factors: a large greatest one takes long to find."""
     # nothing is left to decimal.DefaultContext, which is one for the whole process
     context = Context(digits, rounding, Emin=MIN_EMIN, Emax=MAX_EMAX, capitals=1, clamp=0, flags=[], traps=[Overflow])
-    quotient = context.divide(Decimal(value.numerator), Decimal(value.denominator))
+    quotient = context.divide(Decimal(above), Decimal(below))
     return context.to_sci_string(quotient) if quotient else "0"
 
 

@@ -244,7 +244,7 @@ class Against(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """The exact data of a motion, as text; omega and gamma are its start, or for an ensemble that by which its random
-    starts are drawn, empty in older reports.
+    starts are drawn, empty in older reports; rotor is k of a top that has one.
     """
 
     inertia: tuple[str, ...]
@@ -252,6 +252,7 @@ class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     centre: tuple[str, ...]
     omega: tuple[str, ...] = ()
     gamma: tuple[str, ...] = ()
+    rotor: tuple[str, ...] = ()
 
 
 class Row(msgspec.Struct, gc=False):

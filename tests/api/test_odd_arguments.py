@@ -101,6 +101,38 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         ht.reference,
         {"top": REST, "start": STILL, "times": [1], "digits": 20, "system": "heavy_top", "attitude": False},
     ),
+    "events": (
+        ht.events,
+        {
+            "top": TOP,
+            "start": START,
+            "until": 3,
+            "function": "gamma3 = 1/2",
+            "direction": 0,
+            "precision": ht.DOUBLE,
+            "integrator": "heyoka",
+            "digits": None,
+            "system": ht.HEAVY_TOP,
+            "tolerance": None,
+            "step_limit": 5,
+            "limit": 2,
+        },
+    ),
+    "poincare": (
+        ht.poincare,
+        {
+            "top": TOP,
+            "starts": [START],
+            "until": 1,
+            "function": "gamma2",
+            "direction": 1,
+            "precision": ht.DOUBLE,
+            "integrator": "heyoka",
+            "digits": None,
+            "system": "heavy_top",
+            "limit": 2,
+        },
+    ),
     "score": (
         ht.score,
         {

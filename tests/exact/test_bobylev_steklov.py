@@ -4,10 +4,15 @@ import random
 from fractions import Fraction
 
 import pytest
-from proofs import assert_agrees, assert_narrow, assert_solves, positive, rational
+from flint import arb
+from proofs import assert_agrees, assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import InputError, NotInClass
+from heavytop.exact.attitude import attitude_of
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
 from heavytop.exact.bobylev_steklov import BobylevSteklov, bobylev_steklov_motion
+from heavytop.exact.catalogue import find
+from heavytop.exact.motion import initial_xi
 from heavytop.top.heavy_top import HeavyTop, State
 
 TINY = Fraction(1, 10**30)
@@ -81,3 +86,68 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
         BobylevSteklov(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((1, 0, 1), (0, 1, 2)))
     with pytest.raises(InputError, match="a = 0"):
         bobylev_steklov_motion((Fraction(1), Fraction(1)), Fraction(0), Fraction(1), Fraction(1), Fraction(1))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_attitude_turns_with_the_body(seed):
+    rng = random.Random(seed)
+    moment, p = positive(rng) * rng.choice((1, -1)), rational(rng)
+    motion = motion_from(p, rational(rng), rational(rng), rational(rng), moment, (positive(rng), positive(rng)))
+    assert_attitude(motion, rational(rng, size=30))
+    for a, b in zip(motion.attitude(Fraction(0), 200), initial_xi(motion.start.gamma), strict=True):
+        assert a.overlaps(b)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_attitude_is_that_of_the_enclosure(seed):
+    rng = random.Random(seed)
+    inertia = (positive(rng) + 2, positive(rng) + 1)
+    motion = bobylev_steklov_motion(inertia, Fraction(1), positive(rng, size=2), rational(rng), rational(rng))
+    assert attitude_of(motion, Fraction(1), 170)[0] == motion.method
+    assert_meets(motion, (Fraction(1), Fraction(-5, 3)))
+
+
+def test_the_attitude_is_that_of_the_enclosure_at_50():
+    assert_meets(bobylev_steklov_motion((Fraction(5, 2), Fraction(1)), *map(Fraction, (1, 1, 2, 3))), (Fraction(50),))
+
+
+# γ = (0, 0, ±1): axis 3 is vertical, the pole of its azimuth; γ2 = 0, γ1/γ3 = 2p/x: M ∥ γ at a turning point;
+# the separatrix; equilibria; p = 0: a pendulum about axis 3; x = 0 throughout a cn motion's zero
+@pytest.mark.parametrize(
+    "data",
+    [
+        *((1, 1, 0, 0), (1, -1, 0, 0), (1, 1, 2, 0), (2, -1, 8, 0), (1, 2, 1, 2), (1, 2, 1, 2 + TINY), (1, 0, 1, 0)),
+        *((1, 0, 1, TINY), (0, 1, 1, 1), (0, 0, 1, 0), (TINY, 1, 1, 1), (1, 0, 0, 1), (0, 2, 1, 0)),
+    ],
+)
+def test_the_attitude_has_no_exceptional_state(data):
+    motion = motion_from(*map(Fraction, data))
+    for time in (Fraction(0), Fraction(1, 3), Fraction(-20), Fraction(300)):
+        assert_attitude(motion, time)
+
+
+def test_the_attitude_does_not_know_the_units():
+    slow, size = Fraction(10) ** 100, Fraction(10) ** 60
+    motion = motion_from(Fraction(1, 2), Fraction(2), Fraction(1, 3), Fraction(1))
+    # I by size, Ω by 1/slow, n by size/slow², t by slow: the same motion
+    small = motion_from(
+        Fraction(1, 2) / slow,
+        Fraction(2) / slow,
+        Fraction(1, 3),
+        Fraction(1),
+        size / slow**2,
+        (Fraction(3, 2) * size, size),
+    )
+    for value, same in zip(motion.attitude(Fraction(7), 170), small.attitude(Fraction(7) * slow, 170), strict=True):
+        assert value.overlaps(same)
+        assert same.rad() < arb("1e-45")
+
+
+@pytest.mark.parametrize("axes", ALL)
+def test_fifty_digits_of_the_attitude_at_a_million_in_every_naming(axes):
+    motion = bobylev_steklov_motion((Fraction(5, 2), Fraction(1)), *map(Fraction, (1, 1, 2, 3)))
+    named = find(renamed_top(motion.top, axes), renamed_state(motion.start, axes))
+    method, attitude = attitude_of(named, Fraction(10**6), 180)
+    assert method.startswith("closed form: Bobylev")
+    assert max(x.rad() for x in attitude(Fraction(10**6), 180)) < arb("1e-50")
+    assert_meets(named, (Fraction(2),))

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 from flint import arb
-from proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational
+from proofs import assert_agrees, assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational
 
-from heavytop.errors import NotInClass
+from heavytop.errors import NotInClass, OutOfReach
+from heavytop.exact.attitude import attitude_of
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
 from heavytop.exact.balls import working_precision
+from heavytop.exact.catalogue import find
 from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -92,3 +95,52 @@ def test_beside_the_permanent_rotation_every_digit_comes_out():
 def test_what_is_outside_is_refused_with_the_test_that_failed(inertia, centre, omega, message):
     with pytest.raises(NotInClass, match=message):
         Delone(HeavyTop(inertia, 1, centre), State(omega, (1, 0, 0)))
+
+
+# |gamma| = 1: gamma1 = (3/5)^2/(3/5)
+UNIT = delone((Fraction(3, 5), Fraction(0), Fraction(1)), Fraction(4, 5), (Fraction(3, 5), 0))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_attitude_turns_with_the_body(seed):
+    rng = random.Random(seed)
+    omega = [rational(rng) for _ in range(3)]
+    motion = delone(omega, rational(rng), (rational(rng), positive(rng)), positive(rng))
+    assert_attitude(motion, rational(rng, size=20))
+
+
+# turning points (Ω2 = 0, n on axis 1), M·γ = 0: (1, 0, −2) with γ = (1, 0, 1), no start at rest
+@pytest.mark.parametrize(
+    ("omega", "gamma3"),
+    [((1, 0, 1), 3), ((-1, 0, 3), -1), ((1, 0, -2), 1), ((0, 1, 1), 0), ((1, 1, 0), 1), ((1, 0, 0), 1)],
+)
+def test_the_attitude_at_turning_points_poles_and_without_area(omega, gamma3):
+    motion = delone(tuple(map(Fraction, omega)), Fraction(gamma3), (Fraction(1), Fraction(0)))
+    for time in (Fraction(0), Fraction(7, 3), Fraction(-30)):
+        assert_attitude(motion, time)
+
+
+@pytest.mark.parametrize("axes", ALL)
+def test_the_attitude_meets_the_enclosure_and_reaches_a_million_in_every_naming(axes):
+    named = find(renamed_top(UNIT.top, axes), renamed_state(UNIT.start, axes))
+    method, attitude = attitude_of(named, Fraction(10**6), 180)
+    assert method.startswith("closed form: Delone")
+    assert max(x.rad() for x in attitude(Fraction(10**6), 180)) < arb("1e-50")
+    assert_meets(named, (Fraction(2), Fraction(-20)))
+
+
+def test_the_attitude_does_not_know_the_units():
+    slow = Fraction(10) ** 100
+    small = delone(tuple(w / slow for w in UNIT.start.omega), Fraction(4, 5), (Fraction(3, 5) / slow**2, 0))
+    pairs = zip(UNIT.attitude(Fraction(7), 170), small.attitude(7 * slow, 170), strict=True)
+    for value, same in pairs:
+        assert value.overlaps(same)
+        assert same.rad() < arb("1e-45")
+
+
+# 2A, Ω3 along |g|, γ3, so that e = 0, γ along axis 3 among them; a double root of the cubic
+@pytest.mark.parametrize(("omega", "gamma3"), [((1, 0, 2), 1), ((0, 0, 3), -2), ((1, 0, 1), 1)])
+def test_a_level_without_azimuth_says_so(omega, gamma3):
+    motion = delone(tuple(map(Fraction, omega)), Fraction(gamma3), (Fraction(1), Fraction(0)))
+    with pytest.raises(OutOfReach, match="degenerate"):
+        motion.attitude(Fraction(1), 100)

@@ -136,7 +136,7 @@ def test_each_coefficient_is_rounded_to_nearest(precision):
 def test_the_defect_is_what_the_coefficients_leave(made, field):
     defect, _, _ = theorem(made, field)
     h = float(made.length)
-    bound = enclosure._defect(made.series, made.precision, h * float(field.q), h * float(field.l))
+    bound = enclosure.defect_bound(made.series, made.precision, h * float(field.q), h * float(field.l))
     # β is bounded by a power of two: up to 4 times too large in a product
     assert defect <= Fraction(bound) * ulp(made) <= 16 * defect
 
@@ -203,7 +203,7 @@ def test_the_variation_is_known_within_its_error(precision):
     summed = [[sum((m[i][j] for m in true), Fraction(0)) for j in SIX] for i in SIX]
     given = exact(found.variation.sum(axis=0))
     off = norm([[a - b for a, b in zip(x, y, strict=True)] for x, y in zip(summed, given, strict=True)])
-    error = Fraction(found._summed_error)
+    error = Fraction(found.summed_error)
     # beyond τ^40 next to nothing is left at half the radius of convergence
     assert off <= error
     assert error < Fraction(1, 2**40)
@@ -381,7 +381,7 @@ def test_the_sum_and_the_product_of_the_variation_have_room_for_their_roundings(
     """A row that cancels in binary64, whichever product is rounded first, and not in exact numbers."""
     found = step(FIELD, node_with(128, 1.0), 128)
     terms = enclosure._VARIATIONAL_ORDER + 1
-    assert found._summed_error >= found.variation_error + terms * 2.0**-53 * found.powers
+    assert found.summed_error >= found.variation_error + terms * 2.0**-53 * found.powers
     near, off = 1 + 2.0**-30, 1 + 2.0**-29
     variation, frame = np.zeros((1, 6, 6)), np.zeros((6, 6))
     variation[0, 0, :2], variation[0, 1, :2] = (near, -off), (-off, near)
@@ -407,4 +407,4 @@ def test_both_parts_of_the_defect_beyond_the_last_order_count(quadratic, linear)
         for j in range(n - order, order + 1)
     )
     beyond = Fraction(quadratic) * products + Fraction(linear) * Fraction(values[-1], order + 1)
-    assert Fraction(order, 2) + beyond <= Fraction(enclosure._defect(found, 128, quadratic, linear))
+    assert Fraction(order, 2) + beyond <= Fraction(enclosure.defect_bound(found, 128, quadratic, linear))

@@ -12,7 +12,7 @@ from heavytop.exact.balls import midpoint, radius, relative_bits
 from heavytop.exact.enclosure import start_node, step
 from heavytop.exact.scaled_motion import ScaledMotion
 from heavytop.exact.validated import Validated
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.words import fixed
 from heavytop.words.proven import Carrier, Series
@@ -40,12 +40,13 @@ def used_words(solution):
 
 def solved(system, unit=Fraction(1), moments=(3, 2, 1), omega=START.omega, moment=("1/2", "1/3", "1/5")):
     """A motion whose rates are ``unit`` times as fast."""
-    top = HeavyTop(moments, 1, [Fraction(r) * unit**2 for r in moment])
+    rotor = [Fraction(k) * unit for k in ("1/2", "-2", "1/3")] if system is HEAVY_GYROSTAT else None
+    top = HeavyTop(moments, 1, [Fraction(r) * unit**2 for r in moment], rotor)
     start = State([Fraction(w) * unit for w in omega], START.gamma)
     return Validated(top, start, system, rotor=Fraction(2, 3) * unit if system is GYROSTAT else None)
 
 
-@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 @pytest.mark.parametrize("unit", [0, 100, -100, 7])
 def test_balls_hold_what_exact_integers_find(system, unit, monkeypatch):
     size = Fraction(10) ** unit

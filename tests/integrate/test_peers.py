@@ -12,13 +12,13 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.integrate import peers
-from heavytop.integrate.peers.double import Solved, double_peer, rates
+from heavytop.integrate.peers.double import Solved, count, double_peer, rates
 from heavytop.integrate.peers.mpmath_taylor import odefun
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, QUAD, exact, real
 from heavytop.suite.cases import CASES
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from helpers import run_peer
 
 TIMES = [Fraction(1, 3), Fraction(2), Fraction(5)]
@@ -46,7 +46,9 @@ def need(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "case"),
-    [(name, "generic") for name in PEERS] + [(name, "gyrostat") for name in PEERS if not name.startswith("diffrax")],
+    [(name, "generic") for name in PEERS]
+    + [(name, "gyrostat") for name in PEERS if not name.startswith("diffrax")]
+    + [("cyrk:DOP853", "heavy-gyrostat")],  # the others in test_every_integrator
 )
 def test_every_peer_and_heyoka_agree_to_the_tolerance(name: str, case: str) -> None:
     need(name)
@@ -63,20 +65,19 @@ def test_every_peer_and_heyoka_agree_to_the_tolerance(name: str, case: str) -> N
     assert alone.seconds["compile"] >= 0
 
 
-@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda s: s.name)
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda s: s.name)
 def test_the_compiled_field_is_the_field(system) -> None:
     generator = np.random.default_rng(7)
     for _ in range(20):
-        numbers, y = generator.uniform(0.5, 2, 7), generator.normal(size=6)
-        exactly = Parameters(
-            *(tuple(map(Fraction, part)) for part in (numbers[:3], numbers[3:6])), Fraction(numbers[6])
-        )
+        numbers, y = generator.uniform(0.5, 2, count(system)), generator.normal(size=6)
+        rotor = Fraction(numbers[6]) if system is not HEAVY_GYROSTAT else tuple(map(Fraction, numbers[6:]))
+        exactly = Parameters(*(tuple(map(Fraction, part)) for part in (numbers[:3], numbers[3:6])), rotor)
         expected = [float(v) for v in system.field(exactly, [Fraction(v) for v in y])]
         np.testing.assert_allclose(rates(system)(0.0, y, numbers), expected, rtol=1e-13, atol=1e-15)
 
 
 @pytest.mark.parametrize(("order", "step"), [(2, 64), (4, 8), (8, 2)])
-@pytest.mark.parametrize("name", ["lagrange", "gyrostat"])
+@pytest.mark.parametrize("name", ["lagrange", "gyrostat", "heavy-gyrostat"])
 def test_half_the_step_of_a_splitting_has_its_order(order: int, step: int, name: str) -> None:
     case = CASES[name]
     ours = propagate(case.top, case.start, [Fraction(8)], DOUBLE, system=case.system)

@@ -14,7 +14,7 @@ from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
 from heavytop.suite.cases import CASES
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
 
@@ -29,7 +29,7 @@ def test_the_known_derivatives_are_those_of_the_enclosed_motion() -> None:
             assert (component[n] * factorial).contains(value)
 
 
-@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 def test_every_kind_of_integrator_passes_and_is_at_time_0_again(system, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engines, "_compiled", {})
     for precision in (EXTENDED, QUAD, real(24), real(150)):

@@ -238,7 +238,7 @@ def test_a_radius_beyond_the_digits_promised_is_not_printed(middle, wide, narrow
 
 
 def test_more_digits_than_python_reads_at_once_are_printed():
-    record = reference(KNOWN[0].top, KNOWN[0].start, ["1e-5000", 1], 5000)
+    record = reference(KNOWN[0].top, KNOWN[0].start, [Fraction(1, 10**5000), 1], 5000)
     assert record.times == ["1/1" + 5000 * "0", "1"]
     assert all(4990 < len(ball.value.lstrip("-0.")) <= 5002 for ball in record.states[1])
 

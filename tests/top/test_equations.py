@@ -10,7 +10,7 @@ from flint import arb, fmpq
 
 from heavytop.exact.balls import ball, working_precision
 from heavytop.integrate.engines import expressions
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, Parameters
 from heavytop.top.heavy_top import HeavyTop, State, cross
 from helpers import fraction, positive, unit_vector, vector
 
@@ -110,7 +110,7 @@ def test_a_rational_ball_contains_its_number() -> None:
 def test_a_system_from_another_process_is_the_same_object() -> None:
     import pickle
 
-    for system in (HEAVY_TOP, GYROSTAT):
+    for system in SYSTEMS:
         assert pickle.loads(pickle.dumps(system)) is system
     state = State((1, 2, 3), (0, 0, 1))
     assert pickle.loads(pickle.dumps(state)) == state

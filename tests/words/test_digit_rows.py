@@ -3,13 +3,14 @@
 import ctypes
 from fractions import Fraction
 from random import Random
+from typing import Any
 
 import numpy
 import pytest
 from llvmlite import ir
 from words_helpers import LEVELS, problem
 
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.words import digit_rows, digit_sums
 from heavytop.words.digit_rows import DigitRows, digits_of
 from heavytop.words.digits import exact, grid_of
@@ -159,7 +160,9 @@ def test_digits_are_those_of_the_words_and_sums_become_words(words: int) -> None
 
 def scaled(omega: str, gamma: str, moment: str = "1/2 1/3 1/5", system: System = HEAVY_TOP, xi: str = "") -> Scaled:
     omegas, gammas, moments, xis = (tuple(map(Fraction, text.split())) for text in (omega, gamma, moment, xi))
-    rotor = Fraction(1, 3) if system is GYROSTAT else Fraction(0)
+    rotor: Any = Fraction(1, 3) if system is GYROSTAT else Fraction(0)
+    if system is HEAVY_GYROSTAT:
+        rotor = (Fraction(1, 3), Fraction(-2), Fraction(3, 4))
     return Scaled.of(system, Parameters((Fraction(3), Fraction(2), Fraction(1)), moments, rotor),
                      (*omegas, *gammas, *xis), bounded=True)  # fmt: skip
 
@@ -169,6 +172,8 @@ MOTIONS = {
     "with an attitude": scaled("1/10 1/5 9/10", "3/5 0 4/5", xi="0 1 0"),
     "gyrostat": scaled("1/10 1/5 9/10", "3/5 0 4/5", "0 0 0", GYROSTAT),
     "gyrostat, attitude": scaled("1/10 1/5 9/10", "3/5 0 4/5", "0 0 0", GYROSTAT, "0 1 0"),
+    "heavy gyrostat": scaled("1/10 1/5 9/10", "3/5 0 4/5", system=HEAVY_GYROSTAT),
+    "heavy gyrostat, attitude": scaled("1/10 1/5 9/10", "3/5 0 4/5", system=HEAVY_GYROSTAT, xi="0 1 0"),
     "from rest: every other order is 0": scaled("0 0 0", "3/5 0 4/5"),
     "an entire function": scaled("0 0 1", "3/5 0 4/5", "0 0 0"),
     "tiny beside a middle axis": scaled(f"1/{2**90} 1 0", "5/8 -3/8 11/16", "0 0 0"),

@@ -5,11 +5,12 @@ from fractions import Fraction
 import pytest
 from words_helpers import LEVELS
 
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.words.eight import Eight, exact_state
 from heavytop.words.floating import FALL_IN_LANES, Floating, Ladder
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
+from helpers import rotor
 
 FINE = Ladder.of(Fraction(1, 2**105), FALL_IN_LANES)
 SPAN = Fraction(20)
@@ -17,6 +18,7 @@ SPAN = Fraction(20)
 
 def problems(system) -> list[Scaled]:
     p = Parameters(tuple(map(Fraction, (3, 2, 1))), tuple(Fraction(1, n) for n in (2, 3, 5)), Fraction(1, 7))
+    p = p._replace(rotor=rotor(system, lambda: Fraction(1, 7)))
     rest = (Fraction(3, 5), Fraction(0), Fraction(4, 5))
     return [Scaled.of(system, p, (Fraction(k, 8), Fraction(1, 5), Fraction(k, 3) - 1, *rest)) for k in range(1, 9)]
 
@@ -36,7 +38,7 @@ def samples(eight: Eight, lanes=range(8)) -> dict[int, tuple[Fraction, ...]]:
 
 
 @pytest.mark.parametrize("forwards", [True, False], ids=["forwards", "backwards"])
-@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 def test_each_lane_is_the_motion_of_a_run_by_itself(system, forwards: bool) -> None:
     given = problems(system)
     found = samples(in_lanes(system, given, forwards=forwards))

@@ -5,31 +5,41 @@ from random import Random
 
 import pytest
 
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.words.lanes import coefficients, rates
 from heavytop.words.scaled import Scaled
-from helpers import fraction, positive, vector
+from helpers import fraction, positive, rotor, vector
 
 
-@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 def test_the_lanes_give_the_derivative_of_the_field_exactly(system) -> None:
     random = Random(15)
     for _ in range(50):
-        p = Parameters((positive(random), positive(random), positive(random)), vector(random), fraction(random))
+        lam = rotor(system, lambda: fraction(random))
+        p = Parameters(
+            (positive(random), positive(random), positive(random)),
+            vector(random),
+            lam,
+        )
         y, z = [*vector(random), *vector(random)], list(vector(random))
         given = coefficients(system, p, attitude=True)
         assert rates(system, given, [*y, *z]) == [*system.field(p, y), *system.attitude(p, y, z)]
 
 
-@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 @pytest.mark.parametrize("size", [-100, -3, 0, 40, 150])
 def test_scaling_is_exact_and_brings_numbers_near_one(system, size: int) -> None:
     """y' in the units of the problem is that of the scaled one, whatever the units of time and of weight."""
     random = Random(size)
     unit = Fraction(10) ** size
     for _ in range(10):
+        lam = rotor(system, lambda: fraction(random) * unit)
         weights = tuple(v * unit for v in vector(random))
-        p = Parameters((positive(random), positive(random), positive(random)), weights, fraction(random) * unit)
+        p = Parameters(
+            (positive(random), positive(random), positive(random)),
+            weights,
+            lam,
+        )
         y = tuple(v * unit for v in vector(random)) + vector(random) + vector(random)
         scaled = Scaled.of(system, p, y)
         assert scaled.back(scaled.state) == y

@@ -10,13 +10,14 @@ from words_helpers import LEVELS
 
 from heavytop.exact.scaled_motion import ScaledMotion
 from heavytop.exact.step_series import lacking
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.words import extents, proven
 from heavytop.words.digits import grid_of
 from heavytop.words.kernels import Grid
 from heavytop.words.lanes import LEFT, RIGHT
 from heavytop.words.machine import doubles, pointer
 from heavytop.words.proven import Carrier
+from helpers import rotor
 
 
 def some_motion(random: Random, system=HEAVY_TOP, attitude: bool = False, decades: int = 0) -> ScaledMotion:
@@ -33,7 +34,7 @@ def some_motion(random: Random, system=HEAVY_TOP, attitude: bool = False, decade
     p = Parameters(
         tuple(moments),
         tuple(weight * Fraction(random.randint(-4096, 4096), 4096) for _ in range(3)),
-        speed * Fraction(random.randint(-99, 99), 70),
+        rotor(system, lambda: speed * Fraction(random.randint(-99, 99), 70)),
     )
     y = [speed * Fraction(random.randint(-7000, 7000), 4096) for _ in range(3)]
     y += [Fraction(random.randint(-2300, 2300), 4096) for _ in range(6 if attitude else 3)]
@@ -73,7 +74,16 @@ def used(motion: ScaledMotion, carrier: Carrier, centre: list[int], halvings: in
 
 @pytest.mark.parametrize(
     ("words", "system", "attitude"),
-    [(3, HEAVY_TOP, False), (4, GYROSTAT, False), (6, HEAVY_TOP, True), (3, GYROSTAT, True), (12, HEAVY_TOP, False)],
+    [
+        (3, HEAVY_TOP, False),
+        (4, GYROSTAT, False),
+        (6, HEAVY_TOP, True),
+        (3, GYROSTAT, True),
+        (12, HEAVY_TOP, False),
+        (3, HEAVY_GYROSTAT, False),
+        (6, HEAVY_GYROSTAT, True),
+        (12, HEAVY_GYROSTAT, False),
+    ],
     ids=lambda value: getattr(value, "name", value),
 )
 def test_what_coefficients_lack_is_within_the_bound(words: int, system, attitude: bool) -> None:

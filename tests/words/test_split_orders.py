@@ -8,7 +8,7 @@ from random import Random
 import pytest
 from words_helpers import problem
 
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.words import double_double as dd
 from heavytop.words import split_orders as parts
 from heavytop.words.eight import Eight
@@ -16,6 +16,7 @@ from heavytop.words.floating import Floating, Ladder
 from heavytop.words.recurrence import MOST_ORDER
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
+from helpers import rotor
 
 FINE = Ladder.of(Fraction(1, 2**70))
 ALL_PAIRS = replace(FINE, depth=-1000.0)
@@ -43,7 +44,7 @@ def random_problem(random: Random, system, attitude: bool, scale: int) -> Scaled
     p = Parameters(
         tuple(Fraction(random.randint(10, 40), 20) for _ in range(3)),
         tuple(Fraction(random.randint(-9, 9), 10) * Fraction(10) ** (-2 * scale) for _ in range(3)),
-        Fraction(random.randint(-9, 9), 9) * Fraction(10) ** -scale,
+        rotor(system, lambda: Fraction(random.randint(-9, 9), 9) * Fraction(10) ** -scale),
     )
     spin = random.choice((1, 3, 10))
     omega = [Fraction(random.randint(-99, 99) * spin, 100) * Fraction(10) ** -scale for _ in range(3)]
@@ -52,7 +53,7 @@ def random_problem(random: Random, system, attitude: bool, scale: int) -> Scaled
 
 
 @pytest.mark.parametrize("attitude", [False, True], ids=["motion", "attitude"])
-@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 def test_a_step_in_split_coefficients_differs_by_less_than_its_ladder_allows(system, attitude: bool) -> None:
     random, most = Random(2), Fraction(1, 2**79)
     for scale in (0, 100, -100, 0, 0):
@@ -109,7 +110,7 @@ def test_units_out_of_reach_are_not_used() -> None:
 def test_lanes_are_split_as_a_motion_by_itself_is() -> None:
     random = Random(3)
     ladder = Ladder.of(Fraction(1, 2**70), 1.6)
-    for system in (HEAVY_TOP, GYROSTAT):
+    for system in (HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT):
         given = [random_problem(random, system, False, (0, 40, -40)[k % 3]) for k in range(8)]
         found = []
         for pairs in (False, True):

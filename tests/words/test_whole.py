@@ -11,26 +11,31 @@ from heavytop.exact.validated import Validated
 from heavytop.integrate.trajectory import Outcome
 from heavytop.integrate.words import propagate_words
 from heavytop.precision import exact, real
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.words.lanes import rates
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
 from heavytop.words.whole import Whole, field_of
-from helpers import fraction, positive, vector
+from helpers import fraction, positive, rotor, vector
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 START = State(("1/8", "3/8", "7/8"), ("5/8", 0, "3/4"))
 MANY = real(1040)
 
 
-@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT], ids=lambda system: system.name)
+@pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)
 @pytest.mark.parametrize("attitude", [False, True])
 @pytest.mark.parametrize("forwards", [True, False])
 def test_the_field_is_that_of_the_lanes(system, attitude: bool, forwards: bool) -> None:
     random = Random(16)
     for _ in range(20):
-        p = Parameters((positive(random), positive(random), positive(random)), vector(random), fraction(random))
+        lam = rotor(system, lambda: fraction(random))
+        p = Parameters(
+            (positive(random), positive(random), positive(random)),
+            vector(random),
+            lam,
+        )
         y = (*vector(random), *vector(random), *(vector(random) if attitude else ()))
         scaled = Scaled.of(system, p, y, bounded=True)
         field, state = field_of(scaled, forwards), scaled.state

@@ -8,15 +8,16 @@ from heavytop.api import arguments
 from heavytop.claims.audit import PAPER, only_branch
 from heavytop.claims.audit import audit as audit_named
 from heavytop.claims.judge import Audit as Audit
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import System
 
 
-def audit(claim: str | os.PathLike[str], system: System | str = HEAVY_TOP, *, branch: str | None = None) -> Audit:
+def audit(claim: str | os.PathLike[str], system: System | str | None = None, *, branch: str | None = None) -> Audit:
     """Prove or refute a claim, equation by equation.
 
     Arguments:
         claim: "ershkov-general", "ershkov-partial", or the path of a claim in TOML (docs/claims-in-toml.md).
-        system: "heavy_top" or "gyrostat": the system whose motion it is claimed to be.
+        system: "heavy_top", "gyrostat" or "heavy_gyrostat": the system whose motion it is claimed to be; None for the
+            file's, else "heavy_gyrostat" where its rotor is a list of three, else "heavy_top".
         branch: "smooth" or "printed": the rows of that branch alone.
 
     Returns:
@@ -27,5 +28,5 @@ def audit(claim: str | os.PathLike[str], system: System | str = HEAVY_TOP, *, br
             too long.
     """
     name = claim if isinstance(claim, str) and claim in PAPER else str(arguments.path(claim, "claim"))
-    found = audit_named(name, arguments.system(system).name)
+    found = audit_named(name, None if system is None else arguments.system(system).name)
     return found if branch is None else only_branch(found, arguments.text(branch, "branch"))

@@ -13,6 +13,7 @@ from heavytop.errors import InputError
 from heavytop.integrate import registry
 from heavytop.integrate.peers.source import named
 from heavytop.integrate.trajectory import Trajectory
+from heavytop.measure.derivatives import which_derivatives
 from heavytop.measure.reference import Reference
 from heavytop.measure.reference import reference as proven
 from heavytop.measure.setup import Setup
@@ -144,6 +145,7 @@ def reference(
     *,
     system: System | str | None = None,
     attitude: bool | None = None,
+    derivatives: str | None = None,
 ) -> Reference:
     """The known motion: proven states, from a closed form where there is one, else from a validated enclosure.
 
@@ -155,11 +157,14 @@ def reference(
             "heavy_top".
         attitude: give ξ as well, fixed in space and ⟂ γ, in body components; None for True where the start has an
             attitude.
+        derivatives: "start" for ∂(Ω, γ)(t)/∂(Ω0, γ0) as well, γ0 as three independent variables; "data" for
+            ∂(Ω, γ)(t)/∂(I1, I2, I3, n1, n2, n3), n = P r; "all" for both.
 
     Returns:
         A :class:`Reference`: ``method``, ``states[i][j].value`` and ``.radius`` as decimal text (the true number is
         within the radius of the value), ``texts()``, ``to_numpy()`` and ``radii()``, each of shape (n, 6);
-        ``attitude[i][j]``, shape (n, 3), and ``attitude_method``, where asked for, else None.
+        ``attitude[i][j]``, shape (n, 3), and ``attitude_method``, where asked for, else None; ``derivatives`` with
+        balls, ``derivatives_numpy()``, shape (n, 6, 6), and ``lyapunov()``.
 
     Raises:
         InputError: for what is no motion or time, and for other digits.
@@ -170,7 +175,8 @@ def reference(
     arguments.any_times(given)
     wanted = arguments.flag(attitude, "attitude")
     told = state.attitude is not None if wanted is None else wanted
-    return proven(body, state, given, whole(digits, "digits"), about, attitude=told)
+    which = which_derivatives(derivatives)
+    return proven(body, state, given, whole(digits, "digits"), about, attitude=told, derivatives=which)
 
 
 def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Precision, system: System) -> list[Setup]:

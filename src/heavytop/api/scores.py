@@ -24,7 +24,7 @@ from heavytop.report.text import short
 from heavytop.suite.given import of_arrays
 from heavytop.suite.score import Assessment, Peer, assess, passed, required
 from heavytop.top.bodies import Body
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
 from heavytop.top.times import check_times
 
@@ -114,7 +114,7 @@ def score(
     top: HeavyTop | Body,
     start: State,
     precision: Precision | str | None = None,
-    system: System | str = HEAVY_TOP,
+    system: System | str | None = None,
     name: str = "given",
     integrator: str = "given",
     require: Number | None = None,
@@ -144,7 +144,7 @@ def score(
             None where other arrays fix the motion.
         top, start: what the program was given; rounded to the format first.  A Body has Ω and γ in its own axes.
         precision: the format in which it computed; None for the narrowest that holds every number as it is given.
-        system: "heavy_top" or "gyrostat".
+        system: as in :func:`propagate`.
         name, integrator: what the row is called.
         require: digits that must be right, as ``passed`` of the result says; None asks that the run reached its end.
         omega, omega_space, gamma, positions: shape (n, 3): Ω in body axes, Ω in axes of space, γ, and where ``point``
@@ -164,7 +164,8 @@ def score(
     """
     needed = None if require is None else required(require)
     form = None if precision is None else arguments.precision(precision)
-    about, instants = arguments.system(system), list(check_times(times))
+    body = top if isinstance(top, Body) else arguments.is_a(top, HeavyTop, "top")
+    about, instants = arguments.system(system, body), list(check_times(times))
     names = arguments.text(name, "name"), arguments.text(integrator, "integrator")
     arrays = columns(
         {

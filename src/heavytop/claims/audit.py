@@ -11,7 +11,7 @@ from heavytop.claims.guard import in_time
 from heavytop.claims.judge import Audit, Finding, Row, judge
 from heavytop.claims.statement import Setting, Statement
 from heavytop.errors import InputError
-from heavytop.top.equations import HEAVY_TOP, System, system
+from heavytop.top.equations import System, system
 
 PAPER = ("ershkov-general", "ershkov-partial")
 
@@ -30,6 +30,10 @@ class Auditable(Protocol):
 
     @property
     def setting(self) -> Setting: ...
+
+    def about(self, asked: System | None) -> System:
+        """The system that it is judged about, where that one is asked for, or none; raises InputError for another."""
+        ...
 
     def statements(self, system: System) -> list[Statement]:
         """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
@@ -63,21 +67,24 @@ def _path(name: str) -> Path:
 
 
 def audit(
-    name: str, system_name: str = HEAVY_TOP.name, progress: Callable[[int, int], None] = lambda done, of: None
+    name: str, system_name: str | None = None, progress: Callable[[int, int], None] = lambda done, of: None
 ) -> Audit:
-    """The audit of a claim of the paper, or of a TOML file, as a motion of that system.
+    """The audit of a claim of the paper, or of a TOML file, as a motion of that system; None for the claim's own.
 
     progress: hears of a claim of the paper how many equations are judged, of how many.
     Raises InputError for an unknown claim or system and for a file that cannot be read.
     """
-    about = system(system_name)
+    asked = None if system_name is None else system(system_name)
     if name in PAPER:
-        return audit_claim(find_claim(name), about, progress)
-    return in_time(str(_path(name)), about.name)
+        return audit_claim(find_claim(name), asked, progress)
+    return in_time(str(_path(name)), "" if asked is None else asked.name)
 
 
-def audit_claim(claim: Auditable, about: System, progress: Callable[[int, int], None] = lambda done, of: None) -> Audit:
-    """The audit of a claim that is at hand, as a motion of ``about``.  progress: as in :func:`audit`."""
+def audit_claim(
+    claim: Auditable, asked: System | None = None, progress: Callable[[int, int], None] = lambda done, of: None
+) -> Audit:
+    """The audit of a claim that is at hand, as a motion of the system asked for.  progress: as in :func:`audit`."""
+    about = claim.about(asked)
     rows = judge(claim.statements(about), claim.setting, progress)
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)

@@ -23,7 +23,7 @@ from heavytop.claims.statement import Setting
 from heavytop.claims.statements import SYSTEMS
 from heavytop.errors import InputError, quoted
 from heavytop.precision import exact
-from heavytop.top.equations import GYROSTAT, Parameters, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System, system
 
 TIME = sympy.Symbol("t", real=True)
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
@@ -31,13 +31,16 @@ _RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
 _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
 """Of numerator and denominator of a number in a sample: 2000 digits."""
-_OF_THE_TOP = "The moments, the weight and the centre of mass of a top are constant: use numbers and parameters."
+_OF_THE_TOP = "The moments, the weight, the centre of mass and k of a top are constant: use numbers and parameters."
 _OF_PARAMETERS = "Relations are between parameters; conditions on the state stand in where of [integral]."
 
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What every kind of claim shares: names, assumptions, samples, and the top they are about."""
+    """What every kind of claim shares: names, assumptions, samples, and the top they are about.
+
+    rotor: λ of a gyrostat, with what it needs.  carried: k of a heavy gyrostat.
+    """
 
     names: dict[str, Formula]
     symbols: dict[str, sympy.Symbol]
@@ -48,6 +51,7 @@ class Context:
     rotor: sympy.Expr | None
     needs: frozenset[Need]
     rotor_needs: frozenset[Need]
+    carried: tuple[sympy.Expr, ...] | None = None
 
     def with_rotor(self, rotor: sympy.Expr | None, is_constant: bool) -> Context:
         """The context with the rotor in this form; raises InputError unless it is shown to be constant in time."""
@@ -62,13 +66,28 @@ class Context:
     @property
     def systems(self) -> tuple[System, ...]:
         """The systems that the claim says something about."""
+        if self.carried is not None:
+            return (HEAVY_GYROSTAT,)
         return tuple(system for system in SYSTEMS if system is not GYROSTAT or self.rotor is not None)
 
     def parameters(self, system: System) -> Parameters:
-        """Parameters of the field; raises InputError where `gyrostat` is asked for and the file gives no rotor."""
+        """Parameters of the field; raises InputError where the rotor of the file is none, or not that of the system."""
+        if (system is HEAVY_GYROSTAT) is not (self.carried is not None):
+            raise _other_rotor(system)
+        if self.carried is not None:
+            return self.top._replace(rotor=self.carried)
         if system is GYROSTAT and self.rotor is None:
             raise InputError("The file gives no rotor, so it says nothing about gyrostat.", "Add rotor to [top].")
         return self.top._replace(rotor=sympy.Integer(0) if self.rotor is None else self.rotor)
+
+
+def _other_rotor(system: System) -> InputError:
+    """What is said where one of the two has a rotor of three components, and the other has not."""
+    if system is HEAVY_GYROSTAT:
+        cause = "The file gives no rotor of three components, so it says nothing about heavy_gyrostat."
+        return InputError(cause, "Add rotor = [k1, k2, k3] to [top].")
+    cause = f"The file gives a rotor of three components, so it says nothing about {system.name}."
+    return InputError(cause, "Use the system heavy_gyrostat, or give no such rotor.")
 
 
 def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Context:
@@ -92,11 +111,13 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     top = content.top
     moments = three(top.inertia, names, "top.inertia")
     arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
-    rotor = None if top.rotor is None else parse(top.rotor, names, "top.rotor")
+    rotor = parse(top.rotor, names, "top.rotor") if isinstance(top.rotor, str) else None
+    carried = three(top.rotor, names, "top.rotor") if isinstance(top.rotor, list) else ()
     relations = [parse(text, names, "relations") for text in content.relations]
     _check_constant("top.inertia", moments, _OF_THE_TOP)
     _check_constant("top.centre", arm[:3], _OF_THE_TOP)
     _check_constant("top.weight", arm[3:], _OF_THE_TOP)
+    _check_constant("top.rotor", carried, _OF_THE_TOP)
     _check_constant("relations", relations, _OF_PARAMETERS)
     weight = arm.pop()
     inertia, centre = (tuple(part.expression for part in parts) for parts in (moments, arm))
@@ -111,8 +132,9 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
         tuple(relation.expression for relation in relations),
         Parameters(inertia, tuple(weight.expression * part for part in centre), sympy.Integer(0)),
         None if rotor is None else rotor.expression,
-        needs_of([*moments, *arm, weight, *relations]).union(*(condition("/", (part,)) for part in inertia)),
+        needs_of([*moments, *arm, weight, *carried, *relations]).union(*(condition("/", (part,)) for part in inertia)),
         frozenset() if rotor is None else rotor.needs,
+        tuple(part.expression for part in carried) or None,
     )
     _check_samples(context, bounds)
     return context
@@ -231,3 +253,18 @@ class FileClaim:
     def kind(self) -> str:
         """motion, integral or relation."""
         return self.content.kind
+
+    def about(self, asked: System | None) -> System:
+        """The system asked for, else the file's, else `heavy_gyrostat` where it gives k, else `heavy_top`.
+
+        Raises InputError where the file names another system, or gives another rotor than the system has.
+        """
+        own = None if self.content.system is None else system(self.content.system)
+        if asked is not None and own is not None and asked is not own:
+            raise InputError(
+                f"The file is about {own.name}, but {asked.name} was asked for.", "Ask for that of the file, or none."
+            )
+        by_rotor = HEAVY_TOP if self.context.carried is None else HEAVY_GYROSTAT
+        found = asked or own or by_rotor
+        self.context.parameters(found)
+        return found

@@ -20,13 +20,22 @@ from heavytop.claims.ershkov_general import GeneralConstants
 from heavytop.claims.explain import explain
 from heavytop.claims.judge import Finding, Row
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Formulas, Setting, Statement
-from heavytop.claims.statements import SYMBOLIC, Motion, attitude, motion_statements
+from heavytop.claims.statements import SYMBOLIC, SYSTEMS, Motion, attitude, motion_statements
+from heavytop.errors import InputError
 from heavytop.top.angles import gamma_from_angles
-from heavytop.top.equations import VARIABLES, Parameters, System
+from heavytop.top.equations import HEAVY_TOP, VARIABLES, Parameters, System
 from heavytop.top.integrals import energy, momentum_squared
 
 SOURCE = "S. V. Ershkov, On the invariant motions of rigid body rotation over the fixed point, via Euler's angles"
 Formula = Callable[..., Any]
+
+
+def _of_the_paper(asked: System | None) -> System:
+    found = HEAVY_TOP if asked is None else asked
+    if found not in SYSTEMS:
+        names = " or ".join(each.name for each in SYSTEMS)
+        raise InputError(f"The paper says nothing about {found.name}.", f"Use {names}.")
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +77,10 @@ class PartialClaim:
     def motion(self) -> Motion:
         """The smooth branch."""
         return self._motion("smooth", ALL)
+
+    def about(self, asked: System | None) -> System:
+        """The system asked for, else the heavy top; raises InputError for one that the paper says nothing about."""
+        return _of_the_paper(asked)
 
     def statements(self, system: System) -> list[Statement]:
         """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
@@ -219,6 +232,10 @@ class GeneralClaim:
     def motion(self) -> Motion:
         """The branch of the roots that follows the flow."""
         return self._motion("smooth", _ANY)
+
+    def about(self, asked: System | None) -> System:
+        """The system asked for, else the heavy top; raises InputError for one that the paper says nothing about."""
+        return _of_the_paper(asked)
 
     def statements(self, system: System) -> list[Statement]:
         """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""

@@ -26,12 +26,14 @@ Samples = Annotated[list[Text], msgspec.Meta(min_length=1, max_length=8)]
 
 
 class TopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[top]: principal moments, weight, centre of mass, and the rotor λ where the claim is about `gyrostat`."""
+    """[top]: principal moments, weight, centre of mass; the rotor, λ where the claim is about `gyrostat`, or k1, k2,
+    k3 where it is about `heavy_gyrostat`.
+    """
 
     inertia: Three
     weight: Text
     centre: Three
-    rotor: Text | None = None
+    rotor: Text | Three | None = None
 
 
 class MotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -65,6 +67,7 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: Annotated[str, msgspec.Meta(max_length=80)]
     kind: str
     top: TopTable
+    system: str | None = None
     source: Annotated[str, msgspec.Meta(max_length=2_000)] = ""
     domain: str = "all"
     times: Samples | None = None

@@ -43,9 +43,10 @@ class Answer(msgspec.Struct, frozen=True):
 
 
 def in_time(path: str, system_name: str, seconds: float = SECONDS) -> Audit:
-    """The audit of the claim in a file; raises InputError where it takes more than ``seconds``, 3 GB or the stack.
+    """The audit of the claim in a file, about its own system for the name "".
 
-    Raises AuditEnded with what happened where the process of the audit ends without an answer.
+    Raises InputError where it takes more than ``seconds``, 3 GB or the stack, and
+    AuditEnded with what happened where the process of the audit ends without an answer.
     """
     last = str(math.ceil(seconds) + _GRACE)
     command = [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path), path, system_name, last]
@@ -98,7 +99,7 @@ def child() -> None:
     from heavytop.top.equations import system
 
     try:
-        answer = Answer(report=audit_claim(find_claim(path), system(system_name)))
+        answer = Answer(report=audit_claim(find_claim(path), system(system_name) if system_name else None))
     except HeavyTopError as error:
         answer = Answer(error=(_printable(error.cause), error.remedy))
     except MemoryError:

@@ -15,9 +15,17 @@ from heavytop.claims.conditions import Need
 from heavytop.claims.judge import Finding
 from heavytop.claims.statement import Domain, Formulas, Statement
 from heavytop.top.angles import gamma_from_angles, omega_from_angles
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import cross, dot
-from heavytop.top.integrals import area, energy, gamma_squared, gyrostat_energy, momentum, momentum_squared
+from heavytop.top.integrals import (
+    area,
+    area_with_rotor,
+    energy,
+    gamma_squared,
+    gyrostat_energy,
+    momentum,
+    momentum_squared,
+)
 
 SYMBOLIC = SimpleNamespace(
     sqrt=sympy.sqrt,
@@ -89,11 +97,12 @@ def attitude(phi: sympy.Expr, theta: sympy.Expr, psi: sympy.Expr) -> tuple[sympy
 def motion_statements(motion: Motion, p: Parameters, system: System) -> Iterator[Statement]:
     """(1.1), (1.2), (1.3) and, where there are angles, (3.1), each component, about ``system``."""
     y = motion.state
-    turning = "Omega" if system is HEAVY_TOP else "(Omega + lambda*e2)"
-    torque = " + P*gamma x r" if system is HEAVY_TOP else ""
+    turning = "(Omega + lambda*e2)" if system is GYROSTAT else "Omega"
+    torque = "" if system is GYROSTAT else " + P*gamma x r"
+    carried = ", M = I*Omega + k" if system is HEAVY_GYROSTAT else ""
     field = system.field(p, y)
     for index, (value, claimed) in enumerate(zip(y, field, strict=True)):
-        text = f"gamma' = gamma x {turning}" if index >= 3 else f"M' = M x {turning}{torque}"
+        text = f"gamma' = gamma x {turning}" if index >= 3 else f"M' = M x {turning}{torque}{carried}"
         residual = motion.rate(value) - claimed
         yield _statement("1.2" if index >= 3 else "1.1", index % 3 + 1, motion, residual, text)
     yield from _integral_statements(motion, p, system)
@@ -107,12 +116,12 @@ def motion_statements(motion: Motion, p: Parameters, system: System) -> Iterator
 
 
 def _integral_statements(motion: Motion, p: Parameters, system: System) -> Iterator[Statement]:
-    third = (
-        (energy, "Omega.M/2 + P*r.gamma", "C1")
-        if system is HEAVY_TOP
-        else (gyrostat_energy, "Omega.M/2 + lambda*M2", "C1")
-    )
-    known = (gamma_squared, "|gamma|^2", "1"), (area, "M.gamma", "C0"), third
+    about_gamma, third = {
+        HEAVY_TOP.name: (area, (energy, "Omega.M/2 + P*r.gamma", "C1")),
+        GYROSTAT.name: (area, (gyrostat_energy, "Omega.M/2 + lambda*M2", "C1")),
+        HEAVY_GYROSTAT.name: (area_with_rotor, (energy, "Omega.(M - k)/2 + P*r.gamma", "C1")),
+    }[system.name]
+    known = (gamma_squared, "|gamma|^2", "1"), (about_gamma, "M.gamma", "C0"), third
     for component, (integral, left, right) in enumerate(known, 1):
         text = f"{left} = {right}"
         value = integral(p, motion.state)
@@ -175,3 +184,4 @@ def determinant(motion: Motion, p: Parameters) -> Statement:
 
 
 SYSTEMS = (HEAVY_TOP, GYROSTAT)
+"""Those of the paper, and of tops without k."""

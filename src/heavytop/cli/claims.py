@@ -18,7 +18,9 @@ _AUDIT_SECONDS, _FIGURE_SECONDS = 6.0, 1.0
 @command
 def audit(
     claim: Annotated[str, typer.Argument(help="ershkov-general, ershkov-partial, or a TOML file.")],
-    system: Annotated[str, typer.Option(help="heavy_top or gyrostat.")] = "heavy_top",
+    system: Annotated[
+        str | None, typer.Option(help="heavy_top, gyrostat or heavy_gyrostat; without it that of the file.")
+    ] = None,
     branch: Annotated[str | None, typer.Option(help="smooth or printed: that branch alone.")] = None,
     json: Json = False,
 ) -> int:

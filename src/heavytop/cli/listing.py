@@ -57,6 +57,7 @@ def _everything() -> dict[str, Any]:
     from heavytop.precision import FORMATS, available
     from heavytop.suite.cases import CASES, named_bodies
     from heavytop.suite.plan import BUILT_IN
+    from heavytop.top.equations import SYSTEMS
 
     notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
     said = {"heyoka": "every format but double-double", "multiword": "every format"}
@@ -68,7 +69,7 @@ def _everything() -> dict[str, Any]:
             {"name": case.name, "system": case.system.name, "about": case.about} for case in named_bodies().values()
         ],
         "plans": list(BUILT_IN),
-        "systems": ["heavy_top", "gyrostat"],
+        "systems": [system.name for system in SYSTEMS],
         "formats": {
             "real:BITS" if name == "real" else name: notes[name] if reason is None else f"not available: {reason}"
             for name, reason in available().items()

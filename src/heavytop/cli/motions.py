@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, command, numbers
+from heavytop.cli.events import EventDirection, Events, computed, known_ones, requested, with_events
 from heavytop.cli.motion_output import made_by, require_one_output, write_motion
 from heavytop.cli.output import say, say_former
 from heavytop.cli.progress import reaching, watched
@@ -84,6 +85,8 @@ def propagate(
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     normalize: Normalize = False,
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
+    events: Events = None,
+    event_direction: EventDirection = 0,
     show: Show = None,
     point: Point = None,
     pivot: Pivot = None,
@@ -124,6 +127,7 @@ def propagate(
         raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
     which.parameters(top.top if isinstance(top, Body) else top, start)
     say_former([integrator])
+    functions = requested(events, event_direction, instants[-1])
     if form.bits >= _SLOW_BITS and integrator == "heyoka":
         say(
             f"warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
@@ -160,7 +164,10 @@ def propagate(
 
         return motion_text(motion, shown)
 
-    write_motion(motion.to_json, table, text, csv, latex, json)
+    with reaching("events", _PROPAGATE_SECONDS) as reach:
+        asked = functions, event_direction, instants[-1]
+        found = computed(top, start, *asked, form, integrator, which, max_steps, reach)
+    write_motion(*with_events(motion.to_json, table, text, found), csv, latex, json)
     return 0 if motion.complete else 3
 
 
@@ -184,7 +191,12 @@ def reference(
     rotor: Rotor = None,
     system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Give xi too, fixed in space and across gamma.")] = False,
+    derivatives: Annotated[
+        str | None, typer.Option(help="Derivatives too: start, data (I1..I3, n = P r) or all.", metavar="WHICH")
+    ] = None,
     normalize: Normalize = False,
+    events: Events = None,
+    event_direction: EventDirection = 0,
     show: Show = None,
     point: Point = None,
     pivot: Pivot = None,
@@ -195,8 +207,10 @@ def reference(
     """Print proven states of one motion.
 
     By a closed form where there is one, at once; else by a validated enclosure: a second up to t = 100, a few seconds
-    up to t = 1000.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up.
+    up to t = 1000; derivatives take about ten times as long.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω
+    with M = IΩ; γ points up.
     """
+    from heavytop.measure.derivatives import which_derivatives
     from heavytop.measure.reference import reference as proven
     from heavytop.top.equations import system_of
     from heavytop.top.times import check_times
@@ -218,11 +232,12 @@ def reference(
     }
     top, start, system = _motion(given, case, system, normalize, of_any_size=True)
     which, instants = system_of(system, top), check_times(numbers(times))
-    wanted = _outputs(show, point, pivot)
+    wanted, which_ones = _outputs(show, point, pivot), which_derivatives(derivatives)
     require_one_output(csv, latex, json)
+    functions = requested(events, event_direction, instants[-1])
     watch = _Watch([abs(time) for time in instants])
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        found = proven(top, start, numbers(times), digits, which, watch.find, attitude or bool(wanted))
+        found = proven(top, start, numbers(times), digits, which, watch.find, attitude or bool(wanted), which_ones)
         found.require_outputs(wanted)
 
     def table() -> MotionTable:
@@ -235,7 +250,9 @@ def reference(
 
         return reference_text(found, shown)
 
-    write_motion(lambda: found.document(wanted), table, text, csv, latex, json)
+    with reaching("events", _REFERENCE_SECONDS) as reach:
+        known = known_ones(top, start, functions, event_direction, instants[-1], digits, which, reach)
+    write_motion(*with_events(lambda: found.document(wanted), table, text, known), csv, latex, json)
     return 0
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from decimal import ROUND_CEILING, Decimal
+from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Decimal
 from fractions import Fraction
 from types import SimpleNamespace
 from typing import SupportsInt
@@ -18,7 +18,7 @@ from flint import arb, fmpq
 from heavytop.errors import OutOfReach
 from heavytop.exact.flint_context import at_precision, whole_evaluation
 from heavytop.exact.flint_context import working_precision as working_precision
-from heavytop.precision import decimal_text, exact, quotient_text
+from heavytop.precision import quotient_text, ratio_text
 
 FUNCTIONS = SimpleNamespace(
     sqrt=arb.sqrt,
@@ -37,6 +37,7 @@ _HALF = arb(0.5)
 _INTEGER = re.compile(r"-?[0-9]+")
 _GUARD, _STEP = 16, 64
 _RADIUS_BITS = 30
+_RADIUS_DIGITS = 3
 _ENOUGH = 1 << 15
 """Working bits that are always tried: tops whose moments, weight and spin differ by a thousand decades need them."""
 _SERIES_DIVISION = ("leading term in denominator is not nonzero", "quotient would not be a power series")
@@ -75,7 +76,7 @@ def _fraction(mantissa: SupportsInt, exponent: SupportsInt) -> Fraction:
 
 def radius_text(value: Fraction) -> str:
     """A radius as decimal text of three digits, rounded up: it stays an upper bound."""
-    return quotient_text(value, 3, ROUND_CEILING)
+    return quotient_text(value, _RADIUS_DIGITS, ROUND_CEILING)
 
 
 def ball_text(value: arb) -> str:
@@ -112,8 +113,14 @@ def _integer(text: str) -> int:
 
 def value_text(value: arb, digits: int) -> tuple[str, str]:
     """(value, radius) as decimal text: the radius encloses the ball and the rounding of the printed value."""
-    text = decimal_text(midpoint(value), digits)
-    return text, radius_text(radius(value) + abs(exact(text) - midpoint(value)))
+    (m, e), (r, s) = ((int(part[0]), int(part[1])) for part in (value.mid().man_exp(), value.rad().man_exp()))
+    # over one denominator that need not be the least
+    unit = min(e, s, 0)
+    middle, wide = m << (e - unit), r << (s - unit)
+    text = ratio_text(middle, 1 << -unit, digits, ROUND_HALF_EVEN)
+    above, below = Decimal(text).as_integer_ratio()
+    off = wide * below + abs((above << -unit) - middle * below)
+    return text, ratio_text(off, below << -unit, _RADIUS_DIGITS, ROUND_CEILING)
 
 
 @whole_evaluation

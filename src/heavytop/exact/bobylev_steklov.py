@@ -22,13 +22,16 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass
-from heavytop.exact.balls import ball
-from heavytop.exact.closed_form import ClosedForm, balls, half_angle, instant, sign
+from heavytop.exact.balls import ball, to_bits
+from heavytop.exact.bobylev_steklov_attitude import carried, prepared_axis
+from heavytop.exact.closed_form import ClosedForm, balls, half_angle, instant, rotate, series_length, sign
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
-from heavytop.exact.motion import kept
+from heavytop.exact.lagrange import across
+from heavytop.exact.motion import initial_xi, kept
+from heavytop.exact.quartic import Companions, PreparedMotion
 from heavytop.precision import shown
 from heavytop.top.equations import heavy_top
-from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
+from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +62,36 @@ class BobylevSteklov(ClosedForm):
         if lattice is None:
             return balls(self.start.flat)
         x, slope = lattice.motion(instant(time))
-        p, top, bend, across, up = lattice.shares
-        return [p, arb(0), x, top + bend * (x * x), across * slope, up * x]
+        p, top, bend, side, up = lattice.shares
+        return [p, arb(0), x, top + bend * (x * x), side * slope, up * x]
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 ``initial_xi`` of γ.
+
+        Raises InputError for γ = 0.
+        """
+
+        def evaluate(_working: int) -> list[arb]:
+            start, gamma = initial_xi(self.start.gamma), self.start.gamma
+            basis = across(gamma)
+            exact, unit = balls(basis), [g / ball(dot(gamma, gamma)).sqrt() for g in balls(gamma)]
+            norm = ball(dot(basis, basis))
+            cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
+            first, second = self._carried(basis, time)
+            return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
+
+        return to_bits(evaluate, bits, time, 2)
+
+    def _carried(self, basis: Vector, time: Fraction) -> tuple[list[arb], list[arb]]:
+        """The vector :func:`across` γ, fixed in space, and γ × it/|γ| at ``time``."""
+        with series_length(1):
+            gamma = self.evaluate(time)[3:]
+        rate = self.start.omega[0]
+        if _lattice(self) is None or rate == 0:
+            first = rotate(balls(basis), self.start.omega, ball(time)) if rate else balls(basis)
+            size = dot(gamma, gamma).sqrt()
+            return first, list(cross([g / size for g in gamma], first))
+        return carried(*_axis(self), time, ball(rate), gamma)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +152,12 @@ def _lattice(case: BobylevSteklov) -> _Lattice | None:
     steep = -amplitude * rate * (1 if crossing else functions.parameter)
     shares = ball(p), ball(h / n1), ball(-i3 / (2 * n1)), ball(-i3 / n1), ball(i3 * p / n1)
     return _Lattice(functions, rate, sign(-speed) * side * origin, amplitude, steep, crossing, shares)
+
+
+@kept
+def _axis(case: BobylevSteklov) -> tuple[PreparedMotion, Companions]:
+    """What does not depend on the time in the attitude."""
+    return prepared_axis(case.top, case.start, across(case.start.gamma))
 
 
 def bobylev_steklov_motion(

@@ -35,10 +35,13 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import NotInClass
+from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, WithAngles, balls, constant, instant, series_length, tanh_sech
+from heavytop.exact.delone_attitude import DeloneAzimuth
 from heavytop.exact.flint_context import current_length
-from heavytop.exact.motion import kept
+from heavytop.exact.kovalevskaya_level import Level
+from heavytop.exact.motion import initial_xi, kept
 from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP
@@ -47,7 +50,7 @@ from heavytop.top.integrals import kovalevskaya_xi
 
 
 @dataclass(frozen=True, slots=True)
-class Delone(ClosedForm):
+class Delone(WithBearing, ClosedForm):
     """Every motion of the Delone class with the small moment on axis 3.
 
     Raises NotInClass unless I1 = I2 = 2 I3, P c = 0, P r ≠ 0 and ξ = 0, exactly.
@@ -92,6 +95,12 @@ class Delone(ClosedForm):
         ]
         return state if length > 1 else [constant(part) for part in state]
 
+    def bearing(self, time: Fraction) -> Bearing:
+        """See :class:`heavytop.exact.azimuth.WithBearing`: not on the degenerate levels, nor very near them."""
+        azimuth = _azimuth(self)
+        with series_length(1):
+            return azimuth.bearing(time, self.evaluate(time))
+
     def _turn(self, time: Fraction) -> tuple[Any, Any]:
         """cos b and sin b/|n|."""
         motion, (square, *_) = _prepared(self)
@@ -122,6 +131,12 @@ def _prepared(case: Delone) -> tuple[PreparedMotion, list[arb]]:
     )
     quartic = tuple(c / (4 * square) for c in coefficients)
     return QuarticMotion(quartic, Fraction(0), -across / (2 * square)).prepared(), balls(_constants(case))
+
+
+@kept
+def _azimuth(case: Delone) -> DeloneAzimuth:
+    initial_xi(case.start.gamma)  # raises InputError for γ = 0
+    return DeloneAzimuth.of(Level.of(case.top, case.start))
 
 
 @dataclass(frozen=True, slots=True)

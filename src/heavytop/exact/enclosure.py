@@ -95,7 +95,8 @@ class Step:
 
     series: the polynomial, in whole ulps of 2^-precision.  variation: V̂ by powers of τ.
     powers: an upper bound of Σ |V̂_n|.
-    variation_error: bound of |V − V̂|.  local: bound of |v| in ulps 2^errors.exponent.  widest: W, as a number.
+    variation_error: bound of |V − V̂|.  local: bound of |v| in ulps 2^errors.exponent.  widest: W, as a number;
+    widest_ulps: the same in ulps 2^errors.exponent.
     """
 
     node: Node
@@ -106,6 +107,7 @@ class Step:
     variation_error: float
     local: float
     widest: float
+    widest_ulps: float
 
     @property
     def length(self) -> Fraction:
@@ -123,7 +125,7 @@ class Step:
         return self.series.values
 
     @property
-    def _summed_error(self) -> float:
+    def summed_error(self) -> float:
         """|V − V̂| with the rounding of the sum that V̂ is evaluated by."""
         return self.variation_error + 8 * _VARIATIONAL_ORDER * _UNIT * self.powers
 
@@ -133,11 +135,11 @@ class Step:
 
     def radii(self, tau: Fraction) -> Matrix:
         """Bounds of the errors at 0 ≤ τ ≤ 1, in ulps 2^errors.exponent; in binary64, without FLINT."""
-        slack = self._summed_error
+        slack = self.summed_error
         variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(self.variation))
         errors = self.node.errors
         # the second term: the rounding of the product below
-        spread = (slack + 64 * _UNIT * self.powers) * _norm(errors.frame) * _UP
+        spread = (slack + 64 * _UNIT * self.powers) * norm(errors.frame) * _UP
         return np.asarray(errors.sizes(variation @ errors.frame, spread) + self.local)
 
     def around(self, tau: Fraction, radii: Matrix) -> list[arb]:
@@ -147,15 +149,18 @@ class Step:
         unit = arb(2) ** -self.precision
         scale = arb(2) ** self.node.errors.exponent
         return [
-            arb(fmpz(int(_horner(component, tau))) * unit, (arb(float(r * _UP)) * scale + rounding).upper() * unit)
+            arb(fmpz(int(horner(component, tau))) * unit, (arb(float(r * _UP)) * scale + rounding).upper() * unit)
             for component, r in zip(self.coefficients, radii, strict=True)
         ]
 
-    def end(self) -> Node:
-        """The node at τ = 1: Σ b_n exactly, and the set of errors in a new frame."""
+    def transfer(self) -> tuple[Matrix, Matrix, float]:
+        """(Q', T, η): the frame at τ = 1, T = Q'^T V̂ Q and a bound of |Q'^-1 V Q − T|; η also bounds |Q'^-1 − Q'^T|."""
+        return _new_frame(self.variation.sum(axis=0), self.summed_error, self.node.errors)
+
+    def end(self, transfer: tuple[Matrix, Matrix, float] | None = None) -> Node:
+        """The node at τ = 1: Σ b_n exactly, and the set of errors in a new frame, that of :meth:`transfer`."""
         errors = self.node.errors
-        variation = self.variation.sum(axis=0)
-        frame, turned, slack = _new_frame(variation, self._summed_error, errors)
+        frame, turned, slack = transfer or self.transfer()
         radii = Errors(turned, errors.radii, 0).sizes(slack=slack)
         reach = np.abs(frame.T).sum(axis=1) + slack
         radii = (radii + reach * self.local) * _UP
@@ -169,10 +174,11 @@ class Step:
         (few, many), wanted = self.series.thrifty, self.order / (self.precision + 16)
         if wanted > many:
             return self.node.halvings + 1
-        return self.node.halvings - int(wanted < few and _norm(self.variation[1]) < _LARGEST_SLOPE / 2)
+        return self.node.halvings - int(wanted < few and norm(self.variation[1]) < _LARGEST_SLOPE / 2)
 
 
-def _horner(coefficients: list[int], tau: Fraction) -> mpz:
+def horner(coefficients: list[int], tau: Fraction) -> mpz:
+    """The polynomial at 0 ≤ τ ≤ 1, within half a unit an order; exactly at 1."""
     if tau == 1:
         return mpz(sum(coefficients))
     total = mpz(0)
@@ -189,9 +195,9 @@ def _new_frame(variation: Matrix, variation_error: float, errors: Errors) -> tup
     order = np.argsort(-np.sqrt((carried * carried).sum(axis=0)) * errors.radii, kind="stable")
     frame = np.linalg.qr(carried[:, order])[0]
     rounding = 2 * (size + 4) * _UNIT
-    transposed, before = _norm(frame.T), _norm(errors.frame)
-    product = (_norm(variation) + variation_error) * before
-    off = _norm(frame.T @ frame - _identity(size)) + rounding * transposed * size
+    transposed, before = norm(frame.T), norm(errors.frame)
+    product = (norm(variation) + variation_error) * before
+    off = norm(frame.T @ frame - _identity(size)) + rounding * transposed * size
     # (1 + F)^-1 differs from 1 by at most |F|/(1 − |F|)
     inverse = off / (1 - off) * transposed if off < 1 else inf
     slack = inverse * product + transposed * before * variation_error + 3 * rounding * transposed * product
@@ -203,7 +209,7 @@ def _identity(size: int) -> Matrix:
     return np.eye(size)
 
 
-def _norm(matrix: Matrix) -> float:
+def norm(matrix: Matrix) -> float:
     """The largest row sum of absolute values."""
     return float(max(np.add.reduce(np.abs(matrix), 1).tolist()))
 
@@ -241,7 +247,7 @@ def step(field: Quadratic, node: Node, precision: int, carrier: Carrier | None =
     halvings = node.halvings
     while halvings < node.halvings + 64:
         trial = Node(node.time, node.centre, node.errors, halvings)
-        series = _series(field, trial, precision, carrier)
+        series = taylor_series(field, trial, precision, carrier)
         found = None if series is None else _prove(field, trial, series, precision)
         if found is not None and isfinite(found.widest) and found.variation_error < CAP:
             return found if found.widest < CAP else None
@@ -249,7 +255,8 @@ def step(field: Quadratic, node: Node, precision: int, carrier: Carrier | None =
     return None
 
 
-def _series(field: Quadratic, node: Node, precision: int, carrier: Carrier | None) -> StepSeries | None:
+def taylor_series(field: Quadratic, node: Node, precision: int, carrier: Carrier | None) -> StepSeries | None:
+    """The polynomial from a node, over its own step; None where that is too long for it."""
     if carrier is not None:
         return carrier.series(node.centre, node.halvings)
     values = coefficients(field, node.centre, precision, node.halvings)
@@ -265,7 +272,7 @@ def _prove(field: Quadratic, node: Node, series: StepSeries, precision: int) -> 
         return None
     factor = exp(growth) * _UP
     scale = node.errors.exponent
-    defect = _defect(series, precision, h * q, h * slope)
+    defect = defect_bound(series, precision, h * q, h * slope)
     # what the field itself lacks: |y' − f(y)| on the true motion
     lacking, exponent = field.slack
     defect = np.ldexp(defect, -scale) + np.ldexp(h * lacking * _UP, exponent + precision - scale) + _TINY
@@ -274,10 +281,10 @@ def _prove(field: Quadratic, node: Node, series: StepSeries, precision: int) -> 
     square = np.ldexp(h * q * bound * bound, max(scale - precision, -2000)) + _TINY
     local = float(factor * (defect + square) * _UP)
     widest = float(np.ldexp(bound, min(scale - precision, 900)))
-    return Step(node, precision, series, variation, powers, factor * variation_error * _UP, local, widest)
+    return Step(node, precision, series, variation, powers, factor * variation_error * _UP, local, widest, bound)
 
 
-def _defect(series: StepSeries, precision: int, quadratic: float, linear: float) -> float:
+def defect_bound(series: StepSeries, precision: int, quadratic: float, linear: float) -> float:
     """D of (a) in ulps; ``quadratic`` and ``linear`` are h q and h l.
 
     β_n is multiplied by 2^(rate n), so that binary64 holds it at any precision.

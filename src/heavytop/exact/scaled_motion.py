@@ -15,7 +15,7 @@ from heavytop.top.equations import Parameters, System
 from heavytop.words import fixed
 from heavytop.words.digits import grid_of
 from heavytop.words.kernels import Grid
-from heavytop.words.lanes import rates
+from heavytop.words.lanes import coefficients, rates
 from heavytop.words.proven import Carrier
 from heavytop.words.scaled import Scaled
 
@@ -45,11 +45,20 @@ class ScaledMotion:
     @classmethod
     def of(cls, system: System, p: Parameters, y: tuple[Fraction, ...], forwards: bool) -> ScaledMotion:
         """The motion of (Ω, γ), or of (Ω, γ, ξ), from ``y``."""
-        scaled = Scaled.of(system, p, y, bounded=True)
+        return cls._in_units(Scaled.of(system, p, y, bounded=True), p, forwards)
+
+    def with_parameters(self, p: Parameters) -> ScaledMotion:
+        """Of the same state in the same units, another field's."""
+        scaled = self.scaled
+        given = coefficients(scaled.system, p, len(scaled.state) == 9)
         unit, gamma = scaled.rate, scaled.sizes[3]
-        own = p.mapped(lambda value: Fraction(value) / unit)._replace(
-            inertia=p.inertia, moment=tuple(gamma * n / unit**2 for n in p.moment)
-        )
+        linear = given.with_linear(gamma / unit**2, 1 / unit)
+        return self._in_units(dataclasses.replace(scaled, coefficients=linear), p, self.forwards)
+
+    @classmethod
+    def _in_units(cls, scaled: Scaled, p: Parameters, forwards: bool) -> ScaledMotion:
+        system, size = scaled.system, len(scaled.state)
+        own = own_parameters(scaled, p)
         sign = 1 if forwards else -1
 
         def given(state: tuple[Any, ...]) -> list[Any]:
@@ -61,10 +70,10 @@ class ScaledMotion:
         def by_lanes(state: tuple[Any, ...]) -> list[Any]:
             return [sign * rate for rate in rates(system, scaled.coefficients, state)]
 
-        motion = quadratic(given, len(y))
+        motion = quadratic(given, size)
         in_words = not scaled.rest and fixed.excess(scaled) <= _LARGEST_EXCESS
         if in_words:
-            planned = quadratic(by_lanes, len(y))
+            planned = quadratic(by_lanes, size)
             in_words = (planned.pairs, planned.rows) == (motion.pairs, motion.rows)
         return cls(scaled, motion, forwards, in_words)
 
@@ -105,6 +114,14 @@ class ScaledMotion:
                     )
                 _seen_right.add(key)
                 return
+
+
+def own_parameters(scaled: Scaled, p: Parameters) -> Parameters:
+    """``p`` in the units of a scaled motion."""
+    unit, gamma = scaled.rate, scaled.sizes[3]
+    return p.mapped(lambda value: Fraction(value) / unit)._replace(
+        inertia=p.inertia, moment=tuple(gamma * n / unit**2 for n in p.moment)
+    )
 
 
 def _ladder(bits: float) -> int:

@@ -18,6 +18,7 @@ time, so that t = 10,000 would need some 1,900 bits, more than there are words f
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import inf, log10
@@ -26,7 +27,7 @@ from flint import arb, arb_series
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, relative_bits, working_precision
-from heavytop.exact.enclosure import Step, coefficient_bound, start_node
+from heavytop.exact.enclosure import Step, coefficient_bound, start_node, step
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.exact.quadratic import Matrix
 from heavytop.exact.runs import FAR, Ahead, Pilot, Run
@@ -59,7 +60,7 @@ _LARGEST_RATE = 2**100
 _ATTEMPTS = 6
 
 
-def _seconds_a_step(precision: int, in_words: bool) -> float:
+def seconds_a_step(precision: int, in_words: bool) -> float:
     """A model of the cost, not a measurement: what is refused must not depend on how busy the machine is."""
     return 4e-4 + 1.2e-11 * precision**3 if in_words else 1e-3 + 6e-8 * precision**2
 
@@ -128,6 +129,22 @@ class Validated:
         latest = next(reversed(list(self._runs.values())), None)
         return Fraction(0) if latest is None else latest.nodes[-1].time / Fraction(2) ** self.unit
 
+    def walk(self, time: Fraction, bits: int) -> tuple[ScaledMotion, Iterator[Step]]:
+        """The units of the motion, and its proven steps from t = 0 until one covers ``time``, which is not 0.
+
+        Their working precision is that at which ``bits`` bits are expected to be left at ``time``; they end before it
+        where the errors grow too large.  Raises OutOfReach as :meth:`state` does.
+        """
+        direction = 1 if time > 0 else -1
+        motion = self._motion(direction, self.start.flat)
+        span = abs(time) * motion.scaled.rate
+        loss, steps = self._forecast(direction, span, self.start.flat, bits)
+        planned = motion.precision(bits + loss, steps)
+        if steps * seconds_a_step(*planned) > self.effort:
+            raise self._refusal(time, self._reachable(time, bits, loss, self.start.flat))
+        run = self._run(direction, self.start.flat, *planned)
+        return motion, _steps_of(run, span)
+
     def attitude(self, time: Fraction, bits: int) -> list[arb]:
         """ξ: three balls.  Raises InputError where |γ| is not 1 exactly and no ``xi`` was given."""
         return self.with_attitude(time, bits)[6:]
@@ -164,6 +181,16 @@ class Validated:
                 for component, size in zip(y, sizes, strict=True)
             ]
 
+    def motion(self, direction: int) -> ScaledMotion:
+        """That of (Ω, γ) in units of its own, forwards or backwards in time."""
+        return self._motion(direction, self.start.flat)
+
+    def forecast(self, time: Fraction, bits: int) -> tuple[float, float]:
+        """(bits that will be lost, steps that will be taken) up to ``time``, where ``bits`` are to be left."""
+        direction = 1 if time > 0 else -1
+        span = abs(time) * self.motion(direction).scaled.rate
+        return self._forecast(direction, span, self.start.flat, bits)
+
     def _motion(self, direction: int, start: tuple[Fraction, ...]) -> ScaledMotion:
         """That of ``start``: of y, or of y and ξ."""
         key = (direction, len(start))
@@ -196,7 +223,7 @@ class Validated:
         run = pilot.run if pilot.reaches(span, bits) else None
         for _ in range(_ATTEMPTS):
             planned = motion.precision(bits + loss, steps)
-            if steps * _seconds_a_step(*planned) > self.effort:
+            if steps * seconds_a_step(*planned) > self.effort:
                 raise self._refusal(time, self._reachable(time, bits, loss, start))
             run = run or self._run(direction, start, *planned)
             found = run.at(span)
@@ -230,11 +257,11 @@ class Validated:
         """(bits that will be lost, steps that will be taken) up to ``span``, where ``bits`` are to be left."""
         pilot = self._pilot(direction, start, bits)
         if most is None:
-            a_step = _seconds_a_step(pilot.run.precision, pilot.run.carrier is not None)
+            a_step = seconds_a_step(pilot.run.precision, pilot.run.carrier is not None)
             return pilot.forecast(span, _HOPELESS * self.effort / a_step)
         # the enclosure may take fewer bits than its pilot
         fewest = self._motion(direction, start).precision(bits, inf)
-        return pilot.forecast(span, _SURELY * most / _seconds_a_step(*fewest))
+        return pilot.forecast(span, _SURELY * most / seconds_a_step(*fewest))
 
     def _cost(
         self, time: Fraction, bits: int, start: tuple[Fraction, ...], loss: float = 0.0, most: float | None = None
@@ -243,7 +270,7 @@ class Validated:
         direction = 1 if time > 0 else -1
         motion = self._motion(direction, start)
         forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits, most)
-        return steps * _seconds_a_step(*motion.precision(bits + max(loss, forecast), steps))
+        return steps * seconds_a_step(*motion.precision(bits + max(loss, forecast), steps))
 
     def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:
         """Fewer bits than ``bits``, within the effort."""
@@ -262,6 +289,17 @@ class Validated:
             f"So many digits at t = {at} are out of reach of a validated integration.",
             f"About {digits} digits could be proven there: ask for fewer, or for an earlier time.",
         )
+
+
+def _steps_of(run: Run, span: Fraction) -> Iterator[Step]:
+    node = run.nodes[0]
+    while node.time < span:
+        found = step(run.motion, node, run.precision, run.carrier)
+        if found is None:
+            return
+        yield found
+        node = found.end()
+        run.keep(node)
 
 
 @whole_evaluation

@@ -99,11 +99,11 @@ def _columns(run: Trajectory, attitude: Any, output: Output) -> NDArray[np.float
         tuple(part.astype(float).T) for part in (run.states[:, :3], run.states[:, 3:6], attitude[:, :3])
     )
     if output.name == "quaternion":
-        products = numpy.array(quaternion_products(rows_of(gamma, xi)))
-        largest = products[range(4), range(4)].argmax(axis=0)
-        multiples = products[largest, :, numpy.arange(len(largest))]
-        found: NDArray[np.float64] = multiples / numpy.linalg.norm(multiples, axis=1)[:, None]
-        return found
+        products = quaternion_products(rows_of(gamma, xi))
+        largest = numpy.argmax([products[place][place] for place in range(4)], axis=0)
+        multiples = [numpy.choose(largest, column) for column in products]
+        length = numpy.sqrt(sum(part * part for part in multiples))
+        return numpy.stack([part / length for part in multiples], axis=1)
     values = output.at(omega, gamma, xi, _centre(run, output), lib, float)
     found = numpy.stack([numpy.broadcast_to(value, omega[0].shape) for value in values], axis=1)
     if output.name == "euler":

@@ -20,6 +20,8 @@ from heavytop.precision import Precision, number
 
 CHUNK_SECONDS = 0.25
 _ON_A_GRID = ("double", "extended", "quad")
+_FIRST_PART, _PART = 256, 0.9
+"""Steps that are taken to guess how many there will be, and which part of what is left is then taken at once."""
 _MANY, _CLOSE = 256, 20
 """States at so many times, of which so many steps lie between two at most, are computed in one call of heyoka."""
 
@@ -159,24 +161,56 @@ def dense(engine: Any, targets: Sequence[Any], precision: Precision) -> bool:
 def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: int | None) -> tuple[int, Any] | None:
     """Steps taken from t = 0 to the last of ``targets``, and the states at all of them, an array of shape (n, 6 or 9).
 
-    The same bits as :class:`Stepper`, in one call of heyoka.  The grid goes on to a time beyond every other, so that no
-    step is cut; the run is stopped behind the step that covers the last target.  None for a run that ends otherwise, or
-    takes more than ``most`` steps: then the engine is anywhere.
+    The same bits as :class:`Stepper`, in few calls of heyoka.  The grid goes on to a time beyond every other, so that
+    no step is cut; the run is stopped behind the step that covers the last target.  None for a run that ends otherwise,
+    or takes more than ``most`` steps: then the engine is anywhere.
+    """
+    state, time = engine.state.copy(), engine.dtime
+    found = _in_parts(engine, targets, precision, most, _FIRST_PART)
+    if found is None and most is None:
+        engine.state[:], engine.dtime = state, time
+        found = _in_parts(engine, targets, precision, most, 0)
+    return found
+
+
+def _in_parts(
+    engine: Any, targets: Sequence[Any], precision: Precision, most: int | None, first: int
+) -> tuple[int, Any] | None:
+    """:func:`on_a_grid`: ``first`` steps, most of the others by what these say of their number, and the last with a
+    look at each, which costs as much as the step.  None where there were fewer than was guessed.
     """
     sign, end = (1 if targets[-1] >= 0 else -1), far(bool(targets[-1] >= 0), precision)
-    reached, last = sign * engine.time, sign * targets[-1]
+    last = sign * targets[-1]
+    left, reached = numpy.array(targets), sign * engine.time
+    parts, taken, count = ([engine.state.copy()[None]], 0, first) if targets[0] == 0 else ([], 0, first)
+    left = left[len(parts) :]
 
     def goes_on(stepped: Any) -> bool:
         nonlocal reached
         before, reached = reached, sign * stepped.time
         return bool(before < reached < last)
 
-    start = [] if targets[0] == 0 else [engine.time]
-    grid = numpy.concatenate([numpy.array([*start, targets[0]]), numpy.array(targets[1:]), numpy.array([end])])
-    _, _, _, steps, _, states = engine.propagate_grid(grid, callback=goes_on, max_steps=most or 0)
-    if len(states) != len(grid) - 1 or not numpy.isfinite(states[-1]).all():
-        return None
-    return steps, states[len(start) :]
+    while len(left):
+        reached = sign * engine.time
+        grid = numpy.concatenate([numpy.array([engine.time]), left, numpy.array([end])])
+        room = 0 if most is None else most - taken
+        if room < 0 or (most is not None and room == 0):
+            return None
+        if count:
+            _, _, _, steps, _, states = engine.propagate_grid(grid, max_steps=min(count, room or count))
+            if sign * engine.time >= last:
+                return None
+        else:
+            _, _, _, steps, _, states = engine.propagate_grid(grid, callback=goes_on, max_steps=room)
+            if len(states) != len(grid) - 1:
+                return None
+        if not steps or not numpy.isfinite(states[-1]).all():
+            return None
+        parts.append(states[1:])
+        left, taken = left[len(states) - 1 :], taken + steps
+        guess = _PART * float((last - sign * engine.time) * taken / abs(engine.time))
+        count = int(guess) if count and guess > first else 0
+    return taken, numpy.concatenate(parts)
 
 
 def far(forwards: bool, precision: Precision) -> Any:

@@ -10,12 +10,12 @@ from fractions import Fraction
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from heavytop.display import Lines, Table, Tabular
+from heavytop.display import Lines, Table, Tabular, path_picture
 from heavytop.errors import InputError
 from heavytop.precision import Precision, decimal_text, exact, native, native_text, number, rounded
 from heavytop.top.bodies import Frame
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import HeavyTop, State, cross
 from heavytop.top.integrals import Integral, holding
 from heavytop.top.outputs import Output, output
 
@@ -307,6 +307,16 @@ class Trajectory(Tabular):
             return f"the motion itself amplifies roundings: all {digits} digits are lost before t = {until}"
         by = f"by 1e{lost:.0f} until t = {until}: {lost:.0f} of {digits} digits are lost"
         return f"the motion itself amplifies roundings {by}"
+
+    def _repr_html_(self) -> str:
+        states, carried = self.states, self.states.shape[1:] == (9,)
+
+        def point(place: int) -> Any:
+            gamma, xi = states[place][3:6], states[place][6:]
+            return (xi[2], cross(gamma, xi)[2], gamma[2]) if carried else gamma
+
+        what = "axis 3 in space" if carried else "γ, the vertical in body axes"
+        return self._table().html() + path_picture(len(states), point, f"{what}, on the unit sphere")
 
     def _table(self) -> Table:
         precision = self.problem.precision

@@ -40,7 +40,7 @@ from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import computed_row
 from heavytop.suite.sampling import positive, uniform
 from heavytop.suite.task import FINEST, Task, computed
-from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import State
 
 NAME = "work_precision"
@@ -165,7 +165,7 @@ class WorkPrecision(Kind):
         metrics = _metrics(scorer, bool(sampled.times))
         seconds, alone = self._timed(task, integrate, sampled, _error(scorer))
         done = alone.outcome is Outcome.SUCCESS and sampled.outcome is Outcome.SUCCESS
-        if case.system is HEAVY_TOP:
+        if case.system is not GYROSTAT:
             metrics[RETURN] = _returned(problem, alone, integrate) if done else _missing()
         if not done:
             metrics[ERROR_FINAL] = _missing()

@@ -302,7 +302,8 @@ def _sizes(given: Suspect) -> dict[str, tuple[float, Fraction]]:
     """What the integrals that are looked at may be, and their units."""
     p = given.system.parameters(given.top, given.start)
     inertia, moment = max(map(float, p.inertia)), max(abs(float(value)) for value in p.moment)
-    area, energy = inertia * given.rate, inertia * given.rate**2 + moment
+    rotor = max(abs(float(value)) for value in given.top.rotor or (0,))
+    area, energy = inertia * given.rate + rotor, inertia * given.rate**2 + moment
     area_unit, energy_unit = given.units.moment * given.units.time, given.units.moment
     return {
         "gamma_squared": (1.0, Fraction(1)),

@@ -17,7 +17,7 @@ from heavytop.integrate.peers.source import Source
 from heavytop.integrate.taylor import Observer
 from heavytop.integrate.trajectory import Problem, TaylorStep, Trajectory
 from heavytop.precision import Precision
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 HEYOKA, MULTIWORD = "heyoka", "multiword"
@@ -146,7 +146,7 @@ class Integrator:
 
 def _given(problem: Problem) -> tuple[HeavyTop, State]:
     """A top and a start that round to ``problem``; raises PeerFailed for a gyrostat that is off its exact data."""
-    if problem.system is HEAVY_TOP:
+    if problem.system is not GYROSTAT:
         return problem.top, problem.start
     if problem.given is None or Problem.of(*problem.given, problem.precision, problem.system) != problem:
         raise PeerFailed("A gyrostat off its exact data is integrated side by side only, by heyoka and multiword")

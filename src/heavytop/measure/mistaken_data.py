@@ -54,27 +54,31 @@ Found = tuple[Data, float]
 def without_numbers(given: Suspect) -> Iterator[Found]:
     """Suppositions that need no fitted number, the likeliest first."""
     top, start = given.top, given.start
-    yield _tried(given, "weight_sign", HeavyTop(top.inertia, -top.weight, top.centre))
+    yield _tried(given, "weight_sign", replace(top, weight=-top.weight))
     yield _tried(given, "start_gamma_sign", start=State(start.omega, [-g for g in start.gamma]))
     yield _tried(given, "start_omega_sign", start=State([-w for w in start.omega], start.gamma))
-    momentum = State([w / i for w, i in zip(start.omega, top.inertia, strict=True)], start.gamma)
+    k = top.rotor or (Fraction(0),) * 3
+    momentum = State([(w - r) / i for w, i, r in zip(start.omega, top.inertia, k, strict=True)], start.gamma)
     yield _tried(given, "start_momentum", start=momentum)
     yield _as_momentum(given, momentum)
     for unit, factor in UNITS_OF_OMEGA.items():
         yield Data(f"all_in_{unit}"), _all_times(given, factor)
-    other = HEAVY_TOP if given.system is GYROSTAT else GYROSTAT
-    yield _tried(replace(given, system=other), "system")
+    other = GYROSTAT if given.system is HEAVY_TOP else HEAVY_TOP
+    yield _tried(replace(given, system=other), "system", None if top.rotor is None else replace(top, rotor=None))
+    if top.rotor is not None:
+        yield _tried(given, "rotor_sign", HeavyTop(top.inertia, top.weight, top.centre, [-part for part in top.rotor]))
     for a, b, c in list(permutations(range(3)))[1:]:
         axes = (("axes", f"{a + 1}{b + 1}{c + 1}"),)
         inertia = [top.inertia[i] for i in (a, b, c)]
         centre = [top.centre[i] for i in (a, b, c)]
-        yield _tried(given, "inertia_axes", HeavyTop(inertia, top.weight, top.centre), numbers=axes)
-        yield _tried(given, "centre_axes", HeavyTop(top.inertia, top.weight, centre), numbers=axes)
-        yield _tried(given, "top_axes", HeavyTop(inertia, top.weight, centre), numbers=axes)
+        rotor = None if top.rotor is None else [top.rotor[i] for i in (a, b, c)]
+        yield _tried(given, "inertia_axes", HeavyTop(inertia, top.weight, top.centre, top.rotor), numbers=axes)
+        yield _tried(given, "centre_axes", HeavyTop(top.inertia, top.weight, centre, top.rotor), numbers=axes)
+        yield _tried(given, "top_axes", HeavyTop(inertia, top.weight, centre, rotor), numbers=axes)
     for signs in list(product((1, -1), repeat=3))[1:-1]:
         centre = [s * r for s, r in zip(signs, top.centre, strict=True)]
         numbers = (("centre", ", ".join(map(str, centre))),)
-        yield _tried(given, "centre_signs", HeavyTop(top.inertia, top.weight, centre), numbers=numbers)
+        yield _tried(given, "centre_signs", HeavyTop(top.inertia, top.weight, centre, top.rotor), numbers=numbers)
 
 
 def _tried(
@@ -84,7 +88,8 @@ def _tried(
     start: State | None = None,
     numbers: tuple[tuple[str, str], ...] = (),
 ) -> Found:
-    same = (top or given.top).moment == given.top.moment and (top or given.top).inertia == given.top.inertia
+    tops = (top or given.top, given.top)
+    same = all(getattr(tops[0], part) == getattr(tops[1], part) for part in ("moment", "inertia", "rotor"))
     if same and (start is None or start == given.start) and kind != "system":
         return Data(kind), float("inf")
     return Data(kind, numbers), given.error(given.supposed(given.times, top, start))
@@ -94,7 +99,8 @@ def _as_momentum(given: Suspect, start: State) -> Found:
     """Start and states give M in place of Ω."""
     truth = given.supposed(given.times, start=start)
     if truth is not None:
-        truth = truth * numpy.array([*map(float, given.top.inertia), 1, 1, 1])
+        rotor = numpy.array([*map(float, given.top.rotor or (0, 0, 0)), 0, 0, 0])
+        truth = truth * numpy.array([*map(float, given.top.inertia), 1, 1, 1]) + rotor
     return Data("all_momentum"), given.error(truth)
 
 
@@ -235,7 +241,7 @@ def _scaled(direction: Array, before: Sequence[Fraction], near: float) -> list[F
 def _with(given: Suspect, inertia: Sequence[Fraction], moment: Sequence[Fraction]) -> float:
     """The error with that top."""
     try:
-        top = HeavyTop(inertia, 1, moment)
+        top = HeavyTop(inertia, 1, moment, given.top.rotor)
     except InputError:  # a moment that is not positive
         return float("inf")
     return given.error(given.supposed(given.times, top))

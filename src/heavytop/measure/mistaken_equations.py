@@ -14,7 +14,7 @@ import numpy
 from heavytop.measure.mistaken_states import constant_column
 from heavytop.measure.suspects import Array, Suspect
 from heavytop.top.equations import HEAVY_TOP, NAMES, Parameters, System, heavy_top
-from heavytop.top.heavy_top import HeavyTop, State, cross
+from heavytop.top.heavy_top import State, cross
 
 Found = tuple[str, dict[str, str], float]
 """Kind, numbers, and the error that is left."""
@@ -46,7 +46,7 @@ def _signs(given: Suspect) -> Iterator[Found]:
     """
     top, start = given.top, given.start
     lifted, reversed_start = (
-        HeavyTop(top.inertia, -top.weight, top.centre),
+        replace(top, weight=-top.weight),
         State([-w for w in start.omega], start.gamma),
     )
     other = replace(given, system=_TURNED_BACK)

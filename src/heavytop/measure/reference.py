@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import msgspec
 
-from heavytop.display import Table, Tabular
+from heavytop.display import Table, Tabular, path_picture
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.exact.balls import radius_text, value_text, working_precision
 from heavytop.exact.bodies import BodyMotion
@@ -20,6 +20,7 @@ from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
 from heavytop.measure import reference_outputs as outputs_of
 from heavytop.measure.certify import bits_of
+from heavytop.measure.derivatives import DerivativeBall, Derivatives, known_derivatives
 from heavytop.measure.reference_outputs import GUARD_BITS, KnownMotion
 from heavytop.measure.setup import motion_texts, xi_texts
 from heavytop.precision import decimal_text, exact, shown
@@ -35,7 +36,9 @@ if TYPE_CHECKING:
 
 DIGITS = range(1, 20001)
 _SHOWN = 15
-"""Digits of a value in a table; all of them are in :meth:`Reference.texts`."""
+"""Up to so many digits the components of a state stand beside each other in a table."""
+_WIDE, _ENDS = 52, 2
+"""Characters of a number in a row, and times at either end that are shown of many."""
 
 Finder = Callable[[HeavyTop, State, System], ExactSolution]
 Evaluate = Callable[[Fraction, int], Sequence[Any]]
@@ -55,6 +58,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
     :func:`heavytop.top.angles.perpendicular` of γ; attitude_method: how it is known; xi: ξ at t = 0.
     inertia, weight, centre, rotor, omega, gamma: the data, exactly.
+    derivatives: on request, with respect to the start and the data.
     """
 
     method: str
@@ -64,6 +68,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     system: str
     attitude: list[list[Ball]] | None = None
     attitude_method: str | None = None
+    derivatives: Derivatives | None = None
     inertia: list[str] | None = None
     weight: str | None = None
     centre: list[str] | None = None
@@ -187,19 +192,71 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
         """The radii rounded up to double, shape (n, 6): they stay upper bounds, and none but 0 becomes 0."""
         import numpy
 
-        return numpy.array([[_rounded_up(ball.radius) for ball in state] for state in self.states])
+        return numpy.array([[rounded_up(ball.radius) for ball in state] for state in self.states])
+
+    def _repr_html_(self) -> str:
+        states, caption = self.states, "γ, the vertical in body axes, on the unit sphere"
+        picture = path_picture(len(states), lambda place: [ball.value for ball in states[place][3:6]], caption)
+        return self._table().html() + picture
+
+    def derivatives_numpy(self) -> NDArray[np.float64] | dict[str, NDArray[np.float64]]:
+        """∂y_i(t)/∂y_j(0) in double, shape (n, 6, 6); where data were asked for, a dict of "start" and "data".
+
+        Raises InputError where none were asked for.
+        """
+        return self._derivatives().numpy()
+
+    def lyapunov(self) -> list[DerivativeBall | None]:
+        """The finite-time Lyapunov exponent at each time, in 1/time unit, with its radius; None at t = 0.
+
+        It is the logarithm of the largest singular value of ∂y(t)/∂y(0) over |t|.  Raises InputError where the
+        derivatives with respect to the start were not asked for.
+        """
+        found = self._derivatives().lyapunov
+        if found is None:
+            raise InputError(
+                "This reference has no derivatives with respect to the start.", 'Ask for derivatives="start" or "all".'
+            )
+        return found
+
+    def _derivatives(self) -> Derivatives:
+        if self.derivatives is None:
+            raise InputError("This reference has no derivatives.", 'Ask for derivatives="start", "data" or "all".')
+        return self.derivatives
 
     def _table(self) -> Table:
         worst = max((Fraction(ball.radius) for state in self.states for ball in state), default=Fraction(0))
+        title = f"{self.system}, known to {self.digits} digits: {self.method}"
+        notes = [f"largest radius {radius_text(worst)}"]
+        if self.xi is not None:
+            notes.append(f"xi(0) = ({', '.join(self.xi)})")
+        if self.digits > _SHOWN:
+            return Table(title, ("t", "", "value", "radius"), self._long_rows(), notes, whole=True)
         rows = [
-            [time, *(decimal_text(Fraction(ball.value), min(_SHOWN, self.digits)) for ball in state)]
+            [time, *(decimal_text(Fraction(ball.value), self.digits) for ball in state)]
             for time, state in zip(self.times, self.states, strict=True)
         ]
-        title = f"{self.system}, known to {self.digits} digits: {self.method}"
-        return Table(title, ("t", *NAMES), rows, [f"largest radius {radius_text(worst)}"])
+        return Table(title, ("t", *NAMES), rows, notes)
+
+    def _long_rows(self) -> list[list[str]]:
+        """All digits, a number a row, which goes on below where it is long; of many times the first and the last."""
+        rows: list[list[str]] = []
+        count = len(self.times)
+        for place, (time, state) in enumerate(zip(self.times, self.states, strict=True)):
+            if count > 2 * _ENDS and _ENDS <= place < count - _ENDS:
+                rows += [[f"... {count - 2 * _ENDS} more", "", "", ""]] if place == _ENDS else []
+                continue
+            for name, ball in zip(NAMES, state, strict=True):
+                parts = [ball.value[i : i + _WIDE] for i in range(0, len(ball.value), _WIDE)]
+                rows.append(
+                    [time if name == NAMES[0] else "", name, parts[0].ljust(_WIDE * (len(parts) > 1)), ball.radius]
+                )
+                rows += [["", "", part.ljust(_WIDE), ""] for part in parts[1:]]
+        return rows
 
 
-def _rounded_up(text: str) -> float:
+def rounded_up(text: str) -> float:
+    """A decimal text as the nearest double that is not less."""
     value = float(text)
     return value if Fraction(value) >= Fraction(text) else math.nextafter(value, math.inf)
 
@@ -212,10 +269,12 @@ def reference(
     system: System = HEAVY_TOP,
     finder: Finder = find,
     attitude: bool = False,
+    derivatives: str | None = None,
 ) -> Reference:
     """The states at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1 and absolute below.
 
-    times: exact numbers in any order.  digits: 1 to 20,000.  attitude: give ξ too.
+    times: exact numbers in any order.  digits: 1 to 20,000.  attitude: give ξ too.  derivatives: "start", "data" or
+    "all" for those too.
     Raises InputError for other digits, for a time that is not a finite rational, and where the system does not admit
     the start; OutOfReach where the digits cannot be proven, and for numbers of more than 9,000 digits.
     """
@@ -224,6 +283,7 @@ def reference(
     instants = [exact(time) for time in times]
     known = BodyMotion(top, start, system, finder)
     require_handy(known.resolved.top, known.resolved.start, instants)
+    derived = None if derivatives is None else known_derivatives(top, start, instants, digits, system, derivatives)
     found = Reference(
         method=known.method,
         digits=digits,
@@ -231,6 +291,7 @@ def reference(
         states=[],
         system=system.name,
         **motion_texts(top, start, digits),
+        derivatives=derived,
     )
     if not attitude:
         states = [ball_texts(known.state, known.method, time, digits) for time in instants]

@@ -25,6 +25,7 @@ GUARD_BITS = 32
 """Bits of a state beyond those asked for: no output loses so many but Euler angles near gimbal lock."""
 _WORKING_BITS = 32
 _ATTEMPTS = 5
+_SMALL = Fraction(1, 10**290)
 UNDEFINED = "nan", "inf"
 """Value and radius of an Euler angle at gimbal lock."""
 
@@ -49,6 +50,7 @@ class KnownMotion:
     ) -> None:
         self.whole, self.times, self.digits, self.method = whole, times, digits, method
         self.centre, self.gamma, self.as_written = centre, gamma, as_written
+        self._unit = dot(gamma, gamma) == 1
         self._kept: dict[int, Sequence[arb]] = {}
         self._signs: list[int] | None = None
 
@@ -66,7 +68,8 @@ class KnownMotion:
         A position is right to the digits relative to |p|, any other number relative to a size above 1.
         Raises OutOfReach where the digits cannot be proven.
         """
-        found = [self._value(place, output) for place in range(len(self.times))]
+        narrow = self._narrow(output)
+        found = [self._value(place, output, narrow) for place in range(len(self.times))]
         if output.name == "quaternion" and found:
             turns = self.signs(found)
             # a ball is negated exactly: the minus sign would round it to FLINT's precision of the moment
@@ -98,13 +101,13 @@ class KnownMotion:
         sign = first_sign(q, Fraction(1, 1 << bits_of(self.digits)))
         return [sign * float(part) for part in q]
 
-    def _value(self, place: int, output: Output) -> list[arb | None]:
+    def _value(self, place: int, output: Output, narrow: float) -> list[arb | None]:
         asked, extra = bits_of(self.digits), GUARD_BITS
         most = 2 * asked + 2 * GUARD_BITS if output.name == "euler" else math.inf
         whole = self.at(place)
         for _ in range(_ATTEMPTS):
             values = self._evaluated(whole, asked + extra, output)
-            lacking = max(self._lacking(value, output) for value in values)
+            lacking = max(self._lacking(value, output, narrow) for value in values)
             if lacking <= 0:
                 return list(values)
             if extra >= most or (output.name == "euler" and self._locked(whole, output)):
@@ -117,7 +120,7 @@ class KnownMotion:
                     raise
                 break
         if output.name == "euler":
-            return [None if self._lacking(value, output) > 0 else value for value in values]
+            return [None if self._lacking(value, output, narrow) > 0 else value for value in values]
         raise OutOfReach(
             f"The {output.name} at t = {shown(self.times[place])} is not known to {self.digits} digits, by "
             f"{self.method}.",
@@ -132,23 +135,36 @@ class KnownMotion:
     @whole_evaluation
     def _evaluated(self, whole: Sequence[arb], bits: int, output: Output) -> list[arb]:
         with working_precision(bits + _WORKING_BITS):
-            length = ball(dot(self.gamma, self.gamma)).sqrt()
-            omega, gamma, xi = whole[:3], [part / length for part in whole[3:6]], whole[6:]
+            omega, gamma, xi = whole[:3], whole[3:6], whole[6:]
+            if not self._unit:
+                length = ball(dot(self.gamma, self.gamma)).sqrt()
+                gamma = [part / length for part in gamma]
             return list(output.at(omega, gamma, xi, self.centre, _BALLS, ball))
 
-    def _lacking(self, value: arb, output: Output) -> float:
-        """Bits by which a ball is too wide; inf where it is not finite."""
+    def _narrow(self, output: Output) -> float:
+        """A radius of a position that is small enough at any rate; 0 where doubles do not tell, and of others."""
+        if output.name != "position":
+            return 0.0
+        size = max(abs(part) for part in (*output.point_of(self.centre), *output.pivot))
+        tenth = Fraction(8, 10 ** (self.digits + 1))
+        return float(size * tenth) if _SMALL < size * tenth < 1 else 0.0
+
+    def _lacking(self, value: arb, output: Output, narrow: float) -> float:
+        """Bits by which a ball is too wide; inf where it is not finite.  narrow: of :meth:`_narrow`."""
         if not value.is_finite():
             return math.inf
         if self.as_written:
             return 0
+        if output.name != "position":
+            if value.rel_one_accuracy_bits() >= bits_of(self.digits):
+                return 0
+        elif float(value.rad()) < narrow:
+            return 0
         scale = max(Fraction(1), abs(midpoint(value)))
         if output.name == "position":
-            sizes = [abs(part) for part in (*output.point_of(self.centre), *output.pivot)]
-            scale = max(sizes)
+            scale = max(abs(part) for part in (*output.point_of(self.centre), *output.pivot))
         # the printed value is rounded to one digit more than was asked for, by at most half a unit of it
-        most = scale * Fraction(9, 10 ** (self.digits + 1))
-        wide = radius(value)
+        most, wide = scale * Fraction(9, 10 ** (self.digits + 1)), radius(value)
         if wide <= most:
             return 0
         return (wide / most).__ceil__().bit_length() if most else math.inf

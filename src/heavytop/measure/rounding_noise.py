@@ -31,8 +31,9 @@ def factor(seed: int, rerun: int = 0) -> Fraction:
 
 
 def scaled(top: HeavyTop, by: Fraction) -> HeavyTop:
-    """The top with the same motions and other roundings: inertia and weight times a :func:`factor`."""
-    return HeavyTop([by * moment for moment in top.inertia], by * top.weight, top.centre)
+    """The top with the same motions and other roundings: inertia, weight and rotor times a :func:`factor`."""
+    rotor = None if top.rotor is None else [by * k for k in top.rotor]
+    return HeavyTop([by * moment for moment in top.inertia], by * top.weight, top.centre, rotor)
 
 
 def least(metrics: Mapping[str, Metric], metric: Metric) -> float:

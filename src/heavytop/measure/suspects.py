@@ -118,7 +118,7 @@ class Suspect:
         truth, unit = self.supposed(self.times) if self.rows else None, _OTHER_UNIT
         if truth is None:
             return self
-        top = HeavyTop([i * unit for i in self.top.inertia], self.top.weight / unit, self.top.centre)
+        top = HeavyTop([i * unit for i in self.top.inertia], self.top.weight / unit, self.top.centre, self.top.rotor)
         start = State([w / unit for w in self.start.omega], self.start.gamma)
         other = motion(top, start, self.system, [time * unit for time in self.times])
         if other is None:
@@ -171,7 +171,8 @@ def suspect(
     """
     units = _units(top, start)
     inertia, force = [i / units.inertia for i in top.inertia], units.inertia / units.time**2
-    top = HeavyTop(inertia, top.weight / force, top.centre)
+    rotor = None if top.rotor is None else [k * units.time / units.inertia for k in top.rotor]
+    top = HeavyTop(inertia, top.weight / force, top.centre, rotor)
     start = State([w * units.time for w in start.omega], start.gamma)
     times = [time / units.time for time in times]
     scaled = [(*(w * units.time for w in state[:3]), *state[3:]) for state in states]
@@ -184,7 +185,8 @@ def suspect(
     if not len(states) or not numpy.isfinite(array).all():
         return None
     fall = (numpy.linalg.norm(moment) / float(max(inertia))) ** 0.5
-    rate = float(max(numpy.linalg.norm(array[0, :3]), fall)) or 1.0
+    carried = numpy.linalg.norm([float(k) for k in top.rotor or ()]) / float(max(inertia))
+    rate = float(max(numpy.linalg.norm(array[0, :3]), fall, carried)) or 1.0
     early = sum(abs(time) * rate <= _TURNS for time in ends)
     last = max(early, min(len(ends), _FEW))
     some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))}
@@ -210,6 +212,7 @@ def _units(top: HeavyTop, start: State) -> Units:
     """1 where the numbers are of a usual size."""
     largest = max(top.inertia)
     squares = [w * w for w in start.omega] + [abs(n) / largest for n in top.moment]
+    squares += [(k / largest) ** 2 for k in top.rotor or ()]
     rate, size = (log10(max(squares)) or 0.0) / 2, log10(largest) or 0.0
     return Units(*(Fraction(10) ** round(power) if abs(power) > _USUAL else Fraction(1) for power in (-rate, size)))
 

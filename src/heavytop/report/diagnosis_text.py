@@ -18,6 +18,7 @@ _SENTENCES = {
     "omega_in_rpm": "Ω is in turns per 60 time units in these states (rpm where times are in s), not in radians",
     "columns_swapped": "γ stands before Ω in these states",
     "weight_sign": "The states fit a top whose weight P has the other sign, as where γ points down in start and states",
+    "rotor_sign": "The states fit a rotor of −k: the momentum of the rotor has the other sign",
     "start_gamma_sign": "The states fit a start with −γ: γ of the start has the other sign",
     "start_omega_sign": "The states fit a start with −Ω: Ω of the start has the other sign",
     "start_momentum": "The start gives the angular momentum M in place of Ω",
@@ -34,7 +35,7 @@ _SENTENCES = {
     "rows_reversed": "The states are listed from the last time to the first",
 }
 """Of the kinds that need no number."""
-_SYSTEM = {"heavy_top": "gyrostat", "gyrostat": "heavy_top"}
+_SYSTEM = {"heavy_top": "gyrostat", "gyrostat": "heavy_top", "heavy_gyrostat": "heavy_top"}
 _OWNERS = {"inertia_axes": "moments of inertia", "centre_axes": "centre of mass", "top_axes": "top"}
 
 

@@ -11,7 +11,7 @@ from heavytop.records import Data
 
 _PLAIN = re.compile(r"(-?[0-9]{1,400}(/[1-9][0-9]{0,399})? )+")
 """Exact numbers as rows hold them, each with a space behind: told without the cost of reading them."""
-_VECTORS = ("inertia", "centre", "omega", "gamma")
+_VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
 
 
 def other_data(old: Data | None, new: Data | None) -> str:
@@ -23,7 +23,7 @@ def other_data(old: Data | None, new: Data | None) -> str:
         return ""
     if old is None or new is None:
         return f"only the {'candidate' if old is None else 'baseline'} says of which top and start it is"
-    of_top, of_start = ("inertia", "weight", "centre"), ("omega", "gamma")
+    of_top, of_start = ("inertia", "weight", "centre", "rotor"), ("omega", "gamma")
     for name in of_top + of_start if old.omega else of_top:
         before, after = (getattr(data, name) for data in (old, new))
         if before != after and _numbers(before) != _numbers(after):
@@ -35,11 +35,11 @@ def impossible(data: Data, starts: int) -> str:
     """What in the data of a row of so many starts no run writes; empty where nothing is."""
     for name in _VECTORS:
         count = len(getattr(data, name))
-        if count != 3 and (count or name in _VECTORS[:2] or starts == 1):
+        if count != 3 and (count or name in _VECTORS[:2] or (starts == 1 and name != "rotor")):
             return f"{count} components of {name}"
     if bool(data.omega) != bool(data.gamma):
         return "half a start"
-    texts = (data.weight, *data.inertia, *data.centre, *data.omega, *data.gamma)
+    texts = (data.weight, *data.inertia, *data.centre, *data.omega, *data.gamma, *data.rotor)
     if not _PLAIN.fullmatch("".join(f"{text} " for text in texts)):
         try:
             _numbers(texts)

@@ -12,14 +12,17 @@ import msgspec
 from heavytop.measure.certify import bits_of
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
-from heavytop.precision import REAL_BITS, exact
+from heavytop.precision import REAL_BITS, exact, exact_text
 from heavytop.report.printable import printable
+from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import rows_of
 from heavytop.top.equations import VARIABLES
+from heavytop.top.heavy_top import dot
 from heavytop.top.outputs import Output
 
 _GREEK = {"Ω": r"\Omega", "γ": r"\gamma", "ξ": r"\xi", "φ": r"\varphi", "θ": r"\theta", "ψ": r"\psi"}
 _BODY = ("mass", "gravity", "inertia", "about", "weight", "centre", "rotor")
-_DATA = (*_BODY, "omega", "gamma", "start_quaternion", "start_matrix", "start_euler", "start_sequence")
+_DATA = (*_BODY, "omega", "gamma", "start_quaternion", "start_matrix", "start_euler", "start_sequence", "xi")
 _LINES = 45
 """Lines of a LaTeX table that fit on a page."""
 _DIGITS_A_LINE = 48
@@ -176,16 +179,14 @@ def _made_by(command: str, version: str) -> list[tuple[str, str]]:
 
 
 def _data_of(document: dict[str, Any]) -> list[tuple[str, str]]:
-    """The body, the start and ξ at t = 0, exactly, by the keys of the JSON document."""
-    found = [(key, document[key]) for key in _DATA if document.get(key) is not None and _is_data(document[key])]
-    if document.get("xi") is not None:
-        found.append(("xi", document["xi"]))
-    return [(key, value if isinstance(value, str) else ", ".join(_flat(value))) for key, value in found]
-
-
-def _is_data(value: Any) -> bool:
-    """Whether a value is text or vectors of text, and no table of outputs of the same name."""
-    return isinstance(value, str) or all(isinstance(part, str) for part in value)
+    """The body, the start and ξ at t = 0, by the keys of the JSON document; R at t = 0 where no other key tells it."""
+    found = [(key, document[key]) for key in _DATA if document.get(key) is not None]
+    if document.get("xi") is not None and not any(key.startswith("start_") for key, _ in found):
+        x, y, z = (exact(part) for part in document["gamma"])
+        xi = tuple(exact(part) for part in document["xi"])
+        if x * x + y * y + z * z == dot(xi, xi) == 1 and xi != perpendicular((x, y, z)):
+            found.append(("start_matrix", [exact_text(part) for row in rows_of((x, y, z), xi) for part in row]))
+    return [(key, value if isinstance(value, str) else ", ".join(value)) for key, value in found]
 
 
 def _outputs_of(outputs: Sequence[Output]) -> list[tuple[str, str]]:
@@ -217,7 +218,7 @@ def _one_line(text: str) -> str:
 def _caption(facts: dict[str, str]) -> str:
     """What a reader of the table alone must know."""
     made = ("digits", "method") if "digits" in facts else ("precision", "integrator")
-    known = [(key, facts[key]) for key in (*_DATA, "xi", *made) if key in facts]
+    known = [(key, facts[key]) for key in (*_DATA, *made) if key in facts]
     said = "; ".join(f"{_escaped(_one_line(key))} {_breakable(text)}" for key, text in known)
     return f"{said}. heavytop {_escaped(facts['version'])}."
 

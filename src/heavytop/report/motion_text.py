@@ -8,6 +8,7 @@ from rich.text import Text
 
 from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
+from heavytop.report.derivative_text import derivative_lines
 from heavytop.report.motion_table import MotionTable
 from heavytop.report.printable import printable
 from heavytop.report.text import short
@@ -41,7 +42,8 @@ def reference_text(found: Reference, table: MotionTable) -> RenderableType:
     if found.attitude_method not in (None, found.method):
         parts.append(Text(f"attitude: {found.attitude_method}"))
     parts += _attitude_at_start(table)
-    return Group(*parts, *_at_each_time(table), *_undefined(table))
+    derivatives = [] if found.derivatives is None else derivative_lines(found.times, found.derivatives)
+    return Group(*parts, *_at_each_time(table), *_undefined(table), *derivatives)
 
 
 def _attitude_at_start(table: MotionTable) -> list[RenderableType]:

@@ -44,7 +44,7 @@ _OF_LAW = {
     "detects": "string",
     "lost_at": "string",
 }
-_OF_DATA = {"inertia": 3, "weight": 0, "centre": 3, "omega": 3, "gamma": 3}
+_OF_DATA = {"inertia": 3, "weight": 0, "centre": 3, "omega": 3, "gamma": 3, "rotor": 3}
 """How many components each has; 0 for a number."""
 _DATA = [f"{name}{i}" for name, count in _OF_DATA.items() for i in (range(1, count + 1) if count else ("",))]
 COLUMNS = (
@@ -57,7 +57,7 @@ COLUMNS = (
 )
 """Column -> type.  Numbers that measure something are text, as in the report, with log10 beside them.
 
-inertia1 to gamma3 are the top and the start as floats, and inertia_exact to gamma_exact the same as exact text.
+inertia1 to rotor3 are the top and the start as floats, and inertia_exact to rotor_exact the same as exact text.
 A growth law is a line of kind "law" whose metric is the name of its series and whose value is its class; a row that has
 neither metric nor law is one line without them.
 """

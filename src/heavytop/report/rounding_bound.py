@@ -73,7 +73,8 @@ class RoundingBound:
         if data is None or not data.omega or not data.gamma:
             return None
         try:
-            top = HeavyTop(_exact(data.inertia), exact(data.weight), _exact(data.centre))
+            rotor = _exact(data.rotor) if data.rotor else None
+            top = HeavyTop(_exact(data.inertia), exact(data.weight), _exact(data.centre), rotor)
             return top, State(_exact(data.omega), _exact(data.gamma))
         except InputError:
             return None

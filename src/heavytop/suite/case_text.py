@@ -33,9 +33,15 @@ def forms(case: Case) -> dict[str, str]:
     return {"command": command} | texts | {"python": _python_of_body(case)}
 
 
+def _follows(data: dict[str, Any]) -> bool:
+    """Whether the system need not be said: it is that of a top with these data."""
+    return bool(data["system"] == ("heavy_gyrostat" if "rotor" in data else "heavy_top"))
+
+
 def _command(data: dict[str, Any]) -> str:
-    system = "" if data["system"] == "heavy_top" else f" --system {data['system']}"
-    options = " ".join(f"--{key} {_joined(data[key])}" for key in ("inertia", "weight", "centre", "omega", "gamma"))
+    system = "" if _follows(data) else f" --system {data['system']}"
+    keys = ("inertia", "weight", "centre", "rotor", "omega", "gamma")
+    options = " ".join(f"--{key} {_joined(data[key])}" for key in keys if key in data)
     return f"heavytop propagate {options}{system} --times {','.join(_TIMES)}"
 
 
@@ -67,12 +73,13 @@ def _python(data: dict[str, Any]) -> str:
         return f"({', '.join(map(number, data[key]))})"
 
     weight = number(data["weight"])
-    system = "" if data["system"] == "heavy_top" else f', system="{data["system"]}"'
+    system = "" if _follows(data) else f', system="{data["system"]}"'
+    rotor = f", rotor={numbers('rotor')}" if "rotor" in data else ""
     return "\n".join(
         [
             "import heavytop as ht",
             "",
-            f"top = ht.HeavyTop(inertia={numbers('inertia')}, weight={weight}, centre={numbers('centre')})",
+            f"top = ht.HeavyTop(inertia={numbers('inertia')}, weight={weight}, centre={numbers('centre')}{rotor})",
             f"start = ht.State(omega={numbers('omega')}, gamma={numbers('gamma')})",
             f"run = ht.propagate(top, start, [{', '.join(_TIMES)}], ht.DOUBLE{system})",
         ]

@@ -18,7 +18,7 @@ from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.kowalewski import kowalewski_motion
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import CENTRE, PIVOT, Body
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System, system_of
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System, system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 
 
@@ -185,6 +185,13 @@ CASES: dict[str, Case] = {
             GYROSTAT,
             HeavyTop((2, 3, "5/2"), "3/2", (0, "2/3", 0)),
             State(("3/10", "4/15", "24/25"), ("3/13", "4/13", "12/13")),
+        ),
+        Case(
+            "heavy-gyrostat",
+            "the generic top with a rotor: no closed form",
+            HEAVY_GYROSTAT,
+            HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"), ("1/2", "-1/3", "3/4")),
+            State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5")),
         ),
     )
 }

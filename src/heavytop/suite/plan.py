@@ -34,7 +34,7 @@ from heavytop.suite.files import read_whole
 from heavytop.suite.kind import Kinds, Table
 from heavytop.suite.sweeps import Lazy, Sweep
 from heavytop.suite.task import FINEST, Task
-from heavytop.top.equations import system
+from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop, State
 
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
@@ -51,7 +51,8 @@ class Top(msgspec.Struct, forbid_unknown_fields=True):
     centre: list[str]
     omega: list[str]
     gamma: list[str]
-    system: str = "heavy_top"
+    rotor: list[str] | None = None
+    system: str | None = None
 
 
 class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
@@ -250,8 +251,8 @@ def _own(plan: Plan) -> dict[str, Case]:
         if top.name in CASES:
             raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", _RENAME)
         try:
-            body = HeavyTop(top.inertia, top.weight, top.centre)
-            case = Case(top.name, "from the plan", system(top.system), body, State(top.omega, top.gamma))
+            body = HeavyTop(top.inertia, top.weight, top.centre, top.rotor)
+            case = Case(top.name, "from the plan", system_of(top.system, body), body, State(top.omega, top.gamma))
             own[top.name] = require_possible(case)
         except InputError as error:
             raise InputError(f"The plan's top {top.name!r}: {error.cause}", error.remedy) from None

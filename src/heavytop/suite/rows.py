@@ -38,10 +38,10 @@ def data_of(case: Case | None) -> Data | None:
     if case is None:
         return None
     top, start = case.top, case.start
-    inertia, centre, omega, gamma = (
-        tuple(map(exact_text, part)) for part in (top.inertia, top.centre, start.omega, start.gamma)
+    inertia, centre, omega, gamma, rotor = (
+        tuple(map(exact_text, part)) for part in (top.inertia, top.centre, start.omega, start.gamma, top.rotor or ())
     )
-    return Data(inertia, exact_text(top.weight), centre, omega, gamma)
+    return Data(inertia, exact_text(top.weight), centre, omega, gamma, rotor)
 
 
 def exact_row(

@@ -15,11 +15,11 @@ import numpy
 from heavytop.errors import InputError
 from heavytop.precision import exact, shown
 from heavytop.suite.cases import Case, require_possible
-from heavytop.top.equations import HEAVY_TOP, system
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system, system_of
 from heavytop.top.heavy_top import HeavyTop, State, vector
 
 _MOST = 1_000_000
-_AXES = ("inertia", "weight", "centre", "omega", "gamma")
+_AXES = ("inertia", "weight", "centre", "omega", "gamma", "rotor")
 _T = TypeVar("_T")
 
 
@@ -60,11 +60,13 @@ class Grid(Strict, tag="grid"):
     centre: list[str | list[str]]
     omega: list[str | list[str]]
     gamma: list[str | list[str]]
-    system: str = "heavy_top"
+    rotor: list[str | list[str]] | None = None
+    system: str | None = None
 
     def cases(self) -> Sequence[Case]:
         """The points.  What is wrong with any of them is said now."""
-        which = system(self.system)
+        if self.system is not None:
+            system(self.system)
         axes = [self._axis(what) for what in _AXES]
         shape = [len(axis) for axis in axes]
         size = _bounded(self.name, prod(shape))
@@ -82,11 +84,12 @@ class Grid(Strict, tag="grid"):
 
         def point(index: int) -> Case:
             place = numpy.unravel_index(index, shape)
-            inertia, weight, centre, omega, gamma = (axis[i] for axis, i in zip(axes, place, strict=True))
-            return Case(label(index), "from a grid", which, HeavyTop(inertia, weight, centre), State(omega, gamma))
+            inertia, weight, centre, omega, gamma, rotor = (axis[i] for axis, i in zip(axes, place, strict=True))
+            top = HeavyTop(inertia, weight, centre, rotor)
+            return Case(label(index), "from a grid", system_of(self.system, top), top, State(omega, gamma))
 
         # the gyrostat asks for more than that each value be possible
-        for index in _along_axes(shape) if which is HEAVY_TOP else range(size):
+        for index in _along_axes(shape) if self.system != GYROSTAT.name else range(size):
             try:
                 for warning in require_possible(point(index)).top.warnings():
                     raise InputError(warning, "Each moment is at most the sum of the other two.")
@@ -95,8 +98,10 @@ class Grid(Strict, tag="grid"):
         return Lazy(size, point)
 
     def _axis(self, what: str) -> list[Any] | tuple[Any]:
-        """The values of one of the five: a list where the plan lists them, a tuple of one where it gives one."""
+        """The values of one of the six: a list where the plan lists them, a tuple of one where it gives one."""
         given = getattr(self, what)
+        if given is None:  # no rotor
+            return (None,)
         try:
             if what == "weight":
                 return [exact(value) for value in given] if isinstance(given, list) else (exact(given),)

@@ -20,6 +20,8 @@ def require_case(case: Case, top: HeavyTop, start: State, which: System, at_star
     said += [
         (f"{name} of the centre", new, old) for name, new, old in zip("abc", top.centre, case.top.centre, strict=True)
     ]
+    rotors = (each.rotor or (Fraction(0),) * 3 for each in (top, case.top))
+    said += [(f"k{i} of the rotor", new, old) for i, (new, old) in enumerate(zip(*rotors, strict=True), 1)]
     said += [(name, new, old) for name, new, old in zip(NAMES, start.flat, case.start.flat, strict=True)]
     if at_start is not None:
         rows = zip(NAMES, at_start.flat, case.start.flat, strict=True)

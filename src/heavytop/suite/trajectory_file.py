@@ -17,13 +17,13 @@ from heavytop.suite import observed_file
 from heavytop.suite.cases import Case
 from heavytop.suite.files import read_whole, without_repeats
 from heavytop.suite.given import LONGEST_NAME, MOST, Given, named, require_states, rounded_state, too_many
-from heavytop.suite.observed_body import AnyBody, system_of
+from heavytop.suite.observed_body import AnyBody
 from heavytop.suite.observed_given import observed, require_system
 from heavytop.suite.observed_start import RawStart
 from heavytop.suite.trajectory_case import require_case
 from heavytop.suite.trajectory_table import REMEDY, VECTORS, Table, unknown
 from heavytop.top.bodies import CENTRE, Body
-from heavytop.top.equations import system
+from heavytop.top.equations import system_of
 from heavytop.top.heavy_top import HeavyTop, State, require_physical
 from heavytop.top.outputs import SHAPES, key_of
 from heavytop.top.times import check_times
@@ -111,9 +111,9 @@ def _given(
 ) -> Given:
     if isinstance(document.get("times"), list) and len(document["times"]) > MOST:
         raise too_many(len(document["times"]))
-    which = system(_text(document, "system", "heavy_top" if case is None else case.system.name))
     top, at_start = _top(document, case), _row_of_start(document)
     start = _start(document, case, at_start)
+    which = system_of(_system(document, case), top)
     times = list(check_times([written_numbers.finite(value, "a time") for value in _list(document, "times")]))
     if not any(times):
         raise InputError("The only time is 0, where the state is the start.", "Give states at later times.")
@@ -148,8 +148,6 @@ def _observed(
     document: dict[str, Any], stem: str, sha256: str, case: Case | None, notes: list[str], normalize: bool
 ) -> Given:
     """The trajectory of a document with attitudes, positions, Ω in any axes, or the data of a body."""
-    which = system(_text(document, "system", "heavy_top" if case is None else case.system.name))
-    require_system(which)
     listed = _list(document, "times") if "lines" not in document else observed_file.times(document)
     times = list(check_times([written_numbers.finite(v, "a time") if isinstance(v, str) else v for v in listed]))
     if not any(times):
@@ -158,6 +156,8 @@ def _observed(
     table = observed_file.columns(document, said)
     require_states(times, table.places)
     body = _body(document, case)
+    which = system_of(_system(document, case), body)
+    require_system(which)
     if case is not None and isinstance(body, HeavyTop):
         require_case(case, body, case.start, which, None)
     raw = _raw_start(document, table, not times[0], said, case)
@@ -167,7 +167,7 @@ def _observed(
     return Given(
         top=found.posed.top,
         start=found.posed.start,
-        system=system_of(body, which),
+        system=which,
         precision=precision,
         times=times,
         states=rows,
@@ -223,7 +223,13 @@ def _top(document: dict[str, Any], case: Case | None) -> HeavyTop:
     """The top of the file, or of the case as far as the file does not say."""
     inertia, centre = (_vector(document, key, case) for key in ("inertia", "centre"))
     weight = _text(document, "weight", None if case is None else exact_text(case.top.weight))
-    return HeavyTop(inertia, weight, centre)
+    rotor = _list(document, "rotor", 3) if "rotor" in document else None if case is None else case.top.rotor
+    return HeavyTop(inertia, weight, centre, rotor)
+
+
+def _system(document: dict[str, Any], case: Case | None) -> str | None:
+    """The name of the system: the file's, else that of the case; None where neither says it."""
+    return _text(document, "system") if "system" in document else None if case is None else case.system.name
 
 
 def _start(document: dict[str, Any], case: Case | None, at_start: State | None) -> State:

@@ -13,8 +13,8 @@ from heavytop.top.equations import VARIABLES
 
 REMEDY = "docs/score.md shows both forms of the file, `heavytop list --case lagrange` one to paste."
 COLUMNS = ("t", *VARIABLES)
-VECTORS = ("inertia", "centre", "omega", "gamma")
-LISTS = (*VECTORS, "omega_space", "pivot", "point", "rotor", "start_quaternion", "start_matrix", "start_euler")
+VECTORS = ("inertia", "centre", "omega", "gamma", "rotor")
+LISTS = (*VECTORS, "omega_space", "pivot", "point", "start_quaternion", "start_matrix", "start_euler")
 """Keys whose values are lists of numbers."""
 _COMMENT = ("#", "%", "!", "//")
 _OMEGA = ("omega", "om", "w", "ω", "angularvelocity")

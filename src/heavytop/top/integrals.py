@@ -126,7 +126,7 @@ def _equatorial_square(y: Any, axes: Axes) -> Any:
 def kovalevskaya_yehia(p: Parameters, y: Any, axes: Axes) -> Any:
     """|ξ|² of :func:`kovalevskaya_xi` + 2λ (Ω3 − λ)(Ω1² + Ω2²) − 4λ (n1 Ω1 + n2 Ω2) γ3, λ = k3/I3, n = P r/I3.
 
-    The rotor lies on the axis of the small moment, ``axes[2]``.  Source: H. M. Yehia, Mech. Res. Comm. 13 (1986) 169.
+    The rotor lies on the axis of the small moment, ``axes[2]``.  Source: H. M. Yehia, 1986.
     """
     i, j, k = axes
     rotor = p.rotor[k] / p.inertia[k]
@@ -138,7 +138,7 @@ def kovalevskaya_yehia(p: Parameters, y: Any, axes: Axes) -> Any:
 def sretensky(p: Parameters, y: Any, axes: Axes) -> Any:
     """(Ω3 − λ)(Ω1² + Ω2²) − (n1 Ω1 + n2 Ω2) γ3, λ = k3/I3, n = P r/I3, conserved on M·γ = 0.
 
-    The rotor lies on the axis of the small moment, ``axes[2]``.  Source: L. N. Sretensky, Vestn. Mosk. Univ. 3 (1963).
+    The rotor lies on the axis of the small moment, ``axes[2]``.  Source: L. N. Sretensky, 1963.
     """
     rotor = p.rotor[axes[2]] / p.inertia[axes[2]]
     return goryachev_chaplygin(p, y, axes) - rotor * _equatorial_square(y, axes)

@@ -127,8 +127,6 @@ def outputs(text: str, point: Any = None, pivot: Any = None) -> tuple[Output, ..
     point or pivot where no position is asked for.
     """
     parts = [part for part in text.split(",") if part.strip()]
-    if not parts:
-        raise InputError(f"{quoted(text)} names no output.", _REMEDY)
     names = [part.strip().partition(":")[0].replace("_", "-").lower() for part in parts]
     for name in names:
         if names.count(name) > 1:
@@ -137,6 +135,8 @@ def outputs(text: str, point: Any = None, pivot: Any = None) -> tuple[Output, ..
             )
     if "position" not in names and (point is not None or pivot is not None):
         raise InputError("A point or a pivot is given, but no position is asked for.", "Add position to the outputs.")
+    if not parts:
+        raise InputError(f"{quoted(text)} names no output.", _REMEDY)
     return tuple(
         output(part, *((point, pivot) if name == "position" else ())) for part, name in zip(parts, names, strict=True)
     )

@@ -182,6 +182,16 @@ class Floating(Run):
         high, low = self.clock[dd.TIME], self.clock[dd.TIME + 1]
         return int(times.searchsorted(high, "right" if low >= 0 else "left")) if self.steps else 0
 
+    def derivatives(self, n: int) -> tuple[Fraction, ...]:
+        """y_n of the last step, exactly as it was computed; a step back in time has a negative length."""
+        return _exact_state(self._row(n), len(self.problem.state))
+
+    @property
+    def length(self) -> Fraction:
+        """h of the last step, negative back in time."""
+        step = self.time - self._time(dd.BEGAN)
+        return step if self.forwards else -step
+
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
         step = self.time - self._time(dd.BEGAN)
         power = (step if self.forwards else -step) ** n

@@ -233,7 +233,7 @@ class Request:
     def text(self, label: int) -> bytes:
         """Its lines."""
         p, precision = self.problem.parameters, self.problem.precision
-        rotor = (0, Fraction(p.rotor), 0) if self.problem.system is GYROSTAT else (0, 0, 0)
+        rotor = (0, p.rotor, 0) if self.problem.system is GYROSTAT else p.rotors if len(p.rotors) == 3 else (0, 0, 0)
         lines = {
             "run": [str(label)],
             "system": [self.problem.system.name],

@@ -7,7 +7,7 @@ from typing import Any
 import numpy
 from CyRK import cyjit, nbsolve2_ivp
 
-from heavytop.integrate.peers.double import Given, Solve, Solved, compiled_once, double_peer, fill, timed
+from heavytop.integrate.peers.double import Given, Solve, Solved, compiled_once, count, double_peer, fill, timed
 from heavytop.top.equations import System
 
 
@@ -19,7 +19,7 @@ def _machine_code(system: System) -> Any:
 @compiled_once
 def _warm(system: System, method: str) -> None:
     """Compiles what a first call would compile."""
-    _call(Given(system, numpy.zeros(6), numpy.ones(1), numpy.ones(7), 1e-3), method).free()
+    _call(Given(system, numpy.zeros(6), numpy.ones(1), numpy.ones(count(system)), 1e-3), method).free()
 
 
 def _call(given: Given, method: str) -> Any:

@@ -10,20 +10,21 @@ import jax
 import jax.numpy as jnp
 import numpy
 
-from heavytop.integrate.peers.double import Given, Solved, compiled_once, double_peer, timed
+from heavytop.integrate.peers.double import Given, Solved, compiled_once, count, double_peer, reader, timed
 from heavytop.integrate.trajectory import Outcome
-from heavytop.top.equations import Parameters, System
+from heavytop.top.equations import System
 
 _LEAST_STEP = 2.0**-60  # of the whole time
 _MOST_STEPS = 2**24
 
 
 @compiled_once
-def _compiled(system: System, count: int) -> Callable[..., Any]:
-    """The integration to ``count`` times as machine code."""
+def _compiled(system: System, samples: int) -> Callable[..., Any]:
+    """The integration to so many times as machine code."""
+    read = reader(system)
 
     def field(_time: Any, y: Any, n: Any) -> Any:
-        return jnp.stack(system.field(Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), n[6]), y))
+        return jnp.stack(system.field(read(n), y))
 
     def integrate(start: Any, times: Any, numbers: Any, tolerance: Any) -> Any:
         return diffrax.diffeqsolve(
@@ -43,7 +44,7 @@ def _compiled(system: System, count: int) -> Callable[..., Any]:
             throw=False,
         )
 
-    shapes = [jax.ShapeDtypeStruct(shape, float) for shape in ((6,), (count,), (7,), ())]
+    shapes = [jax.ShapeDtypeStruct(shape, float) for shape in ((6,), (samples,), (count(system),), ())]
     return jax.jit(integrate).lower(*shapes).compile()
 
 

@@ -17,7 +17,7 @@ from heavytop.integrate.peers.contract import Declared, with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
 from heavytop.top import heavy_top
-from heavytop.top.equations import HEAVY_TOP, Parameters, System
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import check_times
 
@@ -29,7 +29,8 @@ FINEST = Fraction(1, 10**15)
 class Given:
     """A problem in double.
 
-    start: shape (6,).  times: shape (n,), strictly monotone away from 0.  numbers: shape (7,), the parameters I, n, λ.
+    start: shape (6,).  times: shape (n,), strictly monotone away from 0.  numbers: the parameters I, n and the rotor:
+    shape (7,) with λ, 0 for the heavy top, or (9,) with k for the heavy gyrostat.
     setting: the tolerance, or the step of a method with fixed steps.  step_limit: steps after which an adaptive method
     should give up, with the states so far and ``Outcome.STEP_LIMIT``.
     """
@@ -44,8 +45,7 @@ class Given:
     @property
     def parameters(self) -> Parameters:
         """The numbers as ``system.field`` takes them."""
-        n = self.numbers
-        return Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), n[6])
+        return reader(self.system)(self.numbers)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,8 +138,7 @@ def _given(name: str, knob: str, problem: Problem, times: Sequence[Fraction], se
         limits = "between 0 and 1" if knob == "tolerance" else "above 0"
         raise InputError(f"{name} cannot use the {knob} {decimal_text(setting, 6)}.", f"Give one {limits}.")
     grid = numpy.array([number(time, DOUBLE) for time in check_times(times)])
-    p = problem.parameters
-    numbers = numpy.array(problem.native([*p.inertia, *p.moment, p.rotor]), dtype=float)
+    numbers = numpy.array(problem.native(problem.parameters.numbers), dtype=float)
     return Given(problem.system, numpy.array(problem.native(problem.start.flat)), grid, numbers, float(setting))
 
 
@@ -232,17 +231,34 @@ def field_kind() -> str:
     return "python" if compiler().__module__ == __name__ else "numba"
 
 
+def _with_rate(n: Any) -> Parameters:
+    return Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), n[6])
+
+
+def _with_rotor(n: Any) -> Parameters:
+    return Parameters((n[0], n[1], n[2]), (n[3], n[4], n[5]), (n[6], n[7], n[8]))
+
+
+def reader(system: System) -> Callable[[Any], Parameters]:
+    """What takes the numbers of :class:`Given`, of any kind, as the parameters of the field; numba compiles it too."""
+    return _with_rotor if system is HEAVY_GYROSTAT else _with_rate
+
+
+def count(system: System) -> int:
+    """How many numbers of :class:`Given` a system has."""
+    return 9 if system is HEAVY_GYROSTAT else 7
+
+
 @compiled_once
 def fill(system: System) -> Callable[..., None]:
     """(rates, t, y, numbers): writes the field at y into ``rates``.
 
     All but ``t`` are arrays, or pointers in machine code.
     """
-    field = compiler()(system.field)
+    field, read = compiler()(system.field), compiler()(reader(system))
 
     def write(rates: Any, _time: float, y: Any, numbers: Any) -> None:
-        p = Parameters((numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4], numbers[5]), numbers[6])
-        values = field(p, (y[0], y[1], y[2], y[3], y[4], y[5]))
+        values = field(read(numbers), (y[0], y[1], y[2], y[3], y[4], y[5]))
         for i in range(6):
             rates[i] = values[i]
 
@@ -260,7 +276,7 @@ def rates(system: System) -> Callable[..., Any]:
         return result
 
     compiled = compiler()(rates)
-    compiled(0.0, numpy.zeros(6), numpy.ones(7))
+    compiled(0.0, numpy.zeros(6), numpy.ones(count(system)))
     return compiled  # type: ignore[no-any-return]
 
 

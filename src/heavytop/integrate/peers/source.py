@@ -252,8 +252,7 @@ def _require_possible(command: Command) -> None:
         if not values:
             raise InputError(f"{name} is empty.")
     for each in command.systems:
-        if each != "heavy_gyrostat":
-            system(each)
+        system(each)
     for each in command.precisions:
         if each != "real:BITS":
             parse(each)

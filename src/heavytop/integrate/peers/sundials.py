@@ -10,7 +10,7 @@ from typing import Any
 import numpy
 from sksundae.cvode import CVODE
 
-from heavytop.integrate.peers.double import Given, Solved, compiled_once, compiler, double_peer, fill, timed
+from heavytop.integrate.peers.double import Given, Solved, compiled_once, compiler, count, double_peer, fill, timed
 from heavytop.top.equations import System
 
 _MOST_STEPS = 10**8
@@ -19,7 +19,7 @@ _MOST_STEPS = 10**8
 @compiled_once
 def _machine_code(system: System) -> Any:
     write = compiler()(fill(system))
-    write(numpy.empty(6), 0.0, numpy.zeros(6), numpy.ones(7))
+    write(numpy.empty(6), 0.0, numpy.zeros(6), numpy.ones(count(system)))
     return write
 
 

@@ -1,0 +1,78 @@
+"""Proven derivatives on random data of every class: contained differences, laws of the flow, radii and cost.
+
+    python benchmarks/derivatives.py [--count 100] [--case NAME]
+
+For each built-in case, COUNT random starts of its top (of a special motion: other roundings), each at a random time:
+one random column of ∂y/∂y0 and one of ∂y/∂(I, n) against a central difference of references, every law of the flow, and
+the seconds of this process against those of the enclosure without derivatives.  A line a case.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from fractions import Fraction
+from pathlib import Path
+from random import Random
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "exact"))
+
+from derivative_laws import BITS, difference, holds, known, largest_radius, laws, of
+
+from heavytop.errors import HeavyTopError
+from heavytop.exact.balls import working_precision
+from heavytop.measure.rounding_noise import FACTORS
+from heavytop.suite.cases import CASES, Case
+from heavytop.suite.starts import ensemble_of, one_motion
+
+
+def main() -> int:
+    """A line a case; 1 where a difference or a law is not held."""
+    options = argparse.ArgumentParser()
+    options.add_argument("--count", type=int, default=100)
+    options.add_argument("--case")
+    given = options.parse_args()
+    cases = [case for name, case in CASES.items() if given.case in (None, name)]
+    wrong = [_case(case, given.count) for case in cases]
+    return int(any(wrong))
+
+
+def _case(case: Case, count: int) -> bool:
+    random = Random(case.name)
+    members = ensemble_of(case, min(count, FACTORS) if one_motion(case, 0) else count, 28)
+    wrong, refused, widest, plain, derived = 0, 0, Fraction(0), 0.0, 0.0
+    for top, start in members:
+        at = Fraction(random.choice((-1, 1)) * random.randint(1, 400), 100)
+        try:
+            began = time.process_time()
+            known(top, start, case.system).state(at, BITS)
+            plain += time.process_time() - began
+            motion = known(top, start, case.system)
+            began = time.process_time()
+            of(motion, at)
+            derived += time.process_time() - began
+            found = of(motion, at, data=True)
+        except HeavyTopError:
+            refused += 1
+            continue
+        size = max(1, *(abs(v).upper().__float__() for row in found.start + found.data for v in row))
+        widest = max(widest, largest_radius(found.start), largest_radius(found.data))
+        held = [holds(values, Fraction(size) ** 6 / 10**20) for values in laws(motion, at, found).values()]
+        for matrix, datum in ((found.start, False), (found.data, True)):
+            column = random.randrange(6)
+            values = difference(motion, at, column, datum=datum)
+            with working_precision(400):
+                pairs = zip(matrix, values, strict=True)
+                held.append(holds([row[column] - value for row, value in pairs], Fraction(size) / 10**20))
+        wrong += not all(held)
+    print(
+        f"{case.name:28} {len(members):4} motions  {wrong} wrong  {refused} refused  "
+        f"widest radius {float(widest):.1e}  {derived / max(plain, 1e-9):5.1f} times the enclosure",
+        flush=True,
+    )
+    return bool(wrong)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

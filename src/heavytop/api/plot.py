@@ -1,0 +1,525 @@
+"""Pictures of motions, by matplotlib: axes in, axes out.
+
+Every function draws on the ``axes`` that it is given, or on new ones of a figure of its own (``axes.figure``), and
+gives the axes back; none touches pyplot or the settings of the process.  Motions are what :func:`heavytop.propagate`
+and :func:`heavytop.reference` return; the denser their times, the smoother the curves.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heavytop.api import arguments
+from heavytop.api.plot_data import (
+    Motion,
+    Samples,
+    axes_of,
+    compared,
+    every,
+    exact_states,
+    parameters_of,
+    path_in_space,
+    principal,
+    samples,
+)
+from heavytop.errors import InputError, quoted
+from heavytop.event_times.records import Events, ReferenceEvents, Section, component
+from heavytop.integrate.trajectory import Trajectory
+from heavytop.measure.sample_errors import Logs, sample_drifts, sample_errors
+from heavytop.precision import exact
+from heavytop.report.svg import COLOURS, decades
+from heavytop.top.equations import NAMES
+from heavytop.top.heavy_top import HeavyTop
+
+__all__ = ["animate", "digits", "drift", "error", "herpolhode", "phase", "poincare", "polhode", "sphere"]
+
+_GREY = "#888888"
+_LIGHT = "#b8c4d0"
+_WIDTH = 1.2
+_ELEVATION, _AZIMUTH = 24.0, -50.0
+_RATE = "1/time unit"
+_TIME = "t (time units)"
+_FOLLOWED = {"centre": "centre of mass", "vertical": "vertical in the body"} | {
+    f"axis{i}": f"axis {i}" for i in (1, 2, 3)
+}
+_SPAN = 100
+"""Times whose largest is so many times the first stand on a logarithmic axis."""
+_DASHES = ("-", "--", "-.", ":", (0, (6, 2)), (0, (1, 2)))
+
+
+def sphere(
+    run: Motion,
+    axes: Any = None,
+    *,
+    of: str | None = None,
+    top: HeavyTop | None = None,
+    colour: str = COLOURS[0],
+    label: str | None = None,
+) -> Any:
+    """The path of an axis of the body on the unit sphere in space: loops, cusps and waves.
+
+    Arguments:
+        run: a motion; without attitude a computed one is integrated again with it.
+        axes: three-dimensional axes of matplotlib, or None for new ones.
+        of: "axis1" to "axis3", a principal axis; "centre", the direction of the centre of mass (where None, if it has
+            one); "vertical": γ, the vertical in body axes.
+        top: of a reference, for "centre".
+        colour, label: of the path.
+
+    Returns:
+        The axes; the third component is upwards, the part behind the sphere is thin, and a dot is where the path
+        begins.
+
+    Raises:
+        InputError: for fewer than two samples, states that are not finite, and a reference without attitude.
+    """
+    name, _, path = path_in_space(run, of, top)
+    drawn = _solid(axes)
+    _globe(drawn)
+    _visible_path(drawn, path, colour, label)
+    body = name == "vertical"
+    drawn.set(xlabel="γ1" if body else "x", ylabel="γ2" if body else "y", zlabel="γ3" if body else "z, up")
+    drawn.set_title(f"{_FOLLOWED[name]} on the unit sphere", fontsize="medium")
+    return drawn
+
+
+def polhode(
+    run: Motion, axes: Any = None, *, top: HeavyTop | None = None, colour: str = COLOURS[0], label: str | None = None
+) -> Any:
+    """The polhode, the path of Ω in the principal axes; on the energy ellipsoid Ω·IΩ = 2T of a free body, P r = 0.
+
+    Arguments:
+        run: a motion.  axes: three-dimensional axes, or None.
+        top: of a reference, for the ellipsoid.
+        colour, label: of the path.
+
+    Returns:
+        The axes, Ω in 1/time unit.
+
+    Raises:
+        InputError: as :func:`sphere`.
+    """
+    omega = principal(run, samples(run).omega)
+    drawn = _solid(axes)
+    known = isinstance(run, Trajectory) or top is not None
+    if known:
+        p = parameters_of(run, top)
+        if not any(p.moment) and not any(p.rotors):
+            inertia = np.array([float(value) for value in p.inertia])
+            radii = np.sqrt((omega[0] ** 2 * inertia).sum() / inertia)
+            _ellipsoid(drawn, radii)
+            _visible_path(drawn, omega, colour, label, 1 / radii**2)
+            _equal(drawn, radii.max())
+            drawn.set(**_omega_labels())
+            drawn.set_title("polhode on the energy ellipsoid", fontsize="medium")
+            return drawn
+    drawn.plot(*omega.T, color=colour, lw=_WIDTH, label=label)
+    drawn.plot(*omega[:1].T, "o", color=colour, ms=4)
+    low, high = omega.min(axis=0), omega.max(axis=0)
+    _equal(drawn, 0.55 * (high - low).max() or 1.0, (low + high) / 2)
+    drawn.set(**_omega_labels())
+    drawn.set_title("Ω in the body", fontsize="medium")
+    return drawn
+
+
+def _omega_labels() -> dict[str, str]:
+    return {f"{axis}label": f"{name} ({_RATE})" for axis, name in zip("xyz", NAMES, strict=False)}
+
+
+def herpolhode(
+    run: Motion, axes: Any = None, *, top: HeavyTop | None = None, colour: str = COLOURS[0], label: str | None = None
+) -> Any:
+    """The path of Ω in space, the herpolhode, seen along the angular momentum of a free body, else from above.
+
+    Arguments:
+        run: a motion; without attitude a computed one is integrated again with it.
+        axes: plane axes, or None.  top: of a reference.  colour, label: of the path.
+
+    Returns:
+        The axes; both in 1/time unit, to the same scale.
+
+    Raises:
+        InputError: as :func:`sphere`.
+    """
+    found = samples(run)
+    rows = found.rows()
+    omega = np.einsum("nij,nj->ni", rows, found.omega)
+    p = parameters_of(run, top) if isinstance(run, Trajectory) or top is not None else None
+    free = p is not None and not any(p.moment) and not any(p.rotors)
+    across = np.eye(3)[:2]
+    if p is not None and free:
+        own = principal(run, found.omega[:1])[0] * np.array([float(value) for value in p.inertia])
+        turn = axes_of(run)
+        momentum = rows[0] @ (own if turn is None else turn @ own)
+        if (size := np.linalg.norm(momentum)) > 0:
+            across = _plane_across(momentum / size)
+    drawn = _flat(axes)
+    x, y = (omega @ across.T).T
+    drawn.plot(x, y, color=colour, lw=_WIDTH, label=label)
+    drawn.plot(x[:1], y[:1], "o", color=colour, ms=4)
+    drawn.plot([0], [0], "+", color=_GREY)
+    names = ("across M", "across M, at right angles") if free else ("Ωx", "Ωy")
+    drawn.set(xlabel=f"{names[0]} ({_RATE})", ylabel=f"{names[1]} ({_RATE})")
+    drawn.set_title("herpolhode in the invariable plane" if free else "Ω in space, from above", fontsize="medium")
+    drawn.set_aspect("equal", adjustable="datalim")
+    return drawn
+
+
+def phase(
+    run: Motion,
+    x: str = "gamma3",
+    y: str = "omega3",
+    axes: Any = None,
+    *,
+    colour: str = COLOURS[0],
+    label: str | None = None,
+) -> Any:
+    """One component of the motion over another, or over time.
+
+    Arguments:
+        run: a motion.  x, y: "omega1" to "gamma3", or "t".  axes: plane axes, or None.  colour, label: of the curve.
+
+    Returns:
+        The axes; Ω in 1/time unit, t in time units.
+
+    Raises:
+        InputError: for another name, and as :func:`sphere`.
+    """
+    found = samples(run)
+    drawn = _flat(axes)
+    values = [_column(found, name) for name in (x, y)]
+    drawn.plot(*values, color=colour, lw=_WIDTH, label=label)
+    drawn.plot(*(value[:1] for value in values), "o", color=colour, ms=4)
+    drawn.set(xlabel=_named(x), ylabel=_named(y))
+    return drawn
+
+
+def poincare(
+    section: Section | Events | ReferenceEvents | Iterable[Events | ReferenceEvents],
+    x: str = "gamma3",
+    y: str = "omega3",
+    axes: Any = None,
+    *,
+    colours: Sequence[str] = COLOURS,
+    size: float | None = None,
+) -> Any:
+    """A Poincaré section: the states at the events of several motions, a colour each.
+
+    Arguments:
+        section: what :func:`heavytop.poincare` or :func:`heavytop.events` returns, or several of the latter.
+        x, y: "omega1" to "gamma3".  axes: plane axes, or None.
+        colours: taken in turn.  size: of a point, in points; None for one that suits their number.
+
+    Returns:
+        The axes.
+
+    Raises:
+        InputError: for another name, and for a section without a point.
+    """
+    if isinstance(section, Section):
+        listed: list[Events | ReferenceEvents] = list(section.events)
+    else:
+        listed = [section] if isinstance(section, Events | ReferenceEvents) else list(section)
+    for each in listed:
+        if not isinstance(each, Events | ReferenceEvents):
+            raise InputError(
+                f"{quoted(each)} is no section.", "Give what heavytop.poincare or heavytop.events returns."
+            )
+    total = sum(map(len, listed))
+    if not total:
+        raise InputError("The section has no point.", "Ask for a later until, or for another function.")
+    drawn = _flat(axes)
+    diameter = size if size is not None else float(np.clip(90 / np.sqrt(total), 2, 5))
+    columns = [component(name) for name in (x, y)]
+    for place, each in enumerate(listed):
+        points = each.to_numpy()[:, columns]
+        drawn.plot(*points.T, ".", color=colours[place % len(colours)], ms=diameter, mew=0)
+    drawn.set(xlabel=_named(x), ylabel=_named(y))
+    drawn.set_title(f"section {listed[0].function}", fontsize="medium")
+    return drawn
+
+
+def drift(run: Trajectory, axes: Any = None) -> Any:
+    """How far the first integrals of a computed motion are from their value at t = 0, over time.
+
+    Arguments:
+        run: a computed motion, in any format.  axes: plane axes, or None.
+
+    Returns:
+        The axes, with a curve for each integral that the motion has; where it is exactly 0 there is none. Of more than
+        400 samples every nth is drawn, exactly as it is.
+
+    Raises:
+        InputError: for a reference, whose integrals do not drift, and as :func:`sphere`.
+    """
+    if not isinstance(run, Trajectory):
+        raise InputError(f"{quoted(run)} is no computed motion.", "Give what heavytop.propagate returns.")
+    samples(run)
+    places = every(len(run.states))
+    drawn, times = _flat(axes), np.array([float(exact(run.times[place])) for place in places])
+    curves = sample_drifts(run.problem, exact_states(run, places))
+    _logarithmic(drawn, times, {name.replace("_", " "): logs for name, logs in curves.items()})
+    drawn.set_ylabel("|I(t) − I(0)|")
+    drawn.set_title(f"drift in {run.problem.precision.name}, {run.integrator}", fontsize="medium")
+    return drawn
+
+
+def digits(
+    run: Trajectory, known: Motion, axes: Any = None, *, colour: str = COLOURS[0], label: str | None = None
+) -> Any:
+    """The digits right of a computed motion over time, −log10 of the largest error of a component.
+
+    Arguments:
+        run: a computed motion.  known: a reference, or a finer run, at the same times.
+        axes: plane axes, or None.  colour, label: of the curve.
+
+    Returns:
+        The axes, from 0 to the digits of the format.
+
+    Raises:
+        InputError: where the times differ, and as :func:`sphere`.
+    """
+    problem, times, states, truth = compared(run, known)
+    most = problem.precision.bits * np.log10(2)
+    logs = sample_errors(problem, states, truth)["relative"]
+    right = [most if log is None else float(np.clip(-log, 0, most)) for log in logs]
+    drawn, instants = _flat(axes), np.abs(np.array([float(time) for time in times]))
+    drawn.plot(instants, right, color=colour, lw=_WIDTH, label=label)
+    drawn.set_title(f"{problem.precision.name}, {run.integrator}", fontsize="medium")
+    _time_axis(drawn, instants)
+    drawn.set(ylabel="digits right", ylim=(0, max(most * 1.05, drawn.get_ylim()[1])))
+    return drawn
+
+
+def error(run: Trajectory, known: Motion, axes: Any = None) -> Any:
+    """The error of a computed motion along the flow (its phase) and across it, over time.
+
+    Arguments:
+        run: a computed motion.  known: a reference, or a finer run, at the same times.  axes: plane axes, or None.
+
+    Returns:
+        The axes, logarithmic.
+
+    Raises:
+        InputError: where the times differ, and as :func:`sphere`.
+    """
+    problem, times, states, truth = compared(run, known)
+    found = sample_errors(problem, states, truth)
+    drawn = _flat(axes)
+    _logarithmic(drawn, np.array([float(time) for time in times]), {name: found[name] for name in ("along", "across")})
+    drawn.set_ylabel("error along and across the flow")
+    drawn.set_title(f"{problem.precision.name}, {run.integrator}", fontsize="medium")
+    return drawn
+
+
+def animate(
+    run: Motion,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    of: str | None = None,
+    top: HeavyTop | None = None,
+    frames: int = 120,
+    fps: int = 24,
+    colour: str = COLOURS[0],
+) -> Any:
+    """The motion as a film: the principal axes of the body, and the path of one of them on the unit sphere.
+
+    Arguments:
+        run, of, top: as in :func:`sphere`.
+        path: a file to save it in, .gif (with Pillow) or .mp4 (where ffmpeg is); None for none.
+        frames: evenly over the samples, at most as many as there are.  fps: frames a second.
+        colour: of the path.
+
+    Returns:
+        A ``FuncAnimation`` of matplotlib; in a notebook ``HTML(found.to_jshtml())`` shows it.
+
+    Raises:
+        InputError: for another kind of file, for .mp4 where there is no ffmpeg, and as :func:`sphere`.
+    """
+    from matplotlib.animation import FuncAnimation
+
+    count, rate = arguments.count(frames, "frames"), arguments.count(fps, "fps")
+    file = None if path is None else arguments.path(path, "path")
+    writer = None if file is None else _writer(file.suffix.lower(), rate or 1)
+    name, found, line = path_in_space(run, "axis3" if of == "vertical" else of, top)
+    rows, drawn = found.rows(), _solid(None)
+    _globe(drawn)
+    drawn.set(xlabel="x", ylabel="y", zlabel="z, up")
+    arms = [drawn.plot([], [], [], color=COLOURS[i + 1], lw=2.2, label=f"axis {i + 1}")[0] for i in range(3)]
+    rod = drawn.plot([], [], [], color=colour, lw=2.8, label=_FOLLOWED[name])[0]
+    trace = drawn.plot([], [], [], color=colour, lw=_WIDTH)[0]
+    clock = drawn.text2D(0.02, 0.02, "", transform=drawn.transAxes)
+    drawn.legend(loc="upper left", fontsize="small", frameon=False)
+    places = every(len(line), count or 1)
+
+    def show(frame: int) -> Any:
+        place = places[frame]
+        for axis, arm in enumerate(arms):
+            arm.set_data_3d(*np.stack([np.zeros(3), rows[place][:, axis]]).T)
+        rod.set_data_3d(*np.stack([np.zeros(3), line[place]]).T)
+        trace.set_data_3d(*line[: place + 1].T)
+        clock.set_text(f"t = {found.times[place]:.2f}")
+        return [*arms, rod, trace, clock]
+
+    film = FuncAnimation(drawn.figure, show, frames=len(places), interval=1000 / (rate or 1), blit=False)
+    if file is None:
+        drawn.figure.canvas.draw()  # the first frame: matplotlib warns of a film of which nothing was drawn
+    else:
+        _save(film, file, writer)
+    return film
+
+
+def _save(film: Any, file: Path, writer: Any) -> None:
+    try:
+        film.save(file, writer=writer)
+    except OSError as problem:
+        raise InputError(
+            f"{quoted(str(file))} cannot be written: {problem.strerror}.", "Give a file in a writable folder."
+        ) from None
+
+
+def _writer(suffix: str, fps: int) -> Any:
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    if suffix == ".gif":
+        return PillowWriter(fps=fps)
+    if suffix != ".mp4":
+        raise InputError(f"A film is no {quoted(suffix)} file.", "Give a path that ends with .gif or .mp4.")
+    if not FFMpegWriter.isAvailable():
+        raise InputError(
+            "There is no ffmpeg to write .mp4 with.", "Install ffmpeg, or give a path that ends with .gif."
+        )
+    return FFMpegWriter(fps=fps)
+
+
+def _figure(width: float, height: float) -> Any:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _flat(axes: Any) -> Any:
+    """Plane axes: those given, or new ones."""
+    if axes is None:
+        axes = _figure(6.4, 4.0).add_subplot()
+    elif not hasattr(axes, "plot") or getattr(axes, "name", "") == "3d":
+        raise InputError(f"axes = {quoted(axes)} are no plane axes of matplotlib.", "Give what plt.subplots() returns.")
+    axes.grid(visible=True, color=_GREY, alpha=0.25, lw=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    return axes
+
+
+def _solid(axes: Any) -> Any:
+    """Three-dimensional axes: those given, or new ones."""
+    if axes is None:
+        axes = _figure(5.2, 5.0).add_subplot(projection="3d")
+    elif getattr(axes, "name", "") != "3d":
+        raise InputError(f"axes = {quoted(axes)} are no three-dimensional axes.", 'Use add_subplot(projection="3d").')
+    axes.view_init(_ELEVATION, _AZIMUTH)
+    axes.locator_params(nbins=4)
+    return axes
+
+
+def _sight(axes: Any) -> NDArray[np.float64]:
+    """The unit vector from the middle of the axes to the eye."""
+    elevation, azimuth = np.radians(axes.elev), np.radians(axes.azim)
+    return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+
+
+def _globe(axes: Any) -> None:
+    """The unit sphere, and a line upwards."""
+    _ellipsoid(axes, np.ones(3))
+    axes.plot([0, 0], [0, 0], [-1, 1.25], color=_GREY, lw=0.8)
+    _equal(axes, 1.0)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_ticks((-1, 0, 1))
+    axes.zaxis.labelpad = -1
+
+
+def _ellipsoid(axes: Any, radii: NDArray[np.float64]) -> None:
+    """A translucent ellipsoid with circles of latitude and longitude."""
+    turn, height = np.linspace(0, 2 * np.pi, 73), np.linspace(-np.pi / 2, np.pi / 2, 37)
+    across, up = np.cos(height)[:, None], np.sin(height)[:, None]
+    x, y, z = across * np.cos(turn) * radii[0], across * np.sin(turn) * radii[1], up + 0 * turn
+    axes.plot_surface(x, y, z * radii[2], color=_LIGHT, alpha=0.15, lw=0, shade=False)
+    axes.plot_wireframe(x, y, z * radii[2], rstride=6, cstride=9, color=_GREY, alpha=0.18, lw=0.5)
+
+
+def _equal(axes: Any, extent: float, middle: Any = (0.0, 0.0, 0.0)) -> None:
+    """One scale on all three axes, ``extent`` to both sides of the middle."""
+    low, high = np.asarray(middle) - extent, np.asarray(middle) + extent
+    for name, ends in zip("xyz", zip(low, high, strict=True), strict=True):
+        getattr(axes, f"set_{name}lim")(*ends)
+    axes.set_box_aspect((1, 1, 1), zoom=0.86)
+
+
+def _visible_path(
+    axes: Any, path: NDArray[np.float64], colour: str, label: str | None, weights: Any = (1.0, 1.0, 1.0)
+) -> None:
+    """A path on an ellipsoid Σ weight x² = 1: the part that faces the eye as a line, the rest thin."""
+    front = (path * np.asarray(weights)) @ _sight(axes) >= 0
+    near, far = path.copy(), path.copy()
+    # both have the sample where they meet
+    near[~(front | np.roll(front, 1))] = np.nan
+    far[front & np.roll(front, 1)] = np.nan
+    axes.plot(*far.T, color=colour, lw=0.7 * _WIDTH, alpha=0.45)
+    axes.plot(*near.T, color=colour, lw=1.2 * _WIDTH, label=label)
+    axes.plot(*path[:1].T, "o", color=colour, ms=4)
+
+
+def _plane_across(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Two unit vectors at right angles to a unit vector and to each other, (2, 3)."""
+    first = np.cross(normal, np.eye(3)[int(np.argmin(abs(normal)))])
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
+
+
+def _column(found: Samples, name: str) -> NDArray[np.float64]:
+    if name == "t":
+        return found.times
+    place = component(name)
+    values: NDArray[np.float64] = (found.omega if place < 3 else found.gamma)[:, place % 3]
+    return values
+
+
+def _named(name: str) -> str:
+    if name == "t":
+        return _TIME
+    place = component(name)
+    return f"{NAMES[place]} ({_RATE})" if place < 3 else NAMES[place]
+
+
+def _time_axis(axes: Any, times: NDArray[np.float64]) -> None:
+    """Logarithmic over two decades or more; sizes of times."""
+    positive = times[times > 0]
+    if len(positive) and positive.max() >= _SPAN * positive.min():
+        axes.set_xscale("log")
+    axes.set_xlabel(_TIME if (times >= 0).all() else "|t| (time units)")
+
+
+def _logarithmic(axes: Any, times: NDArray[np.float64], curves: dict[str, Logs]) -> None:
+    """Curves over time by their decimal logarithms, which may be those of numbers that no double is."""
+    backwards = bool((times < 0).any())
+    for place, (name, logs) in enumerate(curves.items()):
+        values = np.array([np.nan if log is None else log for log in logs])
+        exact_zero = bool(np.isnan(values).all())
+        colour, dash = COLOURS[place % len(COLOURS)], _DASHES[place % len(_DASHES)]
+        line = {"color": colour, "lw": _WIDTH, "ls": dash, "label": f"{name}: exactly 0" if exact_zero else name}
+        marker = "." if np.isnan(values).any() else ""
+        axes.plot(abs(times), values, marker=marker, ms=3, **line)
+    _time_axis(axes, abs(times))
+    if backwards:
+        axes.set_xlabel("|t| (time units)")
+    decades(axes.yaxis)
+    axes.legend(frameon=False, fontsize="small")

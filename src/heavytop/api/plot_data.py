@@ -1,0 +1,199 @@
+"""What a picture needs of a motion: times, states and attitude as arrays, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heavytop.api.motions import propagate
+from heavytop.errors import InputError, quoted
+from heavytop.integrate.trajectory import Problem, Trajectory
+from heavytop.measure.reference import Reference
+from heavytop.precision import exact
+from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import rotated, transposed
+from heavytop.top.equations import Parameters
+from heavytop.top.heavy_top import HeavyTop
+
+Motion = Trajectory | Reference
+"""A computed motion (:func:`heavytop.propagate`) or a known one (:func:`heavytop.reference`)."""
+
+_FEWEST = 2
+AXES = {"axis1": (1.0, 0.0, 0.0), "axis2": (0.0, 1.0, 0.0), "axis3": (0.0, 0.0, 1.0)}
+OF = (*AXES, "centre", "vertical")
+MOST_EXACT = 400
+"""Samples whose exact errors or integrals are drawn; of more every nth is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """times: (n,).  omega, gamma: (n, 3), in body axes.  xi: (n, 3), the space axis x in body axes, or None."""
+
+    run: Motion
+    times: NDArray[np.float64]
+    omega: NDArray[np.float64]
+    gamma: NDArray[np.float64]
+    xi: NDArray[np.float64] | None
+
+    def rows(self) -> NDArray[np.float64]:
+        """R at every sample, (n, 3, 3): its rows are ξ, γ × ξ, γ, so that v_space = R v_body."""
+        xi = self.xi if self.xi is not None else _integrated_xi(self.run)
+        return np.stack([xi, np.cross(self.gamma, xi), self.gamma], axis=1)
+
+
+def samples(run: Any) -> Samples:
+    """A motion in double; raises InputError for what is none, for fewer than two samples, and for ones not finite."""
+    if not isinstance(run, Trajectory | Reference):
+        raise InputError(
+            f"{quoted(run)} is no motion to draw.", "Give what heavytop.propagate or heavytop.reference returns."
+        )
+    count = len(run.states)
+    if count < _FEWEST:
+        raise InputError(
+            f"A run with {count} samples has no path.",
+            "Ask for many times, such as numpy.arange(1, 1001) / 50, and without an observer.",
+        )
+    states = run.to_numpy()
+    if not np.isfinite(states).all():
+        first = int(np.flatnonzero(~np.isfinite(states).all(axis=1))[0])
+        raise InputError(f"The state of sample {first} is not finite.", "Draw the part of the run before it.")
+    times = np.array([float(exact(time)) for time in run.times])[:count]
+    return Samples(run, times, states[:, :3], states[:, 3:6], _xi(run, states))
+
+
+def _xi(run: Motion, states: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    attitude = getattr(run, "attitude", None)
+    if isinstance(run, Reference):
+        if attitude is None:
+            return None
+        return np.array([[float(ball.value) for ball in row] for row in attitude])
+    if attitude is not None:
+        return np.array([[float(value) for value in row] for row in attitude])
+    return states[:, 6:9] if states.shape[1] == 9 else None
+
+
+def _integrated_xi(run: Motion) -> NDArray[np.float64]:
+    """ξ of a computed motion, which is run again with it; raises InputError for a known one without attitude."""
+    if isinstance(run, Reference):
+        raise InputError("This reference has no attitude.", "Ask for it: heavytop.reference(..., attitude=True).")
+    problem = run.problem
+    top, start = problem.given or (problem.top, problem.start)
+    start = start.normalized()
+    again = propagate(
+        top,
+        start,
+        list(run.times),
+        problem.precision,
+        integrator=run.integrator,
+        system=problem.system,
+        xi=perpendicular(start.gamma),
+    )
+    if len(again.states) < len(run.states):
+        raise InputError(
+            f"The attitude could not be integrated: {again.outcome.message}.",
+            "Give the run with xi=, as propagate takes.",
+        )
+    found = samples(again).xi
+    assert found is not None
+    turn = axes_of(run)
+    return (found if turn is None else found @ turn.T)[: len(run.states)]
+
+
+def axes_of(run: Motion) -> NDArray[np.float64] | None:
+    """A, v_given = A v_principal, of a run whose states are in other axes than the principal ones; else None."""
+    frame = getattr(run, "frame", None)
+    return None if frame is None else np.array([[float(value) for value in row] for row in frame.axes])
+
+
+def principal(run: Motion, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vectors (n, 3) of a run in its principal axes."""
+    turn = axes_of(run)
+    return vectors if turn is None else vectors @ turn
+
+
+def parameters_of(run: Motion, top: HeavyTop | None) -> Parameters:
+    """I, P r and the rotor of a motion, in principal axes; raises InputError for a known one without ``top``."""
+    if isinstance(run, Trajectory):
+        return run.problem.parameters
+    if not isinstance(top, HeavyTop):
+        raise InputError("A reference does not say of which top it is.", "Give top=.")
+    return Parameters(top.inertia, top.moment, top.rotor or 0)
+
+
+def direction(run: Motion, of: str | None, top: HeavyTop | None) -> tuple[str, NDArray[np.float64]]:
+    """(name, unit vector in body axes) of what is followed in space; None: the centre of mass, else axis 3."""
+    if of is None:
+        known = isinstance(run, Trajectory) or top is not None
+        of = "centre" if known and any(parameters_of(run, top).moment) else "axis3"
+    if of in AXES:
+        return of, np.array(AXES[of])
+    if of != "centre":
+        raise InputError(f"of = {quoted(of)} is none.", f"Use {', '.join(OF)}.")
+    moment = parameters_of(run, top).moment
+    if not any(moment):
+        raise InputError("The centre of mass is at the fixed point, or has no weight.", "Use axis1, axis2 or axis3.")
+    largest = max(map(abs, moment))
+    vector = np.array([float(value / largest) for value in moment])
+    turn = axes_of(run)
+    return of, (vector if turn is None else turn @ vector) / np.linalg.norm(vector)
+
+
+def path_in_space(run: Any, of: str | None, top: HeavyTop | None) -> tuple[str, Samples, NDArray[np.float64]]:
+    """What is followed, the samples, and its path on the unit sphere, (n, 3), third component upwards.
+
+    "vertical" is γ, the vertical in body axes.
+    """
+    found = samples(run)
+    if of == "vertical":
+        return of, found, found.gamma
+    name, vector = direction(run, of, top)
+    return name, found, found.rows() @ vector
+
+
+def compared(run: Any, known: Any) -> tuple[Problem, list[Fraction], list[list[Fraction]], list[list[Fraction]]]:
+    """(problem, times, states, known states), exact, every nth of many; raises InputError where the times differ."""
+    if not isinstance(run, Trajectory):
+        raise InputError(f"{quoted(run)} is no computed motion.", "Give what heavytop.propagate returns.")
+    samples(run)
+    samples(known)
+    count = len(run.states)
+    if count != len(known.states):
+        raise InputError(f"The run has {count} samples and the other {len(known.states)}.", "Give the same times.")
+    places = every(count)
+    times = [exact(run.times[place]) for place in places]
+    slack = 4 * run.problem.precision.eps
+    for time, place in zip(times, places, strict=True):
+        other = exact(known.times[place])
+        if abs(time - other) > slack * abs(time):
+            raise InputError(
+                f"Sample {place} is at t = {float(time)!r} of one and {float(other)!r} of the other.",
+                "Give the same times.",
+            )
+    return run.problem, times, exact_states(run, places), exact_states(known, places, run)
+
+
+def every(count: int, most: int = MOST_EXACT) -> list[int]:
+    """The places of at most ``most`` samples of ``count``, evenly, with the first and the last."""
+    if count <= most:
+        return list(range(count))
+    if most == 1:
+        return [count - 1]
+    return [round(place * (count - 1) / (most - 1)) for place in range(most)]
+
+
+def exact_states(run: Motion, places: Sequence[int], beside: Motion | None = None) -> list[list[Fraction]]:
+    """(Ω, γ) at these samples, exactly as they are written, in the principal axes of the run, or of that ``beside``."""
+    if isinstance(run, Reference):
+        found = [[exact(ball.value) for ball in run.states[place]][:6] for place in places]
+    else:
+        found = [[exact(value) for value in run.states[place][:6]] for place in places]
+    frame = getattr(beside or run, "frame", None)
+    if frame is None:
+        return found
+    back = transposed(frame.axes)
+    return [[*rotated(back, state[:3]), *rotated(back, state[3:])] for state in found]

@@ -1,0 +1,299 @@
+"""The Taylor polynomial of every step of an integrator, as polynomials over the rational numbers.
+
+Coefficients are rounded to fixed-point numbers 2^-64 below the format's eps of the largest in their component: far
+below what the integrator itself errs, and short enough that a step costs some 0.1 ms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+from flint import fmpq, fmpq_poly, fmpz_poly
+
+from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.integrate import registry
+from heavytop.integrate.engines import compiled as compile_heyoka
+from heavytop.integrate.engines import load
+from heavytop.integrate.reach import expected_steps
+from heavytop.integrate.stepper import Stepper
+from heavytop.integrate.trajectory import Outcome, Problem
+from heavytop.integrate.words import OUTCOMES
+from heavytop.integrate.words_engines import choose
+from heavytop.integrate.words_engines import compiled as compile_words
+from heavytop.precision import DOUBLE, decimal_text, exact, number
+from heavytop.words.floating import Floating
+from heavytop.words.run import Run, Status
+from heavytop.words.scaled import Scaled
+
+_SPARE_BITS = 64
+MOST_STEPS = 10**8
+"""Each is looked at, in some 0.1 ms in double: these take hours."""
+
+Dyadic = tuple[int, int]
+"""m and e of the number m 2^e."""
+
+
+def dyadic(value: Any) -> Dyadic:
+    """A binary number as m 2^e."""
+    number = exact(value)
+    return number.numerator, 1 - number.denominator.bit_length()
+
+
+def dyadics(values: Any) -> list[Dyadic]:
+    """Numbers of a format as m 2^e each."""
+    import numpy
+
+    if isinstance(values, numpy.ndarray) and values.dtype == numpy.float64:
+        mantissas, exponents = numpy.frexp(values)
+        return list(
+            zip(numpy.ldexp(mantissas, 53).astype(numpy.int64).tolist(), (exponents - 53).tolist(), strict=True)
+        )
+    return [dyadic(value) for value in values]
+
+
+class Piece:
+    """A step: the motion at ``began`` + s ``length`` for 0 ≤ s ≤ 1 (and ``end`` of the last one) as polynomials in s.
+
+    began, length: exact; a step back in time has a negative length.
+    coefficients: gives the numbers c_n of one component, which is Σ c_n (s length)^n, or Σ c_n s^n without ``powers``.
+    doubles: the c_n of all components, shape (6, order + 1), where they are doubles; else None.
+    """
+
+    __slots__ = ("_bits", "_coefficients", "_found", "_powers", "began", "doubles", "end", "length")
+
+    def __init__(
+        self,
+        began: Fraction,
+        length: Fraction,
+        bits: int,
+        coefficients: Callable[[int], Sequence[Dyadic]],
+        powers: bool = True,
+        doubles: Any = None,
+    ) -> None:
+        self.began, self.length, self.end, self.doubles = began, length, fmpq(1), doubles
+        self._bits, self._coefficients = bits + _SPARE_BITS, coefficients
+        self._found: dict[int, fmpq_poly] = {}
+        self._powers: list[Dyadic] | None = None if powers else []
+
+    def component(self, index: int) -> fmpq_poly:
+        """One component of (Ω, γ) as a polynomial in s."""
+        if index not in self._found:
+            values = list(self._coefficients(index))
+            if self._powers is None:
+                self._powers = self._powers_of_length(len(values))
+            if self._powers:
+                values = [(m * k, e + f) for (m, e), (k, f) in zip(values, self._powers, strict=True)]
+            self._found[index] = _fixed_point(values, self._bits)
+        return self._found[index]
+
+    def boxes(self) -> tuple[list[float], list[float]] | None:
+        """(middles, half widths) of intervals that hold the components over the step, but for roundings; or None."""
+        if self.doubles is None:
+            return None
+        import numpy
+
+        sizes = abs(float(self.length)) ** numpy.arange(self.doubles.shape[1])
+        sizes[0] = 0.0
+        return self.doubles[:, 0].tolist(), (abs(self.doubles) @ sizes).tolist()
+
+    def _powers_of_length(self, count: int) -> list[Dyadic]:
+        """length^n for 0 ≤ n < count, to as many bits as are kept."""
+        m, e = dyadic(self.length)
+        found = [(1, 0)]
+        for _ in range(count - 1):
+            k, f = found[-1][0] * m, found[-1][1] + e
+            excess = max(0, k.bit_length() - self._bits)
+            found.append((k >> excess, f + excess))
+        return found
+
+    def state(self, s: fmpq) -> list[Fraction]:
+        """(Ω, γ) at s, exactly as the polynomials give it."""
+        values = (self.component(index)(s) for index in range(6))
+        return [Fraction(int(value.p), int(value.q)) for value in values]
+
+    def time(self, s: fmpq) -> Fraction:
+        """The time at s."""
+        return self.began + self.length * Fraction(int(s.p), int(s.q))
+
+    def cut(self, time: Fraction) -> None:
+        """Let the step end at ``time``, inside it."""
+        part = (time - self.began) / self.length
+        self.end = fmpq(part.numerator, part.denominator)
+
+
+def _fixed_point(values: Sequence[Dyadic], bits: int) -> fmpq_poly:
+    """A polynomial with these coefficients, each within 2^-bits of the largest."""
+    top = max((m.bit_length() + e for m, e in values if m), default=0)
+    shift = bits - top
+    integers = [m << (e + shift) if e + shift >= 0 else m >> -(e + shift) for m, e in values]
+    found = fmpq_poly(fmpz_poly(integers))
+    return found / (1 << shift) if shift >= 0 else found * (1 << -shift)
+
+
+@dataclass(slots=True)
+class Dense:
+    """A run from t = 0 whose steps are looked at one by one.
+
+    until: exact, a number of the format.  outcome, steps, reached, order, seconds, flags: as of a
+    :class:`heavytop.integrate.trajectory.Trajectory`, once :meth:`pieces` is at its end.
+    """
+
+    problem: Problem
+    until: Fraction
+    tolerance: Fraction | None = None
+    step_limit: int | None = None
+    outcome: Outcome = Outcome.SUCCESS
+    steps: int = 0
+    order: int = 0
+    reached: Fraction = Fraction(0)
+    seconds: dict[str, float] = field(default_factory=dict)
+    flags: dict[str, str] = field(default_factory=dict)
+
+    def pieces(self) -> Iterator[Piece]:
+        """The steps, the last one cut at ``until``; none at an equilibrium."""
+        began = perf_counter()
+        try:
+            for piece in self._steps():
+                ends = piece.began + piece.length
+                self.reached = ends
+                if abs(ends) >= abs(self.until):
+                    piece.cut(self.until)
+                    self.reached = self.until
+                    yield piece
+                    return
+                yield piece
+            if self.outcome is Outcome.SUCCESS:
+                self.reached = self.until
+        finally:
+            self.seconds["run"] = perf_counter() - began
+
+    def _steps(self) -> Iterator[Piece]:
+        raise NotImplementedError
+
+    def _stopped(self) -> bool:
+        if self.step_limit is None or self.steps < self.step_limit:
+            return False
+        self.outcome = Outcome.STEP_LIMIT
+        return True
+
+
+class OfHeyoka(Dense):
+    """Steps of heyoka."""
+
+    __slots__ = ()
+
+    def _steps(self) -> Iterator[Piece]:
+        problem, bits = self.problem, self.problem.precision.bits
+        tool = compile_heyoka(problem.system, problem.precision, tolerance=self.tolerance)
+        self.flags, self.seconds["compile"] = tool.flags, tool.seconds
+        with tool.lent() as engine:
+            load(engine, problem)
+            self.order = engine.order
+            stepper = Stepper(engine, self.until > 0, None, None)
+            while not self._stopped():
+                began = sum(map(exact, engine.dtime), Fraction(0))
+                self.outcome = stepper.single()
+                if self.outcome is not Outcome.SUCCESS or stepper.rest is not None:
+                    return
+                self.steps += 1
+                rows = stepper.polynomial()
+                doubles = rows if problem.precision == DOUBLE else None
+                yield Piece(began, exact(engine.last_h), bits, _reader_of(rows), doubles=doubles)
+
+
+class OfWords(Dense):
+    """Steps of the multi-word integrator."""
+
+    __slots__ = ()
+
+    def _steps(self) -> Iterator[Piece]:
+        problem, bits = self.problem, self.problem.precision.bits
+        arithmetic, scaled = choose(problem, self.tolerance)
+        self.seconds["compile"] = compile_words(arithmetic, problem.system, False)
+        self.flags = arithmetic.flags
+        if scaled.rest:
+            return
+        run = arithmetic.begin(scaled, self.until > 0)
+        sign, goal = (1 if run.forwards else -1), abs(self.until) * scaled.rate
+        while not self._stopped():
+            began = run.time
+            status = run.advance(goal, 1)
+            self.steps, self.order = run.steps, run.order
+            if status is not Status.FINE:
+                self.outcome = OUTCOMES[status]
+                return
+            rows = _rows(run)
+            read = _reader(rows, scaled)
+            unit = sign / scaled.rate
+            yield _of_run(run, began * unit, (run.time - began) * unit, bits, read, scaled)
+
+
+def _of_run(
+    run: Run,
+    began: Fraction,
+    length: Fraction,
+    bits: int,
+    read: Callable[[int], Sequence[Dyadic]],
+    scaled: Scaled,
+) -> Piece:
+    """A step in the units of the problem; double-double gives y_n, the others y_n h^n."""
+    if not isinstance(run, Floating):
+        return Piece(began, length, bits, read, powers=False)
+    m, e = dyadic(scaled.rate)
+
+    def in_units(index: int) -> list[Dyadic]:
+        # y_n counts rate^n, a power of two
+        shift = m.bit_length() - 1 + e
+        return [(k, f + n * shift) for n, (k, f) in enumerate(read(index))]
+
+    return Piece(began, length, bits, in_units)
+
+
+def _reader_of(rows: Any) -> Callable[[int], Sequence[Dyadic]]:
+    return lambda index: dyadics(rows[index])
+
+
+def _rows(run: Run) -> list[tuple[Fraction, ...]]:
+    give = run.derivatives if isinstance(run, Floating) else run.coefficients
+    return [give(n) for n in range(run.order + 1)]
+
+
+def _reader(rows: Sequence[tuple[Fraction, ...]], scaled: Scaled) -> Callable[[int], Sequence[Dyadic]]:
+    def read(index: int) -> list[Dyadic]:
+        size = scaled.sizes[index]
+        return [dyadic(row[index] * size) for row in rows]
+
+    return read
+
+
+_DENSE: dict[str, type[Dense]] = {
+    "heavytop.integrate.taylor:propagate": OfHeyoka,
+    "heavytop.integrate.words:propagate_words": OfWords,
+}
+"""By the function that propagates: those that hand over the polynomial of a step."""
+
+
+def dense(
+    integrator: Any, problem: Problem, until: Fraction, tolerance: Fraction | None, step_limit: int | None
+) -> Dense:
+    """A run of that integrator; raises InputError for one that hands over no polynomial of its steps."""
+    found = registry.INTEGRATORS.get(integrator) if isinstance(integrator, str) else None
+    made = _DENSE.get(found.propagate) if found else None
+    if made is None:
+        known = " and ".join(name for name, each in registry.INTEGRATORS.items() if each.propagate in _DENSE)
+        raise InputError(
+            f"The integrator {quoted(integrator)} hands over no polynomial of its steps.",
+            f"Events are located by {known}.",
+        )
+    end = exact(number(until, problem.precision))
+    steps = expected_steps(problem, end)
+    if steps > MOST_STEPS and not (step_limit is not None and step_limit <= MOST_STEPS):
+        raise OutOfReach(
+            f"A run to t = {decimal_text(end, 6)} takes some {steps:.0e} steps, and each is looked at for events.",
+            f"Up to {MOST_STEPS:.0e} are tried: ask for an earlier time, or give a step limit.",
+        )
+    return made(problem, end, tolerance, step_limit)

@@ -1,0 +1,156 @@
+"""Proven derivatives of a motion with respect to its start and its data, as decimal text with the radius of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+from flint import arb
+
+from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.exact.balls import ball, value_text, working_precision
+from heavytop.exact.bodies import Resolved, resolve
+from heavytop.exact.derivatives import METHOD, derivatives
+from heavytop.exact.field_derivatives import DATA
+from heavytop.exact.flint_context import whole_evaluation
+from heavytop.exact.singular import largest_singular_value
+from heavytop.exact.validated import Validated
+from heavytop.measure.certify import bits_of
+from heavytop.precision import exact, shown
+from heavytop.top.bodies import Body
+from heavytop.top.equations import NAMES, System
+from heavytop.top.heavy_top import HeavyTop, State
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+WHICH = ("start", "data", "all")
+STARTS = tuple(f"{name}(0)" for name in NAMES)
+"""Names of the columns of the derivatives with respect to the start."""
+PARAMETERS = DATA
+"""Those of the derivatives with respect to the data."""
+_SPARE_BITS = 12
+
+Balls = list[list[arb]]
+
+
+class DerivativeBall(msgspec.Struct, frozen=True):
+    """A value and a radius, as decimal text: the true derivative is within the radius of the printed value."""
+
+    value: str
+    radius: str
+
+
+class Derivatives(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Proven derivatives; their JSON is that of ``heavytop reference --derivatives``.
+
+    start: ∂y_i(t)/∂y_j(0) as [i][j] at each time, y = (Ω1, Ω2, Ω3, γ1, γ2, γ3).  lyapunov: with them, the logarithm of
+    the largest singular value of that matrix over |t|, in 1/time unit; None at t = 0.
+    data: ∂y_i(t)/∂θ_j, θ = (I1, I2, I3, n1, n2, n3), n = P r.  What was not asked for is None.
+    """
+
+    method: str
+    start: list[list[list[DerivativeBall]]] | None = None
+    data: list[list[list[DerivativeBall]]] | None = None
+    lyapunov: list[DerivativeBall | None] | None = None
+
+    def numpy(self) -> NDArray[np.float64] | dict[str, NDArray[np.float64]]:
+        """The values in double, shape (n, 6, 6), of the start; with data, by ``"start"`` and ``"data"``."""
+        import numpy
+
+        found = {
+            name: numpy.array([[[float(ball.value) for ball in row] for row in rows] for rows in part])
+            for name, part in (("start", self.start), ("data", self.data))
+            if part is not None
+        }
+        return found["start"] if self.data is None else found
+
+
+def which_derivatives(value: object) -> str | None:
+    """ "start", "data", "all", or None for none; raises InputError for any other."""
+    if value is None or (isinstance(value, str) and value in WHICH):
+        return value
+    raise InputError(f"derivatives = {quoted(value)} is none.", 'Give "start", "data" or "all".')
+
+
+def known_derivatives(
+    body: HeavyTop | Body, start: State, times: Sequence[Fraction], digits: int, system: System, which: str
+) -> Derivatives:
+    """The derivatives at ``times`` to ``digits`` digits: each within 10^-digits, relative above 1, absolute below.
+
+    body, start: a body or a top, and its state, in whose axes they are given.  which: one of :data:`WHICH`.
+    Raises OutOfReach where the digits cannot be proven; InputError for a body whose principal axes are irrational.
+    """
+    resolved = resolve(body, start, bits_of(digits) + 256)
+    if resolved.uncertainty is not None:
+        raise InputError(
+            "Derivatives need exact data, but the principal axes or the attitude are irrational.",
+            "Give principal moments, and gamma or an attitude with rational entries such as a quaternion.",
+        )
+    known, bits = Validated(resolved.top, resolved.start, system), bits_of(digits) + _SPARE_BITS
+    found = derivatives(known, times, bits, which != "start")
+    of_start = of_data = lyapunov = None
+    if which != "data":
+        matrices = [in_axes(each.start, resolved) for each in found]
+        of_start = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
+        exponents = [_exponent(matrix, time, bits) for matrix, time in zip(matrices, times, strict=True)]
+        lyapunov = [None if value is None else _text(value, digits) for value in exponents]
+    if which != "start":
+        matrices = [in_axes(each.data or [], resolved, kept=3) for each in found]
+        of_data = [_texts(matrix, time, digits) for matrix, time in zip(matrices, times, strict=True)]
+    return Derivatives(METHOD, of_start, of_data, lyapunov)
+
+
+@whole_evaluation
+def in_axes(matrix: Balls, resolved: Resolved, kept: int = 0) -> Balls:
+    """A matrix of derivatives in principal axes, as one in the axes given: A on both sides of each 3 × 3 block.
+
+    kept: columns that are no vectors, the principal moments.
+    """
+    if not resolved.turned:
+        return matrix
+    longest = max(int(value.mid().man_exp()[0]).bit_length() for row in matrix for value in row)
+    with working_precision(longest + 64):
+        axes = [[ball(value) for value in row] for row in resolved.axes]
+
+        def turned(vector: list[Any]) -> list[Any]:
+            return [
+                sum((a * x for a, x in zip(row, vector[place : place + 3], strict=True)), arb(0))
+                for place in range(0, len(vector), 3)
+                for row in axes
+            ]
+
+        columns = [turned(list(column)) for column in zip(*matrix, strict=True)]
+        rows = [list(row) for row in zip(*columns, strict=True)]
+        return [[*row[:kept], *turned(row[kept:])] for row in rows]
+
+
+@whole_evaluation
+def _exponent(matrix: Balls, time: Fraction, bits: int) -> arb | None:
+    """log σ/|t| of the largest singular value σ; None at t = 0."""
+    if time == 0:
+        return None
+    value = largest_singular_value(matrix, bits)
+    with working_precision(bits + 64):
+        return value.log() / ball(abs(time))
+
+
+def _texts(matrix: Balls, time: Fraction, digits: int) -> list[list[DerivativeBall]]:
+    found = [[_text(value, digits) for value in row] for row in matrix]
+    for row, name in zip(found, NAMES, strict=True):
+        for each in row:
+            if exact(each.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(each.value))):
+                raise OutOfReach(
+                    f"A derivative of {name} at t = {shown(time)} is known within {each.radius} only, not to {digits} "
+                    "digits.",
+                    "Ask for fewer digits.",
+                )
+    return found
+
+
+def _text(value: arb, digits: int) -> DerivativeBall:
+    """One digit more than ``digits`` is printed, so that its rounding does not cost one that was promised."""
+    return DerivativeBall(*value_text(value, digits + 1))

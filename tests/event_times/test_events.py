@@ -1,0 +1,394 @@
+"""Events against root finding that shares nothing with them: mpmath on Taylor series of its own, and closed forms."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+from fractions import Fraction
+from threading import Thread
+
+import mpmath
+import numpy as np
+import pytest
+
+import heavytop as ht
+from heavytop.errors import InputError, OutOfReach
+from heavytop.event_times.dense import Dense, Piece
+from heavytop.event_times.functions import event_function
+from heavytop.event_times.located import locate
+from heavytop.integrate.trajectory import Problem
+
+TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
+START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))
+PENDULUM = ht.HeavyTop((1, 1, 1), 1, (1, 0, 0))
+FUNCTIONS = ("omega1 = 1/5", "gamma3 = 1/2", "omega1*gamma2 - omega2*gamma1 = 1/10", "omega3/(gamma1 + 2) = 1/5")
+
+
+def value(name: str, y):
+    w1, w2, w3, g1, g2, g3 = y
+    return {
+        "omega1 = 1/5": w1 - mpmath.mpf(1) / 5,
+        "gamma3 = 1/2": g3 - mpmath.mpf(1) / 2,
+        "omega1*gamma2 - omega2*gamma1 = 1/10": w1 * g2 - w2 * g1 - mpmath.mpf(1) / 10,
+        "omega3/(gamma1 + 2) = 1/5": w3 / (g1 + 2) - mpmath.mpf(1) / 5,
+    }[name]
+
+
+def field(t, y):
+    """(1.1) and (1.2) for TOP, written out."""
+    w1, w2, w3, g1, g2, g3 = y
+    n1, n2, n3 = mpmath.mpf(1) / 2, mpmath.mpf(1) / 3, mpmath.mpf(1) / 5
+    return [
+        ((2 - 1) * w2 * w3 + g2 * n3 - g3 * n2) / 3,
+        ((1 - 3) * w3 * w1 + g3 * n1 - g1 * n3) / 2,
+        ((3 - 2) * w1 * w2 + g1 * n2 - g2 * n1) / 1,
+        g2 * w3 - g3 * w2,
+        g3 * w1 - g1 * w3,
+        g1 * w2 - g2 * w1,
+    ]
+
+
+@pytest.fixture(scope="module")
+def independent() -> dict[str, list[tuple[mpmath.mpf, list[mpmath.mpf], int]]]:
+    """Events up to t = 6 by mpmath: its Taylor integrator at 40 digits, samples each 0.02, and its root finder."""
+    with mpmath.workdps(40):
+        start = [mpmath.mpf(x.numerator) / x.denominator for x in START.flat]
+        motion = mpmath.odefun(field, 0, start)
+        grid = [mpmath.mpf(k) / 50 for k in range(301)]
+        states = [motion(t) for t in grid]
+        found = {}
+        for name in FUNCTIONS:
+            events = []
+            for (a, u), (b, v) in itertools.pairwise([(t, value(name, y)) for t, y in zip(grid, states, strict=True)]):
+                if u * v < 0:
+                    root = mpmath.findroot(lambda t: value(name, motion(t)), (a, b), solver="anderson")  # noqa: B023
+                    events.append((root, motion(root), 1 if v > 0 else -1))
+            found[name] = events
+        return found
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_proven_events_are_those_of_mpmath(name, independent) -> None:
+    known = ht.events(TOP, START, 6, name, digits=30)
+    assert known.guarantee == "proven"
+    assert len(known) == len(independent[name]) > 0
+    assert known.directions == [direction for *_, direction in independent[name]]
+    with mpmath.workdps(40):
+        for ball, state, (time, other, _) in zip(known.times, known.states, independent[name], strict=True):
+            assert abs(mpmath.mpf(ball.value) - time) <= mpmath.mpf(ball.radius) + mpmath.mpf(10) ** -33
+            assert Fraction(ball.radius) <= Fraction(1, 10**30) * max(1, abs(Fraction(ball.value)))
+            for mine, theirs in zip(state, other, strict=True):
+                assert abs(mpmath.mpf(mine.value) - theirs) <= mpmath.mpf(mine.radius) + mpmath.mpf(10) ** -33
+
+
+@pytest.mark.parametrize("integrator", ["heyoka", "words"])
+@pytest.mark.parametrize("precision", ["double", "extended", "quad", "real:150"])
+def test_computed_events_are_right_to_the_format(integrator, precision) -> None:
+    for until, name in ((6, FUNCTIONS[2]), (-6, FUNCTIONS[1])):
+        found = ht.events(TOP, START, until, name, precision=precision, integrator=integrator)
+        known = ht.events(TOP, START, until, name, digits=found.problem.precision.digits + 4)
+        assert found.guarantee == "polynomial"
+        assert list(found.directions) == known.directions
+        allowed = 60 * found.problem.precision.eps
+        for time, ball in zip(found.time_texts(), known.times, strict=True):
+            assert abs(Fraction(time) - Fraction(ball.value)) <= allowed * max(1, abs(Fraction(ball.value)))
+        for state, balls in zip(found.texts(), known.texts(), strict=True):
+            assert max(abs(Fraction(a) - Fraction(b)) for a, b in zip(state, balls, strict=True)) <= allowed
+
+
+def test_the_state_lies_on_the_section_to_rounding() -> None:
+    found = ht.events(TOP, START, 200, "gamma3 = 1/2")
+    assert len(found) > 40
+    assert abs(found.to_numpy()[:, 5] - 0.5).max() < 1e-16
+    assert (np.diff(found.times) > 0).all()
+    assert (np.diff(found.directions) != 0).all()  # they alternate: none is missed and none is twice
+
+
+def test_the_pendulum_has_the_events_of_its_elliptic_functions() -> None:
+    # from rest at sin(θ/2) = k it passes the bottom at K, 3K, 5K, ... (unit frequency)
+    start = ht.State((0, 0, 0), ("-3/5", "4/5", 0))
+    known = ht.events(PENDULUM, start, 20, "gamma2", digits=40)
+    with mpmath.workdps(50):
+        quarter = mpmath.ellipk((1 - mpmath.mpf(3) / 5) / 2)
+        assert len(known) == int((20 / quarter + 1) / 2) > 4
+        for n, ball in enumerate(known.times):
+            assert abs(mpmath.mpf(ball.value) - (2 * n + 1) * quarter) <= mpmath.mpf(ball.radius)
+    assert known.directions == [(-1) ** (n + 1) for n in range(len(known))]
+    computed = ht.events(PENDULUM, start, 2000, "gamma2")
+    expected = (2 * np.arange(len(computed)) + 1) * float(quarter)
+    assert len(computed) > 500
+    assert abs(computed.times - expected).max() < 1e-10
+
+
+def test_the_start_on_a_section_is_no_event() -> None:
+    for until in (10, -10):
+        # Ω3 = 0 at rest: the first return is half a period later
+        start = ht.State((0, 0, 0), ("-3/5", "4/5", 0))
+        half = 2 * float(mpmath.ellipk(0.2))
+        for digits in (None, 20):
+            found = ht.events(PENDULUM, start, until, "omega3", digits=digits)
+            times = found.times if digits is None else found.times_numpy()
+            assert abs(np.abs(times) - half * np.arange(1, len(found) + 1)).max() < 1e-13
+            assert len(found) == 3
+
+
+def test_a_zero_of_higher_order_at_the_start_is_followed() -> None:
+    # γ1 − γ1(0) begins like t², and Ω3 γ3 + ... of order 1; none but later changes of sign count
+    start = ht.State((0, 0, 0), ("3/5", "4/5", 0))
+    assert len(ht.events(PENDULUM, start, 4, "gamma1 = 3/5", digits=20)) == 0
+    assert len(ht.events(PENDULUM, start, 4, "(gamma1 - 3/5)*omega3", digits=20)) == 0
+    found = ht.events(TOP, START, 6, "gamma3 = 4/5", digits=20)
+    assert len(found) == len(ht.events(TOP, START, 6, "gamma3 = 4/5")) == 1
+
+
+def two_close(distance: Fraction) -> tuple[str, float]:
+    """γ3 = c for a c just below a maximum of γ3 of TOP, so that it is passed twice within ``distance``."""
+    top = ht.events(TOP, START, 30, "gamma1*omega2 - gamma2*omega1", -1, digits=60)
+    time, state = top.times[2], top.states[2]
+    y = [float(ball.value) for ball in state]
+    rate = field(0, y)
+    curvature = rate[3] * y[1] + y[3] * rate[1] - rate[4] * y[0] - y[4] * rate[0]
+    level = Fraction(state[5].value) + Fraction(float(curvature)) / 2 * (distance / 2) ** 2
+    return f"gamma3 = {level}", float(Fraction(time.value))
+
+
+@pytest.mark.parametrize("integrator", ["heyoka", "words"])
+def test_two_roots_a_millionth_apart_inside_a_step_are_both_found(integrator) -> None:
+    function, near = two_close(Fraction(1, 10**6))
+    for digits in (None, 20):
+        options = {"digits": digits} if digits else {"integrator": integrator}
+        found = ht.events(TOP, START, near + 1, function, **options)
+        times = found.times if digits is None else found.times_numpy()
+        close = [t for t in times if abs(t - near) < 1e-5]
+        assert len(close) == 2
+        assert 0.9e-6 < close[1] - close[0] < 1.1e-6
+    # one sample in the middle of each step sees neither: the fault that this guards against
+    run = ht.propagate(TOP, START, [near - 0.01, near + 0.01]).to_numpy()
+    level = float(Fraction(function.split("=")[1]))
+    assert (run[:, 5] < level).all()
+
+
+def test_two_roots_in_balls_at_a_distance_of_1e_minus_20() -> None:
+    function, near = two_close(Fraction(1, 10**20))
+    found = ht.events(TOP, START, Fraction(near).limit_denominator(1000) + 1, function, digits=25)
+    close = [Fraction(ball.value) for ball in found.times if abs(float(ball.value) - near) < 1e-5]
+    assert len(close) == 2
+    assert Fraction(9, 10**21) < close[1] - close[0] < Fraction(11, 10**21)
+
+
+def test_a_function_that_only_touches_zero_is_undecided_by_name() -> None:
+    start = ht.State((0, 0, 0), ("-3/5", "4/5", 0))
+    with pytest.raises(OutOfReach, match=r"Near t = 3\.31.* whether the function changes sign or only touches"):
+        ht.events(PENDULUM, start, 5, "gamma1 = -3/5", digits=15)
+    # a change of sign at the end of the run itself cannot be told from one behind it
+    at_end = Fraction(ht.events(PENDULUM, start, 3, "gamma2", digits=400).times[0].value)
+    with pytest.raises(OutOfReach, match="before the end of the run"):
+        ht.events(PENDULUM, start, at_end, "gamma2", digits=15)
+
+
+@pytest.mark.parametrize("digits", [None, 20])
+def test_a_function_that_is_zero_along_the_motion_is_refused(digits) -> None:
+    start = ht.State((0, 0, 1), ("-3/5", "4/5", 0))
+    for function in ("omega2", "omega1*gamma2", "gamma1**2 + gamma2**2 = 1", "omega3**2/2 + gamma1 = -1/10"):
+        with pytest.raises(InputError, match="is zero along this motion"):
+            ht.events(PENDULUM, start, 10, function, digits=digits)
+    with pytest.raises(InputError, match="is zero at every sample"):
+        ht.events(PENDULUM, start, 10, lambda omega, gamma: abs(omega[1]))
+
+
+def test_directions_split_the_events() -> None:
+    both = ht.events(TOP, START, 60, "gamma2")
+    rising, falling = (ht.events(TOP, START, 60, "gamma2", direction) for direction in (1, -1))
+    assert sorted([*rising.times, *falling.times]) == list(both.times)
+    assert set(rising.directions) == {1}
+    assert set(falling.directions) == {-1}
+    # the direction is that of time, also where the run goes back
+    back = ht.events(TOP, START, -20, "gamma2", digits=15)
+    for ball, direction in zip(back.times, back.directions, strict=True):
+        time = Fraction(ball.value)
+        before, after = ht.reference(TOP, START, [time - Fraction(1, 1000), time + Fraction(1, 1000)], 15).to_numpy()
+        assert np.sign(after[4] - before[4]) == direction
+    assert list(ht.events(TOP, START, -20, "gamma2").directions) == back.directions
+
+
+def test_text_and_callables_are_the_same_function() -> None:
+    text = ht.events(TOP, START, 20, "Ω1*γ2 - 2*γ1/3 = -1/4")
+    ring = ht.events(TOP, START, 20, lambda omega, gamma: omega[0] * gamma[1] - 2 * gamma[0] / 3 + 0.25)
+    sampled = ht.events(TOP, START, 20, lambda omega, gamma: float(omega[0] * gamma[1] - 2 * gamma[0] / 3 + 0.25))
+    assert (text.guarantee, ring.guarantee, sampled.guarantee) == ("polynomial", "polynomial", "sampled")
+    assert list(text.times) == list(ring.times)
+    assert abs(text.times - sampled.times).max() < 1e-13
+    vector = event_function(lambda omega, gamma: omega @ np.array([1, 0, 2]) / 2)
+    assert str(vector.numerator) == "omega1 + 2*omega3"
+    cancelled = event_function("omega1*omega2/omega2")
+    assert str(cancelled.numerator) == "omega1"
+
+
+def test_a_sampled_callable_finds_two_close_roots_at_its_minimum() -> None:
+    function, near = two_close(Fraction(1, 1000))
+    level = float(Fraction(function.split("=")[1]))
+    found = ht.events(TOP, START, near + 1, lambda omega, gamma: math.atan(gamma[2] - level))
+    assert len([t for t in found.times if abs(t - near) < 1e-2]) == 2
+
+
+def test_a_pole_is_no_event() -> None:
+    poles = ht.events(TOP, START, 60, "1/gamma2")
+    assert len(poles) == 0
+    assert len(ht.events(TOP, START, 20, "1/gamma2", digits=15)) == 0
+    assert len(ht.events(TOP, START, 60, "gamma2")) > 10
+    # the sign of the denominator turns the direction
+    plain, over = (ht.events(TOP, START, 20, f, digits=15) for f in ("omega1", "omega1/(gamma2 - 2)"))
+    assert [-d for d in plain.directions] == over.directions
+
+
+class Broken(Dense):
+    """Two steps of f = Ω1 that do not meet at their common end, by a rounding."""
+
+    def _steps(self):
+        first, second = self.ends
+        for began, coefficients in ((0, first), (1, second)):
+            yield Piece(Fraction(began), Fraction(1), 53, lambda i, c=coefficients: c if i == 0 else [(1, 0)] * len(c))
+            self.steps += 1
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "count"),
+    [
+        ([(-1, 0), (1, 0), (-1, -60)], [(1, -60), (1, 0)], 1),  # changes in between
+        ([(-1, 0), (1, 0), (1, -60)], [(-1, -60), (1, 0)], 1),  # just before the end, and again just behind it
+        ([(-1, 0), (1, 0), (1, -60)], [(1, -61), (1, 0)], 1),
+        ([(-1, 0), (1, 0)], [(0, 0), (1, 0)], 1),  # exactly at the end
+        ([(-1, 0), (1, 0)], [(0, 0), (-1, 0)], 0),  # touches there
+    ],
+)
+def test_a_change_at_the_common_end_of_two_steps_counts_once(first, second, count) -> None:
+    class Run(Broken):
+        ends = first, second
+
+    problem = Problem.of(TOP, START, ht.DOUBLE)
+    found = locate(Run(problem, Fraction(2)), "planted", event_function("omega1"), 0)
+    assert len(found) == count
+    assert all(abs(float(t) - 1) < 1e-12 for t in found.times)
+
+
+def test_odd_scales_and_names_of_axes() -> None:
+    # lengths, masses and times scaled by powers of two scale the times of events exactly
+    scale = Fraction(2) ** 200
+    fast = ht.State([w * scale for w in START.omega], START.gamma)
+    heavy = ht.HeavyTop(TOP.inertia, scale**2, TOP.centre)
+    plain = ht.events(TOP, START, 10, "omega1*gamma1 = 1/20", digits=20)
+    other = ht.events(heavy, fast, 10 / scale, f"omega1*gamma1 = {scale / 20}", digits=1)
+    assert [Fraction(b.value) * scale for b in other.times] != []
+    assert len(plain) == len(other)
+    assert other.directions == plain.directions
+    computed = ht.events(heavy, fast, 10 / scale, f"omega1*gamma1 = {scale / 20}", integrator="words")
+    for mine, ball in zip(computed.times, plain.times, strict=True):
+        assert abs(float(Fraction(float(mine)) * scale) - float(ball.value)) < 1e-13
+    turned = ht.HeavyTop((1, 3, 2), 1, ("1/5", "1/2", "1/3"))
+    again = ht.State(("9/10", "1/10", "2/5"), ("4/5", "3/5", 0))
+    renamed = ht.events(turned, again, 10, "omega2*gamma2 = 1/20", digits=20)
+    assert [b.value[:18] for b in renamed.times] == [b.value[:18] for b in plain.times]
+
+
+def test_an_equilibrium_has_no_events() -> None:
+    still = ht.State((0, 0, 0), (1, 0, 0))
+    for options in ({}, {"integrator": "words"}, {"digits": 20}):
+        assert len(ht.events(PENDULUM, still, 10, "omega1 = 1", **options)) == 0
+
+
+def test_a_run_that_ends_early_says_so() -> None:
+    found = ht.events(TOP, START, 1000, "gamma2", step_limit=20)
+    assert found.outcome.value == "step_limit"
+    assert found.steps == 20
+    assert "only" in repr(found)
+    assert len(ht.events(TOP, START, 1000, "gamma2", limit=3)) == 3
+    assert len(ht.events(TOP, START, 100, "gamma2", digits=15, limit=3)) == 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"until": 0}, "until = 0"),
+        ({"until": "nan"}, "not a finite number"),
+        ({"until": "1e151"}, "too large"),
+        ({"direction": 2}, "direction = 2"),
+        ({"direction": 0.5}, "not an integer"),
+        ({"function": ""}, "not a function"),
+        ({"function": "omega4"}, "not a component"),
+        ({"function": "omega1 = 1 = 2"}, "not a function"),
+        ({"function": "1"}, "does not depend"),
+        ({"function": "omega1/(omega2 - omega2)"}, "divides by zero"),
+        ({"function": "omega1**99"}, "power"),
+        ({"function": "(omega1 + gamma1)**20 * omega2**20"}, "degree 40"),
+        ({"function": "omega1 + __import__('os')"}, "not part of"),
+        ({"function": "omega1 + " * 2000 + "1"}, "too long"),
+        ({"function": "(" * 90 + "omega1"}, "not a function"),
+        ({"function": 3}, "neither text nor a callable"),
+        ({"function": lambda omega, gamma: 1 / 0}, "raised ZeroDivisionError"),
+        ({"function": lambda omega, gamma: float("nan")}, "gave nan"),
+        ({"function": lambda omega, gamma: "x"}, "raised TypeError"),
+        ({"function": lambda omega, gamma: abs(omega[0]), "digits": 10}, "nothing is proven"),
+        ({"integrator": "scipy"}, "hands over no polynomial"),
+        ({"digits": 0}, "0 digits"),
+        ({"digits": 10, "precision": ht.QUAD}, "know no precision"),
+        ({"limit": 0}, "allows nothing"),
+    ],
+)
+def test_bad_input_is_named(changes, match) -> None:
+    options = {"until": 5, "function": "omega1"} | changes
+    with pytest.raises(InputError, match=match):
+        ht.events(TOP, START, options.pop("until"), **options)
+
+
+def test_what_is_out_of_reach_says_so() -> None:
+    with pytest.raises(OutOfReach, match="looked at for events"):
+        ht.events(TOP, START, 10**12)
+    with pytest.raises(OutOfReach, match="Computed ones reach further"):
+        ht.events(TOP, START, 10**7, digits=20)
+
+
+def test_threads_and_their_callables_do_not_disturb_each_other() -> None:
+    alone = [ht.events(TOP, START, 20, f, digits=20).time_texts() for f in FUNCTIONS[:2]]
+    found: dict[int, list[str]] = {}
+
+    def work(place: int) -> None:
+        found[place] = ht.events(TOP, START, 20, FUNCTIONS[place % 2], digits=20).time_texts()
+
+    threads = [Thread(target=work, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [found[k] for k in range(4)] == alone * 2
+    inside = ht.events(
+        TOP, START, 3, lambda omega, gamma: float(ht.events(TOP, START, 1, "gamma2").steps) * 0 + omega[0]
+    )
+    assert inside.guarantee == "polynomial" or len(inside) >= 0
+
+
+def test_a_section_of_several_starts() -> None:
+    rng = random.Random(3)
+    starts = [ht.State(("1/10", Fraction(rng.randint(-9, 9), 10), "9/10"), ("3/5", 0, "4/5")) for _ in range(3)]
+    section = ht.poincare(TOP, starts, 40, "gamma2")
+    points = section.points("omega3", "γ3")
+    assert [p.shape[1] for p in points] == [2, 2, 2]
+    assert [len(p) for p in points] == [len(each) for each in section.events]
+    assert not section.on_one_level
+    assert "different levels" in repr(section)
+    assert ht.poincare(TOP, START, 40, "gamma2").on_one_level
+    assert len(ht.poincare(TOP, START, 10, "gamma2", digits=15).points()[0]) > 0
+    with pytest.raises(InputError, match="no starts"):
+        ht.poincare(TOP, [], 40)
+    with pytest.raises(InputError, match=r"Start 1: .*zero along"):
+        ht.poincare(PENDULUM, [ht.State((0, 1, 0), (1, 0, 0)), ht.State((0, 0, 1), (1, 0, 0))], 5, "omega2")
+    with pytest.raises(InputError, match="not a component"):
+        section.points("omega7")
+
+
+def test_records_without_events_keep_their_shapes() -> None:
+    for options in ({}, {"digits": 15}):
+        none = ht.events(TOP, START, "1/100", "omega1 = 5", **options)
+        assert len(none) == 0
+        assert none.to_numpy().shape == (0, 6)
+        assert "0 events" in repr(none)

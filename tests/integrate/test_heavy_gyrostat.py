@@ -1,0 +1,326 @@
+"""The heavy gyrostat in every arithmetic: enclosure, heyoka, multi-word, ensembles, attitude, odd scales.
+
+The computation that is independent of all of them is a Taylor series of (M, γ, ξ) in mpmath, written here.
+"""
+
+import json
+from fractions import Fraction
+from functools import cache
+from itertools import permutations
+from random import Random
+
+import mpmath
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import heavytop as ht
+from heavytop.cli import app
+from heavytop.errors import InputError
+from heavytop.exact.axes import orientation, permuted, renamed_state, renamed_top
+from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.catalogue import find
+from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.staude import Staude
+from heavytop.exact.validated import Validated
+from heavytop.integrate import reach
+from heavytop.integrate.peers.command import Request
+from heavytop.integrate.trajectory import Outcome, Problem
+from heavytop.precision import DOUBLE, exact, parse
+from heavytop.suite.cases import CASES
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
+from heavytop.top.heavy_top import HeavyTop, State, cross
+from helpers import unit_vector, vector
+
+F = Fraction
+CASE = CASES["heavy-gyrostat"]
+XI = (F(4, 5), F(0), F(-3, 5))
+
+
+def independent(top: HeavyTop, start: State, time: Fraction, xi=None, digits: int = 30):
+    """(Ω, γ) or (Ω, γ, ξ) at ``time`` by Taylor series of M' = M × Ω + γ × n, γ' = γ × Ω, Ω = (M − k)/I."""
+    own = mpmath.ctx_mp.MPContext()
+    own.dps = digits + 10
+
+    def number(value):
+        return own.mpf(value.numerator) / value.denominator
+
+    inertia, k = ([number(v) for v in part] for part in (top.inertia, top.rotor or (F(0),) * 3))
+    n = [number(v) for v in top.moment]
+    omega, gamma = ([number(v) for v in part] for part in (start.omega, start.gamma))
+    momentum = [i * w + c for i, w, c in zip(inertia, omega, k, strict=True)]
+    fixed = [gamma] + ([] if xi is None else [[number(F(v)) for v in xi]])
+    size = max(abs(w) for w in omega) + max(map(abs, k)) / min(inertia) + own.sqrt(max(map(abs, n)) / min(inertia))
+    steps = max(1, int(own.ceil(8 * abs(number(time)) * size)))
+    h, order = number(time) / steps, int(1.3 * digits)
+    for _ in range(steps):
+        momentum, fixed = _step(inertia, k, n, momentum, fixed, h, order)
+    return [(m - c) / i for m, c, i in zip(momentum, k, inertia, strict=True)] + [x for v in fixed for x in v]
+
+
+def _step(inertia, k, n, momentum, fixed, h, order):
+    m, vectors, omega = (
+        [momentum],
+        [[v] for v in fixed],
+        [[(a - c) / i for a, c, i in zip(momentum, k, inertia, strict=True)]],
+    )
+
+    def product(series, p):
+        parts = [cross(series[j], omega[p - j]) for j in range(p + 1)]
+        return [sum(part[axis] for part in parts) for axis in range(3)]
+
+    for p in range(order):
+        torque = cross(vectors[0][p], n)
+        following = [(a + b) / (p + 1) for a, b in zip(product(m, p), torque, strict=True)]
+        for series in vectors:
+            series.append([a / (p + 1) for a in product(series, p)])
+        m.append(following)
+        omega.append([a / i for a, i in zip(following, inertia, strict=True)])
+    return _sum(m, h), [_sum(series, h) for series in vectors]
+
+
+def _sum(series, h):
+    total = [0, 0, 0]
+    for row in reversed(series):
+        total = [a * h + b for a, b in zip(total, row, strict=True)]
+    return total
+
+
+def contains(ball, value, digits: int) -> bool:
+    """Whether the ball holds the number, which is right to so many digits."""
+    middle, radius = _fraction(ball.mid()), _fraction(ball.rad())
+    return abs(middle - _exactly(value)) <= radius + F(1, 10**digits) * max(1, abs(middle))
+
+
+def _fraction(ball) -> Fraction:
+    mantissa, exponent = ball.man_exp()
+    return F(int(mantissa)) * F(2) ** int(exponent)
+
+
+def _exactly(value) -> Fraction:
+    sign, mantissa, exponent, _ = value._mpf_
+    return (-1) ** sign * F(int(mantissa)) * F(2) ** int(exponent)
+
+
+@cache
+def integrated(time: Fraction):
+    """The case's motion with its attitude, at one time."""
+    return independent(CASE.top, CASE.start, time, XI)
+
+
+@pytest.mark.parametrize("axes", list(permutations(range(3))))
+def test_the_enclosure_holds_an_independent_integration_on_any_axes(axes) -> None:
+    """The motion is integrated as it is; the enclosure takes it on renamed axes, both ways in time.
+
+    ``benchmarks/heavy_gyrostat.py`` has random motions, to 50 digits.
+    """
+    top, start, d = CASE.top, CASE.start, orientation(axes)
+    for time in (F(3, 4), F(-1, 2)):
+        known = integrated(time)
+        renamed = [d * w for w in permuted(known[:3], axes)] + [*permuted(known[3:6], axes)]
+        enclosed = Validated(renamed_top(top, axes), renamed_state(start, axes), HEAVY_GYROSTAT).state(time, 110)
+        assert all(contains(ball, value, 30) for ball, value in zip(enclosed, renamed, strict=True))
+        assert max(_fraction(ball.rad()) for ball in enclosed) < F(1, 10**30)
+
+
+def test_the_enclosed_attitude_is_that_of_an_independent_integration() -> None:
+    time = F(3, 4)
+    enclosed = Validated(CASE.top, CASE.start, HEAVY_GYROSTAT, xi=XI).attitude(time, 160)
+    known = integrated(time)
+    assert all(contains(ball, value, 30) for ball, value in zip(enclosed, known[6:], strict=True))
+    found = ht.reference(CASE.top, CASE.start, [time], 40, attitude=True)
+    assert found.method.startswith("validated")
+    assert found.attitude is not None
+
+
+def test_series_of_the_enclosure_solve_the_equations() -> None:
+    """y(t + ε) of the enclosure put into the six equations leaves balls around 0."""
+    known = Validated(CASE.top, CASE.start, HEAVY_GYROSTAT)
+    series = known.series(F(3, 2), 12, 120)
+    with working_precision(200, 12):
+        p = HEAVY_GYROSTAT.parameters(CASE.top, CASE.start).mapped(ball)
+        for rate, component in zip(HEAVY_GYROSTAT.field(p, series), series, strict=True):
+            residual = component.derivative() - rate
+            assert all(residual[n].contains(0) and residual[n].rad() < 1e-25 for n in range(11))
+
+
+FORMATS = {
+    "heyoka": ["double", "extended", "quad", "real:160"],
+    "words": ["double", "extended", "double-double", "quad", "real:400", "real:1100"],
+}
+EVERY = [(name, form) for name, forms in FORMATS.items() for form in forms]
+
+
+@pytest.mark.parametrize(("name", "form"), EVERY, ids=lambda part: str(part))
+def test_every_format_is_right_to_its_rounding_with_the_attitude_and_without(name, form) -> None:
+    precision = parse(form)
+    if ht.available()[precision.family] is not None:
+        pytest.skip(f"{form} is not available")
+    problem = Problem.of(CASE.top, CASE.start, precision, HEAVY_GYROSTAT, XI)
+    known = Validated(problem.top, problem.start, HEAVY_GYROSTAT, xi=problem.xi)
+    for time in (F(1), F(-3, 4)):
+        truth = [_fraction(ball.mid()) for ball in known.state(time, precision.bits + 32)]
+        truth += [_fraction(ball.mid()) for ball in known.attitude(time, precision.bits + 32)]
+        for xi in (None, XI) if form in ("double", "real:400", "quad") else (None,):
+            run = ht.propagate(CASE.top, CASE.start, [time], precision, integrator=name, xi=xi)
+            assert run.outcome is Outcome.SUCCESS
+            assert run.problem.system is HEAVY_GYROSTAT
+            found = [exact(value) for value in run.states[0]]
+            assert max(abs(a - b) for a, b in zip(found, truth, strict=False)) <= 4 * precision.eps
+
+
+@pytest.mark.parametrize("name", ["heyoka", "words"])
+def test_a_motion_of_an_ensemble_is_right_whatever_runs_beside_it(name) -> None:
+    """Also beside one without a rotor, whose k is 0 there."""
+    random = Random(name)
+    starts = [State([w / 30 for w in vector(random)], unit_vector(random)) for _ in range(10)]
+    tops = [HeavyTop((3, 2, 1), 1, (0, "1/2", "1/3"), [k / 30 for k in vector(random)]) for _ in range(9)]
+    tops.append(HeavyTop((3, 2, 1), 1, (0, "1/2", "1/3")))
+    runs = ht.ensemble(tops, starts, [1], integrator=name)
+    for run, top, start in zip(runs, tops, starts, strict=True):
+        assert run.problem.system is HEAVY_GYROSTAT
+        alone = ht.propagate(top, start, [1], system="heavy_gyrostat", integrator="words")
+        np.testing.assert_allclose(run.to_numpy(), alone.to_numpy(), rtol=0, atol=1e-14)
+    plain = ht.propagate(tops[-1], starts[-1], [1], integrator="words")
+    np.testing.assert_allclose(runs[-1].to_numpy(), plain.to_numpy(), rtol=0, atol=1e-14)
+
+
+def test_the_papers_gyrostat_is_the_case_without_weight_in_balls_and_in_every_format() -> None:
+    """Ω here is Ω + λ e2 there, k = (0, −I2 λ, 0), n = 0; γ is the same."""
+    case = CASES["gyrostat"]
+    closed = Gyrostat.of(case.top, case.start)
+    rate = GYROSTAT.parameters(case.top, case.start).rotor
+    top = HeavyTop(case.top.inertia, 0, (0, 0, 0), (0, -case.top.inertia[1] * rate, 0))
+    w1, w2, w3 = case.start.omega
+    start = State((w1, w2 + rate, w3), case.start.gamma)
+    for time in (F(9, 2), F(-2)):
+        here = Validated(top, start, HEAVY_GYROSTAT).state(time, 160)
+        there = closed.state(time, 160)
+        for axis, (ours, theirs) in enumerate(zip(here, there, strict=True)):
+            shift = rate if axis == 1 else F(0)
+            off = abs(_fraction(ours.mid()) - _fraction(theirs.mid()) - shift)
+            assert off <= _fraction(ours.rad()) + _fraction(theirs.rad()) < F(1, 10**40)
+    for name, forms in FORMATS.items():
+        for form in ("double", "quad"):
+            precision = parse(form)
+            if form not in forms or ht.available()[precision.family] is not None:
+                continue
+            ours = ht.propagate(top, start, [2], precision, integrator=name)
+            theirs = ht.propagate(case.top, case.start, [2], precision, integrator=name, system="gyrostat")
+            shifts = [F(0), rate, *[F(0)] * 4]
+            for a, b, shift in zip(ours.states[0], theirs.states[0], shifts, strict=True):
+                assert abs(exact(a) - exact(b) - shift) <= 16 * precision.eps
+
+
+@pytest.mark.parametrize("power", [-100, 100])
+def test_a_rotor_of_any_size_is_enclosed_and_integrated(power) -> None:
+    """Tiny beside the body it changes nothing that shows; huge it turns M fast, over a time that is as short.
+
+    Ω is as huge there.
+    """
+    size = F(10) ** power
+    k = [size * part for part in (F(1, 2), F(-1, 3), F(3, 4))]
+    top = HeavyTop(CASE.top.inertia, CASE.top.weight, CASE.top.centre, k)
+    time = F(1) if power < 0 else 1 / size
+    start = CASE.start if power < 0 else State([size * w for w in CASE.start.omega], CASE.start.gamma)
+    truth = [_fraction(ball.mid()) for ball in Validated(top, start, HEAVY_GYROSTAT).state(time, 100)]
+    known = [_exactly(value) for value in independent(top, start, time, digits=40)]
+    units = [max(map(abs, known[:3]))] * 3 + [F(1)] * 3
+    assert max(abs(a - b) / unit for a, b, unit in zip(truth, known, units, strict=True)) < F(1, 10**30)
+    for name in ("words", "heyoka") if power < 0 else ("words",):  # heyoka's derivatives of order 20 overflow
+        run = ht.propagate(top, start, [time], integrator=name)
+        found = [exact(value) for value in run.states[0]]
+        assert max(abs(a - b) / unit for a, b, unit in zip(found, truth, units, strict=True)) < F(1, 10**14)
+
+
+@pytest.mark.parametrize("units", [F(10) ** -90, F(10) ** 90])
+def test_moments_weight_and_rotor_times_a_factor_are_the_same_motion(units) -> None:
+    inertia, k = ([units * value for value in part] for part in (CASE.top.inertia, CASE.top.rotor or ()))
+    other = HeavyTop(inertia, units * CASE.top.weight, CASE.top.centre, k)
+    one, same = (Validated(top, CASE.start, HEAVY_GYROSTAT).state(F(2), 100) for top in (CASE.top, other))
+    assert all(a.overlaps(b) for a, b in zip(one, same, strict=True))
+    for name in ("words", "heyoka"):
+        a, b = (ht.propagate(top, CASE.start, [2], integrator=name).to_numpy() for top in (CASE.top, other))
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-14)
+
+
+def test_a_body_at_rest_is_set_turning_by_its_weight_alone_and_a_rotor_alone_leaves_it_at_rest() -> None:
+    top = HeavyTop((3, 2, 1), 0, (0, 0, 1), (1, 2, 3))
+    still = State((0, 0, 0), (0, 0, -1))
+    assert isinstance(find(top, still, HEAVY_GYROSTAT), Staude)
+    for name in ("words", "heyoka"):
+        run = ht.propagate(top, still, [1, 50], integrator=name)
+        assert [[exact(v) for v in state] for state in run.states] == [list(still.flat)] * 2
+    falling = HeavyTop((3, 2, 1), 1, (0, 1, 0), (1, 2, 3))
+    assert find(falling, still, HEAVY_GYROSTAT).method.startswith("validated")
+
+
+def test_permanent_rotations_are_found_and_carry_the_attitude() -> None:
+    """About γ at the rate ω, M = IΩ + k and γ × (ω² Iγ + ω k − n) = 0: any k with n = ω² Iγ + ω k + κ γ."""
+    gamma, rate = (F(2, 3), F(-1, 3), F(2, 3)), F(3, 2)
+    inertia, k = (F(3), F(2), F(1)), (F(1, 2), F(-1), F(1, 3))
+    n = [rate**2 * i * g + rate * c + g / 7 for i, g, c in zip(inertia, gamma, k, strict=True)]
+    top, start = HeavyTop(inertia, 1, n, k), State([rate * g for g in gamma], gamma)
+    known = find(top, start, HEAVY_GYROSTAT)
+    assert isinstance(known, Staude)
+    assert [_fraction(ball.mid()) for ball in known.attitude(F(0), 80)]
+    enclosed = Validated(top, start, HEAVY_GYROSTAT).attitude(F(2), 80)
+    assert all(a.overlaps(b) for a, b in zip(known.attitude(F(2), 80), enclosed, strict=True))
+    assert not isinstance(find(HeavyTop(inertia, 1, n, (0, 0, 0)), start, HEAVY_GYROSTAT), Staude)
+
+
+def test_no_closed_form_of_the_heavy_top_is_taken_for_a_top_with_a_rotor() -> None:
+    """Each would forget k: the enclosure is the only one, and the heavy top refuses the data."""
+    for name in ("euler", "lagrange", "kovalevskaya", "goryachev-chaplygin", "hess"):
+        if name not in CASES:
+            continue
+        case = CASES[name]
+        top = HeavyTop(case.top.inertia, case.top.weight, case.top.centre, ("1/10", "1/7", "1/3"))
+        assert find(top, case.start, HEAVY_GYROSTAT).method.startswith("validated")
+        with pytest.raises(InputError, match="rotor"):
+            find(top, case.start)
+        with pytest.raises(InputError, match="rotor"):
+            ht.reference(top, case.start, [1], system="heavy_top")
+
+
+def test_a_motion_that_turns_by_its_rotor_alone_is_refused_beyond_reach() -> None:
+    """1e13 turns: the rotor's rate counts, though Ω is small."""
+    top = HeavyTop((1, 1, 2), 0, (0, 0, 0), ("1e13", 0, 0))
+    problem = Problem.of(top, State((0, "1e-3", 0), (0, 0, 1)), DOUBLE, HEAVY_GYROSTAT)
+    assert reach.expected_steps(problem, F(1)) > 10**12
+    with pytest.raises(ht.OutOfReach):
+        ht.propagate(top, State((0, "1e-3", 0), (0, 0, 1)), [1])
+
+
+def test_a_program_is_given_k_and_one_that_declares_the_heavy_top_alone_is_asked_nothing(tmp_path) -> None:
+    problem = Problem.of(CASE.top, CASE.start, DOUBLE, HEAVY_GYROSTAT)
+    lines = Request(problem, [F(1)], None, False).text(1).decode().splitlines()
+    assert "system heavy_gyrostat" in lines
+    assert "rotor 0.5 -0.33333333333333331 0.75" in lines
+    file = tmp_path / "mine.toml"
+    file.write_text('[[integrator]]\nname = "mine"\ncommand = ["true"]\n')
+    with pytest.raises(ht.HeavyTopError, match="cannot do the system heavy_gyrostat"):
+        ht.propagate(CASE.top, CASE.start, [1], integrator=str(file))
+
+
+def test_what_is_computed_is_scored_with_the_rotor_of_the_file(tmp_path) -> None:
+    """A file that says k is scored as it is; with the sign of k turned over the diagnosis names it."""
+    times = [F(1, 4), F(1, 2), F(1), F(2), F(3)]
+    run = ht.propagate(CASE.top, CASE.start, times)
+    file = tmp_path / "t.json"
+    data = {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["1/2", "1/3", "1/5"]}
+    data |= {"omega": ["1/10", "2/5", "9/10"], "gamma": ["3/5", "0", "4/5"], "times": [str(t) for t in times]}
+    data |= {"states": run.texts(), "precision": "double"}
+    for rotor, said in ((["1/2", "-1/3", "3/4"], "15"), (["-1/2", "1/3", "-3/4"], "rotor of −k")):
+        file.write_text(json.dumps(data | {"rotor": rotor}))
+        answer = CliRunner().invoke(app, ["score", str(file)], catch_exceptions=False)
+        assert said in answer.output
+        assert "heavy_gyrostat" in answer.output
+    score = ht.score(times, run.to_numpy(), top=CASE.top, start=CASE.start)
+    assert score.row.system == "heavy_gyrostat"
+    assert score.row.data.rotor == ("1/2", "-1/3", "3/4")
+    assert {"gamma_squared", "area", "energy"} <= score.drift.keys()
+    for bad in ({"rotor": ["1", "2"]}, {"rotor": "1"}, {"rotor": ["1", "2", "3"], "system": "heavy_top"}):
+        file.write_text(json.dumps(data | bad))
+        with pytest.raises(InputError, match="rotor"):
+            CliRunner().invoke(app, ["score", str(file)], catch_exceptions=False)

@@ -1,0 +1,202 @@
+"""--show, --csv and --latex of `propagate` and `reference`: shapes, what makes them citable, and reading them back."""
+
+import csv
+import json
+import re
+import shutil
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from heavytop.cli import app
+from heavytop.cli.motion_output import with_file_of_latex
+from heavytop.errors import InputError
+from heavytop.suite.trajectory_file import read
+
+SHOWN = "quaternion,matrix,euler:ZXZ,position,omega-space"
+KEYS = {"quaternion": (4,), "matrix": (3, 3), "euler": (3,), "position": (3,), "omega_space": (3,)}
+DATA = {
+    "inertia": "2,2,1",
+    "weight": "1",
+    "centre": "1,0,0",
+    "omega": "1/2,1/3,1",
+    "gamma": "3/5,0,4/5",
+    "times": "1/3,2.50",
+}
+
+
+def heavytop(command: str, *more: str, **changes: str) -> str:
+    options = [part for name, value in (DATA | changes).items() for part in (f"--{name}", value)]
+    done = CliRunner(env={"COLUMNS": "80"}).invoke(app, [command, *options, *more], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def refused(command: str, *more: str) -> InputError:
+    options = [part for name, value in DATA.items() for part in (f"--{name}", value)]
+    with pytest.raises(InputError) as error:
+        CliRunner().invoke(app, [command, *options, *more], catch_exceptions=False)
+    return error.value
+
+
+def shape(value: object) -> tuple[int, ...]:
+    return (len(value), *shape(value[0])) if isinstance(value, list) else ()
+
+
+@pytest.mark.parametrize("command", ["propagate", "reference"])
+def test_json_has_every_output_in_its_shape_and_says_what_it_is_of(command: str) -> None:
+    document = json.loads(heavytop(command, "--show", SHOWN, "--json"))
+    for key, expected in KEYS.items():
+        assert shape(document[key]) == (2, *expected)
+    number = document["matrix"][0][0][0]
+    assert (number.keys() == {"value", "radius"}) if command == "reference" else isinstance(number, str)
+    assert document["sequence"] == "ZXZ"
+    assert document["xi"] == ["-4/5", "0", "3/5"]
+    assert (document["inertia"], document["gamma"]) == (["2", "2", "1"], ["3/5", "0", "4/5"])
+    assert document["times_given" if command == "propagate" else "times"] == ["1/3", "2.50"]
+    assert document["version"]
+    assert document["command"].startswith("heavytop ")
+    assert shape(document["states"]) == (2, 6)
+
+
+def test_json_without_show_has_no_attitude() -> None:
+    for command in ("propagate", "reference"):
+        assert not ({*KEYS, "xi", "attitude"} & json.loads(heavytop(command, "--json")).keys())
+
+
+def test_point_and_pivot_are_in_the_document() -> None:
+    document = json.loads(
+        heavytop("propagate", "--show", "position", "--point", "0,0,1", "--pivot", "1,2,1/2", "--json")
+    )
+    assert (document["point"], document["pivot"]) == (["0", "0", "1"], ["1", "2", "1/2"])
+    # the third column of R, shifted
+    matrix = json.loads(heavytop("propagate", "--show", "matrix", "--json"))["matrix"][0]
+    for row, place, shift in zip(matrix, document["position"][0], (1, 2, 0.5), strict=True):
+        assert abs(float(place) - float(row[2]) - shift) < 1e-15
+
+
+@pytest.mark.parametrize(("command", "more"), [("propagate", []), ("reference", ["--digits", "30"])])
+def test_csv_is_the_table_and_score_reads_it(command: str, more: list[str], tmp_path: Path) -> None:
+    file = tmp_path / "table.csv"
+    printed = heavytop(command, "--show", "quaternion,position", "--csv", str(file), *more)
+    lines = file.read_text().splitlines()
+    comments = dict(line[2:].split(": ", 1) for line in lines if line.startswith("# "))
+    assert comments["inertia"] == "2, 2, 1"
+    assert comments["xi"] == "-4/5, 0, 3/5"
+    assert comments["command"].startswith("heavytop ")
+    assert comments["version"]
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert [row["t"] for row in rows] == ["1/3", "2.50"]
+    unfolded = re.sub(r"\s+", "", printed)
+    for row in rows:
+        for name in ("omega1", "gamma3", "qw", "qz", "x", "z"):
+            assert row[name] in unfolded
+            if command == "reference":
+                assert f"±{row[f'{name}_radius']}" in unfolded
+    given = read(file)
+    assert list(given.times) == [Fraction(1, 3), Fraction(5, 2)]
+    assert (given.top.inertia, given.start.gamma[0]) == ((2, 2, 1), Fraction(3, 5))
+    for state, row in zip(given.states, rows, strict=True):
+        assert abs(state[0] - Fraction(row["omega1"])) <= given.precision.eps
+
+
+def test_propagates_json_with_outputs_is_read_by_score(tmp_path: Path) -> None:
+    file = tmp_path / "run.json"
+    file.write_text(heavytop("propagate", "--json"))
+    assert len(read(file).states) == 2
+
+
+def test_latex_is_a_whole_table_of_siunitx_and_booktabs(tmp_path: Path) -> None:
+    text = heavytop("reference", "--show", "quaternion", "--digits", "80", "--latex", "-")
+    for part in (r"\usepackage{siunitx}", r"\usepackage{booktabs}", r"\toprule", r"\midrule", r"\bottomrule"):
+        assert text.count(part) == 1
+    assert r"$\num{1}/\num{3}$" in text
+    assert r"\num{2.50}" in text
+    assert "xi -4" in text
+    assert "heavytop" in text
+    begun, ended = (re.findall(rf"\\{word}{{(\w+)}}", text) for word in ("begin", "end"))
+    assert sorted(begun) == sorted(ended)
+    body = [line for line in text.splitlines() if " & " in line]
+    assert {line.count("&") for line in body} == {2}
+    assert all(line.endswith(r"\\") for line in body)
+    assert all(line.count("{") == line.count("}") for line in body)
+    # every digit of every number is there
+    document = json.loads(heavytop("reference", "--show", "quaternion", "--digits", "80", "--json"))
+    digits = re.sub(r"\\num|\\,|\\quad|\\pm|\\\\|[^0-9.e-]", "", "".join(line.split("&")[2] for line in body))
+    for ball in (*document["states"][0], *document["quaternion"][1]):
+        assert ball["value"].lstrip("-") in digits
+    compiler = shutil.which("pdflatex")
+    if compiler:
+        packages = "\n".join(re.findall(r"\\usepackage{\w+}", text))
+        (tmp_path / "t.tex").write_text(
+            f"\\documentclass{{article}}\n{packages}\n\\begin{{document}}\n{text}\n\\end{{document}}\n"
+        )
+        done = subprocess.run([compiler, "-interaction=batchmode", "t.tex"], cwd=tmp_path, check=False, timeout=60)
+        assert done.returncode == 0
+
+
+def test_latex_needs_no_file() -> None:
+    assert with_file_of_latex(["reference", "--latex", "--digits", "9"]) == [
+        "reference", "--latex", "-", "--digits", "9",
+    ]  # fmt: skip
+    assert with_file_of_latex(["reference", "--latex"]) == ["reference", "--latex", "-"]
+    assert with_file_of_latex(["reference", "--latex", "x.tex"]) == ["reference", "--latex", "x.tex"]
+
+
+def test_eighty_digits_are_readable_on_eighty_columns() -> None:
+    text = heavytop("reference", "--digits", "80", "--attitude")
+    assert max(map(len, text.splitlines())) <= 80
+    assert "xi(0) = (-4/5, 0, 3/5)" in text
+    value = json.loads(heavytop("reference", "--digits", "80", "--json"))["states"][0][0]["value"]
+    lines = text.splitlines()
+    place = next(i for i, line in enumerate(lines) if line.startswith(" Ω1"))
+    first, second = lines[place].split(), lines[place + 1].split()
+    assert first[1] + second[0] == value
+    assert first[2] == "±"
+
+
+def test_gimbal_lock_is_said_in_words() -> None:
+    for command in ("propagate", "reference"):
+        text = heavytop(command, "--show", "euler:ZXZ", centre="0,0,1", omega="0,0,3", gamma="0,0,1")
+        assert "not defined (gimbal lock)" in " ".join(text.split())
+        assert "not defined" not in heavytop(command, "--show", "euler:ZXZ")
+
+
+@pytest.mark.parametrize("command", ["propagate", "reference"])
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["--show", "quaternions"], "Unknown output 'quaternions'"),
+        (["--show", ""], "names no output"),
+        (["--show", "euler"], "need their sequence"),
+        (["--show", "euler:ZZX"], "Unknown sequence"),
+        (["--show", "matrix,matrix"], "stands twice"),
+        (["--show", "euler:ZXZ,euler:ZYX"], "stands twice"),
+        (["--show", "matrix", "--point", "1,2,3"], "no position is asked for"),
+        (["--pivot", "1,2,3"], "no position is asked for"),
+        (["--show", "position", "--point", "1,2"], "point has 2 numbers"),
+        (["--show", "position", "--point", "1,nan,2"], "not a finite number"),
+        (["--show", "position", "--pivot", "1,2,1e400"], "too large"),
+        (["--json", "--latex", "-"], "both print on standard output"),
+        (["--csv", "same", "--latex", "same"], "Give two files"),
+        (["--csv", "no/such/folder/file"], "cannot be written"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused_with_a_remedy(command: str, more: list[str], message: str) -> None:
+    error = refused(command, *more)
+    assert message in f"{error.cause} {error.remedy}"
+    assert error.exit_code == 2
+    assert error.remedy
+
+
+def test_the_command_itself_prints_latex_and_names_itself(tmp_path: Path) -> None:
+    options = [part for name, value in DATA.items() for part in (f"--{name}", value)]
+    command = [sys.executable, "-m", "heavytop", "reference", *options, "--csv", "a.csv", "--latex"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.startswith("% command: heavytop reference --inertia 2,2,1 ")
+    assert "# command: heavytop reference --inertia 2,2,1 " in (tmp_path / "a.csv").read_text()
+    assert done.stderr == "heavytop: wrote a.csv\n"
