@@ -61,7 +61,11 @@ GENERATORS: tuple[Callable[[], Any], ...] = (failing, lambda: (x for x in (1, 2,
 
 GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "HeavyTop": (ht.HeavyTop, {"inertia": (3, 2, 1), "weight": 1, "centre": (1, 0, 0), "rotor": None}),
-    "State": (ht.State, {"omega": (1, 2, 3), "gamma": (0, 0, 1)}),
+    "State": (ht.State, {"omega": (1, 2, 3), "gamma": (0, 0, 1), "attitude": None, "omega_space": None}),
+    "Body": (
+        ht.Body,
+        {"mass": 1, "gravity": 1, "centre": (0, 0, 1), "inertia": (3, 2, 1), "about": "pivot", "rotor": None},
+    ),
     "real": (ht.real, {"bits": 60}),
     "propagate": (
         ht.propagate,
@@ -73,6 +77,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "integrator": "heyoka",
             "system": ht.HEAVY_TOP,
             "xi": None,
+            "attitude": None,
             "tolerance": None,
             "high_accuracy": False,
             "compact_mode": False,
@@ -99,7 +104,15 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "reference": (
         ht.reference,
-        {"top": REST, "start": STILL, "times": [1], "digits": 20, "system": "heavy_top", "attitude": False},
+        {
+            "top": REST,
+            "start": STILL,
+            "times": [1],
+            "digits": 20,
+            "system": "heavy_top",
+            "attitude": False,
+            "derivatives": None,
+        },
     ),
     "events": (
         ht.events,
@@ -145,6 +158,34 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "name": "a",
             "integrator": "b",
             "require": 3,
+            "omega": None,
+            "omega_space": None,
+            "gamma": None,
+            "quaternions": None,
+            "matrices": None,
+            "euler": None,
+            "positions": None,
+            "quaternion_order": "wxyz",
+            "quaternion": "body_to_space",
+            "matrix": "body_to_space",
+            "sequence": "",
+            "angles": "radians",
+            "up": "z",
+            "pivot": (0, 0, 0),
+            "point": None,
+            "normalize": False,
+        },
+    ),
+    "score_derivatives": (
+        ht.score_derivatives,
+        {
+            "times": [1],
+            "jacobians": np.eye(6)[None],
+            "top": REST,
+            "start": STILL,
+            "derivatives": "start",
+            "system": None,
+            "require": 3,
         },
     ),
     "drift": (ht.drift, {"run": None}),
@@ -185,7 +226,7 @@ def answered(function: Callable[..., Any], arguments: dict[str, Any]) -> None:
 
 def test_the_table_names_every_argument_of_every_public_function() -> None:
     functions = {name for name in ht.__all__ if inspect.isfunction(getattr(ht, name))} - {"available", "holding"}
-    assert functions | {"HeavyTop", "State"} == set(GOOD)
+    assert functions | {"HeavyTop", "State", "Body"} == set(GOOD)
     for function, arguments in GOOD.values():
         parameters = inspect.signature(function).parameters.values()
         assert [each.name for each in parameters] == list(arguments)

@@ -99,7 +99,7 @@ def score_derivatives(
     needed = None if require is None else required(require)
     body, state = arguments.motion(top, start, of_any_size=True)
     about, instants = arguments.system(system, body), arguments.any_times(times)
-    if derivatives not in ("start", "data"):
+    if not isinstance(derivatives, str) or derivatives not in ("start", "data"):
         raise InputError(f"derivatives = {quoted(derivatives)} cannot be scored.", 'Give "start" or "data".')
     matrices = _matrices(jacobians, len(instants))
     of_digits = digits_of(max(bits_of(value) for matrix in matrices for row in matrix for value in row))

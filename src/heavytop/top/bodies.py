@@ -145,9 +145,9 @@ def _about(about: object, centre: Vector) -> str:
                 f'Give about = "{PIVOT}" or "{CENTRE}": with the centre of mass off the pivot they differ.',
             )
         return PIVOT
-    if about not in (PIVOT, CENTRE):
+    if not isinstance(about, str) or about not in (PIVOT, CENTRE):
         raise InputError(f"about = {quoted(about)} is unknown.", f'Use "{PIVOT}" or "{CENTRE}".')
-    return str(about)
+    return about
 
 
 def _tensor(inertia: Iterable[Any]) -> Tensor:
