@@ -81,8 +81,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     about: str | None = None
     start_quaternion: list[str] | None = None
     start_matrix: list[str] | None = None
-    start_euler: list[str] | None = None
-    start_sequence: str | None = None
+    start_attitude: str | None = None
 
     @property
     def times(self) -> list[TimeText]:

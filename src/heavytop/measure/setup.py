@@ -114,8 +114,11 @@ def motion_texts(body: HeavyTop | Body, start: State, digits: int) -> dict[str, 
     found["gamma"] = rounded(start.gamma, exact)
     if attitude is not None and attitude.kind in ("quaternion", "matrix"):
         found[f"start_{attitude.kind}"] = _texts(attitude.numbers)
-    elif attitude is not None and attitude.kind == "euler":
-        found |= {"start_euler": [str(angle) for angle in attitude.angles], "start_sequence": attitude.sequence}
+    elif attitude is not None:
+        # read back by score, which takes it for the rotation next to it
+        near = attitude.rational_rows(8 * digits + 128)
+        found["start_matrix"] = [decimal_text(value, 2 * digits + 20) for row in near for value in row]
+        found["start_attitude"] = f"{attitude.kind} {attitude}"
     return found
 
 

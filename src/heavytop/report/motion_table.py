@@ -22,7 +22,7 @@ from heavytop.top.outputs import Output
 
 _GREEK = {"Ω": r"\Omega", "γ": r"\gamma", "ξ": r"\xi", "φ": r"\varphi", "θ": r"\theta", "ψ": r"\psi"}
 _BODY = ("mass", "gravity", "inertia", "about", "weight", "centre", "rotor")
-_DATA = (*_BODY, "omega", "gamma", "start_quaternion", "start_matrix", "start_euler", "start_sequence", "xi")
+_DATA = (*_BODY, "omega", "gamma", "start_quaternion", "start_matrix", "start_attitude", "xi")
 _LINES = 45
 """Lines of a LaTeX table that fit on a page."""
 _DIGITS_A_LINE = 48

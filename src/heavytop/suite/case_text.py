@@ -56,7 +56,16 @@ def _csv(data: dict[str, Any]) -> str:
 
 def _toml(data: dict[str, Any]) -> str:
     # a plan's own top may not have the name of a case
-    named = data | {"name": f"my-{data['name']}"}
+    named = {key: value for key, value in data.items() if not key.startswith("start_")}
+    named |= {"name": f"my-{data['name']}"}
+    kind, _, angles = data.get("start_attitude", "").partition(" ")
+    if kind == "axis_angle":
+        angles = ":".join(angles.rsplit(",", 1))
+    given = {key: data.get(f"start_{key}") for key in ("quaternion", "matrix")} if not kind else {kind: angles}
+    given = {key: value for key, value in given.items() if value}
+    if given:
+        named.pop("gamma")
+    named |= given
     return "\n".join(["[[top]]", *(f"{key} = {json.dumps(value)}" for key, value in named.items())])
 
 

@@ -11,9 +11,9 @@ from heavytop.top.bodies import Body
 from heavytop.top.heavy_top import HeavyTop, State
 
 BODY = ("inertia", "weight", "centre", "mass", "gravity", "about", "rotor")
-START = ("omega", "omega_space", "gamma", "quaternion", "euler", "matrix")
+START = ("omega", "omega_space", "gamma", "quaternion", "euler", "matrix", "axis_angle")
 """The keys of a body and of a start."""
-_ATTITUDES = ("gamma", "quaternion", "euler", "matrix")
+_ATTITUDES = ("gamma", "quaternion", "euler", "matrix", "axis_angle")
 
 
 def motion_of(values: Mapping[str, Any], normalize: bool = False) -> tuple[HeavyTop | Body, State]:
@@ -78,6 +78,11 @@ def _attitude(kind: str, value: Any, normalize: bool) -> Attitude:
         if len(value) != 4:
             raise InputError(f"quaternion has {len(value)} numbers.", "Give four, the scalar first: w,x,y,z.")
         return Attitude.quaternion(*value, normalize=normalize)
+    if kind == "axis_angle":
+        axis, colon, angle = value.partition(":") if isinstance(value, str) else ("", "", "")
+        if not colon:
+            raise InputError(f"axis_angle = {quoted(value)} is not an axis and an angle.", "Give it as x,y,z:angle.")
+        return Attitude.axis_angle(axis.split(","), angle)
     sequence, colon, angles = value.partition(":") if isinstance(value, str) else ("", "", "")
     parts = angles.split(",")
     if not colon or len(parts) != 3:

@@ -20,6 +20,7 @@ import msgspec
 
 from heavytop import former_names
 from heavytop.errors import InputError, quoted
+from heavytop.exact.bodies import resolve
 from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers import known as known_integrators
 from heavytop.integrate.peers.source import Source, command_of, commands_in, named, seconds_of
@@ -29,30 +30,55 @@ from heavytop.measure.integrator import require as require_integrator
 from heavytop.measure.rounding_noise import MOST_SEEDS
 from heavytop.precision import exact, number, require
 from heavytop.records import RowKey
-from heavytop.suite.cases import CASES, Case, case, require_possible
+from heavytop.suite.cases import CASES, Case, case, named_bodies, require_possible
 from heavytop.suite.files import read_whole
+from heavytop.suite.given_motion import motion_of
 from heavytop.suite.kind import Kinds, Table
 from heavytop.suite.sweeps import Lazy, Sweep
 from heavytop.suite.task import FINEST, Task
+from heavytop.top.bodies import Body
 from heavytop.top.equations import system_of
-from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.heavy_top import HeavyTop
 
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
 BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "selftest")
 
 
-class Top(msgspec.Struct, forbid_unknown_fields=True):
-    """A top of the plan's own; numbers as exact text."""
+class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """A top of the plan's own, or a body in any axes; numbers as exact text.
+
+    With ``weight`` a top: inertia its principal moments.  With ``mass`` and ``gravity`` a body: inertia 3, 6 or 9
+    numbers of its tensor, about "pivot" or "centre of mass".  The start has ``omega`` or ``omega_space``, and one of
+    ``gamma``, ``quaternion``, ``matrix``, ``euler`` ("ZXZ:a,b,c") and ``axis_angle`` ("x,y,z:angle").
+    """
 
     name: str
     inertia: list[str]
-    weight: str
     centre: list[str]
-    omega: list[str]
-    gamma: list[str]
+    weight: str | None = None
+    mass: str | None = None
+    gravity: str | None = None
+    about: str | None = None
+    omega: list[str] | None = None
+    omega_space: list[str] | None = None
+    gamma: list[str] | None = None
+    quaternion: list[str] | None = None
+    matrix: list[str] | None = None
+    euler: str | None = None
+    axis_angle: str | None = None
     rotor: list[str] | None = None
     system: str | None = None
+
+    def case(self) -> Case:
+        """The case; raises InputError for what is no body or start, or cannot be measured."""
+        body, start = motion_of(msgspec.structs.asdict(self))
+        about, system = "from the plan", system_of(self.system, body)
+        if isinstance(body, HeavyTop) and start.attitude is None:
+            return require_possible(Case(self.name, about, system, body, start))
+        found = resolve(body, start)
+        case = Case(self.name, about, system, found.top, found.start)
+        return require_possible(replace(case, body=body if isinstance(body, Body) else None, given_start=start))
 
 
 class Plan(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
@@ -248,12 +274,10 @@ def _own(plan: Plan) -> dict[str, Case]:
         _require_name(top.name, "top")
         if top.name in own:
             raise InputError(f"The plan {plan.name} has two tops {top.name!r}.", _RENAME)
-        if top.name in CASES:
+        if top.name in CASES or top.name in named_bodies():
             raise InputError(f"The plan's top {top.name!r} has the name of a built-in case.", _RENAME)
         try:
-            body = HeavyTop(top.inertia, top.weight, top.centre, top.rotor)
-            case = Case(top.name, "from the plan", system_of(top.system, body), body, State(top.omega, top.gamma))
-            own[top.name] = require_possible(case)
+            own[top.name] = top.case()
         except InputError as error:
             raise InputError(f"The plan's top {top.name!r}: {error.cause}", error.remedy) from None
     return own

@@ -32,7 +32,17 @@ _FLAGS = ("language", "tolerance", "step")
 _KEYS = {*VECTORS, *_FLAGS, "weight", "system", "times", "states", "precision", "bits", "name", "integrator"}
 _KEYS |= {"outcome", "steps", *observed_file.KEYS}
 _NOT_READ = {"time_reached", "order", "flags", "seconds", "amplification", "metrics", "attitude", "angles"}
-_NOT_READ |= {"times_given", "xi", "command", "version", "sequence", "point", "pivot", *map(key_of, SHAPES)}
+_NOT_READ |= {
+    "times_given",
+    "xi",
+    "start_attitude",
+    "command",
+    "version",
+    "sequence",
+    "point",
+    "pivot",
+    *map(key_of, SHAPES),
+}
 """What else `heavytop propagate --json` writes."""
 _SLACK = 8
 """γ may be off the unit sphere by so many bits of rounding."""
