@@ -99,7 +99,8 @@ def test_csv_is_the_table_and_score_reads_it(command: str, more: list[str], tmp_
                 assert f"±{row[f'{name}_radius']}" in unfolded
     given = read(file)
     assert list(given.times) == [Fraction(1, 3), Fraction(5, 2)]
-    assert (given.top.inertia, given.start.gamma[0]) == ((2, 2, 1), Fraction(3, 5))
+    assert given.top.inertia == (2, 2, 1)
+    assert abs(given.start.gamma[0] - Fraction(3, 5)) <= given.precision.eps
     for state, row in zip(given.states, rows, strict=True):
         assert abs(state[0] - Fraction(row["omega1"])) <= given.precision.eps
 

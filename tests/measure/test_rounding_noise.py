@@ -13,7 +13,7 @@ from heavytop.measure.scalar import of_fraction
 from heavytop.precision import DOUBLE, exact, rounded
 from heavytop.records import Metric, Quantity, by_name
 from heavytop.suite.cases import CASES
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 
 
 def error(size: float) -> Metric:
@@ -43,7 +43,7 @@ def test_no_two_runs_have_the_same_factor() -> None:
     assert len(factors) == (MOST_SEEDS + 1) * (RERUNS + 1)
     assert 1 <= min(factors) < max(factors) < Fraction(102, 100)
     assert factor(0) == 1
-    assert {HEAVY_TOP, GYROSTAT} >= {case.system for case in CASES.values()}
+    assert {HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT} >= {case.system for case in CASES.values()}
 
 
 def test_the_band_of_a_known_spread() -> None:
