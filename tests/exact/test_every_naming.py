@@ -11,7 +11,7 @@ import pytest
 from flint import ctx
 from test_catalogue import SAMPLES
 
-from heavytop.errors import HeavyTopError, NotInClass
+from heavytop.errors import HeavyTopError, NotInClass, OutOfReach
 from heavytop.exact import catalogue
 from heavytop.exact.axes import ALL, renamed_state, renamed_top
 from heavytop.exact.balls import radius, relative_bits
