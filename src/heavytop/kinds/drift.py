@@ -10,8 +10,10 @@ import msgspec
 from rich.console import RenderableType
 from rich.text import Text
 
-from heavytop.integrate.trajectory import Place, Problem
+from heavytop.exact.bodies import resolve
+from heavytop.integrate.trajectory import Place, Problem, Trajectory
 from heavytop.kinds.base import Kind
+from heavytop.measure.attitude_error import AttitudeErrors
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.reruns import Reruns
 from heavytop.measure.scorer import Scorer
@@ -30,6 +32,7 @@ from heavytop.suite.sampling import positive, uniform
 from heavytop.suite.task import Task, computed
 
 NAME = "drift"
+_ATTITUDE = "attitude"
 
 
 class Run(msgspec.Struct, forbid_unknown_fields=True):
@@ -41,11 +44,16 @@ class Run(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class DriftTable(Table, tag=NAME):
-    """integrator: any that `heavytop list` shows."""
+    """integrator: any that `heavytop list` shows.
+
+    attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too; of heyoka and
+    multiword: others are given Ω and γ alone.
+    """
 
     cases: list[str]
     runs: list[Run]
     integrator: str = HEYOKA
+    attitude: bool = False
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
@@ -61,6 +69,7 @@ class DriftTable(Table, tag=NAME):
                 self.integrator,
                 case,
                 *times,
+                options=_ATTITUDE if self.attitude else None,
             )
             for case in map(find, self.cases)
             for precision, horizon, times in runs
@@ -88,6 +97,8 @@ class Drift(Kind):
         """Of one run.  Raises Contradiction where two proofs of the known motion exclude each other, InputError for a
         place reached with other flags.
         """
+        if task.options == _ATTITUDE and task.integrator.takes_many:
+            return _with_attitude(task)
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
         # samples are taken at the rounded times, so the series must be asked for by these
@@ -106,10 +117,7 @@ class Drift(Kind):
         if task.integrator.takes_many:
             going_on = {"place": None if before is None else Place.of(before["run"], precision), "mark": mark}
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **going_on)
-        assert task.case is not None
-        plain = Problem.of(task.case.top, case.start, DOUBLE, case.system)
-        reruns = Reruns(plain, task.integrator, task.seed)
-        metrics = reruns.drift_bands(run, task.times, scorer.metrics(), scorer.truth)
+        metrics = _banded(task, run, scorer)
         return computed_row(task, run, metrics, scorer.series(time_text), scorer.against)
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
@@ -131,6 +139,32 @@ class Drift(Kind):
     def brief(self, rows: Sequence[Row]) -> list[str]:
         """Digits right, a line a motion."""
         return digits_lines(rows, "Digits right, to |t|")
+
+
+def _banded(task: Task, run: Trajectory, scorer: Scorer) -> dict[str, Metric]:
+    assert task.case is not None
+    plain = Problem.of(task.case.top, task.given.start, DOUBLE, task.given.system)
+    return Reruns(plain, task.integrator, task.seed).drift_bands(run, task.times, scorer.metrics(), scorer.truth)
+
+
+def _with_attitude(task: Task) -> Row:
+    """Of one run with ξ beside Ω and γ; begun anew where it was interrupted."""
+    case, precision, integrator = task.given, task.precision, task.integrator
+    times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
+    xi = resolve(case.body or case.top, case.given_start or case.start).xi
+    problem = Problem.of(case.top, case.start, precision, case.system)
+    scorer = Scorer(problem, truth(problem, times), keep)
+    turned = AttitudeErrors(
+        Problem.of(case.top, case.start, precision, case.system, xi), case.top, case.start, times, keep
+    )
+
+    def observe(time: Fraction, state: Any) -> None:
+        scorer(time, state[:6])
+        turned(time, state)
+
+    run = integrator.propagate(case.top, case.start, task.times, precision, case.system, observe, xi=xi)
+    series = scorer.series(time_text) | turned.series(time_text)
+    return computed_row(task, run, _banded(task, run, scorer) | turned.metrics(), series, scorer.against)
 
 
 def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:

@@ -9,6 +9,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
+from operator import mul
 
 from msgspec.structs import replace as replace_struct
 
@@ -19,7 +21,7 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import Truth, closed_form, uncertified
 from heavytop.precision import DOUBLE, exact, number, round_to
 from heavytop.records import Metric
-from heavytop.top.equations import GYROSTAT
+from heavytop.top.equations import GYROSTAT, Parameters
 
 _STEPS = 20_000
 """A longer run is rerun over about its first so many steps only."""
@@ -75,8 +77,7 @@ class Reruns:
         problems = []
         for index in range(1, RERUNS + 1):
             scale = factor(self.seed, index)
-            inertia, moment = (tuple(scale * value for value in part) for part in (p.inertia, p.moment))
-            problems.append(replace(problem, parameters=p._replace(inertia=inertia, moment=moment)))
+            problems.append(replace(problem, parameters=_each(p, partial(mul, scale))))
         scorers = [scorer(given) for given in problems]
         self.integrator.propagate_many(problems, times, lambda i, time, state: scorers[i](time, state), threads=1)
         return scorers
@@ -103,9 +104,14 @@ def escape_band(own: Fraction, escapes: Sequence[Fraction], rate: float, bits: i
 
 
 def _short(problem: Problem) -> Problem:
-    p = problem.parameters
-    inertia, moment = (tuple(round_to(value, _BITS) for value in part) for part in (p.inertia, p.moment))
-    return replace(problem, parameters=p._replace(inertia=inertia, moment=moment))
+    return replace(problem, parameters=_each(problem.parameters, lambda value: round_to(value, _BITS)))
+
+
+def _each(p: Parameters, change: Callable[[Fraction], Fraction]) -> Parameters:
+    """The parameters with every number changed that is proportional to a mass: λ of the gyrostat is none."""
+    inertia, moment = (tuple(map(change, part)) for part in (p.inertia, p.moment))
+    rotor = tuple(map(change, p.rotor)) if isinstance(p.rotor, tuple) else p.rotor
+    return p._replace(inertia=inertia, moment=moment, rotor=rotor)
 
 
 def banded(run: Trajectory, metrics: Metrics, reruns: Sequence[Metrics]) -> Metrics:

@@ -1,0 +1,113 @@
+"""Rows of drift with the attitude: its error and that of the centre of mass, and bands of tops with a rotor."""
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import heavytop as ht
+
+PLAN = """name = "bodies"
+[[top]]
+name = "tilted"
+mass = "2"
+gravity = "9.81"
+about = "pivot"
+centre = ["0.1", "-0.2", "0.3"]
+inertia = ["0.5", "0.7", "0.9", "0.1", "-0.05", "0.02"]
+omega = ["1", "2", "-3"]
+euler = "ZYX:30deg,0.2,1"
+[[top]]
+name = "wheel"
+mass = "1"
+gravity = "0"
+centre = ["0", "0", "0"]
+inertia = ["350", "300", "400"]
+rotor = ["3500", "0", "0"]
+omega = ["61", "1", "1"]
+quaternion = ["1", "0", "0", "0"]
+"""
+TABLE = """[[measure]]
+kind = "drift"
+cases = ["tilted", "wheel"]
+attitude = {attitude}
+integrator = "{integrator}"
+runs = [{{ precision = "{precision}", horizon = "2", samples = 20 }}]
+"""
+
+
+def rows(folder: Path, *tables: dict[str, Any]) -> dict[tuple[str, str], Any]:
+    text = PLAN + "".join(TABLE.format(**table) for table in tables)
+    (folder / "plan.toml").write_text(text, "utf-8")
+    found = ht.run(folder / "plan.toml", out=folder / "out", workers=1).rows
+    return {(row.case, f"{row.key.subject.name} {row.precision}"): row for row in found}
+
+
+def test_the_attitude_and_the_position_are_measured_as_far_as_they_are_there(tmp_path: Path) -> None:
+    both = (("heyoka", "double"), ("multiword", "double"), ("multiword", "quad"))
+    tables = [{"integrator": name, "precision": form, "attitude": "true"} for name, form in both]
+    for (case, subject), row in rows(tmp_path, *tables).items():
+        assert row.outcome == "success"
+        eps = 2.0**-52 if "double" in subject else 2.0**-112
+        for name in ("attitude_error", *(["position_error"] if case == "tilted" else [])):
+            assert 0 < float(row.metrics[f"{name}_max"].value) < 500 * eps
+        assert ("position_error_max" in row.metrics) == (case == "tilted")
+        assert len(row.series["attitude_error"].values) > 3
+
+
+def test_the_states_are_those_of_a_run_without_attitude_to_rounding(tmp_path: Path) -> None:
+    both = [{"integrator": "heyoka", "precision": "double", "attitude": flag} for flag in ("true", "false")]
+    (tmp_path / "one").mkdir()
+    (tmp_path / "other").mkdir()
+    with_it, without = (rows(tmp_path / name, table) for name, table in zip(("one", "other"), both, strict=True))
+    for key, row in without.items():
+        assert "attitude_error_max" not in row.metrics
+        assert set(row.metrics) < set(with_it[key].metrics)
+
+
+def test_the_band_of_a_body_with_a_rotor_is_rounding_noise(tmp_path: Path) -> None:
+    """Reruns scale the rotor with the moments: else they are other motions, with bands of many decades."""
+    found = rows(tmp_path, {"integrator": "heyoka", "precision": "double", "attitude": "true"})
+    row = found["wheel", "heyoka double"]
+    bands = [
+        metric.band for name, metric in row.metrics.items() if name.startswith(("drift", "solution")) and metric.band
+    ]
+    assert bands
+    assert max(bands) < 2
+    report = ht.read_report(tmp_path / "out")
+    assert ht.compare(report, report).verdict == "same"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('about = "pivot"\n', "", "which point"),
+        ('mass = "2"\n', 'mass = "2"\nweight = "3"\n', "weight and mass"),
+        ("ZYX:", "ZYY:", "ZYY"),
+        ('omega = ["1", "2", "-3"]', 'gamma = ["0", "0", "1"]', "neither omega"),
+        ('gravity = "9.81"\n', "", "gravity is missing"),
+    ],
+)
+def test_a_body_that_is_none_is_refused_by_the_name_of_its_top(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    table = TABLE.format(integrator="heyoka", precision="double", attitude="true")
+    (tmp_path / "plan.toml").write_text((PLAN + table).replace(old, new, 1), "utf-8")
+    with pytest.raises(ht.InputError, match=message) as refused:
+        ht.run(tmp_path / "plan.toml", out=tmp_path / "out")
+    assert "'tilted'" in str(refused.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_plan_reads_the_body_exactly(tmp_path: Path) -> None:
+    from heavytop.kinds import KINDS
+    from heavytop.suite.plan import expand, load
+
+    table = TABLE.format(integrator="heyoka", precision="double", attitude="false")
+    (tmp_path / "plan.toml").write_text(PLAN + table, "utf-8")
+    task = next(iter(expand(load(str(tmp_path / "plan.toml"), KINDS)[0])))
+    assert task.case is not None
+    assert task.case.body is not None
+    assert task.case.body.tensor[0] == (Fraction(1, 2), Fraction(1, 10), Fraction(-1, 20))
+    assert sum(g * g for g in task.case.start.gamma) == 1
