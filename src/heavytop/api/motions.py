@@ -58,7 +58,7 @@ def propagate(
         attitude: True to have ξ ride along beside the states, from the attitude of the start, or else from
             :func:`heavytop.top.angles.perpendicular` of γ, where no ``xi`` says otherwise: for ``quaternions()``,
             ``matrices()``, ``positions()``, ``omega_space()`` and ``euler("ZXZ")`` of the run; an observer is given
-            nine numbers.  None for True where the start has an attitude.
+            nine numbers.  None for True where the start has an attitude and the integrator is heyoka or multiword.
         tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; multiword: from there to
             1e-6, where None finer than the format; splittings have none.
         high_accuracy: compensated summation of heyoka's Taylor series, off where None.
@@ -83,12 +83,15 @@ def propagate(
     setup = Setup.of(body, state, form, arguments.system(system, body))
     options = _options(form, tolerance, high_accuracy, compact_mode, step_limit, setup.watched(observer))
     wanted = arguments.flag(attitude, "attitude")
-    beside = xi is None and (state.attitude is not None if wanted is None else wanted)
+    which = named(integrator)
+    if wanted is None:  # integrators of other packages carry Ω and γ alone
+        wanted = state.attitude is not None and which in registry.INTEGRATORS
+    beside = xi is None and wanted
     if xi is not None:
         options["xi"] = setup.own(arguments.attitude(xi, state, form))
     elif beside:
         options["xi"] = setup.xi
-    run = registry.propagator(named(integrator), options)
+    run = registry.propagator(which, options)
     found = cast(Trajectory, run(setup.top, setup.start, check_times(times), form, system=setup.system))
     if beside:
         found = replace(found, states=found.states[:, :6], attitude=found.states[:, 6:])
