@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -92,7 +92,7 @@ class Events(Tabular):
             return [numbers[0], _arrow(self.directions[place]), *numbers[1:]]
 
         title = (
-            f"{len(self)} event{'s' * (len(self) != 1)} {self.function} in {self.problem.precision.name} by {self.integrator}, "
+            f"{_counted(self)} {self.function} in {self.problem.precision.name} by {self.integrator}, "
             f"t = 0 to {decimal_text(self.until, 6)}"
         )
         notes = [_EXPLAINED[self.guarantee]]
@@ -159,7 +159,7 @@ class ReferenceEvents(Tabular, msgspec.Struct, frozen=True):
             return [numbers[0], _arrow(self.directions[place]), *numbers[1:]]
 
         worst = max((Fraction(ball.radius) for ball in self.times), default=Fraction(0))
-        title = f"{len(self)} event{'s' * (len(self) != 1)} {self.function}, known to {self.digits} digits, t = 0 to {self.until[:_SHOWN]}"
+        title = f"{_counted(self)} {self.function}, known to {self.digits} digits, t = 0 to {self.until[:_SHOWN]}"
         notes = [_EXPLAINED[PROVEN], f"largest radius of a time {radius_text(worst)}; {self.method}"]
         return Table(title, ("t", "sign", *NAMES), Lines(len(self), line), notes)
 
@@ -230,3 +230,7 @@ def arrays(times: Sequence[Any], states: Sequence[Any], directions: Sequence[int
         numpy.array(states) if len(states) else numpy.empty((0, 6)),
         numpy.array(directions, dtype=numpy.int64),
     )
+
+
+def _counted(found: Sized) -> str:
+    return f"{len(found)} event{'s' * (len(found) != 1)}"
