@@ -23,6 +23,9 @@ _COMPLETE = "_HEAVYTOP_COMPLETE"
 """Set by the scripts of `heavytop --completion SHELL`."""
 
 
+_NO_MEMORY = "There is not enough memory.\n  Ask for less at once, or use a machine with more."
+
+
 def run_command_line() -> int:
     """Run the command in sys.argv; returns or exits with its code.  Errors are printed as cause and remedy."""
     if _COMPLETE in os.environ:
@@ -39,7 +42,11 @@ def run_command_line() -> int:
     except HeavyTopError as error:
         return _failed(str(error), error.exit_code)
     except MemoryError:
-        return _failed("There is not enough memory.\n  Ask for less at once, or use a machine with more.")
+        return _failed(_NO_MEMORY)
+    except ImportError as error:  # a library that finds no memory while it is loaded
+        if "bad_alloc" not in str(error) and "allocate memory" not in str(error):
+            raise
+        return _failed(_NO_MEMORY)
     except OSError as error:
         return _failed(f"{error}\n  The surroundings of the program do not allow what it needs.")
     return code
