@@ -106,6 +106,36 @@ def test_moments_that_are_nearly_equal_are_told_apart_and_huge_ones_scaled() -> 
         assert max(abs(x) for row in found.left for x in row) <= size / 2**190
 
 
+def thin(small: Fraction) -> list[list[Fraction]]:
+    """A tensor with irrational axes, one moment near 14 and two near ``small``."""
+    v, rest = (1, 2, -3), ((2, 1, 0), (1, 3, 1), (0, 1, 5))
+    return [[v[i] * v[j] + small * rest[i][j] for j in range(3)] for i in range(3)]
+
+
+@pytest.mark.parametrize("power", [20, 90, 130, 300])
+def test_what_is_left_of_a_tensor_is_far_below_its_smallest_moment(power: int) -> None:
+    tensor = thin(Fraction(1, 10**power))
+    found = principal_axes(tensor, 128)
+    rest = max(abs(x) for row in found.left for x in row)
+    assert 0 < rest < min(found.moments) / 2**120
+    # the small moments scale with what is added to v v^T, up to its square
+    scaled = sorted(x * 10**power for x in found.moments)[:2]
+    wanted = sorted(x * 10**20 for x in principal_axes(thin(Fraction(1, 10**20)), 128).moments)[:2]
+    assert all(abs(a / b - 1) < Fraction(1, 10**18) for a, b in zip(scaled, wanted, strict=True))
+
+
+def test_a_moment_far_below_the_rounding_is_an_answer_or_a_refusal() -> None:
+    start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
+    body = ht.Body(1, 1, (0, 0, 1), thin(Fraction(1, 10**100)), "pivot")
+    found = resolve(body, start, 80)
+    assert found.uncertainty is not None
+    assert found.uncertainty.rate > 0
+    with pytest.raises(OutOfReach, match="times as fast"):
+        ht.reference(body, start, [1], 20)
+    with pytest.raises(InputError, match="factor above 1e300"):
+        _ = ht.Body(1, 1, (0, 0, 1), thin(Fraction(1, 10**320)), "pivot").top
+
+
 def test_axes_under_every_renaming_give_the_same_motion() -> None:
     """The body with its axes permuted (and one reversed, where that keeps them right-handed) moves as before."""
     start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion("1/2", "1/2", "-1/2", "1/2"))

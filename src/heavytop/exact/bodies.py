@@ -78,7 +78,8 @@ class Resolved:
 def resolve(body: Body | HeavyTop, start: State, bits: int = 256) -> Resolved:
     """The motion of a body, or of a top, from ``start``, in principal axes.
 
-    bits: to which what is irrational is rounded, relative to the largest of its kind.
+    bits: to which what is irrational is rounded: a tensor relative to its smallest moment, the rest to the largest of
+    its kind.
     """
     spin, rows, off = _start(start, bits)
     up = rows[2] if rows is not None else start.gamma

@@ -14,6 +14,7 @@ from itertools import permutations
 from math import isqrt, lcm
 from typing import Any
 
+from heavytop.errors import InputError
 from heavytop.precision import round_to
 from heavytop.top.angles import perpendicular
 from heavytop.top.attitude import Rows, multiplied, rotation_of, transposed
@@ -22,6 +23,8 @@ from heavytop.top.vectors import Vector, cross, dot
 IDENTITY: tuple[Vector, Vector, Vector] = tuple(tuple(Fraction(i == j) for j in range(3)) for i in range(3))  # type: ignore[assignment]
 _GUARD_BITS = 64
 _MOST_SWEEPS = 60
+_MOST_SPREAD = 2048
+"""Bits; beyond it two moments differ by a factor of 2^1021 at least, more than any data may."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +47,12 @@ class PrincipalAxes:
 def principal_axes(tensor: Rows, bits: int) -> PrincipalAxes:
     """The principal axes of a symmetric tensor of exact rationals.
 
-    A diagonal tensor keeps its axes.  bits: where they are irrational, A and the moments are within some 2^-bits of
-    them relative to the largest moment.
+    A diagonal tensor keeps its axes.  bits: where they are irrational, what is left is within some 2^-bits of the
+    smallest moment.  Raises InputError where moments of a tensor that is not diagonal differ by a factor above 1e300.
     """
     if not any(tensor[i][j] for i in range(3) for j in range(i)):
         return _with_rest(tensor, IDENTITY, (tensor[0][0], tensor[1][1], tensor[2][2]))
+    bits += _spread(tensor)
     near = _near(tensor, bits)
     found = _rational(tensor, near)
     if found is not None:
@@ -62,6 +66,24 @@ def _with_rest(tensor: Rows, axes: Any, moments: Vector) -> PrincipalAxes:
     turned = multiplied(transposed(axes), multiplied(tensor, axes))
     first, second, third = (tuple(turned[i][j] - (moments[i] if i == j else 0) for j in range(3)) for i in range(3))
     return PrincipalAxes(axes, moments, (first, second, third))
+
+
+def _spread(tensor: Rows) -> int:
+    """Bits by which the smallest moment may be below the largest entry, in whole words: det/trace² is a bound of it.
+
+    0 for ordinary bodies, whose guard bits do, and for a tensor that has a moment below 0.
+    """
+    trace, determinant = tensor[0][0] + tensor[1][1] + tensor[2][2], _determinant(tensor)
+    if determinant <= 0:
+        return 0
+    ratio = Fraction(trace**3 / determinant)
+    spread = ratio.numerator.bit_length() - ratio.denominator.bit_length()
+    if spread > _MOST_SPREAD:
+        raise InputError(
+            "Two principal moments of the inertia tensor differ by a factor above 1e300.",
+            "Check its entries and their units: no body that can be computed has such moments.",
+        )
+    return spread // _GUARD_BITS * _GUARD_BITS
 
 
 def _determinant(rows: Rows) -> Any:
