@@ -44,7 +44,7 @@ def as_csv(given: dict, number=str) -> str:
     return "\n".join([*lines, HEADER, *(",".join([t, *map(number, state)]) for t, state in rows)]) + "\n"
 
 
-def command(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
+def started(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
     line = [sys.executable, "-m", "heavytop", *arguments]
     return subprocess.run(line, capture_output=True, text=True, timeout=120, check=False, **options)
 
