@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
 import shutil
+import subprocess
 import tomllib
 from pathlib import Path
+from unittest import mock
 
 import pytest
 import typer
 
 import from_a_wheel
 import heavytop as ht
+import in_process
 from documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
 from heavytop.cli import app
 from heavytop.integrate.peers.source import commands_in
@@ -56,7 +60,7 @@ def test_the_code_of_a_page_runs(
         if block.language == "python":
             exec(compile(block.text, where, "exec"), names)
         elif block.language == "sh":
-            done = run_shell(block.text, tmp_path, environment)
+            done = run_here(block.text, tmp_path, environment) or run_shell(block.text, tmp_path, environment)
             assert done.returncode == 0, f"{where}\n{done.stdout}\n{done.stderr}"
             printed = "".join(line.rstrip() + "\n" for line in done.stdout.splitlines())
         elif block.language == "toml":
@@ -89,6 +93,28 @@ def to_run(page: Path) -> list[Block]:
         return found
     doors = tuple(f"heavytop {key}" for key in from_a_wheel.LIMITS)
     return [block for block in found if block.language and not any(door in block.text for door in doors)]
+
+
+HERE = ("audit", "compare", "export", "list", "propagate", "reference", "score", "show")
+"""Commands that need no process of their own: they start none, and neither signals nor streams are their point."""
+
+
+def run_here(text: str, folder: Path, environment: dict[str, str]) -> subprocess.CompletedProcess[str] | None:
+    """What run_shell returns, without a process; None where the block has anything for a shell."""
+    lines = [line for line in text.replace("\\\n", " ").splitlines() if line.strip() and not line.startswith("#")]
+    if not all(re.match(rf"heavytop ({'|'.join(HERE)})\b", line) for line in lines):
+        return None
+    if any(re.search(r"[|&;<>$`*?~{}()]", line.partition(" # ")[0]) for line in lines):
+        return None
+    out = errors = ""
+    for line in lines:
+        expected = re.search(r"\s# exit code (\d+)\b", line)
+        with mock.patch.dict(os.environ, environment):
+            done = in_process.heavytop(*shlex.split(line, comments=True)[1:], cwd=folder)
+        out, errors = out + done.stdout, errors + done.stderr
+        if done.returncode != (int(expected[1]) if expected else 0):
+            return subprocess.CompletedProcess(line, done.returncode or 1, out, errors)
+    return subprocess.CompletedProcess(text, 0, out, errors)
 
 
 def without_options(cell: str) -> str:
@@ -162,6 +188,16 @@ def test_a_page_links_to_what_is_there(page: Path) -> None:
 def test_a_block_that_fails_is_seen(tmp_path: Path) -> None:
     environment = folder_like_a_checkout(tmp_path)
     assert run_shell("false # exit code 1: as said\ntrue\n", tmp_path, environment).returncode == 0
+    assert run_here("heavytop list\nheavytop show nowhere  # exit code 2\n", tmp_path, environment).returncode == 0
+    for text in ("heavytop show nowhere\nheavytop list\n", "heavytop list  # exit code 1\n"):
+        assert run_here(text, tmp_path, environment).returncode != 0
+    for text in (
+        "heavytop list | cat\n",
+        "heavytop list > a\n",
+        "heavytop run --plan smoke\n",
+        "cat a\nheavytop list\n",
+    ):
+        assert run_here(text, tmp_path, environment) is None
     for text in ("false\ntrue\n", "true # exit code 1\n", "false | true\n", "heavytop audit none.toml # exit code 3\n"):
         assert run_shell(text, tmp_path, environment).returncode != 0
     page = tmp_path / "page.md"

@@ -2,13 +2,12 @@
 
 import json
 import math
-import subprocess
-import sys
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
+import in_process
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
 from heavytop.measure.truth import known_motion
@@ -94,8 +93,9 @@ def test_numbers_bounds_and_words() -> None:
 
 
 def command(*arguments: object) -> str:
-    line = [sys.executable, "-m", "heavytop", *map(str, arguments)]
-    return subprocess.run(line, capture_output=True, text=True, check=True, timeout=120).stdout
+    done = in_process.heavytop(*arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def test_every_surface_says_the_same(tmp_path: Path) -> None:

@@ -6,14 +6,14 @@ import csv
 import json
 import math
 import re
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
 import msgspec
 import pytest
 
+import in_process
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.records import Report
@@ -118,10 +118,7 @@ def test_csv_has_a_line_a_metric(report: Report) -> None:
 
 
 def test_the_command_writes_a_file_or_standard_output_and_refuses_another_format(tmp_path: Path) -> None:
-    def heavytop(*words: object) -> subprocess.CompletedProcess[str]:
-        line = [sys.executable, "-m", "heavytop", "export", str(ROOT / "results" / "growth"), *map(str, words)]
-        return subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
-
+    heavytop = partial(in_process.heavytop, "export", ROOT / "results" / "growth")
     done = heavytop("--to", "csv", "--out", tmp_path / "rows.csv")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert (tmp_path / "rows.csv").stat().st_size > 1000

@@ -2,14 +2,13 @@
 
 import math
 import re
-import subprocess
-import sys
 from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+import in_process
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.measure.digits import RELATIVE
@@ -299,11 +298,11 @@ def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_show_writes_a_page(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "heavytop", "show", str(RESULTS), "--html"]
-    done = subprocess.run([*command, "page.html"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    done = in_process.heavytop("show", RESULTS, "--html", "page.html", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == "page.html\n"
     assert Page(tmp_path / "page.html").all("svg")
-    refused = subprocess.run([*command, "no/page.html"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    refused = in_process.heavytop("show", RESULTS, "--html", "no/page.html", cwd=tmp_path)
     assert refused.returncode == 2
     assert "Give a file in a writable folder" in refused.stderr
 

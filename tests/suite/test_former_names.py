@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import heavytop as ht
+import in_process
 from heavytop import former_names
 from heavytop.api.run_folder import prepare
 from heavytop.errors import InputError
@@ -141,7 +142,7 @@ def test_the_name_of_before_is_nobody_elses(tmp_path: Path) -> None:
 
 def test_the_command_line_takes_it_with_one_line_of_notice(tmp_path: Path) -> None:
     motion = "--inertia 3,2,1 --weight 1 --centre 0,0,1 --omega 1,2,3 --gamma 0,0,1 --times 1 --json"
-    found = heavytop("propagate", *motion.split(), "--integrator", "words")
+    found = in_process.heavytop("propagate", *motion.split(), "--integrator", "words")
     assert json.loads(found.stdout)["integrator"] == "multiword"
     assert found.stderr == "heavytop: note: the integrator words is called multiword now\n"
     run = heavytop("run", "--plan", plan(tmp_path, "words"), "--workers", "1", "--out", str(tmp_path / "out"))

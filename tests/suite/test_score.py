@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import in_process
 from heavytop.errors import InputError
 from heavytop.integrate.taylor import propagate
 from heavytop.measure.motion import compute
@@ -44,9 +45,12 @@ def as_csv(given: dict, number=str) -> str:
     return "\n".join([*lines, HEADER, *(",".join([t, *map(number, state)]) for t, state in rows)]) + "\n"
 
 
-def command(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
+def started(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
     line = [sys.executable, "-m", "heavytop", *arguments]
     return subprocess.run(line, capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+command = in_process.heavytop
 
 
 @pytest.mark.parametrize("precision", [DOUBLE, EXTENDED, QUAD, real(160)], ids=lambda p: p.name)
@@ -232,8 +236,8 @@ def test_what_no_body_has_and_states_in_another_order_are_warnings(tmp_path: Pat
 def test_the_command_scores_writes_a_report_and_pipes(tmp_path: Path) -> None:
     options = ["--inertia", "5/2,5/2,3/2", "--weight", "2", "--centre", "0,0,3/4", "--omega", "1/5,-1/3,7/4"]
     options += ["--gamma", "2/7,3/7,6/7", "--times", "1,5", "--json"]
-    made = command("propagate", *options)
-    piped = command("score", "-", "--json", input=made.stdout)
+    made = started("propagate", *options)
+    piped = started("score", "-", "--json", input=made.stdout)
     assert piped.returncode == 0, piped.stderr
     assert json.loads(piped.stdout)["digits_kept"] > 14
     file = tmp_path / "motion.json"

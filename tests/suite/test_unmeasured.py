@@ -1,7 +1,5 @@
 """A row that cannot be known: an outcome of its own, never the same as another, and the other rows are there."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +9,7 @@ from heavytop.measure import truth
 from heavytop.report.policy import Policy
 from heavytop.suite.rows import unmeasured
 from helpers import without_progress
+from in_process import heavytop
 from reports import all_good, compare, expand, load, replace, rows, store
 
 PLAN = """name = "far"
@@ -37,11 +36,6 @@ directions = ["forward"]
 def tasks_of(folder: Path, text: str):
     (folder / "plan.toml").write_text(text)
     return expand(load(str(folder / "plan.toml"))[0])
-
-
-def heavytop(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "heavytop", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
 def test_a_plan_with_rows_out_of_reach_ends_with_all_others_and_exit_3(tmp_path: Path) -> None:

@@ -1,0 +1,72 @@
+"""The command line in the process of the tests: no interpreter starts, no library is loaded again.
+
+What a process of its own is the point of (signals, closed streams, limits, what an import loads, workers that are
+spawned, ``python -O``) is tested in one.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import flint
+import mpmath
+
+from heavytop.__main__ import main
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def heavytop(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """What ``heavytop ARGUMENTS`` prints and its exit code, in ``cwd`` or here.
+
+    An error that is none of the program's is a traceback on standard error and exit 1, as in a process.  Fails where
+    the command leaves anything behind that the next one would see.
+    """
+    line = ["heavytop", *map(str, arguments)]
+    out, errors = (io.TextIOWrapper(io.BytesIO(), "utf-8", newline="", write_through=True) for _ in range(2))
+    code: object = 0
+    with _as_before(line), chdir(cwd or "."), redirect_stdout(out), redirect_stderr(errors):
+        try:
+            main()
+        except SystemExit as ended:
+            code = ended.code or 0
+        except Exception:
+            traceback.print_exc()
+            code = 1
+    assert isinstance(code, int)
+    texts = [stream.buffer.getvalue().decode() for stream in (out, errors)]
+    return subprocess.CompletedProcess(line, code, *texts)
+
+
+@contextmanager
+def _as_before(line: list[str]) -> Iterator[None]:
+    """The program's own argv and its handler of Ctrl-C go; all else has to be as it was."""
+    argv, sys.argv = sys.argv, line
+    interrupt, before = signal.getsignal(signal.SIGINT), state()
+    try:
+        yield
+    finally:
+        sys.argv = argv
+        signal.signal(signal.SIGINT, interrupt)
+    assert state() == before
+
+
+def state() -> dict[str, object]:
+    """What one command could leave to the next: folder, environment, signals, streams, precisions, import path."""
+    return {
+        "folder": os.getcwd(),
+        "environment": dict(os.environ),
+        "signals": [signal.getsignal(number) for number in SIGNALS],
+        "streams": (sys.stdout, sys.stderr),
+        "flint": (flint.ctx.prec, flint.ctx.threads),
+        "mpmath": mpmath.mp.prec,
+        "path": list(sys.path),
+    }
