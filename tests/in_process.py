@@ -11,6 +11,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import traceback
 from collections.abc import Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
@@ -48,15 +49,23 @@ def heavytop(*arguments: object, cwd: Path | None = None) -> subprocess.Complete
 
 @contextmanager
 def _as_before(line: list[str]) -> Iterator[None]:
-    """The program's own argv and its handler of Ctrl-C go; all else has to be as it was."""
+    """The program's own argv, its handler of Ctrl-C and modules of the test go; all else has to be as it was."""
     argv, sys.argv = sys.argv, line
-    interrupt, before = signal.getsignal(signal.SIGINT), state()
+    interrupt, before, loaded = signal.getsignal(signal.SIGINT), state(), set(sys.modules)
     try:
         yield
     finally:
         sys.argv = argv
         signal.signal(signal.SIGINT, interrupt)
+        for name in sys.modules.keys() - loaded:
+            if _is_temporary(sys.modules[name]):
+                del sys.modules[name]
     assert state() == before
+
+
+def _is_temporary(module: object) -> bool:
+    """Whether it is an integrator of one test, whose name the next gives to another."""
+    return str(getattr(module, "__file__", None) or "").startswith(tempfile.gettempdir())
 
 
 def state() -> dict[str, object]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from heavytop.api import plot
-    from heavytop.api.claims import Audit, audit
+    from heavytop.api.claims import Audit, ClaimLibrary, audit, claim_library
     from heavytop.api.derivatives import DerivativeScore, score_derivatives
     from heavytop.api.events import events, poincare
     from heavytop.api.motions import ensemble, propagate, reference
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _PLACES = {
-    "api.claims": ("Audit", "audit"),
+    "api.claims": ("Audit", "ClaimLibrary", "audit", "claim_library"),
     "api.derivatives": ("DerivativeScore", "score_derivatives"),
     "api.events": ("events", "poincare"),
     "api.motions": ("ensemble", "propagate", "reference"),
@@ -58,6 +58,7 @@ __all__ = [
     "Attitude",
     "Audit",
     "Body",
+    "ClaimLibrary",
     "Comparison",
     "Contradiction",
     "DerivativeScore",
@@ -80,6 +81,7 @@ __all__ = [
     "__version__",
     "audit",
     "available",
+    "claim_library",
     "compare",
     "drift",
     "ensemble",

@@ -78,6 +78,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "system": ht.HEAVY_TOP,
             "xi": None,
             "attitude": None,
+            "angles": None,
             "tolerance": None,
             "high_accuracy": False,
             "compact_mode": False,
@@ -114,6 +115,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "derivatives": None,
         },
     ),
+    "claim_library": (ht.claim_library, {"tag": "delone", "anew": False, "done": None}),
     "events": (
         ht.events,
         {
@@ -129,6 +131,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "tolerance": None,
             "step_limit": 5,
             "limit": 2,
+            "reached": None,
         },
     ),
     "poincare": (
@@ -247,7 +250,7 @@ def test_one_odd_argument_is_answered_or_refused_in_words(
     for odd in itertools.chain(ODD[::6] if few else ODD, (make() for make in GENERATORS)):
         if name == "run" and isinstance(odd, str) and odd == "smoke":
             continue  # a plan that is there
-        if argument == "observer" and callable(odd):
+        if argument in ("observer", "reached", "done") and callable(odd):
             continue  # what the caller's own function raises is the caller's
         answered(function, arguments | {argument: odd})
 
@@ -261,7 +264,7 @@ def test_two_odd_arguments_at_once_are_answered_or_refused_in_words(
     random = Random(7)
     function, arguments = GOOD[name]
     for _ in range(150):
-        names = [each for each in arguments if each != "observer"]
+        names = [each for each in arguments if each not in ("observer", "reached", "done")]
         changed = {each: random.choice(ODD) for each in random.sample(names, 2)}
         answered(function, arguments | changed)
 

@@ -109,3 +109,24 @@ def test_a_plan_reads_the_body_exactly(tmp_path: Path) -> None:
     assert task.case.body is not None
     assert task.case.body.tensor[0] == (Fraction(1, 2), Fraction(1, 10), Fraction(-1, 20))
     assert sum(g * g for g in task.case.start.gamma) == 1
+
+
+GROWTH = """name = "laws"
+[[measure]]
+kind = "growth"
+cases = ["lagrange"]
+runs = [
+    { precision = "double", horizon = "1e4", starts = 8, samples = 8, decades = 3, attitude = true },
+    { precision = "double", horizon = "1e4", starts = 8, samples = 8, decades = 3, attitude = true, bias = "1e-9" },
+]
+"""
+
+
+def test_the_errors_of_attitude_and_position_have_laws(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(GROWTH, "utf-8")
+    plain, biased = ht.run(tmp_path / "plan.toml", out=tmp_path / "out", workers=1).rows
+    for name in ("attitude_error", "position_error"):
+        law = plain.laws[name]
+        assert law.low <= 1.5 <= law.high  # rounding noise that adds up to a phase
+        assert biased.laws[name].growth == "t"  # a frequency off by a constant
+        assert 0 < float(plain.metrics[f"{name}_max"].value) < 1e-9 < float(biased.metrics[f"{name}_max"].value)

@@ -48,8 +48,7 @@ def motion(
     state = is_a(start, State, "start")
     if not of_any_size:
         require_physical(body.top if isinstance(body, Body) else body, state)
-    remedy = 'Give rational components such as ("3/5", 0, "4/5"), or use start.normalized().'
-    return body, state.require_unit_gamma(slack_of(precision), remedy)
+    return body, state.require_unit_gamma(slack_of(precision))
 
 
 def slack_of(precision: Precision) -> Fraction:
@@ -81,7 +80,7 @@ def any_times(values: Numbers) -> list[Fraction]:
     """Exact times in any order, at least one."""
     found = [physical(exact(value), "a time") for value in ordered(values, "times", "Give a list such as [1, 2, 5].")]
     if not found:
-        raise InputError("No times were given.", "Give at least one, such as [1, 2, 5].")
+        raise InputError("No times were given.", "Give at least one, such as 1, 2, 5.")
     return found
 
 
@@ -113,6 +112,14 @@ def count(value: int | None, what: str) -> int | None:
     if found < 1:
         raise InputError(f"{what} = {quoted(found)} allows nothing.", "Give 1 or more, or None for no limit.")
     return min(found, _MOST)
+
+
+def steps(value: int | None) -> int | None:
+    """A limit of steps, or None."""
+    found = None if value is None else whole(value, "step_limit")
+    if found is not None and found < 1:
+        raise InputError(f"step_limit = {quoted(found)} allows no step.", "Give 1 or more.")
+    return None if found is None else min(found, _MOST)
 
 
 def limit(value: Number | None, what: str) -> str | None:

@@ -50,6 +50,7 @@ def events(
     tolerance: Number | None = None,
     step_limit: int | None = None,
     limit: int | None = None,
+    reached: Reached | None = None,
 ) -> Events: ...
 
 
@@ -64,6 +65,7 @@ def events(
     digits: int,
     system: System | str | None = None,
     limit: int | None = None,
+    reached: Reached | None = None,
 ) -> ReferenceEvents: ...
 
 
@@ -81,6 +83,7 @@ def events(
     tolerance: Number | None = None,
     step_limit: int | None = None,
     limit: int | None = None,
+    reached: Reached | None = None,
 ) -> Events | ReferenceEvents:
     """The times strictly between 0 and ``until`` at which a function of the state changes sign, and the states there.
 
@@ -96,6 +99,7 @@ def events(
         digits: None for a computed motion; 1 to 20,000 for proven events of the true motion, in place of ``precision``
             and ``integrator``.
         limit: stop after so many events.
+        reached: called with the times on the way.
 
     Returns:
         :class:`Events`: ``times`` (n,), ``states`` (n, 6) and ``directions`` (n,), each time and state rounded once
@@ -108,8 +112,9 @@ def events(
         OutOfReach: for more than 1e8 steps; with ``digits`` beyond the reach of the enclosure, and where it is not
             decided whether the function changes sign or only touches zero.
     """
-    which, way = event_function(function), _direction(direction)
+    which, way = event_function(function), require_direction(direction)
     most = arguments.count(limit, "limit")
+    arguments.callback(reached, "reached")
     if digits is None:
         form = arguments.precision(precision)
         body, state = arguments.motion(top, start, form)
@@ -123,8 +128,9 @@ def events(
             integrator,
             arguments.system(system, body),
             arguments.tolerance(tolerance, form),
-            arguments.count(step_limit, "step_limit"),
+            arguments.steps(step_limit),
             most,
+            reached,
         )
     if (precision, integrator, tolerance, step_limit) != (DOUBLE, "heyoka", None, None):
         raise InputError(
@@ -133,7 +139,7 @@ def events(
         )
     body, state = arguments.motion(top, start, of_any_size=True)
     return known_events(
-        body, state, _until(until), which, way, whole(digits, "digits"), arguments.system(system, body), most
+        body, state, _until(until), which, way, whole(digits, "digits"), arguments.system(system, body), most, reached
     )
 
 
@@ -279,7 +285,8 @@ def _until(value: Number) -> Fraction:
     return found
 
 
-def _direction(value: int) -> int:
+def require_direction(value: int) -> int:
+    """1, -1 or 0; raises InputError for any other."""
     found = whole(value, "direction")
     if found not in (-1, 0, 1):
         raise InputError(f"direction = {quoted(found)} is none.", "Give 1 (rising), -1 (falling) or 0 (both).")

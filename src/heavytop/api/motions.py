@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any, TypeAlias, cast
@@ -10,18 +10,21 @@ from typing import Any, TypeAlias, cast
 from heavytop.api import arguments
 from heavytop.api.arguments import Number, Numbers
 from heavytop.errors import InputError
+from heavytop.exact.catalogue import find
 from heavytop.integrate import registry
 from heavytop.integrate.peers.source import named
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.derivatives import which_derivatives
-from heavytop.measure.reference import Reference
+from heavytop.measure.motion import Motion, compute
+from heavytop.measure.reference import Finder, Reference
 from heavytop.measure.reference import reference as proven
 from heavytop.measure.setup import Setup
 from heavytop.precision import DOUBLE, Precision, whole
 from heavytop.top.bodies import Body
 from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State, ordered
-from heavytop.top.times import check_times
+from heavytop.top.outputs import Output
+from heavytop.top.times import TimeText, check_times
 
 Observer: TypeAlias = Callable[[Fraction, Any], object]
 EnsembleObserver: TypeAlias = Callable[[int, Fraction, Any], object]
@@ -37,6 +40,7 @@ def propagate(
     system: System | str | None = None,
     xi: Numbers | None = None,
     attitude: bool | None = None,
+    angles: bool | None = None,
     tolerance: Number | None = None,
     high_accuracy: bool | None = None,
     compact_mode: bool | None = None,
@@ -59,6 +63,8 @@ def propagate(
             :func:`heavytop.top.angles.perpendicular` of γ, where no ``xi`` says otherwise: for ``quaternions()``,
             ``matrices()``, ``positions()``, ``omega_space()`` and ``euler("ZXZ")`` of the run; an observer is given
             nine numbers.  None for True where the start has an attitude and the integrator is heyoka or multiword.
+        angles: True for ``angles()`` of the run too, the Euler angles φ, θ, ψ with all turns, followed from t = 0 on
+            ``attitude``; not with ``xi``, an ``observer`` or options of heyoka alone.
         tolerance: relative and absolute. heyoka: from the eps of the format (where None) to 1; multiword: from there to
             1e-6, where None finer than the format; splittings have none.
         high_accuracy: compensated summation of heyoka's Taylor series, off where None.
@@ -78,6 +84,28 @@ def propagate(
     Source:
         (1.1) and (1.2), as in :mod:`heavytop.top.equations`; the Taylor method is heyoka's (Biscani and Izzo, 2021).
     """
+    if arguments.flag(angles, "angles"):
+        if xi is not None or observer is not None or attitude is False:
+            raise InputError("angles go with neither xi, observer nor attitude=False.", "Leave angles or these out.")
+        shown = motion(
+            top,
+            start,
+            times,
+            precision,
+            integrator=integrator,
+            system=system,
+            angles=True,
+            tolerance=tolerance,
+            step_limit=step_limit,
+            flags={"high_accuracy": high_accuracy, "compact_mode": compact_mode},
+        )
+        whole_states = shown.trajectory.states
+        return replace(
+            shown.trajectory,
+            states=whole_states[:, :6],
+            attitude=whole_states[:, 6:],
+            angle_texts=shown.angles,
+        )
     form = arguments.precision(precision)
     body, state = arguments.motion(top, start, form)
     setup = Setup.of(body, state, form, arguments.system(system, body))
@@ -96,6 +124,48 @@ def propagate(
     if beside:
         found = replace(found, states=found.states[:, :6], attitude=found.states[:, 6:])
     return setup.given(found)
+
+
+def motion(
+    top: HeavyTop | Body,
+    start: State,
+    times: Numbers,
+    precision: Precision | str = DOUBLE,
+    *,
+    integrator: str | Callable[..., Any] = "heyoka",
+    system: System | str | None = None,
+    angles: bool = False,
+    outputs: tuple[Output, ...] = (),
+    tolerance: Number | None = None,
+    step_limit: int | None = None,
+    flags: Mapping[str, bool | None] | None = None,
+    reached: Callable[[Fraction], None] | None = None,
+) -> Motion:
+    """What `heavytop propagate` shows: a computed motion with the drift of every first integral that holds.
+
+    Arguments:
+        top, start, times, precision, integrator, system, tolerance, step_limit: as in :func:`propagate`.
+        angles: ξ rides along, and the Euler angles φ, θ, ψ are followed from t = 0, continuous but for jumps by π at
+            the poles.
+        outputs: of :func:`heavytop.top.outputs.outputs`, told beside the states.
+        flags: ``high_accuracy`` and ``compact_mode``.
+        reached: called with the times on the way.
+
+    Returns:
+        A :class:`heavytop.measure.motion.Motion`: ``trajectory``, ``states``, ``drift``, ``attitude``, ``angles``.
+
+    Raises:
+        InputError, OutOfReach: as :func:`propagate`.
+    """
+    form = arguments.precision(precision)
+    body, state = arguments.motion(top, start, form)
+    about = arguments.system(system, body)
+    asked = flags or {}
+    options = _options(form, tolerance, asked.get("high_accuracy"), asked.get("compact_mode"), step_limit, None)
+    given = ordered(times, "times", "Give a list such as [1, 2, 5].")
+    instants = check_times(given)
+    written = [str(TimeText.of(time)) for time in given]
+    return compute(body, state, instants, form, about, angles, options, named(integrator), reached, outputs, written)
 
 
 def ensemble(
@@ -173,13 +243,27 @@ def reference(
         InputError: for what is no motion or time, and for other digits.
         OutOfReach: where the digits cannot be proven, and for fractions beyond 1e-9000 to 1e9000.
     """
+    return known(top, start, times, digits, system, attitude, derivatives)
+
+
+def known(
+    top: HeavyTop | Body,
+    start: State,
+    times: Numbers,
+    digits: int = 50,
+    system: System | str | None = None,
+    attitude: bool | None = None,
+    derivatives: str | None = None,
+    finder: Finder = find,
+) -> Reference:
+    """:func:`reference`, whose progress may be watched: ``finder`` is :func:`heavytop.exact.catalogue.find`."""
     body, state = arguments.motion(top, start, of_any_size=True)
     about, given = arguments.system(system, body), ordered(times, "times", "Give a list such as [1, 2, 5].")
     arguments.any_times(given)
     wanted = arguments.flag(attitude, "attitude")
     told = state.attitude is not None if wanted is None else wanted
     which = which_derivatives(derivatives)
-    return proven(body, state, given, whole(digits, "digits"), about, attitude=told, derivatives=which)
+    return proven(body, state, given, whole(digits, "digits"), about, finder, told, which)
 
 
 def _setups(tops: Sequence[HeavyTop | Body], starts: Sequence[State], form: Precision, system: System) -> list[Setup]:
@@ -218,7 +302,7 @@ def _options(
         "tolerance": arguments.tolerance(tolerance, form),
         "high_accuracy": arguments.flag(high_accuracy, "high_accuracy"),
         "compact_mode": arguments.flag(compact_mode, "compact_mode"),
-        "step_limit": arguments.count(step_limit, "step_limit"),
+        "step_limit": arguments.steps(step_limit),
         "observer": arguments.callback(observer, "observer"),
     }
     return {name: value for name, value in checked.items() if value is not None}

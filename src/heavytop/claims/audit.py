@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
+from heavytop.claims.entry import Entry, file_of
 from heavytop.claims.guard import in_time
 from heavytop.claims.judge import Audit, Finding, Row, judge
 from heavytop.claims.statement import Setting, Statement
@@ -27,6 +28,9 @@ class Auditable(Protocol):
 
     @property
     def kind(self) -> str: ...
+
+    @property
+    def entry(self) -> Entry | None: ...
 
     @property
     def setting(self) -> Setting: ...
@@ -59,11 +63,15 @@ def find_claim(name: str) -> Auditable:
 
 
 def _path(name: str) -> Path:
-    """The path of a claim in TOML; raises InputError for any other name."""
+    """The path of a claim in TOML, or of the entry of that name; raises InputError for any other name."""
     path = Path(name)
-    if path.suffix != ".toml":
-        raise InputError(f"Unknown claim {name[:60]!r}.", f"Use {', '.join(PAPER)} or the path of a TOML file.")
-    return path
+    if path.suffix == ".toml":
+        return path
+    found = file_of(name)
+    if found is None:
+        remedy = f"Use {', '.join(PAPER)}, an entry that `heavytop claims` lists, or the path of a TOML file."
+        raise InputError(f"Unknown claim {name[:60]!r}.", remedy)
+    return found
 
 
 def audit(
@@ -88,7 +96,7 @@ def audit_claim(
     rows = judge(claim.statements(about), claim.setting, progress)
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
-    return Audit(claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind)
+    return Audit(claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
 
 
 def only_branch(report: Audit, branch: str) -> Audit:

@@ -12,6 +12,7 @@ from flint import arb
 
 from heavytop.claims.assume import Assumed, assume, comparisons
 from heavytop.claims.conditions import Kind, Need, condition, is_exactly_zero
+from heavytop.claims.entry import Entry
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
@@ -248,6 +249,11 @@ class FileClaim:
     def source(self) -> str:
         """As the file has it."""
         return self.content.source
+
+    @property
+    def entry(self) -> Entry | None:
+        """What the file says as an entry of the library."""
+        return self.content.entry
 
     @property
     def kind(self) -> str:

@@ -51,6 +51,7 @@ class PartialClaim:
     psi: Formula = ershkov.psi
     name: str = "ershkov-partial"
     kind: str = "motion"
+    entry: None = None
     source: str = f"{SOURCE}, (4.1)-(4.6), (6.1)-(6.2)"
 
     @property
@@ -205,6 +206,7 @@ class GeneralClaim:
     f2: Formula = ershkov_general.f2
     name: str = "ershkov-general"
     kind: str = "motion"
+    entry: None = None
     source: str = f"{SOURCE}, (2.1)-(2.4), (3.3), (3.4)"
 
     @property

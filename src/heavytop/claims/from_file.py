@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import msgspec
 
 from heavytop.claims.audit import Auditable
+from heavytop.claims.entry import Entry, split
 from heavytop.errors import InputError
 
 _MAX_BYTES = 100_000
@@ -62,7 +63,10 @@ class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole file."""
+    """The whole file.
+
+    entry: what it says as an entry of the library, where it is one.
+    """
 
     name: Annotated[str, msgspec.Meta(max_length=80)]
     kind: str
@@ -77,6 +81,7 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     relations: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
     motion: MotionTable | None = None
     integral: IntegralTable | None = None
+    entry: Entry | None = None
 
 
 def read_claim(path: Path) -> Auditable:
@@ -97,8 +102,11 @@ def read_claim(path: Path) -> Auditable:
 
 def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable:
     """The claim in a TOML table that has been read; raises InputError for anything that is not one."""
+    entry, rest = split(table, where)
+    if "entry" in rest:
+        raise InputError(f"{where}: entry is no key of a claim.", _REMEDY)
     try:
-        content = msgspec.convert(table, ClaimFile)
+        content = msgspec.convert(rest, ClaimFile)
     except (msgspec.ValidationError, RecursionError) as error:
         raise InputError(f"{where}: {error}.", _REMEDY) from None
     tables = {"motion": content.motion, "integral": content.integral, "relation": content.integral}
@@ -109,6 +117,7 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable:
         raise InputError(f"{where}: kind {content.kind!r} needs the table [{wanted}], and no other claim.", _REMEDY)
     if content.domain not in ("all", "t<=0", "t>0"):
         raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
+    content = msgspec.structs.replace(content, entry=entry)
     from heavytop.claims.user_claim import UserMotion
     from heavytop.claims.user_integral import UserIntegral
 

@@ -13,11 +13,13 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+import msgspec
 import sympy
 from flint import arb
 
 from heavytop.claims.algebra import Field
 from heavytop.claims.conditions import conditions_of, is_exactly_zero
+from heavytop.claims.entry import Entry
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.proof import Condition
 from heavytop.claims.prover import Prover
@@ -92,7 +94,7 @@ class Audit(Tabular):
 
     why: what explains the verdict, each step checked.  solves: the systems whose equations of motion the claim
     satisfies on its smooth branch, or that keep the integral or relation.  kind: motion, integral or relation.
-    constants: names in the residuals with what they stand for, such as k/2.
+    constants: names in the residuals with what they stand for, such as k/2.  entry: of the library, where it is one.
     """
 
     claim: str
@@ -103,6 +105,7 @@ class Audit(Tabular):
     solves: tuple[str, ...] = ()
     constants: tuple[tuple[str, str], ...] = ()
     kind: str = "motion"
+    entry: Entry | None = None
 
     @property
     def verdict(self) -> str:
@@ -126,7 +129,7 @@ class Audit(Tabular):
             "constants": dict(self.constants),
             "why": [{"statement": finding.statement, "holds": finding.holds} for finding in self.why],
             "equations": [row.to_json() for row in self.rows],
-        }
+        } | ({} if self.entry is None else {"entry": msgspec.to_builtins(self.entry)})
 
     def _table(self) -> Table:
         lines = [(r.equation, str(r.component or ""), r.branch, r.domain, VERDICTS[r.holds]) for r in self.rows]

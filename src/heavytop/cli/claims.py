@@ -1,9 +1,9 @@
-"""`audit` and `figures`."""
+"""`audit`, `claims` and `figures`."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -11,28 +11,33 @@ from heavytop.cli.app import Json, absolute, command, print_json, require_new, s
 from heavytop.cli.progress import counted, followed, waiting
 from heavytop.errors import InputError
 
-_AUDIT_SECONDS, _FIGURE_SECONDS = 6.0, 1.0
-"""Expected, for the time left: of an audit, and of each figure."""
+_AUDIT_SECONDS, _FIGURE_SECONDS, _ENTRY_SECONDS = 6.0, 1.0, 1.0
+"""Expected, for the time left: of an audit, of each figure, and of each entry of the library."""
 
 
 @command
 def audit(
-    claim: Annotated[str, typer.Argument(help="ershkov-general, ershkov-partial, or a TOML file.")],
+    claim: Annotated[
+        str, typer.Argument(help="ershkov-general, ershkov-partial, a name of `heavytop claims`, or a TOML file.")
+    ] = "",
     system: Annotated[
         str | None, typer.Option(help="heavy_top, gyrostat or heavy_gyrostat; without it that of the file.")
     ] = None,
     branch: Annotated[str | None, typer.Option(help="smooth or printed: that branch alone.")] = None,
+    library: Annotated[bool, typer.Option("--library", help="Every claim of `heavytop claims`, anew.")] = False,
     json: Json = False,
 ) -> int:
     """Prove or refute a claimed motion, by equation.
 
     Exit 0 if all equations hold, 1 if one is refuted, 3 if none is refuted but one is undecided.  Takes 5 to 20
-    seconds.
+    seconds.  With --library: 0 if every verdict is the expected one, 1 if one is not, 3 if one is undecided.
     """
     from heavytop.claims.audit import PAPER, only_branch
     from heavytop.claims.audit import audit as audit_named
     from heavytop.claims.guard import SECONDS
 
+    if library or not claim:
+        return _library(claim, system, branch, json) if library else _no_claim()
     if claim in PAPER:
         with followed(f"audit of {claim}", "equations", _AUDIT_SECONDS) as progress:
             report = audit_named(claim, system, progress)
@@ -48,6 +53,50 @@ def audit(
 
         show_on_terminal(audit_text(report))
     return report.exit_code
+
+
+def _no_claim() -> int:
+    raise InputError("No claim was given.", "Give a name of `heavytop claims`, a TOML file, or --library.")
+
+
+def _library(claim: str, system: str | None, branch: str | None, json: bool) -> int:
+    if claim or system is not None or branch is not None:
+        raise InputError("--library audits every claim as it is.", "Leave out the claim, --system and --branch.")
+    found = _listed(None, anew=True)
+    if json:
+        print_json(found.to_json())
+    else:
+        from heavytop.report.claims_text import unexpected_text
+
+        show_on_terminal(unexpected_text(found))
+    return int(found.exit_code)
+
+
+@command
+def claims(
+    tag: Annotated[str | None, typer.Option(help="Only those with that tag, such as a class or a system.")] = None,
+    json: Json = False,
+) -> int:
+    """List the library of published claims, by verdict.
+
+    Proven or refuted by `heavytop audit NAME`; verdicts that are not known from before take a second each.
+    """
+    found = _listed(tag, anew=False)
+    if json:
+        print_json(found.to_json())
+    else:
+        from heavytop.report.claims_text import claims_text
+
+        show_on_terminal(claims_text(found))
+    return 0
+
+
+def _listed(tag: str | None, anew: bool) -> Any:
+    from heavytop.api.claims import claim_library
+    from heavytop.claims.entry import library
+
+    with counted("audits", len(library()), "claims", _ENTRY_SECONDS) as advance:
+        return claim_library(tag, anew=anew, done=advance)
 
 
 @command

@@ -8,8 +8,6 @@ from typing import Annotated, Any
 
 import typer
 
-from heavytop.errors import InputError
-
 Events = Annotated[
     list[str] | None,
     typer.Option("--events", help="Also the times, up to the last, at which omega1=0 or the like changes sign."),
@@ -19,61 +17,43 @@ EventDirection = Annotated[
 ]
 
 
-def requested(texts: Sequence[str] | None, direction: int, until: Fraction) -> list[Any]:
+def requested(texts: Sequence[str] | None, direction: int) -> list[str]:
     """The functions asked for, read before anything is computed; raises InputError for what is none."""
+    from heavytop.api.events import require_direction
     from heavytop.event_times.functions import event_function
 
-    if direction not in (-1, 0, 1):
-        raise InputError(f"--event-direction {direction} is none.", "Give 1 (rising), -1 (falling) or 0 (both).")
-    if texts and until == 0:
-        raise InputError("There is no time for an event up to t = 0.", "Give a later time with --times.")
-    return [event_function(text) for text in texts or ()]
+    require_direction(direction)
+    for text in texts or ():
+        event_function(text)
+    return list(texts or ())
 
 
-def computed(
+def farthest(times: Sequence[str]) -> Fraction:
+    """The time farthest from 0."""
+    from heavytop.precision import exact
+
+    return max(map(exact, times), key=abs)
+
+
+def of_motion(
+    functions: Sequence[str],
+    direction: int,
     top: Any,
     start: Any,
-    functions: Sequence[Any],
-    direction: int,
-    until: Fraction,
-    form: Any,
-    integrator: str,
-    system: Any,
-    max_steps: int | None,
-    reach: Callable[[float], Any],
+    times: Sequence[str],
+    system: str | None,
+    reached: Callable[[Fraction], None],
+    settings: dict[str, Any],
 ) -> list[Any]:
-    """The events of the computed motion, of each function."""
+    """The events of each function up to the time farthest from 0; settings: of :func:`heavytop.api.events.events`."""
     if not functions:
         return []
-    from heavytop.api.events import computed_events
+    from heavytop.api.events import events
 
-    def reached(time: Fraction) -> None:
-        reach(float(time / until))
-
-    settings = form, integrator, system, None, max_steps, None, reached
-    return [computed_events(top, start, until, function, direction, *settings) for function in functions]
-
-
-def known_ones(
-    top: Any,
-    start: Any,
-    functions: Sequence[Any],
-    direction: int,
-    until: Fraction,
-    digits: int,
-    system: Any,
-    reach: Callable[[float], Any],
-) -> list[Any]:
-    """The proven events, of each function."""
-    if not functions:
-        return []
-    from heavytop.api.events import known_events
-
-    def reached(time: Fraction) -> None:
-        reach(float(time / until))
-
+    until = farthest(times)
     return [
-        known_events(top, start, until, function, direction, digits, system, None, reached) for function in functions
+        events(top, start, until, function, direction, system=system, reached=reached, **settings)
+        for function in functions
     ]
 
 

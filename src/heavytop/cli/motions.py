@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from heavytop.cli.app import Json, command, numbers
-from heavytop.cli.events import EventDirection, Events, computed, known_ones, requested, with_events
+from heavytop.cli.events import EventDirection, Events, farthest, of_motion, requested, with_events
 from heavytop.cli.motion_output import made_by, require_one_output, write_motion
 from heavytop.cli.output import say, say_former
 from heavytop.cli.progress import reaching, watched
@@ -84,6 +86,7 @@ def propagate(
     system: SystemName = None,
     attitude: Annotated[bool, typer.Option("--attitude", help="Carry the attitude; give Euler angles.")] = False,
     normalize: Normalize = False,
+    tolerance: Annotated[str | None, typer.Option(help="Of the integrator; the eps of the format without it.")] = None,
     max_steps: Annotated[int | None, typer.Option(help="Stop after that many steps.")] = None,
     events: Events = None,
     event_direction: EventDirection = 0,
@@ -99,10 +102,7 @@ def propagate(
     The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω with M = IΩ; γ points up: the energy is ½ Ω·M + P r·γ.
     Numbers are exact: 3, 0.25, 1e-3, -2/5.
     """
-    from heavytop import precision as formats
-    from heavytop.top.bodies import Body
-    from heavytop.top.equations import system_of
-    from heavytop.top.times import check_times
+    from heavytop.api.motions import motion as computed_motion
 
     given = {
         "inertia": inertia,
@@ -119,45 +119,31 @@ def propagate(
         "euler": euler,
         "matrix": matrix,
     }
-    top, start, system = _motion(given, case, system, normalize)
-    form, which, instants = formats.parse(precision), system_of(system, top), check_times(numbers(times))
-    wanted = _outputs(show, point, pivot)
     require_one_output(csv, latex, json)
-    if max_steps is not None and max_steps < 1:
-        raise InputError(f"--max-steps {max_steps} allows no step.", "Give 1 or more.")
-    which.parameters(top.top if isinstance(top, Body) else top, start)
+    top, start, which = _motion(given, case, system, normalize)
+    wanted, instants = _outputs(show, point, pivot), numbers(times)
     say_former([integrator])
-    functions = requested(events, event_direction, instants[-1])
-    if form.bits >= _SLOW_BITS and integrator == "heyoka":
-        say(
-            f"warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
-            f"seconds at real:{_SLOW_BITS}, 20 times as long with twice the bits; Ctrl-C waits for it.\n"
-            "  `heavytop reference` proves as many digits, at once where there is a closed form."
-        )
-
-    from heavytop.integrate.peers.source import named
-    from heavytop.measure.motion import compute
-
-    end, which_one = instants[-1] or 1, named(integrator)
+    _warn_of_cost(precision, integrator)
+    functions = requested(events, event_direction)
     with reaching("integration", _PROPAGATE_SECONDS) as reach:
-        motion = compute(
+        motion = computed_motion(
             top,
             start,
             instants,
-            form,
-            which,
-            attitude,
-            max_steps,
-            which_one,
-            lambda time: reach(float(time / end)),
-            wanted,
-            numbers(times),
+            precision,
+            integrator=integrator,
+            system=which,
+            angles=attitude,
+            outputs=wanted,
+            tolerance=tolerance,
+            step_limit=max_steps,
+            reached=_part_of(instants, reach),
         )
 
     def table() -> MotionTable:
-        from heavytop.report.motion_table import of_motion
+        from heavytop.report.motion_table import of_motion as table_of
 
-        return of_motion(motion, *made_by())
+        return table_of(motion, *made_by())
 
     def text(shown: MotionTable) -> RenderableType:
         from heavytop.report.motion_text import motion_text
@@ -165,8 +151,8 @@ def propagate(
         return motion_text(motion, shown)
 
     with reaching("events", _PROPAGATE_SECONDS) as reach:
-        asked = functions, event_direction, instants[-1]
-        found = computed(top, start, *asked, form, integrator, which, max_steps, reach)
+        settings = {"precision": precision, "integrator": integrator, "tolerance": tolerance, "step_limit": max_steps}
+        found = of_motion(functions, event_direction, top, start, instants, which, _part_of(instants, reach), settings)
     write_motion(*with_events(motion.to_json, table, text, found), csv, latex, json)
     return 0 if motion.complete else 3
 
@@ -210,10 +196,7 @@ def reference(
     up to t = 1000; derivatives take about ten times as long.  The motion is that of M' = M × Ω + P γ × r, γ' = γ × Ω
     with M = IΩ; γ points up.
     """
-    from heavytop.measure.derivatives import which_derivatives
-    from heavytop.measure.reference import reference as proven
-    from heavytop.top.equations import system_of
-    from heavytop.top.times import check_times
+    from heavytop.api.motions import known
 
     given = {
         "inertia": inertia,
@@ -230,14 +213,13 @@ def reference(
         "euler": euler,
         "matrix": matrix,
     }
-    top, start, system = _motion(given, case, system, normalize, of_any_size=True)
-    which, instants = system_of(system, top), check_times(numbers(times))
-    wanted, which_ones = _outputs(show, point, pivot), which_derivatives(derivatives)
     require_one_output(csv, latex, json)
-    functions = requested(events, event_direction, instants[-1])
-    watch = _Watch([abs(time) for time in instants])
+    top, start, which = _motion(given, case, system, normalize)
+    wanted, instants = _outputs(show, point, pivot), numbers(times)
+    functions = requested(events, event_direction)
+    watch, told = _Watch(instants), True if attitude or wanted else None
     with watched("reference", watch.fraction, _REFERENCE_SECONDS):
-        found = proven(top, start, numbers(times), digits, which, watch.find, attitude or bool(wanted), which_ones)
+        found = known(top, start, instants, digits, which, told, derivatives, watch.find)
         found.require_outputs(wanted)
 
     def table() -> MotionTable:
@@ -251,8 +233,9 @@ def reference(
         return reference_text(found, shown)
 
     with reaching("events", _REFERENCE_SECONDS) as reach:
-        known = known_ones(top, start, functions, event_direction, instants[-1], digits, which, reach)
-    write_motion(*with_events(lambda: found.document(wanted), table, text, known), csv, latex, json)
+        part, settings = _part_of(instants, reach), {"digits": digits}
+        crossed = of_motion(functions, event_direction, top, start, instants, which, part, settings)
+    write_motion(*with_events(lambda: found.document(wanted), table, text, crossed), csv, latex, json)
     return 0
 
 
@@ -266,11 +249,33 @@ def _outputs(show: str | None, point: str | None, pivot: str | None) -> tuple[Ou
     return outputs("" if show is None else show, *places)
 
 
+def _warn_of_cost(precision: str, integrator: str) -> None:
+    from heavytop.precision import parse
+
+    form = parse(precision)
+    if form.bits >= _SLOW_BITS and integrator == "heyoka":
+        say(
+            f"warning: in {form.name} a step sums a Taylor series of order {round(0.35 * form.bits)}: "
+            f"seconds at real:{_SLOW_BITS}, 20 times as long with twice the bits; Ctrl-C waits for it.\n"
+            "  `heavytop reference` proves as many digits, at once where there is a closed form."
+        )
+
+
+def _part_of(times: list[str], reach: Callable[[float], None]) -> Callable[[Fraction], None]:
+    """What to call with the times reached on the way to the last of ``times``, for a bar that hears of parts."""
+
+    def reached(time: Fraction) -> None:
+        end = farthest(times)
+        reach(float(time / end) if end else 1.0)
+
+    return reached
+
+
 class _Watch:
     """How far a reference has come: a closed form takes no time to speak of, an enclosure goes from 0 to each time."""
 
-    def __init__(self, spans: list[Any]) -> None:
-        self.last = max(spans)
+    def __init__(self, times: list[str]) -> None:
+        self.times = times
         self.solution: Any = None
 
     def find(self, top: Any, start: Any, system: Any) -> Any:
@@ -283,7 +288,8 @@ class _Watch:
     def fraction(self) -> float:
         """Part of the span that is enclosed."""
         reached = getattr(self.solution, "reached", None)
-        return float(reached() / self.last) if reached is not None and self.last else 0.0
+        last = abs(farthest(self.times))
+        return float(reached() / last) if reached is not None and last else 0.0
 
 
 def _motion(
@@ -291,16 +297,11 @@ def _motion(
     case: str | None,
     system: str | None,
     normalize: bool,
-    of_any_size: bool = False,
 ) -> Any:
     """The exact top or body, the start and the name of the system; what no rigid body has is a warning.
 
     texts: the options, by the keys of a plan.  case: in place of them.
-    of_any_size: for what computes with exact numbers alone, which no format bounds.
     """
-    from heavytop.top.bodies import Body
-    from heavytop.top.heavy_top import require_physical
-
     if case is None:
         from heavytop.suite.given_motion import motion_of
 
@@ -308,9 +309,6 @@ def _motion(
         top, start = motion_of(given, normalize)
     else:
         top, start, system = _of_case(case, system, [key for key, text in texts.items() if text is not None])
-    if not of_any_size:
-        require_physical(top.top if isinstance(top, Body) else top, start)
-    start.require_unit_gamma()
     for warning in top.warnings():
         say(f"warning: {warning}")
     return top, start, system

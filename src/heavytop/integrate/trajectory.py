@@ -191,6 +191,7 @@ class Trajectory(Tabular):
     attitude: ξ, native numbers, shape (n, 3), where it was computed beside ``states`` and is no part of them.
     frame: the axes in which the body was given, and which ``states`` and ``attitude`` are in; None for those of the
     problem, the principal axes.  principal: then the run as it was computed.
+    angle_texts: φ, θ, ψ, followed from t = 0, as decimal text, shape (n, 3), where they were asked for.
     """
 
     problem: Problem
@@ -207,6 +208,7 @@ class Trajectory(Tabular):
     attitude: Any = None
     frame: Frame | None = None
     principal: Trajectory | None = None
+    angle_texts: Sequence[Sequence[str]] | None = None
 
     def __post_init__(self) -> None:
         import numpy
@@ -275,6 +277,18 @@ class Trajectory(Tabular):
         Raises InputError for an unknown sequence and for a run without attitude.
         """
         return self._in_double(output(f"euler:{sequence}" if isinstance(sequence, str) else sequence))
+
+    def angles(self) -> NDArray[np.float64]:
+        """φ, θ, ψ of (3.2) in radians, shape (n, 3), followed from t = 0 with all turns: ``euler("ZXZ")`` is ψ, θ, φ.
+
+        Continuous but for jumps of φ and ψ by π where the axis goes through a pole; ``nan`` at one.
+        Raises InputError for a run that was not asked for angles.
+        """
+        import numpy
+
+        if self.angle_texts is None:
+            raise InputError("The angles were not followed.", "Propagate with angles=True; euler() needs no following.")
+        return numpy.array(self.angle_texts, dtype=float).reshape(-1, 3)
 
     def _in_double(self, what: Output) -> NDArray[np.float64]:
         from heavytop.integrate.attitude_outputs import in_double

@@ -1,4 +1,4 @@
-"""Every equation of a claim of the paper, proven or refuted, as a motion of each system."""
+"""Every equation of a claim, proven or refuted: of the paper as a motion of each system, and of the library."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from typing import Literal
 from rich.console import RenderableType
 from rich.text import Text
 
-from heavytop.claims.audit import find_claim
+from heavytop.claims.audit import PAPER, find_claim
+from heavytop.claims.entry import library
 from heavytop.claims.judge import judge
+from heavytop.claims.verdicts import audited, own_system
+from heavytop.errors import InputError
 from heavytop.kinds.base import Kind
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.records import Against, Metric, Quantity, Row, RowKey, Subject, by_name
@@ -23,22 +26,42 @@ from heavytop.suite.rows import exact_row
 from heavytop.suite.task import Task
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
 
-NAME = "audit"
+NAME, LIBRARY = "audit", "library"
+EXPECTED = Quantity("as_expected")
 _SMOOTH = "smooth"
 _SYSTEMS = {HEAVY_TOP.name: "the heavy top", GYROSTAT.name: "the gyrostat"}
 _SECONDS = 1.5
 
 
 class AuditTable(Table, tag=NAME):
-    """The claims, and the systems whose motions they are said to be."""
+    """The claims, and the systems whose motions those of the paper are said to be.
 
-    claims: list[Literal["ershkov-general", "ershkov-partial"]]
-    systems: list[Literal["heavy_top", "gyrostat"]]
+    claims: "ershkov-general", "ershkov-partial", ids of the library, or "library" for every entry of it.
+    """
+
+    claims: list[str]
+    systems: tuple[Literal["heavy_top", "gyrostat"], ...] = ()
 
     def tasks(self, find: Find) -> list[Task]:
-        """One a row."""
-        keys = [RowKey(NAME, c, system, Subject("claimed", c)) for c in self.claims for system in self.systems]
+        """One a row; raises InputError for an unknown claim."""
+        keys: list[RowKey] = []
+        for claim in self.claims:
+            if claim in PAPER:
+                keys += [RowKey(NAME, claim, system, Subject("claimed", claim)) for system in self.systems]
+            else:
+                keys += [RowKey(NAME, name, own_system(name), Subject("claimed", name)) for name in _entries(claim)]
         return [Task(key, key.case, NAME) for key in keys]
+
+
+def _entries(claim: str) -> list[str]:
+    if claim == LIBRARY:
+        return list(library())
+    if claim not in library():
+        raise InputError(
+            f"Unknown claim {claim[:60]!r} to audit.",
+            f'Use {", ".join(PAPER)}, a name of `heavytop claims`, or "{LIBRARY}".',
+        )
+    return [claim]
 
 
 class Audit(Kind):
@@ -53,6 +76,8 @@ class Audit(Kind):
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """Of the branches of a claim about the gyrostat the smooth one alone, which the formulas solve."""
+        if task.key.case not in PAPER:
+            return _of_entry(task)
         claim, about = find_claim(task.key.case), system(task.key.system)
         asked = [each for each in claim.statements(about) if about is HEAVY_TOP or each.branch == _SMOOTH]
         metrics = {
@@ -64,8 +89,13 @@ class Audit(Kind):
 
     def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
         """A line for each claim and system."""
-        parts: list[RenderableType] = [title("Verdict on the paper's solution, equation by equation (heavytop audit)")]
-        for row in rows:
+        paper, entries = _parted(rows)
+        parts: list[RenderableType] = []
+        if entries:
+            parts += [title("Verdicts on the library of claims (heavytop claims)"), *map(Text, _of_library(entries))]
+        if paper:
+            parts.append(title("Verdict on the paper's solution, equation by equation (heavytop audit)"))
+        for row in paper:
             verdict, refuted, held = _verdict(row)
             smooth = " on the smooth branch" if row.system == GYROSTAT.name else ""
             line = Text(printable(f"  {row.case} as a motion of {row.system}: "))
@@ -78,6 +108,7 @@ class Audit(Kind):
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
         """The verdict on each claim for each system."""
+        rows, entries = _parted(rows)
         found: dict[tuple[str, str], list[str]] = {}
         for row in rows:
             found.setdefault((_verdict(row)[0], row.system), []).append(row.case)
@@ -85,13 +116,15 @@ class Audit(Kind):
             f"{', '.join(claims)}: {verdict} for {_SYSTEMS.get(system, system)}."
             for (verdict, system), claims in found.items()
         )
-        return [line for sentence in said for line in wrapped(f"Ershkov's claims {sentence}")]
+        of_paper = [line for sentence in said for line in wrapped(f"Ershkov's claims {sentence}")]
+        return of_paper + [line for sentence in _of_library(entries) for line in wrapped(sentence)]
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
         """Whether the claims are motions of the heavy top."""
+        rows, entries = _parted(rows)
         verdicts = {_verdict(row)[0] for row in rows if row.system == HEAVY_TOP.name}
         if not verdicts:
-            return None
+            return _of_verdicts(entries) if entries else None
         others = [row.system for row in rows if row.system != HEAVY_TOP.name and _verdict(row)[0] == "holds"]
         solved = " and ".join(_SYSTEMS.get(name, name) for name in dict.fromkeys(others))
         instead = f" It solves {solved} instead." if others else ""
@@ -105,7 +138,8 @@ class Audit(Kind):
 
     def cards(self, rows: Sequence[Row]) -> list[Card]:
         """The equations that are proven and refuted, of each claim and system."""
-        lines = []
+        rows, entries = _parted(rows)
+        lines = [Line(sentence) for sentence in _of_library(entries)]
         for claim in sorted({row.case for row in rows}):
             lines.append(Line(clip(claim), "soft"))
             for row in rows:
@@ -120,6 +154,45 @@ class Audit(Kind):
         return [Card("Equation by equation", lines)] if lines else []
 
 
+def _of_entry(task: Task) -> Row:
+    """Its equations, and whether its verdict is the expected one; where the audit is stopped that alone, unresolved."""
+    entry = library()[task.key.case]
+    judged, found = audited(entry)
+    metrics: dict[Quantity, Metric] = {}
+    for row in () if found is None else found.rows:
+        where = Quantity(f"({row.equation})", str(row.component), "", row.branch, row.domain)
+        metrics[where] = _value(row.holds)
+    metrics[EXPECTED] = _value(
+        None if judged.verdict == "undecided" != entry.expects else judged.verdict == entry.expects
+    )
+    against = Against("equations", f"the equations of {task.key.system}")
+    return exact_row(task, f"claimed: {entry.source.text}", against, by_name(metrics))
+
+
+def _parted(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
+    """Rows of the paper and of the library."""
+    return [row for row in rows if row.key.case in PAPER], [row for row in rows if row.key.case not in PAPER]
+
+
+def _of_library(rows: Sequence[Row]) -> list[str]:
+    """How many claims hold and are refuted, and those whose verdict is not the expected one."""
+    if not rows:
+        return []
+    verdicts = [_verdict(row)[0] for row in rows]
+    counts = ((verdicts.count("holds"), "proven"), (verdicts.count("refuted"), "refuted"))
+    open_ones = verdicts.count("undecided")
+    said = [f"{count} {what}" for count, what in (*counts, (open_ones, "undecided")) if count]
+    off = [row.case for row in rows if row.metrics[EXPECTED.text].value != "1"]
+    expected = f"not as expected: {', '.join(off)}" if off else "every verdict as expected"
+    return [f"Library of {len(rows)} claims: {', '.join(said)}; {expected}."]
+
+
+def _of_verdicts(rows: Sequence[Row]) -> tuple[str, str]:
+    wrong = any(row.metrics[EXPECTED.text].value == "0" for row in rows)
+    undecided = any(row.metrics[EXPECTED.text].value == UNRESOLVED for row in rows)
+    return ("refuted" if wrong else "undecided" if undecided else "holds"), " ".join(_of_library(rows))
+
+
 def _value(holds: bool | None) -> Metric:
     return (
         Metric(UNRESOLVED, None, "value") if holds is None else Metric(str(int(holds)), 0.0 if holds else None, "value")
@@ -128,7 +201,8 @@ def _value(holds: bool | None) -> Metric:
 
 def _verdict(row: Row) -> tuple[str, list[Quantity], int]:
     """The verdict, the equations that are refuted, and how many are proven."""
-    refuted = [metric.quantity or Quantity("?") for metric in row.metrics.values() if metric.value == "0"]
-    held = sum(metric.value == "1" for metric in row.metrics.values())
-    undecided = len(row.metrics) - held - len(refuted)
+    equations = [metric for metric in row.metrics.values() if metric.quantity != EXPECTED]
+    refuted = [metric.quantity or Quantity("?") for metric in equations if metric.value == "0"]
+    held = sum(metric.value == "1" for metric in equations)
+    undecided = len(equations) - held - len(refuted)
     return ("refuted" if refuted else "undecided" if undecided or not held else "holds"), refuted, held

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -13,7 +14,7 @@ from rich.text import Text
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.trajectory import Place, Problem, Trajectory
 from heavytop.kinds.base import Kind
-from heavytop.measure.attitude_error import AttitudeErrors
+from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.reruns import Reruns
 from heavytop.measure.scorer import Scorer
@@ -152,19 +153,11 @@ def _with_attitude(task: Task) -> Row:
     case, precision, integrator = task.given, task.precision, task.integrator
     times, keep = ([exact(number(time, precision)) for time in part] for part in (task.times, task.keep))
     xi = resolve(case.body or case.top, case.given_start or case.start).xi
-    problem = Problem.of(case.top, case.start, precision, case.system)
-    scorer = Scorer(problem, truth(problem, times), keep)
-    turned = AttitudeErrors(
-        Problem.of(case.top, case.start, precision, case.system, xi), case.top, case.start, times, keep
-    )
-
-    def observe(time: Fraction, state: Any) -> None:
-        scorer(time, state[:6])
-        turned(time, state)
-
-    run = integrator.propagate(case.top, case.start, task.times, precision, case.system, observe, xi=xi)
-    series = scorer.series(time_text) | turned.series(time_text)
-    return computed_row(task, run, _banded(task, run, scorer) | turned.metrics(), series, scorer.against)
+    problem = Problem.of(case.top, case.start, precision, case.system, xi)
+    known = truth(replace(problem, xi=None), times)
+    scorer = AttitudeScorer(problem, known, case.top, case.start, times, keep)
+    run = integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, xi=xi)
+    return computed_row(task, run, _banded(task, run, scorer), scorer.series(time_text), scorer.against)
 
 
 def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:

@@ -16,6 +16,7 @@ from rich.text import Text
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.kinds.base import Kind
+from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.ensemble import Ended, complete, growing
 from heavytop.measure.ensemble_reference import Reference, reference
@@ -36,6 +37,8 @@ from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import input_rounding
 from heavytop.suite.starts import ensemble_of, one_motion
 from heavytop.suite.task import Task, computed
+from heavytop.top.angles import perpendicular
+from heavytop.top.heavy_top import HeavyTop, State
 
 NAME = "growth"
 FAILED = Quantity("starts_failed")
@@ -54,6 +57,8 @@ class Run(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     tolerance, high_accuracy: of the integrator.  bias: a relative error of I1 in the field that is integrated and not
     in the reference: a planted fault.  reference: a format whose bits the runs have at least that stand for the truth
     where no closed form is known; None for 30 bits more than those of ``precision``, which they have in any case.
+    attitude: whether ξ rides along, and the laws of the errors of the attitude and of the centre of mass are found too;
+    of heyoka and multiword: others are given Ω and γ alone.
     """
 
     precision: str
@@ -66,6 +71,7 @@ class Run(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     high_accuracy: bool = False
     bias: str | None = None
     reference: str | None = None
+    attitude: bool = False
 
     @property
     def options(self) -> dict[str, Any]:
@@ -146,7 +152,9 @@ class Growth(Kind):
         case, precision, run = task.given, task.precision, task.options
         members = ensemble_of(case, run.starts, run.seed)
         true = [Problem.of(*member, precision, case.system) for member in members]
-        given = [_biased(problem, run.bias) for problem in true]
+        turned = run.attitude and task.integrator.takes_many
+        posed = [_posed(problem, *member) if turned else problem for problem, member in zip(true, members, strict=True)]
+        given = [_biased(problem, run.bias) for problem in posed]
         times = [exact(number(time, precision)) for time in task.times]
         before = saved.load()
         done = _Done({}) if before is None else msgspec.convert(before, _Done, strict=False)
@@ -158,7 +166,10 @@ class Growth(Kind):
         began = perf_counter()
         compared = reference(tuple(true), tuple(times), parse(run.reference).bits if run.reference else 0)
         ready = perf_counter()
-        scorers = [Scorer(problem, motion, times) for problem, motion in zip(true, compared.motions, strict=True)]
+        scorers = [
+            AttitudeScorer(problem, motion, *member, times, times) if turned else Scorer(problem, motion, times)
+            for problem, motion, member in zip(posed, compared.motions, members, strict=True)
+        ]
         complete(done.motions, given, times, scorers, save, task.integrator, run.options)
         motions = [done.motions[index] for index in range(len(members))]
         seconds = {"reference": ready - began, "run": perf_counter() - ready, "compile": motions[0].compile}
@@ -201,6 +212,11 @@ class Growth(Kind):
         return law_lines(rows)
 
 
+def _posed(problem: Problem, top: HeavyTop, start: State) -> Problem:
+    """The problem with the ξ that a start without attitude has."""
+    return Problem.of(top, start, problem.precision, problem.system, perpendicular(start.gamma))
+
+
 def _biased(problem: Problem, bias: str | None) -> Problem:
     """The problem with its first moment of inertia off by the relative ``bias``: the planted fault."""
     if bias is None:
@@ -223,7 +239,8 @@ def _row(
     precision, first = task.precision, motions[0]
     failed = [motion for motion in motions if motion.outcome != Outcome.SUCCESS.value]
     reached = min((abs(Fraction(motion.time_reached)) for motion in failed), default=abs(task.times[-1]))
-    found = growing(starts, task.times, motions, scorers, compared, time_text)
+    distance = math.sqrt(sum(float(part) ** 2 for part in task.given.top.centre))
+    found = growing(starts, task.times, motions, scorers, compared, time_text, distance)
     metrics = {FAILED: of_fraction(Fraction(len(failed)), words=str(len(failed)))} | found.metrics
     of = "roundings of one motion" if one_motion(task.given, task.options.seed) else "random starts"
     who = f"computed: {first.integrator} in {precision.name}"
@@ -258,7 +275,9 @@ def _row(
 def _label(law: Law) -> str:
     """What a law is about."""
     quantity = law.quantity or Quantity("")
-    return quantity.component if quantity.name == DRIFT else f"error {quantity.component}"
+    if quantity.name == DRIFT:
+        return quantity.component
+    return f"error {quantity.component or quantity.name.removesuffix('_error')}"
 
 
 def _exponent(law: Law) -> str:

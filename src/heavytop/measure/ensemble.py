@@ -13,6 +13,7 @@ import numpy
 from flint import arb
 
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.measure.attitude_error import ATTITUDE, POSITION
 from heavytop.measure.digits import RELATIVE
 from heavytop.measure.ensemble_reference import Reference
 from heavytop.measure.growth import Array, Ensemble, band, law, root_mean_square
@@ -121,10 +122,11 @@ def growing(
     scorers: Sequence[Scorer],
     reference: Reference,
     time_text: TimeText,
+    distance: float = 0.0,
 ) -> Growing:
     """How every drift grows, and every error where there is a reference.
 
-    times: exact, shape (samples,), as they are asked for.
+    times: exact, shape (samples,), as they are asked for.  distance: of the centre of mass from the fixed point.
     """
     steps = sum(motion.steps for motion in motions) / len(motions)
     step = float(times[-1]) / steps if steps else 0.0
@@ -132,7 +134,7 @@ def growing(
     quantities = _drifts(scorers, len(times), motions)
     known = any(scorer.error for scorer in scorers) and reference.samples
     if known:
-        quantities |= _errors(starts, motions, reference)
+        quantities |= _errors(starts, motions, reference, distance)
     for quantity, measured in quantities.items():
         _add(found, quantity, measured, times[: measured.values.shape[1]], step, time_text)
     if known:
@@ -150,7 +152,10 @@ def _drifts(scorers: Sequence[Scorer], samples: int, motions: Sequence[Ended]) -
     return found
 
 
-def _errors(starts: Sequence[State], motions: Sequence[Ended], reference: Reference) -> dict[Quantity, _Measured]:
+def _errors(
+    starts: Sequence[State], motions: Sequence[Ended], reference: Reference, distance: float
+) -> dict[Quantity, _Measured]:
+    """The error of Ω and γ, of its parts, and of attitude and position where every motion has them."""
     omega = numpy.linalg.norm([[float(w) for w in start.omega] for start in starts], axis=1)
     one = numpy.ones(len(starts))
     whole = numpy.hypot(omega, one)
@@ -159,6 +164,9 @@ def _errors(starts: Sequence[State], motions: Sequence[Ended], reference: Refere
     for part, accumulates in _ACCUMULATES.items():
         quantity = Quantity(SOLUTION_ERROR, part)
         found[quantity] = _Measured(_values(quantity, reference.samples, motions), sizes[part], accumulates, blur)
+    for quantity, size in ((ATTITUDE, one), (POSITION, distance * one)):
+        if all(quantity.text in motion.values for motion in motions):
+            found[quantity] = _Measured(_values(quantity, reference.samples, motions), size, 2, blur)
     return found
 
 

@@ -125,7 +125,7 @@ def compute(
     precision: Precision,
     system: System,
     attitude: bool = False,
-    step_limit: int | None = None,
+    options: dict[str, Any] | None = None,
     integrator: str | Source = "heyoka",
     reached: Reached | None = None,
     outputs: tuple[Output, ...] = (),
@@ -135,7 +135,7 @@ def compute(
 
     attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
-    integrator: a name that `heavytop list` shows, or a source.
+    integrator: a name that `heavytop list` shows, or a source; options: of it, checked.
     outputs: told beside the states; written: the times as they were given, none for their exact text.
     reached: called with the times on the way, some fifty and one for each doubling; by others than heyoka and multiword
     at the end.
@@ -153,7 +153,7 @@ def compute(
     if reached is not None and integrator in registry.INTEGRATORS:
         on_the_way = {exact(number(time, precision)) for time in _on_the_way(problem, times[-1])}
         samples = sorted({*samples, *(on_the_way - wanted.keys())}, key=abs)
-    options = {name: value for name, value in (("xi", xi), ("step_limit", step_limit)) if value is not None}
+    options = (options or {}) | ({} if xi is None else {"xi": xi})
     propagate = registry.watched(integrator, options, watcher)
     run = propagate(setup.top, setup.start, samples, precision, system=system)
     run = replace(run, times=tuple(time for time, _ in watcher.kept), states=tuple(state for _, state in watcher.kept))

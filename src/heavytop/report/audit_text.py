@@ -32,9 +32,19 @@ def audit_text(report: Audit) -> RenderableType:
     if report.why:
         parts += [Text(), Text("Why, each step checked by the same algebra:")]
         parts += [Text(f"  [{VERDICTS[finding.holds]}] {finding.statement}") for finding in report.why]
+    parts += _entry(report)
     solved = ", ".join(report.solves) or "none of the systems known here"
     parts += [Text(), Text(f"{_PROVEN[report.kind]}: {solved}")]
     return Group(*parts)
+
+
+def _entry(report: Audit) -> list[RenderableType]:
+    """What an entry of the library says of itself: how its source was read, the verdict expected, its note."""
+    entry = report.entry
+    if entry is None:
+        return []
+    expected = "as expected" if report.verdict == entry.expects else f"expected: {entry.expects}"
+    return [Text(), Text(f"Read: {entry.read}; {entry.status}; {expected}."), Text(" ".join(entry.note.split()))]
 
 
 def _table(report: Audit) -> Table:

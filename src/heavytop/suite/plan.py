@@ -42,7 +42,7 @@ from heavytop.top.heavy_top import HeavyTop
 
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 _RENAME = "Give it another name."
-BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "bodies", "selftest")
+BUILT_IN = ("smoke", "default", "growth", "long", "peers", "gate", "bodies", "claims", "selftest")
 
 
 class Top(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):

@@ -51,6 +51,8 @@ _NAP, _NAP_SHARE, _NAP_LEFT = 1e-3, 1 / 4, 1 / 3
 """Seconds, part of the seconds so far, and part of those that are left, between two readings of such states."""
 _LOOK = 0.1
 """Seconds between two looks whether a silent program is still there."""
+_AWAKE, _AWAKE_AT_END = 2e-4, 1e-3
+"""Seconds for which a short answer, and the last states of a long one, are waited for awake: to be woken takes 1e-4."""
 _FAREWELL = 0.3
 """Seconds that a program has to end after `quit`."""
 _MOST_OVERHEAD = 1e-3
@@ -492,7 +494,7 @@ class Session:
     def _exchange(self, text: bytes, reply: Reply | _Greeting, awaited: str) -> None:
         """Writes ``text`` and hands over line after line until ``reply`` has its last; nothing may be left then."""
         began = monotonic()
-        deadline = began + self.command.seconds
+        deadline, awake_until = began + self.command.seconds, began + _AWAKE
         waiting = self._write(memoryview(text))
         if waiting:
             self._poll.register(self._in, select.POLLOUT)
@@ -504,11 +506,17 @@ class Session:
             left = deadline - monotonic()
             if left <= 0:
                 raise self._failed(f"did not say {awaited} within {self.command.seconds:g} s")
-            events = self._poll.poll(1000 * min(left, _LOOK))
+            now = monotonic()
+            awake = not waiting and reply.due < _MANY and now < awake_until
+            events = self._poll.poll(0 if awake else 1000 * min(left, _LOOK))
+            if awake and not events:
+                os.sched_yield()
+                continue
             if not events and self.process.poll() is not None and not self._drained():
                 raise self._failed(f"{self._end()} before it said {awaited}")
             if events and not waiting and reply.due >= _MANY:
                 sleep(min(_NAP, reply.nap(monotonic() - began)))
+                awake_until = monotonic() + _AWAKE_AT_END
             self._receive([descriptor for descriptor, _ in events], awaited)
 
     def _write(self, waiting: memoryview) -> memoryview:

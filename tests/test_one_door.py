@@ -1,0 +1,183 @@
+"""Command line and Python are one: the same input gives the same numbers, or the same error with the same remedy."""
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import heavytop as ht
+from heavytop.cli import app
+from heavytop.errors import HeavyTopError
+
+DATA = {
+    "inertia": "3,2,1",
+    "weight": "1",
+    "centre": "1/2,1/3,1/5",
+    "omega": "1/10,2/5,9/10",
+    "gamma": "3/5,0,4/5",
+}
+GOOD: Mapping[str, dict[str, str]] = {
+    "plain": {"times": "1,2.5"},
+    "backward": {"times": "-1,-2"},
+    "zero first": {"times": "0,1"},
+    "quad": {"times": "1", "precision": "quad"},
+    "tolerance": {"times": "4", "tolerance": "1e-9"},
+    "step limit": {"times": "1,40", "max-steps": "7"},
+    "multiword": {"times": "3", "integrator": "multiword", "precision": "double-double"},
+    "rotor": {"times": "1", "rotor": "0,0,1/3"},
+    "gyrostat": {"times": "1", "system": "gyrostat", "gamma": "0,1,0", "omega": "0,1,0", "centre": "0,1,0"},
+    "gamma of decimals": {"times": "1", "gamma": "0.5773502691896257,0.5773502691896257,0.5773502691896257"},
+}
+BAD: Mapping[str, dict[str, str]] = {
+    "no time": {"times": ""},
+    "time not a number": {"times": "1,x"},
+    "time infinite": {"times": "inf"},
+    "times of both signs": {"times": "-1,1"},
+    "times not in order": {"times": "2,1"},
+    "a time twice": {"times": "1,1"},
+    "out of reach": {"times": "1e16"},
+    "moment 0": {"inertia": "3,0,1", "times": "1"},
+    "two moments": {"inertia": "3,2", "times": "1"},
+    "moment not a number": {"inertia": "3,nan,1", "times": "1"},
+    "weight infinite": {"weight": "inf", "times": "1"},
+    "gamma not on the sphere": {"gamma": "3/5,0,4", "times": "1"},
+    "gamma 0": {"gamma": "0,0,0", "times": "1"},
+    "four components": {"omega": "1,2,3,4", "times": "1"},
+    "precision unknown": {"precision": "triple", "times": "1"},
+    "precision too fine": {"precision": "real:99999", "times": "1"},
+    "integrator unknown": {"integrator": "nobody", "times": "1"},
+    "no such file": {"integrator": "nowhere.toml", "times": "1"},
+    "format not of heyoka": {"precision": "double-double", "times": "1"},
+    "tolerance 0": {"tolerance": "0", "times": "1"},
+    "tolerance above 1": {"tolerance": "2", "times": "1"},
+    "tolerance of an integrator without": {"tolerance": "1e-9", "integrator": "splitting2", "times": "1"},
+    "no step": {"max-steps": "0", "times": "1"},
+    "system unknown": {"system": "kite", "times": "1"},
+    "rotor of a heavy top": {"rotor": "0,0,1", "system": "heavy_top", "times": "1"},
+    "gyrostat with Mγ = 0": {"system": "gyrostat", "omega": "0,0,0", "times": "1"},
+    "too large": {"omega": "1e200,0,0", "times": "1"},
+}
+REFERENCES: Mapping[str, dict[str, str]] = {
+    "plain": {"times": "1,2.5"},
+    "any order, both signs": {"times": "2,-1,0,2", "digits": "20"},
+    "beyond the doubles": {"inertia": "3e160,2e160,1e160", "weight": "1e160", "times": "1", "digits": "20"},
+    "attitude": {"times": "1", "attitude": ""},
+    "derivatives": {"times": "1", "digits": "20", "derivatives": "start"},
+    "no time": {"times": ""},
+    "time not a number": {"times": "1,x"},
+    "no digits": {"times": "1", "digits": "0"},
+    "too many digits": {"times": "1", "digits": "20001"},
+    "derivatives unknown": {"times": "1", "derivatives": "end"},
+    "system unknown": {"times": "1", "system": "kite"},
+    "gamma not on the sphere": {"gamma": "3/5,0,4", "times": "1"},
+    "moment negative": {"inertia": "3,-2,1", "times": "1"},
+}
+_RENAMED = {"max-steps": "step_limit"}
+
+
+def body_and_start(given: dict[str, str]) -> tuple[ht.HeavyTop, ht.State, dict[str, Any]]:
+    """The Python arguments of the same words; what is left over is by name."""
+
+    def vector(text: str) -> list[str]:
+        return text.split(",")
+
+    left = {_RENAMED.get(key, key): value for key, value in given.items()}
+    data = {key: left.pop(key) for key in ("inertia", "weight", "centre", "omega", "gamma")}
+    rotor = left.pop("rotor", None)
+    top = ht.HeavyTop(
+        vector(data["inertia"]), data["weight"], vector(data["centre"]), None if rotor is None else vector(rotor)
+    )
+    start = ht.State(vector(data["omega"]), vector(data["gamma"]))
+    options: dict[str, Any] = {"times": [time.strip() for time in left.pop("times").split(",")]} | left
+    for name in ("step_limit", "digits"):
+        if name in options:
+            options[name] = int(options[name])
+    if "attitude" in options:
+        options["attitude"] = True
+    return top, start, options
+
+
+def of_python(call: Callable[..., Any], given: dict[str, str], **more: Any) -> Any:
+    top, start, options = body_and_start(given)
+    return call(top, start, **options, **more)
+
+
+def of_command(command: str, given: dict[str, str]) -> Any:
+    words = [part for key, value in given.items() for part in (f"--{key}", *([value] if key != "attitude" else []))]
+    done = CliRunner().invoke(app, [command, *words, "--json"], catch_exceptions=False, standalone_mode=False)
+    return json.loads(done.stdout)
+
+
+def outcome(call: Callable[[], Any]) -> Any:
+    """What it gives, or its error in words."""
+    try:
+        return call()
+    except HeavyTopError as error:
+        return type(error), error.cause, error.remedy
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_good_input_propagates_to_the_same_numbers(name: str) -> None:
+    given = DATA | GOOD[name]
+    printed, run = of_command("propagate", given), of_python(ht.propagate, given)
+    assert printed["states"] == run.texts()
+    assert (printed["outcome"], printed["steps"]) == (run.outcome.value, run.steps)
+    assert (printed["system"], printed["integrator"]) == (run.problem.system.name, run.integrator)
+    metrics = {name: number["value"] for name, number in printed["metrics"].items()}
+    drifts = {name: (each.max, each.rms, each.final) for name, each in ht.drift(run).items()}
+    assert {name: tuple(metrics[f"drift_{name}_{which}"] for which in ("max", "rms", "final")) for name in drifts} == {
+        name: tuple(metric.value for metric in each) for name, each in drifts.items()
+    }
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input_of_a_propagation_is_the_same_error(name: str) -> None:
+    given = DATA | BAD[name]
+    said = outcome(lambda: of_command("propagate", given))
+    assert isinstance(said, tuple)
+    assert said == outcome(lambda: of_python(ht.propagate, given))
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_a_reference_is_the_same_or_the_same_error(name: str) -> None:
+    given = DATA | REFERENCES[name]
+    printed = outcome(lambda: of_command("reference", given))
+    known = outcome(lambda: of_python(ht.reference, given))
+    if isinstance(known, tuple):
+        assert printed == known
+    else:
+        document = known.document()
+        assert {key: printed[key] for key in document} == document
+
+
+def test_angles_are_of_both() -> None:
+    given = DATA | {"times": "1,2", "attitude": ""}
+    printed, run = of_command("propagate", given), of_python(ht.propagate, given, angles=True)
+    assert run.angles().tolist() == [[float(value) for value in line] for line in printed["angles"]]
+
+
+EVENTS = {
+    "omega1": {"times": "9"},
+    "gamma3 = 1/2": {"times": "1,-9"},
+    "omega1*gamma2": {"times": "9", "event-direction": "-1"},
+    "nothing": {"times": "9"},
+    "1/0": {"times": "9"},
+    "omega3": {"times": "0"},
+    "gamma1": {"times": "9", "event-direction": "2"},
+}
+
+
+@pytest.mark.parametrize("function", EVENTS)
+def test_events_are_the_same_or_the_same_error(function: str) -> None:
+    given = DATA | EVENTS[function]
+    printed = outcome(lambda: of_command("reference", given | {"events": function, "digits": "20"}))
+    top, start, options = body_and_start(given)
+    direction, until = int(options.get("event-direction", 0)), max(options["times"], key=lambda text: abs(float(text)))
+    known = outcome(lambda: ht.events(top, start, until, function, direction, digits=20))
+    if isinstance(known, tuple):
+        assert printed == known
+    else:
+        (found,) = printed["events"]
+        assert found["times"] == [{"value": ball.value, "radius": ball.radius} for ball in known.times]
