@@ -2,11 +2,12 @@
 
 Nothing of `heavytop.claims` is used: the files are read here, their formulas evaluated in doubles, and the equations of
 motion written again.  A motion is put into them by differences; a first integral or relation is followed by SciPy's
-DOP853 from states at random on its conditions, which are found by least squares.
+DOP853 from states at random on its conditions, which are found by least squares.  Published numbers are compared with
+the attitude that it gives, as far as its digits go.
 
     python benchmarks/library_by_numbers.py [--seed 1] [--starts 4]
 
-Of the 78 entries that are no values every one is confirmed: 36 that hold and 42 that are refuted.
+Every entry is confirmed.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import operator
 import re
 import tomllib
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
+from scipy.special import ellipj
 
 LIBRARY = Path(__file__).parents[1] / "src" / "heavytop" / "claims" / "library"
 STATE = ("Omega1", "Omega2", "Omega3", "gamma1", "gamma2", "gamma3")
@@ -32,6 +35,9 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
     name: getattr(math, name)
     for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "asin", "acos", "atan", "atan2")
 } | {"sech": lambda x: 1 / math.cosh(x)}
+FUNCTIONS |= {
+    name: lambda u, m, index=index: float(ellipj(u, m)[index]) for index, name in enumerate(("sn", "cn", "dn"))
+}
 OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.Pow: operator.pow,
@@ -146,6 +152,42 @@ class Numbers:
         return max(abs(value - values[0]) for value in values) / max(1.0, abs(values[0]))
 
 
+# --- published numbers ---
+
+
+def misses(table: dict[str, Any]) -> tuple[float, float]:
+    """How far the numbers are off, and by how much they may be: both of the number that is worst."""
+    body, start = table["body"], table["start"]
+    mass, centre = float(body["mass"]), np.array([float(Fraction(x)) for x in body["centre"]])
+    inertia = np.diag([float(Fraction(x)) for x in body["inertia"]])
+    if body["about"] == "centre of mass":
+        inertia += mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    torque = mass * float(body["gravity"]) * centre
+
+    def field(_: float, y: Vector) -> Vector:
+        w, x, omega = y[0], y[1:4], y[4:]
+        up = 2 * (x[2] * x + w * np.cross([0, 0, 1.0], x)) + (w * w - x @ x) * np.array([0, 0, 1.0])
+        rate = np.linalg.solve(inertia, np.cross(inertia @ omega, omega) + np.cross(up, torque))
+        return np.concatenate([[-x @ omega / 2], (w * omega + np.cross(x, omega)) / 2, rate])
+
+    at = np.array([float(Fraction(x)) for x in (*start["quaternion"], *start["omega"])])
+    time, found = 0.0, (0.0, math.inf)
+    for given in sorted(table["value"], key=lambda given: float(given["time"])):
+        if float(given["time"]) > time:
+            path = solve_ivp(field, (time, float(given["time"])), at, method="DOP853", rtol=1e-13, atol=1e-13)
+            at, time = path.y[:, -1], float(given["time"])
+        w, x = at[0], at[1:4]
+        place = centre + 2 * np.cross(x, np.cross(x, centre) + w * centre)
+        known = {"quaternion": at[:4], "position": place, "omega": at[4:]}[given["quantity"]][given["component"] - 1]
+        number = float(given["number"])
+        digits = len(given["number"].partition(".")[2])
+        off = abs(number - known) if given["quantity"] != "quaternion" else abs(abs(number) - abs(known))
+        allowed = float(given.get("tolerance", 0.5 * 10.0**-digits))
+        if off / allowed > found[0] / found[1]:
+            found = (off, allowed)
+    return found
+
+
 def slope(function: Callable[[float], Vector], time: float) -> Vector:
     """The derivative by five points."""
     near = function(time + STEP) - function(time - STEP)
@@ -170,15 +212,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--starts", type=int, default=4)
+    parser.add_argument("--folder", type=Path, default=LIBRARY)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
     confirmed = {"holds": 0, "refuted": 0}
-    for path in sorted(LIBRARY.glob("*.toml")):
+    for path in sorted(options.folder.glob("*.toml")):
         table = tomllib.loads(path.read_text("utf-8"))
+        expects = table["expects"]
         if table["kind"] == "value":
-            continue
-        off, expects = largest(table, rng, options.starts), table["expects"]
-        right = off < 1e-8 if expects == "holds" else off > 1e-5
+            off, allowed = misses(table)
+            right = off < max(allowed, 1e-7) if expects == "holds" else off > allowed
+        else:
+            off = largest(table, rng, options.starts)
+            right = off < 1e-8 if expects == "holds" else off > 1e-5
         confirmed[expects] += right
         if not right:
             print(f"{path.stem}: expected to be {expects}, off by {off:.1e}", flush=True)
