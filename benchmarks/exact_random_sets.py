@@ -25,6 +25,7 @@ from heavytop.errors import HeavyTopError
 from heavytop.exact.algebraic import AlgebraicMotion
 from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.chaplygin import chaplygin_motion
+from heavytop.exact.dokshevich import AlgebraicDokshevich, dokshevich_motion
 from heavytop.exact.goryachev import goryachev_motion
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
 from heavytop.exact.hess import Hess
@@ -125,6 +126,12 @@ def hess_beside(area: Fraction) -> FAMILY:
     return family
 
 
+def dokshevich(random: Random) -> Any:
+    low, high = sorted(positive(random) for _ in range(2))
+    middle = low + (high - low) * F(random.randint(1, 15), 16)
+    return dokshevich_motion((low, middle, high), F(random.choice((1, -1)) * random.randint(1, 15), 16))
+
+
 def steklov(random: Random) -> Any:
     return steklov_motion(*(positive(random) / 2 for _ in range(4)), random.choice((1, -1)), positive(random))
 
@@ -141,11 +148,14 @@ def algebraic(build: Callable[..., AlgebraicMotion], low: Fraction, high: Fracti
 
 
 def data(motion: Any) -> tuple[HeavyTop, State]:
-    return motion.rounded(NOT_EXACT) if isinstance(motion, AlgebraicMotion) else (motion.top, motion.start)
+    is_algebraic = isinstance(motion, AlgebraicMotion | AlgebraicDokshevich)
+    return motion.rounded(NOT_EXACT) if is_algebraic else (motion.top, motion.start)
 
 
 def afresh(motion: Any) -> Any:
     """The motion without what was made for it."""
+    if isinstance(motion, AlgebraicDokshevich):
+        return AlgebraicDokshevich(motion.inertia, motion.place)
     if isinstance(motion, AlgebraicMotion):
         return AlgebraicMotion(motion.curve, motion.place, motion.signs, motion.method)
     return type(motion)(motion.top, motion.start)
@@ -155,7 +165,7 @@ def residual(motion: Any, time: Fraction) -> float:
     """The largest radius of y' − f(y); raises AssertionError where a ball does not hold 0."""
     series = motion.series(time, 3, BITS_60)
     with working_precision(2 * BITS_60):
-        if isinstance(motion, AlgebraicMotion):
+        if isinstance(motion, AlgebraicMotion | AlgebraicDokshevich):
             inertia, moment = motion.inertia, motion.moment(2 * BITS_60)
         else:
             inertia, moment = motion.top.inertia, [ball(n) for n in motion.top.moment]
@@ -194,7 +204,7 @@ def survey(name: str, family: FAMILY, count: int, seed: int) -> None:
             for time in (F(10), F(-10)):
                 pairs = list(zip(motion.state(time, BITS_50), enclosure.state(time, BITS_50), strict=True))
                 off = max(float(abs(a - b).upper() / (1 + abs(a))) for a, b in pairs)
-                exact = not isinstance(motion, AlgebraicMotion)
+                exact = not isinstance(motion, AlgebraicMotion | AlgebraicDokshevich)
                 assert off < 1e-50, data(motion)
                 assert not exact or all(one.overlaps(other) for one, other in pairs), data(motion)
                 apart.append(off)
@@ -254,6 +264,7 @@ def main() -> None:
         ("Hess", hess, count),
         ("Hess, M·gamma = 0", hess_beside(F(0)), count),
         ("Steklov", steklov, count),
+        ("Dokshevich", dokshevich, count),
         ("Goryachev", algebraic(goryachev_motion, F(601, 1000), F(624, 1000), -1), count),
         ("N. Kowalewski", algebraic(kowalewski_motion, F(589, 1000), F(644, 1000), 1), count),
         ("Chaplygin", algebraic(chaplygin_motion, F(1501, 1000), F(1596, 1000), 1), count),

@@ -1,8 +1,9 @@
 """Build the site into docs/_build/html: ``python docs/build.py``.
 
-Every warning is an error, pictures and notebooks are executed, nothing is fetched.  Then every link inside the site is
-followed, and the words of pages, docstrings and messages are looked up among common misspellings.  Exit code 1 where
-anything was found.  ``--fresh`` executes notebooks again that have not changed.
+Every warning is an error, pictures and notebooks are executed, nothing is fetched.  The page of audited claims is made
+from `results/claims/library.json`, or by new audits where that is not of the entries as they stand.  Then every link
+inside the site is followed, and the words of pages, docstrings and messages are looked up among common misspellings.
+Exit code 1 where anything was found.  ``--fresh`` executes notebooks again that have not changed.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from urllib.parse import unquote, urlsplit
 
 DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "_build" / "html"
+CLAIMS = DOCS / "_build" / "claims.md"
 ROOT = DOCS.parent
 SPELLED = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs", "results", "examples", "src", "benchmarks"]
 
@@ -66,6 +68,22 @@ def misspelt() -> list[str]:
     return (done.stdout + done.stderr).splitlines()
 
 
+def write_claims() -> None:
+    """The part of the page of audited claims that is made from the library."""
+    import msgspec
+
+    from heavytop.report.claims_page import page
+    from heavytop.suite.claim_library import Library, document, is_current
+
+    kept = ROOT / "results" / "claims" / "library.json"
+    found = msgspec.json.decode(kept.read_bytes(), type=Library) if kept.exists() else None
+    if found is None or not is_current(found):
+        print("results/claims is not of the entries as they stand: every claim is audited")
+        found = document()
+    CLAIMS.parent.mkdir(parents=True, exist_ok=True)
+    CLAIMS.write_text(page(found), "utf-8")
+
+
 def main() -> int:
     """Build and check; returns the exit code."""
     parser = argparse.ArgumentParser(description="Build the site and check its links and spelling.")
@@ -73,6 +91,7 @@ def main() -> int:
     if parser.parse_args().fresh:
         shutil.rmtree(DOCS / "_build", ignore_errors=True)
     began = perf_counter()
+    write_claims()
     sphinx = [sys.executable, "-m", "sphinx", "-q", "-E", "-W", "--keep-going", "-n", "-b", "html", str(DOCS), str(OUT)]
     built = subprocess.run(sphinx, stderr=subprocess.PIPE, text=True, check=False)
     # the kernels of notebooks talk over the loopback device, and say so each time

@@ -26,7 +26,16 @@ from heavytop.report import policy
 from heavytop.report.brief import brief
 from heavytop.suite import plan
 
-NOT_CODE = {"text", "{eval-rst}", "{toctree}", "{image}", "{figure}", "{note}", "{include} ../CHANGELOG.md"}
+NOT_CODE = {
+    "text",
+    "{eval-rst}",
+    "{toctree}",
+    "{image}",
+    "{figure}",
+    "{note}",
+    "{include} ../CHANGELOG.md",
+    "{include} _build/claims.md",
+}
 CELL = "{code-cell} ipython3"
 MOST_LINES = 10
 """Of a picture in the gallery."""

@@ -11,7 +11,7 @@ from flint import arb
 from heavytop.exact.attitude import attitude_of
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.validated import Validated
-from heavytop.top.equations import Parameters
+from heavytop.top.equations import HEAVY_TOP, Parameters
 
 DIGITS_60 = 200
 
@@ -115,3 +115,26 @@ def positive(rng: random.Random, size=4, denominator=9):
 def triple(rng, draw=rational):
     """Three random numbers."""
     return tuple(draw(rng) for _ in range(3))
+
+
+def assert_algebraic_solves(motion, time, bits=200):
+    """Of an algebraic start: the residual of all six equations contains 0 within 1e-40 at 60 digits; |γ| = 1."""
+    series, moment = motion.series(time, 3, bits), motion.moment(2 * bits)
+    with working_precision(2 * bits):
+        field = HEAVY_TOP.field(Parameters([ball(i) for i in motion.inertia], moment, arb(0)), series)
+        for y, f in zip(series, field, strict=True):
+            for k in range(2):
+                off = (y.derivative() - f)[k]
+                assert off.contains(0)
+                assert off.rad() < arb("1e-40")
+        assert abs(sum(g[0] * g[0] for g in series[3:]) - 1) < arb("1e-55")
+
+
+class AsRounded:
+    """The motion as if it were that of a top whose data agree with it to 280 bits."""
+
+    system = HEAVY_TOP
+
+    def __init__(self, motion):
+        self.top, self.start = motion.rounded(280)
+        self.state, self.attitude = motion.state, motion.attitude

@@ -11,6 +11,7 @@ from heavytop.exact.axes import ALL, Renamed, renamed_state, renamed_top
 from heavytop.exact.bobylev_steklov import BobylevSteklov, bobylev_steklov_motion
 from heavytop.exact.catalogue import find, matches
 from heavytop.exact.delone import Delone, DeloneHomoclinic
+from heavytop.exact.dokshevich import Dokshevich
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
@@ -52,6 +53,10 @@ SAMPLES = {
     ),
     HessPendulum: HessPendulum(HeavyTop((6, 4, 3), 1, (2, 0, 2)), State(("3/5", "6/5", "-6/5"), ("2/7", "3/7", "6/7"))),
     Steklov: steklov_motion(F(1), F(1, 5), F(6, 5), F(2)),
+    Dokshevich: Dokshevich(
+        HeavyTop(("4/5", "1/2", "3/10"), 1, ("-25/24", 0, "25/18")),
+        State(("-17/14", "6/7", "8/7"), ("24/49", "36/49", "23/49")),
+    ),
     Hess: Hess(HeavyTop((6, 4, 3), "1/2", (2, 0, 2)), State(("3/5", "4/5", "-6/5"), ("2/3", "1/2", 1))),
     Delone: Delone(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((1, "1/2", "1/3"), ("3/4", 1, "1/5"))),
 }

@@ -11,6 +11,7 @@ from heavytop.claims.entry import Entry, file_of
 from heavytop.claims.guard import in_time
 from heavytop.claims.judge import Audit, Finding, Row, judge
 from heavytop.claims.statement import Setting, Statement
+from heavytop.claims.values import ValueClaim
 from heavytop.errors import InputError
 from heavytop.top.equations import System, system
 
@@ -18,7 +19,7 @@ PAPER = ("ershkov-general", "ershkov-partial")
 
 
 class Auditable(Protocol):
-    """A claim that can state what it says, equation by equation."""
+    """A claim whose formulas can be put into equations."""
 
     @property
     def name(self) -> str: ...
@@ -51,12 +52,17 @@ class Auditable(Protocol):
         ...
 
 
-def find_claim(name: str) -> Auditable:
+def paper_claim(name: str) -> Auditable:
+    """The paper's claim of that name, one of :data:`PAPER`."""
+    from heavytop.claims.ershkov_audit import GeneralClaim, PartialClaim
+
+    return GeneralClaim() if name == "ershkov-general" else PartialClaim()
+
+
+def find_claim(name: str) -> Auditable | ValueClaim:
     """The paper's claim of that name, or the claim in the TOML file at that path; raises InputError for neither."""
     if name in PAPER:
-        from heavytop.claims.ershkov_audit import GeneralClaim, PartialClaim
-
-        return GeneralClaim() if name == "ershkov-general" else PartialClaim()
+        return paper_claim(name)
     from heavytop.claims.from_file import read_claim
 
     return read_claim(_path(name))
@@ -84,15 +90,19 @@ def audit(
     """
     asked = None if system_name is None else system(system_name)
     if name in PAPER:
-        return audit_claim(find_claim(name), asked, progress)
+        return audit_claim(paper_claim(name), asked, progress)
     return in_time(str(_path(name)), "" if asked is None else asked.name)
 
 
 def audit_claim(
-    claim: Auditable, asked: System | None = None, progress: Callable[[int, int], None] = lambda done, of: None
+    claim: Auditable | ValueClaim,
+    asked: System | None = None,
+    progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Audit:
     """The audit of a claim that is at hand, as a motion of the system asked for.  progress: as in :func:`audit`."""
     about = claim.about(asked)
+    if isinstance(claim, ValueClaim):
+        return Audit(claim.name, about.name, claim.source, claim.rows(about), kind=claim.kind, entry=claim.entry)
     rows = judge(claim.statements(about), claim.setting, progress)
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)

@@ -1,4 +1,4 @@
-"""Claims that a user writes in TOML: a motion, a first integral or an invariant relation.
+"""Claims that a user writes in TOML: a motion, a first integral, an invariant relation, or numbers.
 
 The format is that of docs/claims-in-toml.md.  Formulas go through :mod:`heavytop.claims.expression`; nothing in a
 file is ever evaluated as code.
@@ -15,6 +15,7 @@ import msgspec
 
 from heavytop.claims.audit import Auditable
 from heavytop.claims.entry import Entry, split
+from heavytop.claims.values import ValueClaim, ValueFile
 from heavytop.errors import InputError
 
 _MAX_BYTES = 100_000
@@ -84,7 +85,7 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     entry: Entry | None = None
 
 
-def read_claim(path: Path) -> Auditable:
+def read_claim(path: Path) -> Auditable | ValueClaim:
     """The claim in a TOML file; raises InputError, with the reason, for anything that is not one."""
     try:
         with path.open("rb") as stream:
@@ -100,18 +101,20 @@ def read_claim(path: Path) -> Auditable:
     return claim_from_table(table, str(path))
 
 
-def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable:
+def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueClaim:
     """The claim in a TOML table that has been read; raises InputError for anything that is not one."""
     entry, rest = split(table, where)
     if "entry" in rest:
         raise InputError(f"{where}: entry is no key of a claim.", _REMEDY)
+    if rest.get("kind") == "value":
+        return _value_claim(rest, entry, where)
     try:
         content = msgspec.convert(rest, ClaimFile)
     except (msgspec.ValidationError, RecursionError) as error:
         raise InputError(f"{where}: {error}.", _REMEDY) from None
     tables = {"motion": content.motion, "integral": content.integral, "relation": content.integral}
     if content.kind not in tables:
-        raise InputError(f"{where}: kind = {content.kind[:40]!r}.", "Use motion, integral or relation.")
+        raise InputError(f"{where}: kind = {content.kind[:40]!r}.", "Use motion, integral, relation or value.")
     wanted = "motion" if content.kind == "motion" else "integral"
     if tables[content.kind] is None or (content.motion is not None and content.integral is not None):
         raise InputError(f"{where}: kind {content.kind!r} needs the table [{wanted}], and no other claim.", _REMEDY)
@@ -122,6 +125,15 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable:
     from heavytop.claims.user_integral import UserIntegral
 
     return UserMotion(content) if content.kind == "motion" else UserIntegral(content)
+
+
+def _value_claim(table: Mapping[str, Any], entry: Entry | None, where: str) -> ValueClaim:
+    try:
+        return ValueClaim(msgspec.convert(table, ValueFile), entry)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise InputError(f"{where}: {error}.", f"Numbers are text, as they are printed. {_REMEDY}") from None
+    except InputError as error:
+        raise InputError(f"{where}: {error.cause}", error.remedy) from None
 
 
 def sample_rows(parameters: Mapping[str, Sequence[str] | str]) -> list[dict[str, str]]:

@@ -31,7 +31,12 @@ from heavytop.exact.balls import radius as radius_of
 from heavytop.exact.balls import radius_text, value_text
 
 VERDICTS = {True: "holds", False: "refuted", None: "undecided"}
-ABOUT = {"motion": "a motion", "integral": "a first integral", "relation": "an invariant relation"}
+ABOUT = {
+    "motion": "a motion",
+    "integral": "a first integral",
+    "relation": "an invariant relation",
+    "value": "numbers of a motion",
+}
 """What a claim of each kind says that its formulas are."""
 _BITS = (192, 1024)
 _MOST_BITS = 300_000
@@ -46,6 +51,7 @@ class Row:
     holds: True (proven), False (refuted by ``witness``), None (undecided).
     residual: "0", the closed form where found, else what the balls say.
     conditions: what the proof rests on; the row is undecided if one is not discharged.
+    figures: of a published number, what is printed, its digits that are right, the proven value.
     """
 
     equation: str
@@ -58,6 +64,7 @@ class Row:
     witness: Mapping[str, Any] | None = None
     note: str = ""
     conditions: tuple[Condition, ...] = ()
+    figures: Mapping[str, Any] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The row with the keys that scripts rely on."""
@@ -67,6 +74,7 @@ class Row:
             document["witness"] = dict(self.witness)
         if self.note:
             document["where"] = self.note
+        document |= self.figures or {}
         document["conditions"] = [
             {"text": c.text, "discharged": c.discharged, "reason": c.reason} for c in self.conditions
         ]
@@ -93,7 +101,7 @@ class Audit(Tabular):
     """The audit of one claim about one system.
 
     why: what explains the verdict, each step checked.  solves: the systems whose equations of motion the claim
-    satisfies on its smooth branch, or that keep the integral or relation.  kind: motion, integral or relation.
+    satisfies on its smooth branch, or that keep the integral or relation.  kind: motion, integral, relation or value.
     constants: names in the residuals with what they stand for, such as k/2.  entry: of the library, where it is one.
     """
 

@@ -303,7 +303,7 @@ def _motion(
     texts: the options, by the keys of a plan.  case: in place of them.
     """
     if case is None:
-        from heavytop.suite.given_motion import motion_of
+        from heavytop.top.given_motion import motion_of
 
         given = {key: _value(key, text) for key, text in texts.items()}
         top, start = motion_of(given, normalize)

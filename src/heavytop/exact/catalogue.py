@@ -17,6 +17,7 @@ from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.axes import ALL, CYCLIC, Axes, Renamed, inverse, renamed_state, renamed_top
 from heavytop.exact.bobylev_steklov import BobylevSteklov
 from heavytop.exact.delone import Delone, DeloneHomoclinic
+from heavytop.exact.dokshevich import Dokshevich
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
@@ -115,6 +116,7 @@ _HEAVY_TOP: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (HessPendulum, CYCLIC),
     (Delone, CYCLIC),
     (Steklov, CYCLIC),
+    (Dokshevich, CYCLIC),
     (Hess, CYCLIC),
     (Kovalevskaya, CYCLIC),
     (GoryachevChaplyginRest, CYCLIC),

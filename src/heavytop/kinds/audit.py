@@ -8,7 +8,7 @@ from typing import Literal
 from rich.console import RenderableType
 from rich.text import Text
 
-from heavytop.claims.audit import PAPER, find_claim
+from heavytop.claims.audit import PAPER, paper_claim
 from heavytop.claims.entry import library
 from heavytop.claims.judge import judge
 from heavytop.claims.verdicts import audited, own_system
@@ -78,7 +78,7 @@ class Audit(Kind):
         """Of the branches of a claim about the gyrostat the smooth one alone, which the formulas solve."""
         if task.key.case not in PAPER:
             return _of_entry(task)
-        claim, about = find_claim(task.key.case), system(task.key.system)
+        claim, about = paper_claim(task.key.case), system(task.key.system)
         asked = [each for each in claim.statements(about) if about is HEAVY_TOP or each.branch == _SMOOTH]
         metrics = {
             Quantity(f"({row.equation})", str(row.component), "", row.branch, row.domain): _value(row.holds)

@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from heavytop.claims.judge import ABOUT, VERDICTS, Audit, Row
+from heavytop.report.values_text import values_text
 
 _PROVEN = {
     "motion": "Its equations of motion are proven for",
@@ -28,6 +29,8 @@ def audit_text(report: Audit) -> RenderableType:
     if report.source:
         parts.append(Text(report.source))
     parts += [Text(f"{name} = {value}") for name, value in report.constants if name != value]
+    if report.kind == "value":
+        return Group(*parts, Text(), *values_text(report.rows), *_entry(report))
     parts += [Text(), _table(report), Text(), *_witnesses(report), *_conditions(report)]
     if report.why:
         parts += [Text(), Text("Why, each step checked by the same algebra:")]

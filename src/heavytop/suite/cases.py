@@ -176,6 +176,13 @@ CASES: dict[str, Case] = {
             HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)),
             State((0, 4, 2), (-1, 0, 0)),
         ),
+        Case(
+            "dokshevich",
+            "Dokshevich's motion of a Hess top, periodic: M·gamma = 0, M·r not 0",
+            HEAVY_TOP,
+            HeavyTop(("3/10", "4/5", "1/2"), 1, ("25/18", "-25/24", 0)),
+            State(("8/7", "-17/14", "6/7"), ("23/49", "24/49", "36/49")),
+        ),
         _near("goryachev", "Goryachev", goryachev_motion(Fraction(39, 64), Fraction(-1), Fraction(1, 4))),
         _near("kowalewski", "N. Kowalewski", kowalewski_motion(Fraction(5, 8), Fraction(1))),
         _near("chaplygin", "Chaplygin", chaplygin_motion(Fraction(49, 32), Fraction(1), Fraction(1, 2))),

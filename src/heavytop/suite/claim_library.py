@@ -22,8 +22,11 @@ VERSION = "1.0.0"
 """Of the form: a key that is added raises the second place, one that changes the first."""
 
 
-class Equation(msgspec.Struct, frozen=True, kw_only=True):
-    """The verdict on one equation; as in `heavytop audit --json`."""
+class Equation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The verdict on one equation, or on one published number; as in `heavytop audit --json`.
+
+    printed, tolerance, digits_printed, digits_right, proven: of a number.
+    """
 
     equation: str
     component: int
@@ -35,6 +38,11 @@ class Equation(msgspec.Struct, frozen=True, kw_only=True):
     conditions: list[dict[str, Any]]
     witness: dict[str, Any] | None = None
     where: str | None = None
+    printed: str | None = None
+    tolerance: str | None = None
+    digits_printed: int | None = None
+    digits_right: int | None = None
+    proven: dict[str, str] | None = None
 
 
 class Published(msgspec.Struct, frozen=True, kw_only=True):
@@ -68,15 +76,28 @@ def document() -> Library:
     return Library(library="heavytop library of claims", version=VERSION, claims=claims)
 
 
-def _published(entry: Entry) -> Published:
+def is_current(found: Library) -> bool:
+    """Whether a document is of the entries as they stand in their files, with the verdicts that they expect."""
+    stated = {each.entry.id: (each.entry, each.claim) for each in found.claims}
+    as_expected = all(each.verdict == each.entry.expects for each in found.claims)
+    return as_expected and stated == {entry.id: (entry, _claim(entry)) for entry in library().values()}
+
+
+def _claim(entry: Entry) -> dict[str, Any]:
+    """The claim in the file of an entry, without what it says as an entry."""
     table = tomllib.loads((FOLDER / f"{entry.id}.toml").read_text("utf-8"))
     own = set(msgspec.to_builtins(entry)) | {"corrects"}
+    return {key: value for key, value in table.items() if key not in own}
+
+
+def _published(entry: Entry) -> Published:
+    claim = _claim(entry)
     judged, found = audited(entry)
     return Published(
         entry=entry,
-        claim={key: value for key, value in table.items() if key not in own},
+        claim=claim,
         system="" if found is None else found.system,
-        kind=str(table.get("kind", "")),
+        kind=str(claim.get("kind", "")),
         verdict=judged.verdict,
         reason=judged.reason,
         equations=[] if found is None else [_equation(row) for row in found.rows],

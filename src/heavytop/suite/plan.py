@@ -32,12 +32,12 @@ from heavytop.precision import exact, number, require
 from heavytop.records import RowKey
 from heavytop.suite.cases import CASES, Case, case, named_bodies, require_possible
 from heavytop.suite.files import read_whole
-from heavytop.suite.given_motion import motion_of
 from heavytop.suite.kind import Kinds, Table
 from heavytop.suite.sweeps import Lazy, Sweep
 from heavytop.suite.task import FINEST, Task
 from heavytop.top.bodies import Body
 from heavytop.top.equations import system_of
+from heavytop.top.given_motion import motion_of
 from heavytop.top.heavy_top import HeavyTop
 
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"

@@ -25,7 +25,7 @@ from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import PIVOT, Body
 from heavytop.top.heavy_top import State
 
-VERSION = "1.0.0"
+VERSION = "1.1.0"
 """Of the format and the numbers: a changed number raises the second place, a changed key the first."""
 DIGITS = 40
 TIMES = 50
@@ -44,6 +44,7 @@ _CLASSICAL = {
     "goryachev-chaplygin": "20",
     "hess": "20",
     "steklov": "100",
+    "dokshevich": "100",
 }
 """Motions of the table of certified states, by the time up to which they are here."""
 _QUANTITIES = (("omega", 3), ("gamma", 3), ("quaternion", 4), ("position", 3))

@@ -122,6 +122,8 @@ def cases() -> Iterator[Case]:
     yield Case("hess", hess, State(("3/4", "1/2", -1), (0, 1, 0)))
     yield Case("hess, M·gamma = 0", hess, State(("3/4", 0, -1), (0, 1, 0)))
     yield Case("steklov", HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)), State((0, 4, 2), (-1, 0, 0)))
+    top = HeavyTop(("3/10", "4/5", "1/2"), 1, ("25/18", "-25/24", 0))
+    yield Case("dokshevich", top, State(("8/7", "-17/14", "6/7"), ("23/49", "24/49", "36/49")))
     # rational data beside motions whose starts are algebraic, rounded to 53 bits
     for name, beside in (
         ("goryachev", goryachev_motion(f(39, 64), f(-1), f(1, 4))),

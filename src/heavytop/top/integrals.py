@@ -33,7 +33,9 @@ class Integral:
 
 
 def momentum(p: Parameters, y: Any) -> tuple[Any, Any, Any]:
-    """M = I Ω."""
+    """M = I Ω; of a full tensor where the moments are its three rows."""
+    if isinstance(p.inertia[0], tuple):
+        return dot(p.inertia[0], y[:3]), dot(p.inertia[1], y[:3]), dot(p.inertia[2], y[:3])
     return p.inertia[0] * y[0], p.inertia[1] * y[1], p.inertia[2] * y[2]
 
 

@@ -1,0 +1,380 @@
+"""Claims of kind `value`: published numbers, against numbers that are known otherwise."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import mpmath
+import pytest
+from rich.console import Console
+
+import in_process
+from heavytop.claims.audit import audit_claim
+from heavytop.claims.from_file import claim_from_table, read_claim
+from heavytop.claims.judge import Audit, Row
+from heavytop.claims.printed_number import PrintedNumber
+from heavytop.claims.values import ValueClaim
+from heavytop.errors import InputError
+from heavytop.report.audit_text import audit_text
+from heavytop.top.equations import system
+
+TOP = {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["1/2", "1/3", "1/5"]}
+START = {"omega": ["1/10", "2/5", "9/10"], "gamma": ["3/5", "0", "4/5"]}
+UPRIGHT = {"inertia": ["2", "2", "1"], "weight": "3", "centre": ["0", "0", "1/2"]}
+"""Turning about the vertical, its axis of symmetry: q = (cos wt/2, 0, 0, sin wt/2)."""
+
+
+def claim(values: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
+    table = {"name": "x", "kind": "value", "top": TOP, "start": START, "value": values} | changes
+    return {key: part for key, part in table.items() if part is not None}
+
+
+def judged(values: list[dict[str, Any]], about: str | None = None, **changes: Any) -> Audit:
+    return audit_claim(claim_from_table(claim(values, **changes), "x"), None if about is None else system(about))
+
+
+def one(quantity: str, component: int, number: str, time: str = "0", **more: str) -> dict[str, Any]:
+    return {"quantity": quantity, "component": component, "number": number, "time": time} | more
+
+
+def figures(row: Row) -> dict[str, Any]:
+    assert row.figures is not None
+    return dict(row.figures)
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "unit", "digits"),
+    [
+        ("0.450", "9/20", "1/1000", 3),
+        ("-12", "-12", "1", 2),
+        ("1500", "1500", "1", 4),
+        ("+.5e-3", "1/2000", "1/10000", 1),
+        ("1.20E2", "120", "1", 3),
+        ("0.1D+01", "1", "1", 1),
+        ("0.000", "0", "1/1000", 4),
+        ("007", "7", "1", 1),
+        ("3.", "3", "1", 1),
+    ],
+)
+def test_a_printed_number_has_the_digits_that_are_written(text: str, value: str, unit: str, digits: int) -> None:
+    found = PrintedNumber.read(text, "x")
+    assert (found.value, found.unit, found.digits) == (Fraction(value), Fraction(unit), digits)
+
+
+@pytest.mark.parametrize(
+    "text", ["", ".", "1/3", "nan", "inf", "1e", "1 2", "0x1p3", "--1", "1e99999", "1" * 1001, "١"]
+)
+def test_what_is_no_decimal_number_is_refused(text: str) -> None:
+    with pytest.raises(InputError):
+        PrintedNumber.read(text, "x")
+
+
+def test_digits_right_are_those_that_half_a_unit_of_each_covers() -> None:
+    number = PrintedNumber.read("1.234", "x")
+    for error, right in (
+        ("0.0005", 4),
+        ("0.00051", 3),
+        ("0.005", 3),
+        ("0.0051", 2),
+        ("0.4", 1),
+        ("0.5", 1),
+        ("0.6", 0),
+    ):
+        assert number.right(Fraction(error)) == right
+
+
+def test_random_numbers_of_a_turning_top_get_the_verdict_that_their_cosine_gives() -> None:
+    """q of a top that turns upright is elementary; numbers of 1 to 30 digits are off by random amounts."""
+    random, lib = Random(30), mpmath.MPContext()
+    lib.prec = 400
+    values, expected = [], []
+    for place in range(120):
+        time = Fraction(random.randint(-5000, 5000), random.choice((7, 100, 1)))
+        angle = lib.mpf(3 * time.numerator) / (7 * time.denominator) / 2
+        component = random.choice((1, 4))
+        true = lib.cos(angle) if component == 1 else lib.sin(angle)
+        digits = random.randint(1, 30)
+        near = true + lib.mpf(10) ** (-random.randint(1, 32)) * random.choice((0, 1, -1)) * random.random()
+        text = lib.nstr(near, digits, strip_zeros=False)
+        number = PrintedNumber.read(text, "x")
+        # of either sign: one component alone does not fix it
+        exact = Fraction(*(int(part) for part in (lib.nint(true * lib.mpf(2) ** 380), 2**380)))
+        off = min(abs(number.value - exact), abs(number.value + exact))
+        values.append(one("quaternion", component, text, f"{time + Fraction(place, 10**9)}"))
+        expected.append((off, number))
+        values[-1]["time"] = str(time)
+    seen = {}
+    for value, said in zip(values, expected, strict=True):
+        seen[value["time"]] = value, said
+    report = judged(
+        [value for value, _ in seen.values()],
+        top=UPRIGHT,
+        start={"omega": ["0", "0", "3/7"], "quaternion": ["1", "0", "0", "0"]},
+    )
+    verdicts = set()
+    for row, (_, (off, number)) in zip(report.rows, seen.values(), strict=True):
+        assert row.holds is (off <= number.half_unit)
+        assert figures(row)["digits_right"] == number.right(off)
+        verdicts.add(row.holds)
+    assert verdicts == {True, False}
+
+
+TENSOR = [["1.5", "0.1", "-0.2"], ["0.1", "1.2", "0.05"], ["-0.2", "0.05", "0.9"]]
+TENSOR_BODY = {
+    "mass": "2",
+    "gravity": "9.81",
+    "centre": ["0.1", "-0.2", "0.3"],
+    "inertia": [part for row in TENSOR for part in row],
+    "about": "pivot",
+    "rotor": ["0.3", "-0.1", "0.7"],
+}
+TURNED = {"omega": ["0.5", "-0.25", "1.5"], "euler": "ZXZ:30deg,0.4,1"}
+
+
+def integrated(time: str) -> dict[str, list[Any]]:
+    """The motion of :data:`TENSOR_BODY` by mpmath's own Taylor method, with the quaternion of the whole attitude."""
+    lib = mpmath.mp.clone()
+    lib.dps = 30
+    inertia = lib.matrix([[lib.mpf(part) for part in row] for row in TENSOR])
+    inverse, wheel = inertia**-1, [lib.mpf(part) for part in ("0.3", "-0.1", "0.7")]
+    pull = [2 * lib.mpf("9.81") * lib.mpf(part) for part in ("0.1", "-0.2", "0.3")]
+
+    def cross(a: Any, b: Any) -> list[Any]:
+        return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+    def up(q: Any) -> list[Any]:
+        w, x, y, z = q
+        return [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z]
+
+    def product(p: Any, q: Any) -> list[Any]:
+        v = [p[0] * b + q[0] * a + c for a, b, c in zip(p[1:], q[1:], cross(p[1:], q[1:]), strict=True)]
+        return [p[0] * q[0] - sum(a * b for a, b in zip(p[1:], q[1:], strict=True)), *v]
+
+    def rates(_: Any, y: Any) -> list[Any]:
+        omega, q = y[:3], y[3:]
+        momentum = [sum(inertia[i, j] * omega[j] for j in range(3)) + wheel[i] for i in range(3)]
+        torque = [a + b for a, b in zip(cross(momentum, omega), cross(up(q), pull), strict=True)]
+        spin = [sum(inverse[i, j] * torque[j] for j in range(3)) for i in range(3)]
+        return [*spin, *(part / 2 for part in product(q, [0, *omega]))]
+
+    q = [lib.mpf(1), lib.mpf(0), lib.mpf(0), lib.mpf(0)]
+    for angle, axis in ((lib.pi / 6, 3), (lib.mpf("0.4"), 1), (lib.mpf(1), 3)):
+        turn = [lib.cos(angle / 2), lib.mpf(0), lib.mpf(0), lib.mpf(0)]
+        turn[axis] = lib.sin(angle / 2)
+        q = product(q, turn)
+    began = [*(lib.mpf(part) for part in TURNED["omega"]), *q]
+    omega, q = (lambda y: (y[:3], y[3:]))(lib.odefun(rates, 0, began)(lib.mpf(time)))
+    centre = [lib.mpf(0), *(lib.mpf(part) for part in TENSOR_BODY["centre"])]
+    place = product(product(q, centre), [q[0], -q[1], -q[2], -q[3]])[1:]
+    kinetic = sum(inertia[i, j] * omega[i] * omega[j] for i in range(3) for j in range(3)) / 2
+    momentum = [sum(inertia[i, j] * omega[j] for j in range(3)) + wheel[i] for i in range(3)]
+    energy = kinetic + sum(a * b for a, b in zip(pull, up(q), strict=True))
+    area = sum(a * b for a, b in zip(momentum, up(q), strict=True))
+    found = {"omega": omega, "gamma": up(q), "quaternion": [-part for part in q], "position": place}
+    return {
+        name: [lib.nstr(part, 22, strip_zeros=False) for part in values]
+        for name, values in (found | {"energy": [energy], "area": [area]}).items()
+    }
+
+
+def with_another_digit(text: str) -> str:
+    """The number with its eighth digit from the end one higher, or 0 in place of 9."""
+    return text[:-8] + str((int(text[-8]) + 1) % 10) + text[-7:]
+
+
+def test_a_full_tensor_with_a_rotor_from_euler_angles_agrees_with_mpmath() -> None:
+    """22 digits of mpmath's integration of other equations, every quantity, and each again with a digit changed."""
+    known = integrated("0.5")
+    right = [one(name, place, text, "0.5") for name, texts in known.items() for place, text in enumerate(texts, 1)]
+    report = judged(right, top=None, body=TENSOR_BODY, start=TURNED)
+    assert report.system == "heavy_gyrostat"
+    assert report.verdict == "holds", [row.residual for row in report.rows]
+    assert all(figures(row)["digits_right"] == figures(row)["digits_printed"] for row in report.rows)
+    wrong = [
+        value | {"number": value["number"][:-8] + str((int(value["number"][-8]) + 1) % 10) + value["number"][-7:]}
+        for value in right
+    ]
+    for row in judged(wrong, top=None, body=TENSOR_BODY, start=TURNED).rows:
+        assert row.holds is False
+        assert row.witness is not None
+        assert abs(Fraction(row.witness["value"])) > Fraction(row.witness["radius"])
+
+
+def test_rational_numbers_at_the_start_are_decided_even_where_half_a_unit_is_met_exactly() -> None:
+    values = [one("omega", 1, "0.1"), one("gamma", 1, "0.6"), one("gamma", 3, "0.75"), one("gamma", 2, "0.0")]
+    rows = judged([*values, one("omega", 2, "0.45")]).rows
+    assert [row.holds for row in rows] == [True, True, False, True, False]
+    assert judged([one("gamma", 1, "0.65")]).verdict == "refuted"
+    assert judged([one("gamma", 1, "0.65", tolerance="0.05")]).verdict == "holds"
+    assert judged([one("gamma", 1, "0.65", tolerance="0.049999999999999999999999")]).verdict == "refuted"
+    assert judged([one("gamma", 1, "0.6", tolerance="0")]).verdict == "holds"
+    assert judged([one("gamma", 1, "1")]).verdict == "holds"
+
+
+def test_a_first_integral_is_exact_at_any_time() -> None:
+    energy = Fraction(1, 2) * (Fraction(3, 100) + Fraction(32, 100) + Fraction(81, 100)) + Fraction(23, 50)
+    text = f"{float(energy):.4f}"
+    assert Fraction(text) == energy
+    for number, holds in ((text, True), ("1.0401", False), ("1.04", True), ("1.0", True), ("1.1", False)):
+        report = judged([one("energy", 1, number, "1e6")])
+        assert report.rows[0].holds is holds
+
+
+def test_the_sign_of_a_quaternion_is_free_but_one_for_all_of_its_components() -> None:
+    start = {"omega": ["0", "0", "0"], "quaternion": ["3/5", "0", "0", "4/5"]}
+
+    def said(*numbers: str) -> str:
+        values = [one("quaternion", place, number) for place, number in enumerate(numbers, 1)]
+        return judged(values, top=UPRIGHT, start=start).verdict
+
+    assert said("0.6", "0", "0", "0.8") == said("-0.6", "0", "0", "-0.8") == "holds"
+    assert said("0.6", "0", "0", "-0.8") == said("0.6", "0.1", "0", "0.8") == "refuted"
+
+
+def test_a_height_follows_from_gamma_alone_and_nothing_else_of_the_attitude_does() -> None:
+    assert judged([one("position", 3, "0.4600")]).verdict == "holds"
+    for name, component in (("position", 1), ("quaternion", 1)):
+        with pytest.raises(InputError, match="gamma does not fix"):
+            judged([one(name, component, "0.5")])
+
+
+def test_out_of_reach_is_undecided_with_the_reason_and_no_guess() -> None:
+    report = judged([one("omega", 1, "0.5", "100000"), one("energy", 1, "1.04", "100000")])
+    assert [row.holds for row in report.rows] == [None, True]
+    assert report.verdict == "undecided"
+    assert "digit" in report.rows[0].residual or "reach" in report.rows[0].residual
+    assert "digits_right" not in figures(report.rows[0])
+
+
+def test_scales_times_and_digits_far_from_one() -> None:
+    """Scaled by s in time: Omega by 1/s; numbers keep their digits, and the verdict with them."""
+    fast = {"omega": ["1e99", "4e99", "9e99"], "gamma": START["gamma"]}
+    heavy = TOP | {"weight": "1e200"}
+    slow = judged([one("omega", 1, "0.1", "-1/2")]).rows[0]
+    value = figures(judged([one("omega", 1, "0.1000000000000000", "-1/2")]).rows[0])["proven"]["value"]
+    near = f"{Fraction(value).numerator / Fraction(value).denominator:.12f}"
+    assert judged([one("omega", 1, near, "-1/2")]).verdict == "holds"
+    rows = judged([one("omega", 1, f"{near}e100", "-0.5e-100")], top=heavy, start=fast).rows
+    assert rows[0].holds is True
+    assert figures(rows[0])["digits_right"] == PrintedNumber.read(near, "x").digits
+    assert slow.holds is not None
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"value": []}, "length >= 1"),
+        ({"value": [one("speed", 1, "1")]}, "'speed' is none of this motion"),
+        ({"value": [one("kovalevskaya", 1, "1")]}, "none of this motion"),
+        ({"value": [one("omega", 4, "1")]}, "no component 4"),
+        ({"value": [one("energy", 2, "1")]}, "no component 2"),
+        ({"value": [one("omega", 0, "1")]}, ">= 1"),
+        ({"value": [one("omega", 1, "1"), one("omega", 1, "2", "0.0")]}, "stands in value 1 already"),
+        ({"value": [one("omega", 1, "1", tolerance="-1")]}, "negative"),
+        ({"value": [one("omega", 1, "1", tolerance="nan")]}, "tolerance"),
+        ({"value": [one("omega", 1, "1", "inf")]}, "time"),
+        ({"value": [one("omega", 1, 0.5)]}, "Expected `str`"),  # type: ignore[arg-type]
+        ({"value": [one("omega", 1, "1") | {"unit": "m"}]}, "unit"),
+        ({"body": TENSOR_BODY}, "one of"),
+        ({"top": None}, "one of"),
+        ({"top": TOP | {"rotor": "1"}}, "top.rotor is one number"),
+        ({"top": TOP | {"rotor": ["1", "0", "0"]}, "system": "heavy_top"}, "rotor"),
+        ({"top": TOP | {"weight": "1e"}}, "top, body or start"),
+        ({"start": {"omega": ["1", "2", "3"], "gamma": ["0.6", "0", "0.81"]}}, "not a unit vector"),
+        ({"start": {"omega": ["1", "2", "3"]}}, "No attitude"),
+        ({"start": {"gamma": ["1", "0", "0"]}}, "angular velocity"),
+        ({"start": START | {"quaternion": ["1", "0", "0"]}}, "quaternion has 3"),
+        ({"start": {"omega": ["1", "2", "3"], "matrix": ["1", "0", "0"]}}, "matrix"),
+        ({"start": {"omega": ["1", "2", "3"], "euler": "ZXZ:1,2"}}, "euler"),
+        ({"system": "pendulum"}, "pendulum"),
+        ({"assume": ["a > 0"]}, "assume"),
+        ({"domain": "all"}, "domain"),
+    ],
+)
+def test_what_is_no_claim_of_numbers_says_what_is_wrong(changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError) as error:
+        judged([one("omega", 1, "0.1")], **changes)
+    assert said in str(error.value)
+
+
+def test_a_rounded_gamma_is_taken_where_the_file_says_so() -> None:
+    start = {"omega": ["1", "2", "3"], "gamma": ["0.6", "0", "0.81"], "normalize": True}
+    found = judged([one("gamma", 1, "0.595")], start=start)
+    assert found.verdict == "holds"
+
+
+def test_the_systems_are_the_files_or_asked_for() -> None:
+    gyrostat = {"top": TOP | {"rotor": ["0", "0", "1/2"]}}
+    assert judged([one("omega", 1, "0.1")]).system == "heavy_top"
+    assert judged([one("omega", 1, "0.1")], **gyrostat).system == "heavy_gyrostat"
+    assert judged([one("omega", 1, "0.1")], "heavy_gyrostat").system == "heavy_gyrostat"
+    with pytest.raises(InputError, match="about heavy_top"):
+        judged([one("omega", 1, "0.1")], "heavy_gyrostat", system="heavy_top")
+    with pytest.raises(InputError, match="gyrostat"):  # centre of mass off axis 2
+        judged([one("omega", 1, "0.1")], "gyrostat")
+
+
+FILE = """
+name = "a table"
+kind = "value"
+[top]
+inertia = ["3", "2", "1"]
+weight = "1"
+centre = ["1/2", "1/3", "1/5"]
+[start]
+omega = ["1/10", "2/5", "9/10"]
+gamma = ["3/5", "0", "4/5"]
+[[value]]
+time = "2"
+quantity = "omega"
+component = 1
+number = "{}"
+[[value]]
+time = "2"
+quantity = "energy"
+number = "1.0400"
+"""
+
+
+def test_the_command_line_shows_printed_and_proven(tmp_path: Path) -> None:
+    path = tmp_path / "table.toml"
+    path.write_text(FILE.format("0.9"), "utf-8")
+    claim = read_claim(path)
+    assert isinstance(claim, ValueClaim)
+    found = audit_claim(claim)
+    assert found.verdict == "refuted"
+    near = f"{float(Fraction(figures(found.rows[0])['proven']['value'])):.5f}"
+    path.write_text(FILE.format(near), "utf-8")
+    done = in_process.heavytop("audit", path, "--json")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert (document["kind"], document["verdict"]) == ("value", "holds")
+    row = document["equations"][0]
+    assert row["printed"] == near
+    assert row["digits_right"] == row["digits_printed"] == PrintedNumber.read(near, "x").digits
+    assert row["domain"] == "t=2"
+    console = Console(width=120)
+    with console.capture() as shown:
+        console.print(audit_text(found))
+    for part in (
+        "omega 1",
+        "energy ",
+        "0.9",
+        "0 of 1",
+        "5 of 5",
+        "half a unit",
+        "refuted",
+        "+/-",
+        "Known from validated",
+    ):
+        assert part in shown.get()
+
+
+def test_a_claim_of_numbers_is_no_claim_of_formulas() -> None:
+    assert isinstance(claim_from_table(claim([one("omega", 1, "0.1")]), "x"), ValueClaim)
+    with pytest.raises(InputError, match="start"):
+        claim_from_table({"name": "x", "kind": "motion", "top": TOP, "start": START}, "x")

@@ -1,0 +1,168 @@
+"""Dokshevich's motions: random ones, turning points, odd sizes, every naming of the axes, algebraic starts."""
+
+import random
+from fractions import Fraction
+from math import isqrt
+
+import pytest
+from flint import arb
+from proofs import AsRounded, assert_algebraic_solves, assert_attitude, assert_narrow, assert_solves, positive, rational
+
+from heavytop.errors import InputError, NotInClass
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
+from heavytop.exact.balls import midpoint
+from heavytop.exact.catalogue import find
+from heavytop.exact.dokshevich import Dokshevich, dokshevich_motion
+from heavytop.exact.validated import Validated
+from heavytop.top.heavy_top import HeavyTop, State, dot
+
+F = Fraction
+# (tangent u, S - b, w, z/x) with rational S and axes: found by a search over small fractions
+SHAPES = (
+    (F(3, 4), F(-1, 12), F(5), F(5, 12)),
+    (F(4, 3), F(11, 12), F(25, 36), F(0)),
+    (F(4, 3), F(7, 12), F(89, 28), F(5, 12)),
+)
+
+
+def root(square):
+    found = F(isqrt(square.numerator), isqrt(square.denominator))
+    assert found * found == square
+    return found
+
+
+def shape(place, slope=None):
+    """Constants by their definitions, and a point (w, z/x) of z²/x² = C2 + K w − w², another one for a slope."""
+    u, excess, w, ratio = SHAPES[place]
+    d = u - 1 / u
+    b = (d * d + 3 - excess * excess) / (2 * excess - d)
+    a = b + d
+    s = root(a * a - a * b + b * b + 3)
+    first = (b - 2 * a - s) / 3
+    size = (a + b + 2 * s) / 3
+    p = (a * b + 3 * b * first + 2) / (b * b + 4)
+    sigma = (2 * p - b * first - 1) / b
+    middle = sigma - first - 1 / b
+    lead = first**2 + (a - b) * first - 1 - size * sigma
+    if slope is not None:  # the second point of the line through (w, ratio)
+        step = (middle - 2 * w - 2 * slope * ratio) / (1 + slope * slope)
+        w, ratio = w + step, ratio + slope * step
+    assert ratio * ratio == lead + middle * w - w * w
+    return u, (a, b, first, size, p, sigma), w, ratio
+
+
+def motion(place, slope=None, x=F(1), beta=F(1), moment=F(1), side=1):
+    """The exact motion with x = M·e1 and the units β and |n|; e1 = (cos, 0, sin) on the principal axes."""
+    u, (a, b, first, size, p, sigma), w, ratio = shape(place, slope)
+    cosine = u / root(1 + u * u)
+    sine = cosine / u
+    unit = w * x * x  # B
+    y, z = first * x + unit / x, ratio * x * side
+    minus_gamma = (size * (p * x * x + unit / b), size * (unit - sigma * x * x), size * x * z)
+    high, low = (a + b + u + 1 / u) / 2 * beta, (a + b - u - 1 / u) / 2 * beta
+    inertia = (1 / high, 1 / (b * beta), 1 / low)
+    # e3 = axis 2, e2 = e3 × e1 = (sin, 0, −cos): e1·I⁻¹e2 = β (u + 1/u) cos sin = β
+    momentum = (cosine * x + sine * y, z, sine * x - cosine * y)
+    gamma = tuple(beta / moment * g for g in minus_gamma)
+    up = (cosine * gamma[0] + sine * gamma[1], gamma[2], sine * gamma[0] - cosine * gamma[1])
+    omega = tuple(m / i for m, i in zip(momentum, inertia, strict=True))
+    return HeavyTop(inertia, 1, (moment * cosine, 0, moment * sine)), State(omega, up)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_every_random_motion_solves_all_six_equations(seed):
+    rng = random.Random(seed)
+    slope = None if seed < 3 else rational(rng, size=4)
+    sizes = positive(rng) * rng.choice((1, -1)), positive(rng), positive(rng)
+    case = Dokshevich(*motion(seed % 3, slope, *sizes, rng.choice((1, -1))))
+    assert_solves(case, rational(rng, size=30))
+    assert_narrow(case, F(10**6))
+    assert_attitude(case, rational(rng, size=30))
+    for time in (F(3, 2), F(-2)):
+        pairs = zip(case.state(time, 180), Validated(case.top, case.start).state(time, 180), strict=True)
+        assert all(a.overlaps(b) for a, b in pairs)
+
+
+def test_momentum_is_level_and_its_share_along_r_is_not_0():
+    top, start = motion(0, F(1, 3), F(2), F(3, 5), F(7))
+    momentum = top.angular_momentum(start.omega)
+    assert dot(momentum, start.gamma) == 0
+    assert dot(momentum, top.moment) != 0
+    _, (_, b, _, size, *_), w, _ = shape(0, F(1, 3))
+    assert dot(start.gamma, start.gamma) == (F(3, 5) / 7 * size * w * 4 / b) ** 2
+
+
+@pytest.mark.parametrize("axes", ALL)
+def test_it_is_found_under_every_naming_of_the_axes(axes):
+    top, start = motion(2)
+    named = renamed_top(top, axes), renamed_state(start, axes)
+    found = find(*named)
+    assert isinstance(getattr(found, "solution", found), Dokshevich)
+    assert (found.top, found.start) == named
+    assert_solves(found, F(7, 3))
+
+
+def test_a_turning_point_is_a_start_like_any_other():
+    case = Dokshevich(*motion(1))
+    assert case.start.omega[1] == 0
+    assert_solves(case, F(0))
+    assert_solves(case, F(-1000))
+
+
+@pytest.mark.parametrize("power", [100, -100])
+def test_units_do_not_matter(power):
+    unit = F(10) ** power
+    plain = Dokshevich(*motion(0))
+    other = Dokshevich(*motion(0, None, unit))  # momentum, and so time
+    for one, same, factor in zip(
+        plain.state(F(7, 3), 170), other.state(F(7, 3) / unit, 900), [unit] * 3 + [unit * unit] * 3, strict=True
+    ):
+        assert abs(midpoint(one) - midpoint(same) / factor) < F(1, 10**45)
+
+
+def test_the_case_of_the_plans_is_one():
+    start = State(("8/7", "-17/14", "6/7"), ("23/49", "24/49", "36/49"))
+    found = find(HeavyTop(("3/10", "4/5", "1/2"), 1, ("25/18", "-25/24", 0)), start)
+    assert isinstance(getattr(found, "solution", found), Dokshevich)
+
+
+def test_what_is_outside_is_refused_with_the_equality_that_failed():
+    top, start = motion(0)
+    other = top.inertia[0], top.inertia[1] + F(1, 10**30), top.inertia[2]
+    with pytest.raises(NotInClass, match=r"I1 \(I2 - I3\) a\^2"):
+        Dokshevich(HeavyTop(other, 1, top.centre), start)
+    with pytest.raises(NotInClass, match="P b = 0"):
+        Dokshevich(HeavyTop(top.inertia, 1, (top.centre[0], 1, top.centre[2])), start)
+    for place, what in ((0, r"z\^2|gamma|not positive"), (1, r"z\^2"), (2, r"z\^2|gamma")):
+        omega = list(start.omega)
+        omega[place] += F(1, 10**30)
+        with pytest.raises(NotInClass, match=what):
+            Dokshevich(top, State(omega, start.gamma))
+    for place in range(3):
+        gamma = list(start.gamma)
+        gamma[place] += F(1, 10**30)
+        with pytest.raises(NotInClass, match="gamma"):
+            Dokshevich(top, State(start.omega, gamma))
+    x, z = top.centre[0], top.centre[2]
+    with pytest.raises(NotInClass, match="Hess' own motion"):
+        Dokshevich(top, State((z / top.inertia[0], 1, -x / top.inertia[2]), start.gamma))
+    with pytest.raises(NotInClass, match="square of no rational number"):
+        Dokshevich(HeavyTop((6, 4, 3), 1, (2, 0, 2)), State((1, 1, 1), (0, 1, 0)))
+
+
+@pytest.mark.parametrize("data", [((8, 6, 3), F(1, 3)), ((3, 4, 5), F(-9, 10)), (("1/2", 1, "11/10"), F(1, 1000))])
+def test_every_hess_top_has_one_with_an_algebraic_start(data):
+    case = dokshevich_motion(tuple(map(F, data[0])), data[1])
+    for time in (F(0), F(7, 3), F(-(10**6))):
+        assert_algebraic_solves(case, time)
+    assert_attitude(AsRounded(case), F(7, 3))
+    top, start = case.rounded(220)
+    assert dot(start.gamma, start.gamma) == 1
+    enclosed = Validated(top, start).state(F(10), 170)
+    assert max(abs(a - b) for a, b in zip(case.state(F(10), 170), enclosed, strict=True)) < arb("1e-50")
+
+
+@pytest.mark.parametrize("data", [((8, 3, 6), F(1, 2)), ((0, 1, 2), F(1, 2)), ((8, 6, 3), F(1)), ((8, 6, 3), F(0))])
+def test_numbers_of_no_such_top_are_refused(data):
+    with pytest.raises(InputError):
+        dokshevich_motion(tuple(map(F, data[0])), data[1])

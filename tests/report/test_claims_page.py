@@ -1,0 +1,126 @@
+"""The page of audited claims: what stands in an entry is shown, none of it is read as markup."""
+
+from __future__ import annotations
+
+import copy
+import re
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import msgspec
+import pytest
+
+from heavytop.claims.audit import audit_claim
+from heavytop.claims.entry import Entry
+from heavytop.claims.from_file import claim_from_table
+from heavytop.report.claims_page import page
+from heavytop.suite import claim_library
+from heavytop.suite.claim_library import Equation, Library, Published, is_current
+
+ENTRY: dict[str, Any] = {
+    "id": "spin",
+    "title": "Spin of a *symmetric* top",
+    "language": "en",
+    "read": "the text",
+    "status": "as published",
+    "expects": "holds",
+    "note": "Where | two_moments are <b>equal</b>.",
+    "source": {"authors": ["L. & Co"], "year": 1788, "title": "On `tops`", "doi": "10.1/a_b"},
+}
+SPIN: dict[str, Any] = {
+    "kind": "integral",
+    "parameters": {"A": "2", "C": "1"},
+    "top": {"inertia": ["A", "A", "C"], "weight": "1", "centre": ["0", "0", "1/2"]},
+    "integral": {"value": "Omega3"},
+}
+NUMBERS: dict[str, Any] = {
+    "kind": "value",
+    "top": {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["0", "0", "1/2"]},
+    "start": {"omega": ["1/10", "2/5", "9/10"], "gamma": ["3/5", "0", "4/5"]},
+    "value": [
+        {"time": "0", "quantity": "omega", "component": 2, "number": "0.40"},
+        {"time": "0", "quantity": "energy", "number": "9.99"},
+    ],
+}
+
+
+def published(claim: dict[str, Any], **changes: Any) -> Published:
+    entry = msgspec.convert(copy.deepcopy(ENTRY) | changes, Entry)
+    found = audit_claim(claim_from_table(ENTRY | changes | claim, "x"))
+    rows = [msgspec.convert(row.to_json(), Equation) for row in found.rows]
+    return Published(
+        entry=entry,
+        claim=claim,
+        system=found.system,
+        kind=found.kind,
+        verdict=found.verdict,  # type: ignore[arg-type]
+        reason="",
+        equations=rows,
+        solves=[],
+    )
+
+
+@pytest.fixture(scope="module")
+def shown() -> str:
+    misprint = SPIN | {"integral": {"value": "Omega3 + Omega1^2/2"}}
+    motion = SPIN | {"kind": "motion", "motion": {"omega": ["0", "0", "A"], "gamma": ["0", "0", "1"]}, "integral": None}
+    motion = {key: part for key, part in motion.items() if part is not None}
+    wrong = published(misprint, id="misprint", title="Wrong", expects="refuted")
+    claims = [published(SPIN, corrects="misprint"), wrong, published(NUMBERS, id="numbers"), published(motion, id="m")]
+    return page(Library(library="heavytop library of claims", version="1.0.0", claims=claims))
+
+
+def test_every_claim_stands_under_its_verdict_and_in_the_table(shown: str) -> None:
+    heads = re.findall(r"^## (.+)$", shown, re.M)
+    assert heads == ["Refuted", "Proven"]
+    proven = shown[shown.index("## Proven") :]
+    assert "(spin)=" in proven
+    assert "(m)=" in proven
+    assert "(misprint)=" not in proven
+    assert "(numbers)=" not in proven
+    assert "4 claims: 2 proven, 2 refuted." in shown
+    assert shown.count("](#spin)") == 2  # the table, and the misprint that it corrects
+    assert "Corrects [Wrong](#misprint)." in proven
+
+
+def test_formulas_conditions_witness_and_numbers_are_there(shown: str) -> None:
+    assert "<details><summary>Conditions of the proofs</summary>" in shown
+    assert "Witness: " in shown
+    assert "±" in shown
+    refuted = shown[shown.index("(misprint)=") : shown.index("(numbers)=")]
+    assert "<mfrac>" in refuted
+    assert "<mi>Ω</mi>" in refuted
+    assert "<td>0.40</td><td>2 of 2</td>" in shown
+    assert "<td>energy</td>" in shown
+    assert "<td>9.99</td><td>0 of 3</td>" in shown
+    assert "[doi:10.1/a\\_b](<https://doi.org/10.1/a_b>)" in shown
+
+
+def test_nothing_of_an_entry_becomes_markup(shown: str) -> None:
+    assert "\\*symmetric\\*" in shown
+    assert "\\<b\\>equal\\</b\\>" in shown
+    for block in re.findall(r'<div class="claim">\n.*?\n</div>', shown, re.S):
+        assert "\n\n" not in block
+        ElementTree.fromstring(block.replace("&#x2062;", "").replace("&#x2061;", ""))
+
+
+def test_a_document_is_current_only_of_the_entries_as_they_stand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = published(SPIN, note="a")
+    document = Library(library="x", version="1.0.0", claims=[found])
+    stated = {"spin": found.entry}
+    monkeypatch.setattr(claim_library, "library", lambda: stated)
+    monkeypatch.setattr(claim_library, "_claim", lambda entry: SPIN)
+    assert is_current(document)
+    monkeypatch.setattr(claim_library, "_claim", lambda entry: SPIN | {"integral": {"value": "Omega1"}})
+    assert not is_current(document)
+    monkeypatch.setattr(claim_library, "_claim", lambda entry: SPIN)
+    stated["spin"] = msgspec.structs.replace(found.entry, note="b")
+    assert not is_current(document)
+    unexpected = msgspec.structs.replace(found, verdict="undecided")
+    stated["spin"] = found.entry
+    assert not is_current(Library(library="x", version="1.0.0", claims=[unexpected]))
+    stated["more"] = msgspec.structs.replace(found.entry, id="more")
+    assert not is_current(document)
