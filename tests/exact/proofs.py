@@ -19,7 +19,7 @@ DIGITS_60 = 200
 def parameters(solution):
     """The parameters of the solution's field as balls at the working precision."""
     exact = solution.system.parameters(solution.top, solution.start)
-    return Parameters([ball(i) for i in exact.inertia], [ball(n) for n in exact.moment], ball(Fraction(exact.rotor)))
+    return exact.mapped(lambda value: ball(Fraction(value)))
 
 
 def residual(solution, time, bits=DIGITS_60):

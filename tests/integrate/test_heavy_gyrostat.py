@@ -270,13 +270,14 @@ def test_permanent_rotations_are_found_and_carry_the_attitude() -> None:
 
 
 def test_no_closed_form_of_the_heavy_top_is_taken_for_a_top_with_a_rotor() -> None:
-    """Each would forget k: the enclosure is the only one, and the heavy top refuses the data."""
+    """Each would forget k: of a top with weight the enclosure is the only one, and the heavy top refuses the data."""
     for name in ("euler", "lagrange", "kovalevskaya", "goryachev-chaplygin", "hess"):
         if name not in CASES:
             continue
         case = CASES[name]
         top = HeavyTop(case.top.inertia, case.top.weight, case.top.centre, ("1/10", "1/7", "1/3"))
-        assert find(top, case.start, HEAVY_GYROSTAT).method.startswith("validated")
+        known = "validated" if any(case.top.moment) else "closed form: Zhukovsky-Volterra"
+        assert find(top, case.start, HEAVY_GYROSTAT).method.startswith(known)
         with pytest.raises(InputError, match="rotor"):
             find(top, case.start)
         with pytest.raises(InputError, match="rotor"):

@@ -35,6 +35,7 @@ from heavytop.exact.spherical import SphericalTop
 from heavytop.exact.staude import Staude
 from heavytop.exact.steklov import Steklov
 from heavytop.exact.validated import Validated
+from heavytop.exact.zhukovsky_volterra import ZhukovskyVolterra
 from heavytop.precision import shown
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
@@ -128,7 +129,10 @@ _GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (Gyrostat.of, _KEEP),
 )
 
-_HEAVY_GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = ((_permanent_heavy_gyrostat, _KEEP),)
+_HEAVY_GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
+    (_permanent_heavy_gyrostat, _KEEP),
+    (ZhukovskyVolterra, _KEEP),
+)
 _CASES = {HEAVY_TOP.name: _HEAVY_TOP, GYROSTAT.name: _GYROSTAT, HEAVY_GYROSTAT.name: _HEAVY_GYROSTAT}
 
 

@@ -1,0 +1,137 @@
+"""The gyrostat of Zhukovsky and Volterra: random ones, limits, odd sizes, and the paper's gyrostat as its case."""
+
+import random
+from fractions import Fraction
+
+import mpmath
+import pytest
+from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
+
+import heavytop as ht
+from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
+from heavytop.exact.balls import midpoint
+from heavytop.exact.catalogue import find
+from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.validated import Validated
+from heavytop.exact.zhukovsky_volterra import ZhukovskyVolterra
+from heavytop.top.equations import HEAVY_GYROSTAT
+from heavytop.top.heavy_top import HeavyTop, State, dot
+
+F = Fraction
+START = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
+TOP = HeavyTop((3, 2, 1), 0, (0, 0, 0), ("1/2", "-1/3", "3/4"))
+
+
+def random_motion(seed):
+    """Any body, rotor and start; γ of any length."""
+    rng = random.Random(seed)
+    moments = sorted((positive(rng), positive(rng), positive(rng)))
+    moments[2] = min(moments[2], (moments[0] + moments[1]) * F(15, 16))
+    rng.shuffle(moments)
+    top = HeavyTop(moments, 0, (0, 0, 0), [rational(rng, size=3) for _ in range(3)])
+    start = State([rational(rng, size=3) for _ in range(3)], [rational(rng, size=2) for _ in range(3)])
+    return ZhukovskyVolterra(top, start)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_every_random_motion_solves_all_six_equations(seed):
+    motion = random_motion(seed)
+    assert_solves(motion, rational(random.Random(seed), size=30))
+    assert_narrow(motion, F(10**6))
+    assert_attitude(motion, rational(random.Random(seed + 50), size=30))
+    for time in (F(3, 2), F(-2)):
+        enclosed = Validated(motion.top, motion.start, HEAVY_GYROSTAT).state(time, 180)
+        assert all(a.overlaps(b) for a, b in zip(motion.state(time, 180), enclosed, strict=True))
+
+
+def test_an_integration_that_knows_nothing_of_it_agrees():
+    def cross(a, b):
+        return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+    with mpmath.workdps(30):
+        inertia, rotor = (3, 2, 1), (mpmath.mpf(1) / 2, -mpmath.mpf(1) / 3, mpmath.mpf(3) / 4)
+
+        def field(_time, y):
+            momentum = [i * w + k for i, w, k in zip(inertia, y[:3], rotor, strict=True)]
+            rates = [m / i for m, i in zip(cross(momentum, y[:3]), inertia, strict=True)]
+            return [*rates, *cross(y[3:], y[:3])]
+
+        found = mpmath.odefun(
+            field, 0, [mpmath.mpf(v.numerator) / v.denominator for v in START.flat], tol=mpmath.mpf(10) ** -25
+        )(3)
+        known = ht.reference(TOP, START, [3], 30)
+        assert "Zhukovsky" in known.method
+        for value, ball in zip(found, known.states[0], strict=True):
+            assert abs(value - mpmath.mpf(ball.value)) < mpmath.mpf(10) ** -22
+
+
+@pytest.mark.parametrize("axes", ALL)
+def test_it_is_found_under_every_naming_of_the_axes(axes):
+    found = find(renamed_top(TOP, axes), renamed_state(START, axes), HEAVY_GYROSTAT)
+    assert isinstance(found, ZhukovskyVolterra)
+    assert_solves(found, F(7, 3))
+
+
+def test_the_paper_s_gyrostat_is_its_case():
+    """Ω here is Ω + λ e2 there, k = (0, −I2 λ, 0), M and γ are the same."""
+    rate = F(2, 7)
+    top, start = HeavyTop((3, 2, 1), 0, (0, 0, 0)), State(("1/10", "2/5", "9/10"), ("3/10", "4/5", "9/10"))
+    other = Gyrostat(top, start, rate)
+    omega = (start.omega[0], start.omega[1] + rate, start.omega[2])
+    carried = HeavyTop((3, 2, 1), 0, (0, 0, 0), (0, -2 * rate, 0))
+    motion = ZhukovskyVolterra(carried, State(omega, start.gamma))
+    assert motion.momentum == other.momentum
+    for time in (F(0), F(7, 3), F(-1000)):
+        mine, theirs = motion.state(time, 170), other.state(time, 170)
+        for place, (a, b) in enumerate(zip(mine, theirs, strict=True)):
+            assert abs(midpoint(a) - midpoint(b) - (rate if place == 1 else 0)) < F(1, 10**48)
+
+
+@pytest.mark.parametrize("power", [100, -100])
+def test_units_do_not_matter(power):
+    unit = F(10) ** power
+    top = HeavyTop(TOP.inertia, 0, (0, 0, 0), [k * unit for k in TOP.rotor])
+    other = ZhukovskyVolterra(top, State([w * unit for w in START.omega], START.gamma))
+    plain = ZhukovskyVolterra(TOP, START)
+    factors = [unit] * 3 + [F(1)] * 3
+    for one, same, factor in zip(plain.state(F(7, 3), 170), other.state(F(7, 3) / unit, 900), factors, strict=True):
+        assert abs(midpoint(one) - midpoint(same) / factor) < F(1, 10**45)
+
+
+def test_a_body_without_rotor_is_eulers():
+    top = HeavyTop((3, 2, 1), 0, (0, 0, 0), (0, 0, 0))
+    motion, euler = ZhukovskyVolterra(top, START), find(HeavyTop((3, 2, 1), 0, (0, 0, 0)), START)
+    for time in (F(7, 3), F(10**6)):
+        assert all(a.overlaps(b) for a, b in zip(motion.state(time, 170), euler.state(time, 170), strict=True))
+
+
+@pytest.mark.parametrize("gamma", [(0, 0, 0), "along M", "across M"])
+def test_gamma_may_be_anything(gamma):
+    momentum = TOP.angular_momentum(START.omega)
+    vectors = {"along M": momentum, "across M": (momentum[1], -momentum[0], 0)}
+    motion = ZhukovskyVolterra(TOP, State(START.omega, vectors.get(gamma, gamma)))
+    assert_solves(motion, F(7, 3))
+    assert dot(motion.start.gamma, motion.momentum) == (dot(momentum, momentum) if gamma == "along M" else 0)
+
+
+def test_permanent_rotations_turn_gamma():
+    # M ∥ Ω: I Ω + k = 2 Ω
+    top = HeavyTop((3, 2, 1), 0, (0, 0, 0), ("-1/10", 0, "9/10"))
+    motion = ZhukovskyVolterra(top, START)
+    assert motion.permanent
+    assert_solves(motion, F(7, 3))
+    assert_attitude(motion, F(7, 3))
+
+
+@pytest.mark.parametrize(("inertia", "rotor"), [((2, 2, 1), (0, 0, 1)), ((2, 2, 2), (1, 2, 3)), ((2, 2, 1), (0, 0, 0))])
+def test_limits_are_refused_by_name_and_enclosed(inertia, rotor):
+    top = HeavyTop(inertia, 0, (0, 0, 0), rotor)
+    with pytest.raises(LevelNotDone, match="aperiodic, or that of a symmetric top"):
+        ZhukovskyVolterra(top, START)
+    assert ht.reference(top, START, [1], 20).states
+
+
+def test_a_weight_is_refused():
+    with pytest.raises(NotInClass, match="has no weight"):
+        ZhukovskyVolterra(HeavyTop((3, 2, 1), 1, (0, 0, 1), (1, 0, 0)), START)
