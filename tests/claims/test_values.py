@@ -13,13 +13,18 @@ import pytest
 from rich.console import Console
 
 import in_process
+from heavytop.claims import entry as entries
+from heavytop.claims import verdicts
 from heavytop.claims.audit import audit_claim
 from heavytop.claims.from_file import claim_from_table, read_claim
 from heavytop.claims.judge import Audit, Row
 from heavytop.claims.printed_number import PrintedNumber
 from heavytop.claims.values import ValueClaim
 from heavytop.errors import InputError
+from heavytop.kinds import KINDS
+from heavytop.kinds.audit import AuditTable
 from heavytop.report.audit_text import audit_text
+from heavytop.suite.checkpoint import Saved
 from heavytop.top.equations import system
 
 TOP = {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["1/2", "1/3", "1/5"]}
@@ -378,3 +383,26 @@ def test_a_claim_of_numbers_is_no_claim_of_formulas() -> None:
     assert isinstance(claim_from_table(claim([one("omega", 1, "0.1")]), "x"), ValueClaim)
     with pytest.raises(InputError, match="start"):
         claim_from_table({"name": "x", "kind": "motion", "top": TOP, "start": START}, "x")
+
+
+def test_a_report_counts_the_digits_that_are_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    head = 'id = "three"\ntitle = "Three"\nlanguage = "en"\nread = "the text"\nstatus = "as published"\n'
+    head += 'expects = "refuted"\nnote = "A slip."\nsource = {authors = ["A"], year = 2000, title = "T"}\n'
+    body = FILE.format("0.203").replace('name = "a table"\n', "")
+    (tmp_path / "three.toml").write_text(head + body, "utf-8")
+    monkeypatch.setattr(entries, "FOLDER", tmp_path)
+    monkeypatch.setattr(verdicts, "FOLDER", tmp_path)
+    entries.library.cache_clear()
+    try:
+        (task,) = AuditTable(claims=["three"]).tasks(lambda name: pytest.fail(name))
+        row = KINDS["audit"].measure(task, Saved())
+    finally:
+        entries.library.cache_clear()
+    assert {name: metric.value for name, metric in row.metrics.items()} == {
+        "(omega).1 printed t=2": "0",
+        "(energy).1 printed t=2": "1",
+        "digits_right.omega1 printed t=2": "1",
+        "digits_right.energy1 printed t=2": "5",
+        "as_expected": "1",
+    }
+    assert KINDS["audit"].brief([row]) == ["Library of 1 claims: 1 refuted; every verdict as expected."]

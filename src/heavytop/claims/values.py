@@ -277,7 +277,7 @@ def _given(content: ValueFile) -> tuple[HeavyTop | Body, State]:
 def _rows_of(group: Sequence[Figure], motion: _KnownNumbers) -> list[Row]:
     """The rows of the numbers of one quantity at one time, each judged by the narrowest ball that was made."""
     found: list[Judgement] | None = None
-    missing = "narrower balls do not decide whether that is within what is allowed"
+    missing = "the balls that can be proven do not decide whether that is within what is allowed"
     needed = min(_MOST_BITS, max(_FIRST_BITS, *(figure.bits for figure in group)))
     trials = [_FIRST_BITS, *(min(_MOST_BITS, needed << doubling) for doubling in range(_DOUBLINGS + 1))]
     while trials and not (found and all(each.decided for each in found)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import log10
 from typing import Literal
 
 from rich.console import RenderableType
@@ -28,6 +29,7 @@ from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
 
 NAME, LIBRARY = "audit", "library"
 EXPECTED = Quantity("as_expected")
+DIGITS = "digits_right"
 _SMOOTH = "smooth"
 _SYSTEMS = {HEAVY_TOP.name: "the heavy top", GYROSTAT.name: "the gyrostat"}
 _SECONDS = 1.5
@@ -155,13 +157,22 @@ class Audit(Kind):
 
 
 def _of_entry(task: Task) -> Row:
-    """Its equations, and whether its verdict is the expected one; where the audit is stopped that alone, unresolved."""
+    """Its equations, and whether its verdict is the expected one; where the audit is stopped that alone, unresolved.
+
+    Of published numbers also how many of their digits are right.
+    """
     entry = library()[task.key.case]
     judged, found = audited(entry)
     metrics: dict[Quantity, Metric] = {}
     for row in () if found is None else found.rows:
         where = Quantity(f"({row.equation})", str(row.component), "", row.branch, row.domain)
         metrics[where] = _value(row.holds)
+        right = (row.figures or {}).get(DIGITS)
+        if right is not None:
+            label = f"{row.equation}{row.component}"
+            metrics[Quantity(DIGITS, label, "", row.branch, row.domain)] = Metric(
+                str(right), log10(right) if right else None, "value"
+            )
     metrics[EXPECTED] = _value(
         None if judged.verdict == "undecided" != entry.expects else judged.verdict == entry.expects
     )
@@ -201,7 +212,11 @@ def _value(holds: bool | None) -> Metric:
 
 def _verdict(row: Row) -> tuple[str, list[Quantity], int]:
     """The verdict, the equations that are refuted, and how many are proven."""
-    equations = [metric for metric in row.metrics.values() if metric.quantity != EXPECTED]
+    equations = [
+        metric
+        for metric in row.metrics.values()
+        if metric.quantity != EXPECTED and (metric.quantity is None or metric.quantity.name != DIGITS)
+    ]
     refuted = [metric.quantity or Quantity("?") for metric in equations if metric.value == "0"]
     held = sum(metric.value == "1" for metric in equations)
     undecided = len(equations) - held - len(refuted)
