@@ -34,6 +34,11 @@ class Kind(Enum):
         return sign.value > 0 and (sign.strict or self is Kind.NONNEGATIVE)
 
 
+def written(text: str) -> str:
+    """A formula as files have it: a power is ``^``."""
+    return text.replace("**", "^")
+
+
 @dataclass(frozen=True, slots=True)
 class Need:
     """One condition on one expression.
