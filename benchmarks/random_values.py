@@ -151,6 +151,7 @@ def main() -> int:
             said = (row.figures or {}).get("digits_right")
             if row.holds is None:
                 counts["undecided"] += 1
+                print("undecided:", row.statement, row.residual)
             elif row.holds is not right or said != digits:
                 counts["false"] += 1
                 print("false:", row.statement, row.residual, said, digits)
