@@ -135,4 +135,4 @@ def test_the_results_are_of_the_entries_as_they_stand() -> None:
     document = json.loads((folder / "library.json").read_bytes())
     jsonschema.validate(document, json.loads((folder / "library.schema.json").read_bytes()))
     assert is_current(msgspec.convert(document, Library, strict=True))
-    assert set(ht.read_report(folder).to_pandas()["case"]) == {each["entry"]["id"] for each in document["claims"]}
+    assert {row.case for row in ht.read_report(folder).rows} == {each["entry"]["id"] for each in document["claims"]}
