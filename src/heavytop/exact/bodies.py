@@ -104,7 +104,7 @@ def _start(start: State, bits: int) -> tuple[Vector, tuple[Vector, Vector, Vecto
     return turned, rows, (off * sum(map(abs, start.omega_space), Fraction(0)), off)
 
 
-def _near(attitude: Attitude, bits: int) -> tuple[Rows, Fraction]:
+def _near(attitude: Attitude, bits: int) -> tuple[tuple[Vector, Vector, Vector], Fraction]:
     """A rational rotation, and how far its entries are off: about 2^-bits, of large angles by more working bits."""
     for more in _MORE_BITS:
         rows = attitude.rational_rows(bits + more)
