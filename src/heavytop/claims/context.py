@@ -23,8 +23,8 @@ from heavytop.claims.real_zeros import conditions_for_zero
 from heavytop.claims.relations import solve_relations
 from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import Setting
-from heavytop.claims.tensor import minors, of_bodies, read_tensor
 from heavytop.claims.statements import SYSTEMS
+from heavytop.claims.tensor import minors, of_bodies, read_tensor
 from heavytop.errors import InputError, quoted
 from heavytop.precision import exact
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System, system
