@@ -24,15 +24,19 @@ _REMEDY = "See docs/claims-in-toml.md; worked examples are in src/heavytop/claim
 Text = Annotated[str, msgspec.Meta(max_length=20_000)]
 Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,30}$")]
 Three = Annotated[list[Text], msgspec.Meta(min_length=3, max_length=3)]
+Tensor = Annotated[list[Text | list[Text]], msgspec.Meta(min_length=3, max_length=9)]
 Samples = Annotated[list[Text], msgspec.Meta(min_length=1, max_length=8)]
 
 
 class TopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[top]: principal moments, weight, centre of mass; the rotor, λ where the claim is about `gyrostat`, or k1, k2,
+    """[top]: moments of inertia, weight, centre of mass; the rotor, λ where the claim is about `gyrostat`, or k1, k2,
     k3 where it is about `heavy_gyrostat`.
+
+    inertia: three principal moments; or a tensor in other axes: six numbers I11, I22, I33, I12, I13, I23, nine row by
+    row, or three rows of three.
     """
 
-    inertia: Three
+    inertia: Tensor
     weight: Text
     centre: Three
     rotor: Text | Three | None = None

@@ -57,7 +57,12 @@ class Parameters(NamedTuple):
 
 
 def heavy_top(p: Parameters, y: Any) -> tuple[Any, ...]:
-    """(1.1) M' = M × Ω + P γ × r and (1.2) γ' = γ × Ω, as (Ω', γ') in the order of the state."""
+    """(1.1) M' = M × Ω + P γ × r and (1.2) γ' = γ × Ω, as (Ω', γ') in the order of the state.
+
+    ``p.inertia`` may be the three rows of a full tensor.
+    """
+    if isinstance(p.inertia[0], tuple):
+        return _of_full_tensor(p, y, None)
     (i1, i2, i3), n = p.inertia, p.moment
     w1, w2, w3 = omega = y[:3]
     gamma = y[3:6]
@@ -90,8 +95,11 @@ def heavy_gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
     """M' = M × Ω + γ × n and γ' = γ × Ω with M = IΩ + k: a heavy top that carries a rotor of constant momentum k.
 
     k = 0 is the heavy top.  n = 0 is the gyrostat of Zhukovsky and Volterra; :func:`gyrostat` is its case
-    k = (0, −I2 λ, 0), where Ω here is Ω + λ e2 there, and M and γ are the same.
+    k = (0, −I2 λ, 0), where Ω here is Ω + λ e2 there, and M and γ are the same.  ``p.inertia`` may be the three rows of
+    a full tensor.
     """
+    if isinstance(p.inertia[0], tuple):
+        return _of_full_tensor(p, y, p.rotor)
     (i1, i2, i3), n = p.inertia, p.moment
     w1, w2, w3 = omega = y[:3]
     gamma = y[3:6]
@@ -102,6 +110,23 @@ def heavy_gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
         ((i1 - i2) * (w1 * w2) + turning[2] + torque[2]) / i3,
         *cross(gamma, omega),
     )
+
+
+def _of_full_tensor(p: Parameters, y: Any, rotor: Any) -> tuple[Any, ...]:
+    """The same with products of inertia: Ω' = I⁻¹ (M × Ω + γ × n), I⁻¹ by the cofactors of the symmetric tensor."""
+    (a, f, e), (_, b, d), (_, _, c) = rows = p.inertia
+    omega, gamma = y[:3], y[3:6]
+    m = tuple(dot(row, omega) for row in rows)
+    if rotor is not None:
+        m = tuple(own + part for own, part in zip(m, rotor, strict=True))
+    torque = tuple(own + part for own, part in zip(cross(m, omega), cross(gamma, p.moment), strict=True))
+    adjugate = (
+        (b * c - d * d, d * e - c * f, d * f - b * e),
+        (d * e - c * f, a * c - e * e, e * f - a * d),
+        (d * f - b * e, e * f - a * d, a * b - f * f),
+    )
+    determinant = dot(rows[0], adjugate[0])
+    return (*(dot(row, torque) / determinant for row in adjugate), *cross(gamma, omega))
 
 
 def _omega(p: Parameters, y: Any) -> tuple[Any, ...]:
