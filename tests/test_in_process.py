@@ -3,8 +3,9 @@
 import sys
 from pathlib import Path
 
-import in_process
 import pytest
+
+import in_process
 
 
 def test_integrators_of_a_test_go_and_libraries_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
