@@ -100,7 +100,7 @@ def motion_statements(motion: Motion, p: Parameters, system: System) -> Iterator
     turning = "(Omega + lambda*e2)" if system is GYROSTAT else "Omega"
     torque = "" if system is GYROSTAT else " + P*gamma x r"
     carried = ", M = I*Omega + k" if system is HEAVY_GYROSTAT else ""
-    field = system.field(p, y)
+    field = system.rates(p, y)
     for index, (value, claimed) in enumerate(zip(y, field, strict=True)):
         text = f"gamma' = gamma x {turning}" if index >= 3 else f"M' = M x {turning}{torque}{carried}"
         residual = motion.rate(value) - claimed
@@ -148,7 +148,7 @@ def why_not_equivalent() -> Sequence[Finding]:
     )
     p = Parameters(inertia, moment, sympy.Integer(0))
     state = (*omega, *gamma)
-    field = HEAVY_TOP.field(p, state)
+    field = HEAVY_TOP.rates(p, state)
     rates = (*field[:3], *(g + d for g, d in zip(field[3:], delta, strict=True)))
 
     def rate(value: sympy.Expr) -> sympy.Expr:

@@ -128,7 +128,7 @@ class UserIntegral(FileClaim):
 
     def _rate(self, system: System) -> Rate:
         """The derivative along the field of ``system``."""
-        rates = system.field(self.context.parameters(system), STATE)
+        rates = system.rates(self.context.parameters(system), STATE)
         return rate_along(dict(zip(STATE, rates, strict=True)))
 
     def _parts(self, value: sympy.Expr) -> tuple[sympy.Expr, ...]:

@@ -57,12 +57,7 @@ class Parameters(NamedTuple):
 
 
 def heavy_top(p: Parameters, y: Any) -> tuple[Any, ...]:
-    """(1.1) M' = M × Ω + P γ × r and (1.2) γ' = γ × Ω, as (Ω', γ') in the order of the state.
-
-    ``p.inertia`` may be the three rows of a full tensor.
-    """
-    if isinstance(p.inertia[0], tuple):
-        return _of_full_tensor(p, y, None)
+    """(1.1) M' = M × Ω + P γ × r and (1.2) γ' = γ × Ω, as (Ω', γ') in the order of the state."""
     (i1, i2, i3), n = p.inertia, p.moment
     w1, w2, w3 = omega = y[:3]
     gamma = y[3:6]
@@ -95,11 +90,8 @@ def heavy_gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
     """M' = M × Ω + γ × n and γ' = γ × Ω with M = IΩ + k: a heavy top that carries a rotor of constant momentum k.
 
     k = 0 is the heavy top.  n = 0 is the gyrostat of Zhukovsky and Volterra; :func:`gyrostat` is its case
-    k = (0, −I2 λ, 0), where Ω here is Ω + λ e2 there, and M and γ are the same.  ``p.inertia`` may be the three rows of
-    a full tensor.
+    k = (0, −I2 λ, 0), where Ω here is Ω + λ e2 there, and M and γ are the same.
     """
-    if isinstance(p.inertia[0], tuple):
-        return _of_full_tensor(p, y, p.rotor)
     (i1, i2, i3), n = p.inertia, p.moment
     w1, w2, w3 = omega = y[:3]
     gamma = y[3:6]
@@ -113,7 +105,10 @@ def heavy_gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
 
 
 def _of_full_tensor(p: Parameters, y: Any, rotor: Any) -> tuple[Any, ...]:
-    """The same with products of inertia: Ω' = I⁻¹ (M × Ω + γ × n), I⁻¹ by the cofactors of the symmetric tensor."""
+    """(1.1), (1.2) with products of inertia, ``p.inertia`` the three rows of the tensor, and k = ``rotor`` or None.
+
+    Ω' = I⁻¹ (M × Ω + γ × n), with I⁻¹ by the cofactors of the symmetric tensor.
+    """
     (a, f, e), (_, b, d), (_, _, c) = rows = p.inertia
     omega, gamma = y[:3], y[3:6]
     m = tuple(dot(row, omega) for row in rows)
@@ -173,6 +168,15 @@ class System:
             part, rest = tuple(rest[:size]), rest[size:]
             found[name] = part if size == 3 else part[0]
         return Parameters(**found)
+
+    def rates(self, p: Parameters, y: Any) -> tuple[Any, ...]:
+        """The field where ``p.inertia`` may be the three rows of a full tensor, with y in its axes.
+
+        :attr:`field` itself is for principal axes and has no branch: it is compiled.
+        """
+        if not isinstance(p.inertia[0], tuple):
+            return self.field(p, y)
+        return _of_full_tensor(p, y, p.rotor if "rotor" in self.enters else None)
 
     def attitude(self, p: Parameters, y: Any, xi: Any) -> tuple[Any, Any, Any]:
         """ξ' = ξ × ω for a vector ξ fixed in space."""
