@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import ClassVar, Self
+from typing import Self
 
 import sympy
 from flint import arb
@@ -31,7 +31,7 @@ from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Paramete
 
 TIME = sympy.Symbol("t", real=True)
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
-_RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
+RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
 _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
 """Of numerator and denominator of a number in a sample: 2000 digits."""
@@ -103,9 +103,11 @@ def _other_rotor(system: System) -> InputError:
 
 def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Context:
     """Parsed parameters, assumptions, definitions and top; raises InputError for what cannot be understood."""
+    variables = tuple(variables)
+    reserved = RESERVED.union(map(str, variables))
     for name in (*content.parameters, *content.definitions):
-        if name in _RESERVED or (name in content.parameters and name in content.definitions):
-            raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(_RESERVED))}.")
+        if name in reserved or (name in content.parameters and name in content.definitions):
+            raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(reserved))}.")
     above = [link for text in content.assume for link in comparisons(text)]
     tensor = read_tensor(content.top.inertia)
     # the moments of inertia of a top are positive, said or not
@@ -126,11 +128,11 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     rotor = parse(top.rotor, names, "top.rotor") if isinstance(top.rotor, str) else None
     carried = three(top.rotor, names, "top.rotor") if isinstance(top.rotor, list) else ()
     relations = [parse(text, names, "relations") for text in content.relations]
-    _check_constant("top.inertia", moments, _OF_THE_TOP)
-    _check_constant("top.centre", arm[:3], _OF_THE_TOP)
-    _check_constant("top.weight", arm[3:], _OF_THE_TOP)
-    _check_constant("top.rotor", carried, _OF_THE_TOP)
-    _check_constant("relations", relations, _OF_PARAMETERS)
+    _check_constant("top.inertia", moments, _OF_THE_TOP, variables)
+    _check_constant("top.centre", arm[:3], _OF_THE_TOP, variables)
+    _check_constant("top.weight", arm[3:], _OF_THE_TOP, variables)
+    _check_constant("top.rotor", carried, _OF_THE_TOP, variables)
+    _check_constant("relations", relations, _OF_PARAMETERS, variables)
     weight = arm.pop()
     inertia = tensor.of([part.expression for part in moments])
     centre = tuple(part.expression for part in arm)
@@ -177,11 +179,11 @@ def three(texts: Iterable[str], names: dict[str, Formula], where: str) -> tuple[
     return first, second, third
 
 
-def _check_constant(where: str, formulas: Sequence[Formula], remedy: str) -> None:
-    """Raises InputError where a formula, or what it needs, depends on the time or the state, directly or not."""
+def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variables: Iterable[sympy.Symbol]) -> None:
+    """Raises InputError where a formula, or what it needs, depends on what moves, directly or not."""
     for formula in formulas:
         free = formula.expression.free_symbols.union(*(need.expression.free_symbols for need in formula.needs))
-        moving = sorted(map(str, free & {TIME, *STATE}))
+        moving = sorted(map(str, free & {TIME, *STATE, *variables}))
         if moving:
             text = quoted(str(formula.expression))[1:-1]
             raise InputError(f"{where}: {text} depends on {', '.join(moving)}.", remedy)
@@ -249,11 +251,15 @@ def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
 
 @dataclass(frozen=True)
 class FileClaim:
-    """A claim of a file; variables: what its formulas may hold beside its parameters."""
+    """A claim of a file."""
 
     content: ClaimFile
     context: Context = field(init=False)
-    variables: ClassVar[tuple[sympy.Symbol, ...]] = ()
+
+    @property
+    def variables(self) -> tuple[sympy.Symbol, ...]:
+        """What its formulas may hold beside its parameters."""
+        return ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "context", parse_context(self.content, self.variables))

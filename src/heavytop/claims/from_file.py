@@ -50,6 +50,19 @@ class MotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     angles: Three | None = None
 
 
+class QuadratureTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[quadrature]: the formulas of [motion] hold u, and t = F(u) + constant where u is between bounds.
+
+    time: F(u); or integrand: F'(u).  where: comparisons that bound u.  points: values of u to look for a witness at.
+    """
+
+    variable: Name
+    time: Text | None = None
+    integrand: Text | None = None
+    where: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
+    points: Samples | None = None
+
+
 class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """[integral]: F(Ω, γ), where it is claimed to be constant, and exact states to look for a witness at.
 
@@ -85,6 +98,7 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     definitions: Annotated[dict[Name, Text], msgspec.Meta(max_length=40)] = {}
     relations: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
     motion: MotionTable | None = None
+    quadrature: QuadratureTable | None = None
     integral: IntegralTable | None = None
     entry: Entry | None = None
 
@@ -122,6 +136,8 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
     wanted = "motion" if content.kind == "motion" else "integral"
     if tables[content.kind] is None or (content.motion is not None and content.integral is not None):
         raise InputError(f"{where}: kind {content.kind!r} needs the table [{wanted}], and no other claim.", _REMEDY)
+    if content.quadrature is not None and content.kind != "motion":
+        raise InputError(f"{where}: [quadrature] is about a motion, and kind = {content.kind!r}.", _REMEDY)
     if content.domain not in ("all", "t<=0", "t>0"):
         raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
     content = msgspec.structs.replace(content, entry=entry)
