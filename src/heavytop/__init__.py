@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from heavytop.api.derivatives import DerivativeScore, score_derivatives
     from heavytop.api.events import events, poincare
     from heavytop.api.motions import ensemble, propagate, reference
+    from heavytop.api.prepared import Integrator, Propagated
     from heavytop.api.reports import Comparison, Report, compare, read_report, run
     from heavytop.api.scores import Score, Summary, drift, score
     from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
@@ -32,6 +33,7 @@ _PLACES = {
     "api.derivatives": ("DerivativeScore", "score_derivatives"),
     "api.events": ("events", "poincare"),
     "api.motions": ("ensemble", "propagate", "reference"),
+    "api.prepared": ("Integrator", "Propagated"),
     "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
     "api.scores": ("Score", "Summary", "drift", "score"),
     "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
@@ -66,9 +68,11 @@ __all__ = [
     "HeavyTop",
     "HeavyTopError",
     "InputError",
+    "Integrator",
     "OutOfReach",
     "Outcome",
     "Precision",
+    "Propagated",
     "Reference",
     "ReferenceEvents",
     "Report",
