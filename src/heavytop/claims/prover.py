@@ -236,7 +236,7 @@ def _missed(statement: Statement, setting: Setting) -> str:
                 used = ", ".join(
                     f"{name} = {shown(value)}" for name, value in sample.items() if name in zero.free_symbols
                 )
-                where = f"where {', '.join(used)}, {written(str(zero))} is not 0"
+                where = f"where {used}, {written(str(zero))} is not 0"
                 return f"no sample lies on the relations{on_sphere}: {where}"
         if not setting.zeros and statement.domain.facts:
             points = ", ".join(map(str, statement.domain.points))

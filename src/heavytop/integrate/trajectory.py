@@ -15,7 +15,7 @@ from heavytop.errors import InputError
 from heavytop.last_call import last_call
 from heavytop.precision import Precision, decimal_text, exact, native, native_text, number, rounded
 from heavytop.top.bodies import Frame
-from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, cross
 from heavytop.top.integrals import Integral, holding
 from heavytop.top.outputs import Output, output
@@ -107,9 +107,19 @@ def _rounded(
     def both(values: Any) -> tuple[Fraction, ...]:
         return tuple(rounded(value, precision) for value in values)
 
-    parameters = system.parameters(top, start).mapped(lambda value: rounded(Fraction(value), precision))
+    # of the gyrostat the start is part of them
+    parameters = _rounded_parameters(top, start if system is GYROSTAT else None, precision, system)
     rounded_start = State(both(start.omega), both(start.gamma))
     return Problem(system, precision, parameters, rounded_start, None if xi is None else both(xi), (top, start))
+
+
+@last_call
+def _rounded_parameters(top: HeavyTop, start: State | None, precision: Precision, system: System) -> Parameters:
+    given = system.parameters(top, _ANY_START if start is None else start)
+    return given.mapped(lambda value: rounded(Fraction(value), precision))
+
+
+_ANY_START = State((0, 0, 0), (0, 0, 1))
 
 
 class OtherFlags(InputError):
