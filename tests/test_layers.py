@@ -10,7 +10,8 @@ from heavytop.kinds import KINDS
 ALSO_WORDS = {"drift", "growth", "audit", "score", "local_error"}
 """Names that are quantities, sections or commands as well."""
 SOURCE = Path(__file__).parents[1] / "src" / "heavytop"
-GROUND = {
+GROUND = {"display", "errors", "former_names", "last_call", "precision", "processes", "records", "version"}
+GROUND |= {"written_numbers"}
     "display",
     "errors",
     "former_names",
