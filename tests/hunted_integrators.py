@@ -1,4 +1,4 @@
-"""Integrators with one planted fault each, which shows in a small part of the space alone: heyoka, and what is wrong."""
+"""heyoka with one planted fault each, which shows in a small part of the space alone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy
 from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.precision import Precision
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import System
 from heavytop.top.heavy_top import HeavyTop, State
 
 Times = Sequence[Any]

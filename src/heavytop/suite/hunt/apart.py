@@ -34,9 +34,7 @@ class Run(NamedTuple):
     said: str = ""
 
 
-def follow(
-    integrator: Integrator, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision
-) -> Run:
+def follow(integrator: Integrator, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision) -> Run:
     """One motion by an integrator of any kind, contained; raises Unsupported for what it cannot do at all."""
     try:
         run = integrator.propagate(top, start, times, precision, HEAVY_TOP, again=False)

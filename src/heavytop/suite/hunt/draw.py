@@ -69,7 +69,7 @@ def unit(values: Sequence[Fraction]) -> Vector:
 
 def drawn(seed: int, index: int, family: Family, horizon: Fraction) -> Motion:
     """Number ``index`` of the random motions: every second one of the first 64 and every eighth beyond are plain."""
-    plain = Random("hunt", seed, index + 1, family).cases()[index]
+    plain = Random("random", seed, index + 1, family).cases()[index]
     if is_plain(index):
         return plain.top, plain.start
     dice = Dice(f"{seed}/hunt/{index}")
@@ -128,9 +128,9 @@ def _short(value: Fraction) -> Fraction:
 
 def _simple(motion: Motion, dice: Dice) -> Motion:
     """Small numbers, zeros and equal moments."""
-    inertia = dice.pick([(1, 1, 1), (2, 2, 1), (2, 1, 1), (3, 2, 1), (1, 1, 2), (4, 4, 1), (4, 3, 2), (3, 4, 2)])
+    moments = dice.pick([(1, 1, 1), (2, 2, 1), (2, 1, 1), (3, 2, 1), (1, 1, 2), (4, 4, 1), (4, 3, 2), (3, 4, 2)])
     by = dice.below(3)
-    inertia = inertia[by:] + inertia[:by]
+    inertia = moments[by:] + moments[:by]
     centre = [Fraction(dice.below(5) - 2, 2) for _ in range(3)]
     omega = [Fraction(dice.below(9) - 4, 2) for _ in range(3)]
     return HeavyTop(inertia, 1 + dice.below(3), centre), State(omega, dice.pick([*_POLES, motion[1].gamma]))
@@ -232,7 +232,8 @@ def _nudged(motion: Motion, dice: Dice) -> Motion:
         return [value * (1 + size * dice.part()) for value in values]
 
     gamma = unit([value + size * dice.part() for value in start.gamma])
-    return HeavyTop(near(top.inertia), *near([top.weight]), near(top.centre)), State(near(start.omega), gamma)
+    (weight,) = near([top.weight])
+    return HeavyTop(near(top.inertia), weight, near(top.centre)), State(near(start.omega), gamma)
 
 
 def _without(motion: Motion, dice: Dice) -> Motion:

@@ -1,8 +1,8 @@
 """How wrong an integrator is on many motions, and how much of it the motions themselves explain.
 
 The truth is a run in about twice the digits of the format, double-double in lanes for double; a second one from a start
-moved by 2^-40 tells how much the motion amplifies, for a hundredth of the cost of :mod:`heavytop.top.amplification`,
-which is asked before anything is called found.  Errors are max(|δΩ|/rate, |δγ|) over the samples, with the
+moved by 2^-17 roundings tells how much the motion amplifies, for a hundredth of the cost of
+:mod:`heavytop.top.amplification`, which is asked before anything is called found.  Errors are max(|δΩ|/rate, |δγ|) over the samples, with the
 :func:`heavytop.top.amplification.rate` of the motion.
 """
 
@@ -28,7 +28,8 @@ from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import State
 
 SAMPLES = 10
-_MOVED = Fraction(1, 2**40)
+_MORE_BITS = 17
+"""The second start is so many bits nearer than a rounding of the format: its distance stays small on the way."""
 _WHERE = tuple(Fraction(n, 1000) for n in (427, -331, 373, 461, -397, 433))
 """The direction of the second start, a unit vector nearly, in no plane that a symmetric body knows."""
 _STEP_LIMIT = 1_000_000
@@ -67,8 +68,8 @@ class Meter:
         self.times = [exact(number(horizon * i / SAMPLES, precision)) for i in range(1, SAMPLES + 1)]
         self._fine = DOUBLE_DOUBLE if precision == DOUBLE else real(2 * precision.bits)
         python = is_third_party(integrator.name) and not isinstance(integrator.source, Command)
+        self._shift = Fraction(1, 2 ** (precision.bits + _MORE_BITS))
         self._apart = Apart(integrator, SECONDS) if python else None
-        self.count = 0
 
     def close(self) -> None:
         """End the process of an integrator of others."""
@@ -77,7 +78,8 @@ class Meter:
 
     def measure(self, motions: Sequence[Motion]) -> list[Measured]:
         """Each of them, in order; the bits of one do not depend on the others."""
-        self.count += len(motions)
+        if not motions:
+            return []
         problems = [Problem.of(*motion, self.precision, HEAVY_TOP) for motion in motions]
         rates = [rate(HEAVY_TOP, each.parameters, each.start.flat) for each in problems]
         truths = self._truths(problems, rates)
@@ -94,6 +96,12 @@ class Meter:
                 outcome = Outcome.NON_FINITE.value if math.isinf(error) and not _failed(run) else run.outcome
                 found.append(Measured(motion, outcome, error, grown, turns, other, run.said))
         return found
+
+    def run_of(self, integrator: Integrator, motion: Motion) -> Run:
+        """One run of the integrator that is hunted, or of another."""
+        if integrator == self.integrator and self._apart is not None:
+            return self._apart.follow(*motion, self.times, self.precision)
+        return follow(integrator, *motion, self.times, self.precision)
 
     def sharper(self, found: Measured) -> Measured:
         """The same with the amplification over all directions, which is at least that over one."""
@@ -116,7 +124,9 @@ class Meter:
     ) -> list[tuple[list[list[Fraction]] | None, float]]:
         """The true states and the amplification of each; None where no run reached the horizon."""
         fine = [replace(each, precision=self._fine) for each in problems]
-        moved = [replace(each, start=_moved(each.start, unit)) for each, unit in zip(fine, rates, strict=True)]
+        moved = [
+            replace(each, start=_moved(each.start, unit, self._shift)) for each, unit in zip(fine, rates, strict=True)
+        ]
         runs = self._finely([*fine, *moved])
         found: list[tuple[list[list[Fraction]] | None, float]] = []
         for i, unit in enumerate(rates):
@@ -124,7 +134,7 @@ class Meter:
             if one is None:
                 found.append((None, math.inf))
                 continue
-            grown = math.inf if two is None else _growth(one, two, unit)
+            grown = math.inf if two is None else _growth(one, two, unit, self._shift)
             found.append((one, max(1.0, grown)))
         return found
 
@@ -155,20 +165,22 @@ def _failed(run: Run) -> bool:
     return run.outcome != Outcome.SUCCESS.value
 
 
-def _moved(start: State, unit: Fraction) -> State:
+def _moved(start: State, unit: Fraction, shift: Fraction) -> State:
     scale = [unit or Fraction(1)] * 3 + [Fraction(1)] * 3
-    flat = [value + _MOVED * size * by for value, size, by in zip(start.flat, scale, _WHERE, strict=True)]
+    flat = [value + shift * size * by for value, size, by in zip(start.flat, scale, _WHERE, strict=True)]
     return State(flat[:3], flat[3:])
 
 
-def _growth(one: Sequence[Sequence[Fraction]], two: Sequence[Sequence[Fraction]], unit: Fraction) -> float:
+def _growth(
+    one: Sequence[Sequence[Fraction]], two: Sequence[Sequence[Fraction]], unit: Fraction, shift: Fraction
+) -> float:
     """How many times as far apart the two runs are as at the start, at most over the samples."""
     scale = [float(unit or 1)] * 3 + [1.0] * 3
     largest = 0.0
     for first, second in zip(one, two, strict=True):
         parts = [float(a - b) / size for a, b, size in zip(first, second, scale, strict=True)]
         largest = max(largest, math.hypot(*parts))
-    return largest / float(_MOVED) / math.hypot(*map(float, _WHERE))
+    return largest / float(shift) / math.hypot(*map(float, _WHERE))
 
 
 def _distance(one: Sequence[Any], two: Sequence[Any], unit: Fraction) -> float:

@@ -9,27 +9,27 @@ from fractions import Fraction
 from statistics import median, quantiles
 from time import process_time
 
-from heavytop.errors import InputError
 from heavytop.measure.integrator import HEYOKA, MULTIWORD, Integrator
 from heavytop.precision import Precision
 from heavytop.records import OUT_OF_TIME
 from heavytop.suite.hunt.draw import Dice, Family, Motion, changed, drawn, is_plain, possible
 from heavytop.suite.hunt.measured import Measured, Meter
-from heavytop.suite.hunt.shrink import shrunk
+from heavytop.suite.hunt.proof import Proof, proof
+from heavytop.suite.hunt.shrink import Shows, shrunk
 
 FIRST = 64
 """Motions that tell the law of the integrator and what a motion costs."""
 DECADES = 100.0
 """Beyond so many times what law and amplification explain, an error is found."""
 _POOL = 24
-_MOST_FOUND = 6
+_MOST_FOUND = 3
+_MOST_HITS = 16
 _SHOWN = 3
 _LEAST_LAW = 0.05
 _LOST = 0.01
 """An error that would be explained up to here says nothing: the format has no digit left."""
 _SPARE = 0.8
 """Of a budget in seconds; the rest is for shrinking and proving."""
-_SLOW_ROUNDS = 1
 
 Advance = Callable[[int, int], None]
 """Told (motions done, motions in all)."""
@@ -57,7 +57,7 @@ class Asked:
     @property
     def unit(self) -> float:
         """eps T^1.5."""
-        return float(self.precision.eps) * max(float(abs(self.horizon)), 1e-3) ** 1.5
+        return float(self.precision.eps) * math.pow(max(float(abs(self.horizon)), 1e-3), 1.5)
 
     @property
     def other(self) -> Integrator:
@@ -74,7 +74,7 @@ class Hunted:
 
     law: the error over eps, amplification and √turns that nine tenths of the random tops stay below.
     median: of the errors of random tops.  unknown: motions whose truth was out of reach.  lost: whose amplification
-    leaves no digit, so that they say nothing.
+    leaves no digit, so that they say nothing.  proofs: of those found, in their order.
     """
 
     asked: Asked
@@ -86,6 +86,7 @@ class Hunted:
     median: float
     unknown: int
     lost: int
+    proofs: tuple[Proof, ...] = ()
 
 
 def hunt(asked: Asked, advance: Advance | None = None) -> Hunted:
@@ -134,7 +135,6 @@ class _Hunt:
         """The first 64 motions: what they cost, the law of the integrator, and whether they show anything."""
         asked = self.asked
         self.meter.measure([drawn(asked.seed, 0, asked.family, asked.horizon)] * 2)  # what is compiled, is now
-        self.meter.count -= 2
         motions = [drawn(asked.seed, i, asked.family, asked.horizon) for i in range(FIRST)]
         if asked.budget is not None:
             motions = motions[: asked.budget]
@@ -168,8 +168,8 @@ class _Hunt:
     def _take(self, measured: Sequence[Measured]) -> None:
         self.all += measured
         self.pool = sorted([*self.pool, *measured], key=self._score, reverse=True)[:_POOL]
-        for each in measured:
-            if self.exceeds(each) and self.exceeds(sharp := self.meter.sharper(each)):
+        for each in sorted(measured, key=self._score, reverse=True):
+            if len(self.hits) < _MOST_HITS and self.exceeds(each) and self.exceeds(sharp := self.meter.sharper(each)):
                 self.hits.append(sharp)
 
     def _is_lost(self, m: Measured) -> bool:
@@ -202,42 +202,46 @@ class _Hunt:
 
     def _shrunk(self) -> list[Measured]:
         """The worst found, shrunk; of several that shrink to the same one."""
-        asked, found = self.asked, {}
+        found: dict[Motion, Measured] = {}
         worst = sorted(self.hits, key=self._score, reverse=True)[:_MOST_FOUND]
         for hit in worst:
-            failed = math.isinf(hit.error)
-
-            def shows(motions: Sequence[Motion], failed: bool = failed) -> list[bool]:
-                good = [possible(each, asked.family, asked.horizon) == each for each in motions]
-                tried = iter(self.meter.measure([m for m, ok in zip(motions, good, strict=True) if ok]) if any(good) else [])
-                return [ok and self._as_bad(next(tried), failed) for ok in good]
-
-            slow = hit.outcome == OUT_OF_TIME
-            simple = hit.motion if slow else shrunk(hit.motion, shows)
-            (again,) = [hit] if slow else self.meter.measure([simple])
-            found.setdefault(_key(simple), self.meter.sharper(again))
+            simple = hit if hit.outcome == OUT_OF_TIME else self._simple(hit)
+            found.setdefault(simple.motion, simple)
         return sorted(found.values(), key=self._score, reverse=True)[:_SHOWN]
 
-    def _as_bad(self, m: Measured, failed: bool) -> bool:
+    def _simple(self, hit: Measured) -> Measured:
+        """The simplest that shows the same; the amplification over all directions is asked at the end, and on the way
+        where that did not do.
+        """
+        for careful in (False, True):
+            (again,) = self.meter.measure([shrunk(hit.motion, self._shows(hit, careful))])
+            if self._as_bad(again, hit, True):
+                return self.meter.sharper(again)
+        return hit
+
+    def _shows(self, hit: Measured, careful: bool) -> Shows:
+        asked = self.asked
+
+        def shows(motions: Sequence[Motion]) -> list[bool]:
+            good = [possible(each, asked.family, asked.horizon) == each for each in motions]
+            tried = iter(self.meter.measure([m for m, ok in zip(motions, good, strict=True) if ok]))
+            return [ok and self._as_bad(next(tried), hit, careful) for ok in good]
+
+        return shows
+
+    def _as_bad(self, m: Measured, hit: Measured, careful: bool) -> bool:
         """Whether it is found, and in the same way: a failure does not become an error."""
-        return self.exceeds(m) and math.isinf(m.error) == failed and self.exceeds(self.meter.sharper(m))
+        same = math.isinf(m.error) == math.isinf(hit.error) and self.exceeds(m)
+        return same and (not careful or self.exceeds(self.meter.sharper(m)))
 
     def _ended(self, done: int, found: list[Measured]) -> Hunted:
         good = [m for m in self.all if m.outcome == "success" and not self._is_lost(m)]
-        worst = sorted(good, key=lambda m: m.error, reverse=True)[:_SHOWN]
+        ordered = sorted(good, key=lambda m: m.error, reverse=True)
+        worst = list({m.motion: m for m in ordered[:_POOL]}.values())[:_SHOWN]
         middle = median(m.error for m in self.plain) if self.plain else math.inf
         unknown = sum(not m.outcome for m in self.all)
         lost = sum(bool(m.outcome) and self._is_lost(m) for m in self.all)
-        return Hunted(self.asked, tuple(found), tuple(worst), done, self.planned, self.law, middle, unknown, lost)
-
-
-def _key(motion: Motion) -> str:
-    return repr(motion)
-
-
-def require_hunted(asked: Asked) -> None:
-    """Raises InputError for what no hunt can be."""
-    if asked.budget is not None and asked.budget < 1:
-        raise InputError(f"budget = {asked.budget} is no motion.", "Give a number of motions, or seconds such as 60s.")
-    if not asked.horizon:
-        raise InputError("horizon = 0 is no time.", "Give a time other than 0.")
+        proofs = tuple(proof(self.meter, m, self.asked.other) for m in found)
+        return Hunted(
+            self.asked, tuple(found), tuple(worst), done, self.planned, self.law, middle, unknown, lost, proofs
+        )

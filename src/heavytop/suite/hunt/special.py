@@ -64,10 +64,13 @@ def _start(top: HeavyTop, start: State) -> list[str]:
         said.append(f"spins {spin / own:.3g} times as fast as its weight swings it")
     elif own > _FAST * spin:
         said.append(f"slow: Ω is {spin / own:.2g} of what its weight makes of it")
-    speed = max((abs(value) for value in HEAVY_TOP.field(parameters.mapped(Fraction), start.flat)), default=Fraction(0))
+    field = [abs(value) for value in HEAVY_TOP.field(parameters.mapped(Fraction), start.flat)]
     unit = spin + own or 1.0
-    if float(speed) < _NEAR * unit * max(unit, 1.0):
-        said.append("an equilibrium" if speed == 0 else f"near an equilibrium: the field is {float(speed):.1g}")
+    speed = max(float(max(field[:3])) / unit**2, float(max(field[3:])) / unit)
+    if not any(field):
+        said.append("an equilibrium")
+    elif speed < _NEAR:
+        said.append(f"near an equilibrium: the field is {speed:.1g} of what it could be")
     energy = dot(top.angular_momentum(start.omega), start.omega) / 2 + dot(top.moment, start.gamma)
     height = math.sqrt(pull)
     if height and abs(float(energy) / height - 1) < _NEAR:
@@ -80,4 +83,6 @@ def _growth(found: Measured) -> list[str]:
     chaotic = found.amplification > 100 * (1 + found.turns)
     kind = ", more than a regular motion does: near a separatrix, or chaotic" if chaotic else ""
     said = [f"{found.turns:.3g} radians until the horizon"]
-    return [*said, f"the motion itself amplifies by {found.amplification:.2g}{kind}"] if eaten >= _FEW or chaotic else said
+    return (
+        [*said, f"the motion itself amplifies by {found.amplification:.2g}{kind}"] if eaten >= _FEW or chaotic else said
+    )
