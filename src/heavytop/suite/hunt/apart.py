@@ -9,10 +9,12 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, NamedTuple
 
-from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
-from heavytop.integrate.peers.command import begin_row
+from heavytop.errors import HeavyTopError, InputError, PeerFailed
+from heavytop.integrate import peers
+from heavytop.integrate.peers.command import Command, begin_row
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.integrator import Integrator
 from heavytop.precision import Precision
@@ -35,15 +37,25 @@ class Run(NamedTuple):
 
 
 def follow(integrator: Integrator, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision) -> Run:
-    """One motion by an integrator of any kind, contained; raises Unsupported for what it cannot do at all."""
+    """One motion by an integrator of any kind, contained; raises InputError for what it cannot do at all."""
     try:
-        run = integrator.propagate(top, start, times, precision, HEAVY_TOP, again=False)
-    except (Unsupported, InputError):
+        if integrator.takes_many or isinstance(integrator.source, Command):
+            run = integrator.propagate(top, start, times, precision, HEAVY_TOP, again=False)
+        else:
+            which: Any = integrator.which
+            run = _ready(which)(top, start, times, precision, system=HEAVY_TOP)
+    except InputError:
         raise
     except HeavyTopError as error:
         return Run(FAILED, (), error.cause)
     short = run.outcome is Outcome.SUCCESS and len(run.states) < len(times)
     return Run((Outcome.INCOMPLETE if short else run.outcome).value, run.states)
+
+
+@lru_cache(maxsize=4)
+def _ready(which: Any) -> peers.Peer:
+    """The integrator, looked up once."""
+    return peers.ready(which)
 
 
 class Apart:

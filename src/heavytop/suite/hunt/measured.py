@@ -2,8 +2,8 @@
 
 The truth is a run in about twice the digits of the format, double-double in lanes for double; a second one from a start
 moved by 2^-17 roundings tells how much the motion amplifies, for a hundredth of the cost of
-:mod:`heavytop.top.amplification`, which is asked before anything is called found.  Errors are max(|δΩ|/rate, |δγ|) over the samples, with the
-:func:`heavytop.top.amplification.rate` of the motion.
+:mod:`heavytop.top.amplification`, which is asked before anything is called found.  Errors are max(|δΩ|/rate, |δγ|)
+over the samples, with the :func:`heavytop.top.amplification.rate` of the motion.
 """
 
 from __future__ import annotations

@@ -6,11 +6,14 @@ from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from functools import cache
 from itertools import product
+from math import gcd
+from typing import Any
+
+import numpy
 
 from heavytop.precision import decimal_text, shown
 from heavytop.suite.hunt.draw import Motion
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.vectors import Vector
 
 Shows = Callable[[Sequence[Motion]], list[bool]]
 """Which of the motions show it."""
@@ -135,30 +138,31 @@ def _of_omega(place: int) -> Callable[[Motion], Iterator[Motion]]:
 def _of_gamma(motion: Motion) -> Iterator[Motion]:
     """The nearest unit vector of each of some denominators, to three digits."""
     top, start = motion
-    near: dict[int, tuple[float, Vector]] = {}
-    for norm, gamma in _directions():
-        apart = max(abs(float(a - b)) for a, b in zip(gamma, start.gamma, strict=True))
-        for most in _DIRECTION_NORMS:
-            if norm <= most and (most not in near or apart < near[most][0]):
-                near[most] = apart, gamma
-    for gamma in dict.fromkeys(gamma for _, gamma in near.values()):
-        yield top, State(start.omega, gamma)
+    table = _directions()
+    norms = table[:, 0]
+    apart = numpy.abs(table[:, 1:] / table[:, :1] - numpy.array([float(value) for value in start.gamma])).max(axis=1)
+    nearest = (int(apart[: int((norms <= most).sum())].argmin()) for most in _DIRECTION_NORMS)
+    for place in dict.fromkeys(nearest):
+        norm, *parts = table[place].tolist()
+        yield top, State(start.omega, [Fraction(part, norm) for part in parts])
 
 
 @cache
-def _directions() -> list[tuple[int, Vector]]:
-    """Unit vectors with numerators and denominators of at most three digits, with their common denominator."""
-    found: dict[Vector, int] = {}
+def _directions() -> Any:
+    """Unit vectors with numerators and denominators of at most three digits: integers, shape (n, 4), each the common
+    denominator, in order, and three numerators.
+    """
+    found: dict[tuple[int, int, int, int], None] = {}
     for n in range(1, _MOST_DENOMINATOR + 1):
         for a, b in product(range(-n, n + 1), repeat=2):
             norm = n * n + a * a + b * b
             if a * a + b * b <= n * n and norm < 1000:
-                u, v, w = Fraction(2 * a * n, norm), Fraction(2 * b * n, norm), Fraction(n * n - a * a - b * b, norm)
-                common = max(u.denominator, v.denominator, w.denominator)
+                u, v, w = 2 * a * n, 2 * b * n, n * n - a * a - b * b
+                common = gcd(u, v, w, norm)
+                u, v, w, norm = u // common, v // common, w // common, norm // common
                 for part in (w, -w):
-                    for gamma in ((u, v, part), (v, part, u), (part, u, v)):
-                        found.setdefault(gamma, common)
-    return sorted(((common, gamma) for gamma, common in found.items()), key=lambda each: each[0])
+                    found |= dict.fromkeys([(norm, u, v, part), (norm, v, part, u), (norm, part, u, v)])
+    return numpy.array(sorted(found, key=lambda each: each[0]))
 
 
 def _simpler(value: Fraction) -> list[Fraction]:
