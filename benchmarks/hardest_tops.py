@@ -11,7 +11,7 @@ import heavytop as ht
 from heavytop.precision import shown
 from heavytop.report.hunt_text import law_text, worst_lines
 
-HUNTS = (("heyoka", 2000, 100), ("multiword", 1000, 100), ("scipy:DOP853", 400, 20), ("splitting:4", 400, 20))
+HUNTS = (("heyoka", 2000, 100), ("multiword", 500, 100), ("scipy:DOP853", 200, 20), ("splitting:4", 200, 20))
 HEAD = """# The hardest tops
 What `heavytop hunt` finds for four integrators in double, made by
 [`benchmarks/hardest_tops.py`](../benchmarks/hardest_tops.py); the command above each part searches the same again.

@@ -25,6 +25,7 @@ _POOL = 24
 _MOST_FOUND = 3
 _MOST_HITS = 16
 _SHOWN = 3
+_SHARPENED = 12
 _LEAST_LAW = 0.05
 _LOST = 0.01
 """An error that would be explained up to here says nothing: the format has no digit left."""
@@ -202,11 +203,11 @@ class _Hunt:
 
     def _shrunk(self) -> list[Measured]:
         """The worst found, shrunk; of several that shrink to the same one."""
-        found: dict[Motion, Measured] = {}
+        found: dict[object, Measured] = {}
         worst = sorted(self.hits, key=self._score, reverse=True)[:_MOST_FOUND]
         for hit in worst:
             simple = hit if hit.outcome == OUT_OF_TIME else self._simple(hit)
-            found.setdefault(simple.motion, simple)
+            found.setdefault(_shape(simple.motion), simple)
         return sorted(found.values(), key=self._score, reverse=True)[:_SHOWN]
 
     def _simple(self, hit: Measured) -> Measured:
@@ -237,7 +238,8 @@ class _Hunt:
     def _ended(self, done: int, found: list[Measured]) -> Hunted:
         good = [m for m in self.all if m.outcome == "success" and not self._is_lost(m)]
         ordered = sorted(good, key=lambda m: m.error, reverse=True)
-        worst = list({m.motion: m for m in ordered[:_POOL]}.values())[:_SHOWN]
+        sharp = map(self.meter.sharper, list({m.motion: m for m in ordered[:_POOL]}.values())[:_SHARPENED])
+        worst = [m for m in sharp if not self._is_lost(m)][:_SHOWN]
         middle = median(m.error for m in self.plain) if self.plain else math.inf
         unknown = sum(not m.outcome for m in self.all)
         lost = sum(bool(m.outcome) and self._is_lost(m) for m in self.all)
@@ -245,3 +247,10 @@ class _Hunt:
         return Hunted(
             self.asked, tuple(found), tuple(worst), done, self.planned, self.law, middle, unknown, lost, proofs
         )
+
+
+def _shape(motion: Motion) -> object:
+    """What is the same of motions that differ in the names and senses of their axes alone, or nearly."""
+    top, start = motion
+    axes = zip(top.inertia, map(abs, top.moment), map(abs, start.omega), map(abs, start.gamma), strict=True)
+    return tuple(sorted(axes))
