@@ -18,6 +18,7 @@ import re
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -391,9 +392,94 @@ def _not_kept(draw: random.Random) -> Claim:
     return Claim(table, "trap", "not kept")
 
 
+# --- Jacobi's functions, and tops that carry a rotor -----------------------------------------------------------------
+
+
+def _swing(r: Rewriter) -> dict[str, Any]:
+    """A pendulum that swings, about axis 1: sin of half the angle is h sn(k t, h²)."""
+    u = "k*t, h^2"
+    top = {"inertia": ["m", "2", "3"], "weight": "m", "centre": ["0", "0", "k^2"]}
+    gamma = ["0", f"-2*h*sn({u})*dn({u})", f"2*h^2*sn({u})^2 - 1"]
+    motion = {"omega": [f"2*h*k*cn({u})", "0", "0"], "gamma": gamma}
+    table = _table(r.domain, {**_KM, "h": ["1/2", "3/5"]}, top=top, motion=motion)
+    return table | {"assume": [*table["assume"], "h < 1"]}
+
+
+def _turning(r: Rewriter) -> dict[str, Any]:
+    """The free body A > B > C with 2 T B < G², by A = C + p + q, B = C + q, G² − 2TB = e."""
+    definitions = {
+        "A": "c + p + q",
+        "B": "c + q",
+        "m": "(A*E - H)*(B - c)/((A - B)*(H - c*E))",
+        "rate": "sqrt((H - c*E)*(A - B)/(A*B*c))",
+        "E": "1",
+        "H": "B + p*e",
+    }
+    order = ("A", "B", "E", "H", "m", "rate")
+    parts = [
+        "sqrt(A*(H - c*E)/(A - c))*dn(rate*t, m)",
+        "-sqrt(B*(A*E - H)/(A - B))*sn(rate*t, m)",
+        "sqrt(c*(A*E - H)/(A - c))*cn(rate*t, m)",
+    ]
+    motion = {
+        "omega": [f"{part}/{moment}" for part, moment in zip(parts, "ABc", strict=True)],
+        "gamma": [f"{part}/sqrt(H)" for part in parts],
+    }
+    parameters = {"c": ["1", "1/2"], "p": ["1/2", "1/3"], "q": ["1/3", "1/4"], "e": ["1/2", "2/3"]}
+    top = {"inertia": ["A", "B", "c"], "weight": "0", "centre": ["0", "0", "0"]}
+    given = {name: definitions[name] for name in order}
+    table = _table(r.domain, parameters, definitions=given, top=top, motion=motion)
+    return table | {"assume": [*table["assume"], "e < 1", "p < c"]}
+
+
+_ELLIPTIC_FAULTS = ["1e-20*sn(t, 1/2)", "sn(t, 1/3)/50", "cn(2*t, 1/2)/9", "dn(t, 1/2) - 1", "1e-9"]
+
+
+def elliptic_claim(draw: random.Random) -> Claim:
+    """A motion in Jacobi's functions: true, or with a fault in one component or in a parameter."""
+    r = Rewriter(draw, draw.choice(["all", "t<=0", "t>0"]))
+    make = draw.choice([_swing, _turning])
+    table = make(r)
+    if draw.random() < 0.5:
+        return Claim(table, "true", make.__name__)
+    part, index = draw.choice(["omega", "gamma"]), draw.randrange(3)
+    if draw.random() < 0.5:
+        table["motion"][part][index] += f" + {draw.choice(_ELLIPTIC_FAULTS)}"
+    elif make is _swing:
+        table["motion"]["gamma"][1] = table["motion"]["gamma"][1].replace("dn", draw.choice(["cn", "sn"]))
+    else:
+        table["definitions"]["m"] += draw.choice(["*99/100", "^2", "/(1 + p)"])
+    return Claim(table, "false", make.__name__)
+
+
+_K0 = "((a*Omega1 + u)*gamma1 + (b*Omega2 + v)*gamma2 + (c*Omega3 + w)*gamma3)"
+_CARRIED_FALSE = [_C0, f"{_H} + u*Omega1", "{0} + 1e-20*Omega2", f"{_C0} - u*gamma1", "c*Omega3 + w"]
+
+
+def gyrostat_claim(draw: random.Random) -> Claim:
+    """A first integral of a heavy gyrostat: energy and area in any combination, Lagrange's, Yehia's, or a false one."""
+    pair = draw.sample([_H, _K0, _G], 2)
+    states = _STATES
+    kind = draw.random()
+    value = draw.choice(_COMPOSED if kind < 0.5 else _CARRIED_FALSE).format(*pair)
+    table = _integral(value, states)
+    table["parameters"] |= {"u": ["1/2", "1/3"], "v": ["-1/3", "1"], "w": ["3/4", "2"]}
+    table["top"]["rotor"] = ["u", "v", "w"]
+    if kind >= 0.8:
+        table["top"] |= {"inertia": ["a", "a", "c"], "centre": ["0", "0", "z"], "rotor": ["0", "0", "w"]}
+        table["integral"]["value"] = draw.choice(["c*Omega3 + w", "exp(Omega3)", "(Omega3 - w)^2"])
+    truth = "true" if kind < 0.5 or kind >= 0.8 else "false"
+    return Claim(table, truth, "gyrostat's integral", "heavy_gyrostat")
+
+
 def random_claim(draw: random.Random) -> Claim:
     """Any of them."""
-    return motion_claim(draw) if draw.random() < 0.65 else integral_claim(draw)
+    kind = draw.random()
+    if kind < 0.2:
+        return elliptic_claim(draw)
+    if kind < 0.35:
+        return gyrostat_claim(draw)
+    return motion_claim(draw) if kind < 0.75 else integral_claim(draw)
 
 
 # --- the evaluation of its own -------------------------------------------------------------------------------------
@@ -419,6 +505,10 @@ _FUNCTIONS = {
     "acos": _real(mpmath.acos, lambda x: abs(x) <= 1),
     "sech": _real(mpmath.sech),
     **{name: getattr(mpmath, name) for name in ("exp", "sin", "cos", "tan", "sinh", "cosh", "tanh", "atan", "atan2")},
+    **{
+        name: _real(lambda u, m, name=name: mpmath.ellipfun(name, u, m=m), lambda u, m: 0 <= m <= 1)
+        for name in ("sn", "cn", "dn")
+    },
     "mpf": mpmath.mpf,
     "pi": mpmath.mp.pi,
 }
@@ -449,6 +539,8 @@ def _field(inertia: list[Any], moment: list[Any], rotor: Any, y: list[Any], abou
 
     omega, gamma = list(y[:3]), list(y[3:])
     momentum = [i * w for i, w in zip(inertia, omega, strict=True)]
+    if about == "heavy_gyrostat":
+        momentum = [m + k for m, k in zip(momentum, rotor, strict=True)]
     if about == "gyrostat":
         omega[1] += rotor
         torque = [0, 0, 0]
@@ -467,7 +559,8 @@ class Numbers:
         self.definitions = {name: compiled(text) for name, text in table.get("definitions", {}).items()}
         top = table["top"]
         self.top = {name: [compiled(text) for text in top[name]] for name in ("inertia", "centre")}
-        self.weight, self.rotor = compiled(top["weight"]), compiled(top.get("rotor", "0"))
+        self.weight, rotor = compiled(top["weight"]), top.get("rotor", "0")
+        self.rotor = [compiled(part) for part in rotor] if isinstance(rotor, list) else compiled(rotor)
         if table["kind"] == "motion":
             self.formulas = [compiled(text) for part in ("omega", "gamma") for text in table["motion"][part]]
         else:
@@ -485,10 +578,15 @@ class Numbers:
     def _parameters(self, draw: random.Random) -> dict[str, Any]:
         names = self.claim.table["parameters"]
         positive = {text.split()[0] for text in self.claim.table["assume"]}
-        return {
-            name: mpmath.mpf(draw.uniform(0.3, 2.5)) * (1 if name in positive or draw.random() < 0.5 else -1)
+        below_one = {"h", "e"} if {"h < 1", "e < 1"} & set(self.claim.table["assume"]) else set()
+        found = {
+            name: mpmath.mpf(draw.uniform(0.3, 0.95 if name in below_one else 2.5))
+            * (1 if name in positive or draw.random() < 0.5 else -1)
             for name in names
         }
+        if "p < c" in self.claim.table["assume"]:
+            found["p"] = found["c"] * mpmath.mpf(draw.uniform(0.1, 0.9))
+        return found
 
     def _at(self, names: dict[str, Any]) -> list[Any]:
         for name, formula in self.definitions.items():
@@ -504,10 +602,14 @@ class Numbers:
         return [*(r - f for r, f in zip(rates, field, strict=True)), sum(g * g for g in near[1][3:]) - 1]
 
     def _field(self, names: dict[str, Any], y: list[Any]) -> list[Any]:
+        for name, formula in self.definitions.items():
+            with suppress(NameError):  # of the time: a top does not change
+                names = {**names, name: formula(names)}
         inertia = [part(names) for part in self.top["inertia"]]
         weight = self.weight(names)
         moment = [weight * part(names) for part in self.top["centre"]]
-        return _field(inertia, moment, self.rotor(names), y, self.claim.system)
+        rotor = [part(names) for part in self.rotor] if isinstance(self.rotor, list) else self.rotor(names)
+        return _field(inertia, moment, rotor, y, self.claim.system)
 
     def _of_integral(self, names: dict[str, Any], draw: random.Random) -> list[Any]:
         y = [mpmath.mpf(draw.uniform(-2, 2)) for _ in STATE]

@@ -25,7 +25,9 @@ def _judged(module, make, count, seed, monkeypatch):
     return list(module.outcomes(count, 4, seed))
 
 
-@pytest.mark.parametrize(("kind", "count"), [("integral_claim", 70), ("motion_claim", 12)])
+@pytest.mark.parametrize(
+    ("kind", "count"), [("integral_claim", 70), ("motion_claim", 12), ("elliptic_claim", 6), ("gyrostat_claim", 20)]
+)
 def test_no_verdict_is_false_and_what_is_true_by_construction_holds(random_claims, kind, count, monkeypatch):
     found = _judged(random_claims, getattr(random_claims, kind), count, 3, monkeypatch)
     assert [(o.fault, o.claim.table) for o in found if o.fault] == []

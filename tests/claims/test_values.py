@@ -62,6 +62,7 @@ def figures(row: Row) -> dict[str, Any]:
         ("0.1D+01", "1", "1", 1),
         ("0.000", "0", "1/1000", 4),
         ("007", "7", "1", 1),
+        ("\N{MINUS SIGN}0.50", "-1/2", "1/100", 2),
         ("3.", "3", "1", 1),
     ],
 )
@@ -229,6 +230,20 @@ def test_a_first_integral_is_exact_at_any_time() -> None:
         assert report.rows[0].holds is holds
 
 
+def test_a_first_integral_of_a_full_tensor_is_exact_where_the_start_is() -> None:
+    """½ Ω·JΩ + n·γ by hand: met to half a unit exactly, which no ball would decide."""
+    start = {"omega": ["0", "0", "1"], "quaternion": ["1", "0", "0", "0"]}
+    body = TENSOR_BODY | {"gravity": "1"}
+    energy = Fraction("0.9") / 2 + 2 * Fraction("0.3")
+    assert energy == Fraction("1.05")
+    for number, holds in (("1.0", True), ("1.1", True), ("1.06", False), ("1.050", True)):
+        row = judged([one("energy", 1, number, "3")], top=None, body=body, start=start).rows[0]
+        assert row.holds is holds, number
+    assert judged([one("area", 1, "1.600", "3")], top=None, body=body, start=start).verdict == "holds"
+    with pytest.raises(InputError, match="none of this motion"):
+        judged([one("spin3", 1, "1")], top=None, body=body, start=start)
+
+
 def test_the_sign_of_a_quaternion_is_free_but_one_for_all_of_its_components() -> None:
     start = {"omega": ["0", "0", "0"], "quaternion": ["3/5", "0", "0", "4/5"]}
 
@@ -238,6 +253,21 @@ def test_the_sign_of_a_quaternion_is_free_but_one_for_all_of_its_components() ->
 
     assert said("0.6", "0", "0", "0.8") == said("-0.6", "0", "0", "-0.8") == "holds"
     assert said("0.6", "0", "0", "-0.8") == said("0.6", "0.1", "0", "0.8") == "refuted"
+
+
+def test_of_two_signs_that_both_fail_the_nearer_is_judged() -> None:
+    """One number is wrong, the others are right to more digits than the first balls have."""
+    lib = mpmath.mp.clone()
+    lib.dps = 50
+    start = {"omega": ["0", "0", "3/7"], "quaternion": ["1", "0", "0", "0"]}
+    values = [
+        one("quaternion", 1, lib.nstr(lib.cos(lib.mpf(3) / 14), 40), "1"),
+        one("quaternion", 3, "0.001", "1"),
+        one("quaternion", 4, lib.nstr(lib.sin(lib.mpf(3) / 14), 40), "1"),
+    ]
+    rows = judged(values, top=UPRIGHT, start=start).rows
+    assert [row.holds for row in rows] == [True, False, True]
+    assert [figures(row)["digits_right"] for row in rows] == [40, 0, 40]
 
 
 def test_a_height_follows_from_gamma_alone_and_nothing_else_of_the_attitude_does() -> None:

@@ -4,11 +4,12 @@ import random
 from fractions import Fraction
 from math import isqrt
 
+import mpmath
 import pytest
 from flint import arb
 from proofs import AsRounded, assert_algebraic_solves, assert_attitude, assert_narrow, assert_solves, positive, rational
 
-from heavytop.errors import InputError, NotInClass
+from heavytop.errors import InputError, NotInClass, OutOfReach
 from heavytop.exact.axes import ALL, renamed_state, renamed_top
 from heavytop.exact.balls import midpoint
 from heavytop.exact.catalogue import find
@@ -109,6 +110,81 @@ def test_a_turning_point_is_a_start_like_any_other():
     assert_solves(case, F(-1000))
 
 
+def by_mpmath(top, start, time, steps):
+    """The state after ``time``: Taylor series of order 40 of the six equations, in mpmath."""
+    inertia, moment = ([mpmath.mpf(v.numerator) / v.denominator for v in part] for part in (top.inertia, top.moment))
+    state = [mpmath.mpf(v.numerator) / v.denominator for v in start.flat]
+    for _ in range(steps):
+        series = [[value] for value in state]
+        omega, gamma = series[:3], series[3:]
+        for k in range(40):
+
+            def product(a, b, k=k):
+                return mpmath.fdot(a[: k + 1], b[k::-1])
+
+            rates = []
+            for i in range(3):
+                j, m = (i + 1) % 3, (i + 2) % 3
+                torque = gamma[j][k] * moment[m] - gamma[m][k] * moment[j]
+                rates.append(((inertia[j] - inertia[m]) * product(omega[j], omega[m]) + torque) / inertia[i])
+            for i in range(3):
+                j, m = (i + 1) % 3, (i + 2) % 3
+                rates.append(product(gamma[j], omega[m]) - product(gamma[m], omega[j]))
+            for each, rate in zip(series, rates, strict=True):
+                each.append(rate / (k + 1))
+        state = [mpmath.polyval(each[::-1], mpmath.mpf(time) / steps) for each in series]
+    return state
+
+
+def test_mpmath_has_the_same_states_and_the_same_period():
+    _, (a, b, first, size, _, sigma), w, _ = shape(2)
+    top, start = motion(2)
+    case = Dokshevich(top, start)
+    with mpmath.workdps(60):
+        near = [mpmath.mpf(midpoint(x).numerator) / midpoint(x).denominator for x in case.state(F(1), 170)]
+        assert max(abs(x - y) for x, y in zip(near, by_mpmath(top, start, 1, 32), strict=True)) < mpmath.mpf(10) ** -48
+        # x = sqrt(s1) dn: the period by the arithmetic-geometric mean; in units of B, x = 1 has B = w
+        k = sigma - first - 1 / b
+        c2 = first**2 + (a - b) * first - 1 - size * sigma
+        k, c2 = (mpmath.mpf(v.numerator) / v.denominator for v in (k, c2))
+        spread = mpmath.sqrt(k * k + 4 * c2)
+        s1, s2 = (k + spread) / (-2 * c2), (k - spread) / (-2 * c2)
+        unit = mpmath.sqrt(mpmath.mpf(w.numerator) / w.denominator)
+        period = 2 * mpmath.ellipk((s1 - s2) / s1) / mpmath.sqrt(-c2 * s1) / unit
+        turn = F(int(mpmath.nint(period * 2**180)), 2**180)
+    for part in (2, 3):  # neither half nor a third of it
+        pairs = zip(case.state(turn / part, 160), start.flat, strict=True)
+        assert max(abs(midpoint(x) - y) for x, y in pairs) > F(1, 100)
+    for turns in (1, -7, 10**6):
+        pairs = zip(case.state(turns * turn, 160), start.flat, strict=True)
+        assert max(abs(midpoint(x) - y) for x, y in pairs) < F(1, 10**40)
+
+
+@pytest.mark.parametrize("sizes", [(100, -100, 100), (-100, 100, 100), (100, 100, -100), (0, 100, 0), (0, 0, -100)])
+@pytest.mark.parametrize("axes", [ALL[0], ALL[3]])
+def test_momentum_moments_and_weight_may_be_of_any_size(sizes, axes):
+    x, beta, moment = (F(10) ** power for power in sizes)
+    top, start = motion(0, None, x, beta, moment)
+    other = find(renamed_top(top, axes), renamed_state(start, axes))
+    near = [midpoint(part) for part in Dokshevich(*motion(0)).state(F(7, 3), 200)]
+    plain = renamed_state(State(near[:3], near[3:]), axes)
+    scales = [x * beta] * 3 + [x * x * beta / moment] * 3
+    for one, same, scale in zip(plain.flat, other.state(F(7, 3) / (x * beta), 1500), scales, strict=True):
+        assert abs(midpoint(same) / scale - one) < F(1, 10**45)
+
+
+def test_moments_on_the_edge_of_what_a_body_has_are_no_harder():
+    tiny = F(1, 10**30)
+    for inertia in ((1, 1 - tiny / 3, tiny), (1, F(1, 2) + tiny, F(1, 2)), (1, 1 - tiny, 1 - 2 * tiny)):
+        state = dokshevich_motion(inertia).state(F(10**6), 170)
+        assert all(x.rad() < arb("1e-35") * (1 + abs(x)) for x in state)
+
+
+def test_moments_that_no_body_has_may_be_too_far_apart_and_the_refusal_names_the_level():
+    with pytest.raises(OutOfReach, match="degenerate but for"):
+        dokshevich_motion((1, F(1, 10**10), F(1, 10**20))).state(F(1), 170)
+
+
 @pytest.mark.parametrize("power", [100, -100])
 def test_units_do_not_matter(power):
     unit = F(10) ** power
@@ -160,6 +236,23 @@ def test_every_hess_top_has_one_with_an_algebraic_start(data):
     assert dot(start.gamma, start.gamma) == 1
     enclosed = Validated(top, start).state(F(10), 170)
     assert max(abs(a - b) for a, b in zip(case.state(F(10), 170), enclosed, strict=True)) < arb("1e-50")
+
+
+@pytest.mark.parametrize(
+    ("inertia", "place", "what"),
+    [
+        (("nan", 1, 2), F(1, 2), "inertia"),
+        ((8, 6), F(1, 2), "inertia has 2"),
+        ("863", F(1, 2), "inertia"),
+        ((8, 6, 3), "nan", "place"),
+        ((8, 6, 3), float("inf"), "place"),
+        ((8, 6, 3), "", "place"),
+        ((8, 6, 3), "1e400", "place"),
+    ],
+)
+def test_what_is_no_number_is_refused_by_the_name_of_the_argument(inertia, place, what):
+    with pytest.raises(InputError, match=what):
+        dokshevich_motion(inertia, place)
 
 
 @pytest.mark.parametrize("data", [((8, 3, 6), F(1, 2)), ((0, 1, 2), F(1, 2)), ((8, 6, 3), F(1)), ((8, 6, 3), F(0))])

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import copy
+import json
 import re
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import jsonschema
 import msgspec
 import pytest
 
+import heavytop as ht
 from heavytop.claims.audit import audit_claim
 from heavytop.claims.entry import Entry
 from heavytop.claims.from_file import claim_from_table
@@ -124,3 +127,12 @@ def test_a_document_is_current_only_of_the_entries_as_they_stand(
     assert not is_current(Library(library="x", version="1.0.0", claims=[unexpected]))
     stated["more"] = msgspec.structs.replace(found.entry, id="more")
     assert not is_current(document)
+
+
+def test_the_results_are_of_the_entries_as_they_stand() -> None:
+    """Else: heavytop run --plan claims and python -m heavytop.suite.claim_library, as results/README.md says."""
+    folder = Path(__file__).parents[2] / "results" / "claims"
+    document = json.loads((folder / "library.json").read_bytes())
+    jsonschema.validate(document, json.loads((folder / "library.schema.json").read_bytes()))
+    assert is_current(msgspec.convert(document, Library, strict=True))
+    assert {row.case for row in ht.read_report(folder).rows} == {each["entry"]["id"] for each in document["claims"]}

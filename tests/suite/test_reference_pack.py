@@ -81,7 +81,9 @@ def test_the_pack_has_every_motion_at_fifty_times_to_forty_digits() -> None:
             )
 
 
-@pytest.mark.parametrize("name", ["bruels-cardona-arnold", "full-tensor", "flywheel-gyroscope", "lagrange", "steklov"])
+@pytest.mark.parametrize(
+    "name", ["bruels-cardona-arnold", "full-tensor", "flywheel-gyroscope", "lagrange", "steklov", "dokshevich"]
+)
 def test_what_is_committed_is_what_the_command_makes(name: str) -> None:
     """Two times of a motion, made again: the same text."""
     case, last = next((case, last) for case, last in reference_pack.motions() if case.name == name)

@@ -15,6 +15,7 @@ from typing import Any
 import sympy
 
 from heavytop.claims.defined import Defined
+from heavytop.claims.elliptic import NAMES
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.ideal import forces_zero
 from heavytop.claims.rational import Quotient, Tower
@@ -308,6 +309,8 @@ class Field:
             return tower.divide(tower.absolute(first), first)
         if name == "log":
             return self._transcendental.logarithm(first)
+        if name in NAMES:
+            return self._transcendental.jacobi(name, first, arguments[1])
         if name in _INVERSE:
             return self._transcendental.function(name, tuple(arguments))
         raise Unprovable(f"{name} has no place in the algebra.")

@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from time import perf_counter
+from typing import Protocol, runtime_checkable
 
 from heavytop.claims.entry import Entry, file_of
 from heavytop.claims.guard import in_time
-from heavytop.claims.judge import Audit, Finding, Row, judge
+from heavytop.claims.judge import Audit, Finding, Row, judge, verdict_of
 from heavytop.claims.statement import Setting, Statement
 from heavytop.claims.values import ValueClaim
-from heavytop.errors import InputError
+from heavytop.errors import HeavyTopError, InputError
 from heavytop.top.equations import System, system
 
 PAPER = ("ershkov-general", "ershkov-partial")
+_SEARCH, _MOST_FOUND = 6.0, 3
+"""Seconds for assumptions that would decide a claim, and how many of them are said."""
 
 
 class Auditable(Protocol):
@@ -59,6 +62,20 @@ def paper_claim(name: str) -> Auditable:
     return GeneralClaim() if name == "ershkov-general" else PartialClaim()
 
 
+@runtime_checkable
+class Assuming(Auditable, Protocol):
+    """A claim with parameters, of which more may be assumed."""
+
+    @property
+    def unassumed(self) -> list[str]:
+        """Parameters of which the claim assumes nothing."""
+        ...
+
+    def assuming(self, bound: str) -> Auditable:
+        """The same claim with one assumption more; raises InputError where a sample breaks it."""
+        ...
+
+
 def find_claim(name: str) -> Auditable | ValueClaim:
     """The paper's claim of that name, or the claim in the TOML file at that path; raises InputError for neither."""
     if name in PAPER:
@@ -100,13 +117,39 @@ def audit_claim(
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Audit:
     """The audit of a claim that is at hand, as a motion of the system asked for.  progress: as in :func:`audit`."""
-    about = claim.about(asked)
+    about, began = claim.about(asked), perf_counter()
     if isinstance(claim, ValueClaim):
         return Audit(claim.name, about.name, claim.source, claim.rows(about), kind=claim.kind, entry=claim.entry)
     rows = judge(claim.statements(about), claim.setting, progress)
+    deciding = would_decide(claim, about, rows, perf_counter() - began)
     why, solves = claim.explain(about, rows)
     constants = tuple((name, str(value)) for name, value in claim.setting.constants)
-    return Audit(claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
+    said = (claim.name, about.name, claim.source, rows, tuple(why), solves, constants, claim.kind, claim.entry)
+    return Audit(*said, deciding)
+
+
+def would_decide(claim: Auditable, about: System, rows: Sequence[Row], seconds: float) -> tuple[tuple[str, str], ...]:
+    """Assumptions on the parameters of an undecided claim in a file, each of which decides it, with the verdict then.
+
+    seconds: that the audit took; what would take more than :data:`_SEARCH` together is not tried.
+    """
+    if not isinstance(claim, Assuming) or verdict_of(rows) != "undecided":
+        return ()
+    open_ones = [c.positive for row in rows for c in row.conditions if c.positive and not c.discharged]
+    found: list[tuple[str, str]] = []
+    began = perf_counter()
+    for formula in dict.fromkeys([*claim.unassumed, *open_ones]):
+        if perf_counter() - began + 2 * seconds > _SEARCH or len(found) == _MOST_FOUND:
+            break
+        bound = f"{formula} > 0"
+        try:
+            other = claim.assuming(bound)
+            verdict = verdict_of(judge(other.statements(about), other.setting))
+        except HeavyTopError:  # a sample breaks it, or the formula is none that may be assumed
+            continue
+        if verdict != "undecided":
+            found.append((bound, verdict))
+    return tuple(found)
 
 
 def only_branch(report: Audit, branch: str) -> Audit:

@@ -12,6 +12,7 @@ import sympy
 from flint import arb
 
 from heavytop.claims.defined import at_values
+from heavytop.claims.elliptic import NAMES
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.sign import Sign, Unprovable
 
@@ -31,6 +32,11 @@ class Kind(Enum):
         if self is Kind.NONZERO:
             return sign.strict
         return sign.value > 0 and (sign.strict or self is Kind.NONNEGATIVE)
+
+
+def written(text: str) -> str:
+    """A formula as files have it: a power is ``^``."""
+    return text.replace("**", "^")
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +89,9 @@ def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Nee
         needs = {Need(Kind.NONZERO, sympy.cos(u))}
     elif function in ("coth", "csch"):
         needs = {Need(Kind.NONZERO, sympy.sinh(u))}
+    elif function in NAMES:
+        m = arguments[1]
+        needs = {Need(Kind.NONNEGATIVE, m), Need(Kind.NONNEGATIVE, 1 - m, f"{m} ≤ 1")}
     elif function == "atan2":
         needs = {Need(Kind.POSITIVE, u**2 + arguments[1] ** 2)}
     else:

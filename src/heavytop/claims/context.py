@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import sympy
 from flint import arb
+from msgspec import structs
 
 from heavytop.claims.assume import Assumed, assume, comparisons
 from heavytop.claims.conditions import Kind, Need, condition, is_exactly_zero
@@ -249,6 +251,16 @@ class FileClaim:
     def source(self) -> str:
         """As the file has it."""
         return self.content.source
+
+    @property
+    def unassumed(self) -> list[str]:
+        """Parameters that stand in no assumption."""
+        words = set(re.findall(r"\w+", " ".join(self.content.assume)))
+        return [name for name in self.content.parameters if name not in words]
+
+    def assuming(self, bound: str) -> Self:
+        """The same claim with one assumption more; raises InputError where a sample breaks it."""
+        return type(self)(structs.replace(self.content, assume=[*self.content.assume, bound]))
 
     @property
     def entry(self) -> Entry | None:

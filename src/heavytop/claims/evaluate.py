@@ -35,7 +35,20 @@ _FUNCTIONS: dict[str, Callable[..., arb]] = {
     "atan2": lambda y, x: arb.atan2(y, x),
     "Abs": abs,
     "sign": arb.sgn,
+    "sn": lambda u, m: _jacobi(u, m)[0],
+    "cn": lambda u, m: _jacobi(u, m)[1],
+    "dn": lambda u, m: _jacobi(u, m)[2],
 }
+
+
+def _jacobi(u: arb, m: arb) -> tuple[arb, arb, arb]:
+    """sn, cn, dn; not finite unless 0 ≤ m ≤ 1 is certain."""
+    from heavytop.exact.jacobi import jacobi
+
+    if not (m >= 0 and m <= 1):
+        return arb("nan"), arb("nan"), arb("nan")
+    sine, cosine, delta = jacobi(m, 1 - m).functions(u)
+    return sine, cosine, delta
 
 
 @whole_evaluation

@@ -15,17 +15,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import comb
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import sympy
 
+from heavytop.claims import elliptic
 from heavytop.claims.conditions import Need, condition
 from heavytop.claims.defined import Defined
 from heavytop.errors import InputError
 from heavytop.precision import exact
 
 _OF_ONE = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sech", "asin", "acos", "atan")
-FUNCTIONS = {**{name: (getattr(sympy, name), 1) for name in _OF_ONE}, "atan2": (sympy.atan2, 2)}
+FUNCTIONS: dict[str, tuple[Any, int]] = {
+    **{name: (getattr(sympy, name), 1) for name in _OF_ONE},
+    "atan2": (sympy.atan2, 2),
+    **{name: (getattr(elliptic, name), 2) for name in elliptic.NAMES},
+}
 _MAX_LENGTH = 10_000
 _MAX_DEPTH = 60
 _MAX_NODES = 2_000
@@ -226,7 +231,8 @@ class _Parser:
     def _name(self, token: str) -> Formula:
         if token not in self._names:
             known = ", ".join(sorted(self._names))
-            raise InputError(f"{self._where}: unknown name {token[:40]!r}.", f"Known here: {known[:400]}.")
+            remedy = f"Known here: {known[:400]}; functions: {', '.join(FUNCTIONS)}."
+            raise InputError(f"{self._where}: unknown name {token[:40]!r}.", remedy)
         return self._names[token]
 
     def _function(self, token: str) -> Formula:

@@ -18,7 +18,7 @@ import sympy
 from flint import arb
 
 from heavytop.claims.algebra import Field
-from heavytop.claims.conditions import conditions_of, is_exactly_zero
+from heavytop.claims.conditions import conditions_of, is_exactly_zero, written
 from heavytop.claims.entry import Entry
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.proof import Condition
@@ -103,6 +103,7 @@ class Audit(Tabular):
     why: what explains the verdict, each step checked.  solves: the systems whose equations of motion the claim
     satisfies on its smooth branch, or that keep the integral or relation.  kind: motion, integral, relation or value.
     constants: names in the residuals with what they stand for, such as k/2.  entry: of the library, where it is one.
+    deciding: of an undecided claim, assumptions each of which decides it, with the verdict then.
     """
 
     claim: str
@@ -114,6 +115,7 @@ class Audit(Tabular):
     constants: tuple[tuple[str, str], ...] = ()
     kind: str = "motion"
     entry: Entry | None = None
+    deciding: tuple[tuple[str, str], ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -127,17 +129,24 @@ class Audit(Tabular):
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``heavytop audit --json``."""
-        return {
-            "claim": self.claim,
-            "system": self.system,
-            "kind": self.kind,
-            "verdict": self.verdict,
-            "source": self.source,
-            "solves": list(self.solves),
-            "constants": dict(self.constants),
-            "why": [{"statement": finding.statement, "holds": finding.holds} for finding in self.why],
-            "equations": [row.to_json() for row in self.rows],
-        } | ({} if self.entry is None else {"entry": msgspec.to_builtins(self.entry)})
+        return (
+            {
+                "claim": self.claim,
+                "system": self.system,
+                "kind": self.kind,
+                "verdict": self.verdict,
+                "source": self.source,
+                "solves": list(self.solves),
+                "constants": dict(self.constants),
+                "why": [{"statement": finding.statement, "holds": finding.holds} for finding in self.why],
+                "equations": [row.to_json() for row in self.rows],
+            }
+            | ({} if self.entry is None else {"entry": msgspec.to_builtins(self.entry)})
+            | self._missing()
+        )
+
+    def _missing(self) -> dict[str, Any]:
+        return {"would_decide": dict(self.deciding)} if self.deciding else {}
 
     def _table(self) -> Table:
         lines = [(r.equation, str(r.component or ""), r.branch, r.domain, VERDICTS[r.holds]) for r in self.rows]
@@ -199,7 +208,8 @@ def _row(
     witness: Mapping[str, Any] | None = None,
 ) -> Row:
     name, note = s.domain.label, s.domain.note
-    return Row(s.equation, s.component, s.branch, name, holds, residual, s.text, witness, note, conditions)
+    said = tuple(replace(c, text=written(c.text), reason=written(c.reason)) for c in conditions)
+    return Row(s.equation, s.component, s.branch, name, holds, written(residual), s.text, witness, note, said)
 
 
 def _witnesses(statement: Statement, setting: Setting, prover: Prover) -> Iterator[dict[str, Any]]:

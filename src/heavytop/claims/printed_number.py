@@ -9,6 +9,7 @@ from fractions import Fraction
 from heavytop.errors import InputError, quoted
 
 _DECIMAL = re.compile(r"[+-]?(?P<whole>[0-9]*)(?:\.(?P<part>[0-9]*))?(?:[eEdD](?P<power>[+-]?[0-9]{1,5}))?")
+_MINUS = "\N{MINUS SIGN}"
 _MOST_DIGITS = 1_000
 _LARGEST_POWER = 9_000
 _REMEDY = "Write it as it is printed, as text: a decimal such as 0.450, -1.5e-3 or 12; its zeros at the end count."
@@ -29,7 +30,8 @@ class PrintedNumber:
     @classmethod
     def read(cls, text: str, what: str) -> PrintedNumber:
         """Raises InputError for what is no decimal number, and for one of more than 1000 digits or beyond 1e±9000."""
-        found = _DECIMAL.fullmatch(text.strip())
+        plain = text.strip().replace(_MINUS, "-")
+        found = _DECIMAL.fullmatch(plain)
         whole, part = (found["whole"], found["part"] or "") if found is not None else ("", "")
         if found is None or not whole + part:
             raise InputError(f"{what}: {quoted(text)} is no decimal number.", _REMEDY)
@@ -42,7 +44,7 @@ class PrintedNumber:
         unit = Fraction(10) ** (power - len(part))
         size = int(whole + part)
         digits = len(str(size)) if size else len(part) + 1
-        return cls(text.strip(), (-size if text.strip().startswith("-") else size) * unit, unit, digits)
+        return cls(text.strip(), (-size if plain.startswith("-") else size) * unit, unit, digits)
 
     def right(self, error: Fraction) -> int:
         """How many digits are right of a number that is off by ``error`` ≥ 0: the most that are so to half a unit."""

@@ -37,11 +37,15 @@ _SOME_STATE = {
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """A condition of a proof: whether it is discharged, and how, or what stands against it."""
+    """A condition of a proof: whether it is discharged, and how, or what stands against it.
+
+    positive: the formula that has to be > 0 for it, where it is one of the parameters alone.
+    """
 
     text: str
     discharged: bool
     reason: str
+    positive: str = ""
 
 
 class Region:

@@ -8,7 +8,7 @@ from functools import lru_cache
 import sympy
 
 from heavytop.claims.algebra import Field
-from heavytop.claims.conditions import Kind, Need
+from heavytop.claims.conditions import Kind, Need, written
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.proof import KEPT, Condition, Region
 from heavytop.claims.sign import NUMBER_BITS, PLUS, Unprovable
@@ -202,7 +202,7 @@ class Prover:
             elif not how and continuous and inner.is_removable(need):
                 found[need] = _REMOVABLE
         conditions = [
-            Condition(need.text, bool(how), how or whole.fails_everywhere(need) or "not shown")
+            Condition(need.text, bool(how), how or whole.fails_everywhere(need) or "not shown", self._bound(need))
             for need, how in found.items()
         ]
         for text, values, obstacle in ((_CONTINUOUS, f.values, against[0]), (_ATTITUDE, f.attitude, against[1])):
@@ -211,6 +211,12 @@ class Prover:
         if f.pole:
             conditions.append(Condition(f.pole, continuous, "removable in gamma" if continuous else "not shown"))
         return [*conditions, *self._kept(statement, whole)]
+
+    def _bound(self, need: Need) -> str:
+        """The formula that has to be > 0 for the condition, where it is one of the parameters alone; "" for others."""
+        names = {str(symbol) for symbol in need.expression.free_symbols}
+        moving = {str(self._setting.variable), *(f"{name}{axis}" for name in ("Omega", "gamma") for axis in (1, 2, 3))}
+        return written(str(need.expression)) if names and not names & moving else ""
 
     def _kept(self, statement: Statement, region: Region) -> Iterable[Condition]:
         """The side conditions are invariant: their rates are combinations of them."""

@@ -8,9 +8,10 @@ from fractions import Fraction
 import sympy
 
 from heavytop.claims.defined import Defined
+from heavytop.claims.elliptic import dn
 from heavytop.claims.sign import PLUS, UNKNOWN, Sign, sum_of
 
-_BOUNDS = {"sin": Fraction(1), "cos": Fraction(1), "tanh": Fraction(1), "sech": Fraction(1), "atan": Fraction(11, 7)}
+_BOUNDS = dict.fromkeys(("sin", "cos", "tanh", "sech", "sn", "cn"), Fraction(1)) | {"atan": Fraction(11, 7)}
 
 
 def sign_of(e: sympy.Expr) -> Sign:
@@ -26,7 +27,7 @@ def sign_of(e: sympy.Expr) -> Sign:
         return total
     if e.is_Add:
         return _sign_of_sum(e)
-    if isinstance(e, (sympy.exp, sympy.cosh, sympy.sech)):
+    if isinstance(e, (sympy.exp, sympy.cosh, sympy.sech, dn)):
         return PLUS
     if e.is_Pow and e.args[1].is_Rational:
         return _sign_of_power(*e.args)

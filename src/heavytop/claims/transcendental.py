@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import sympy
 from flint import fmpz
 
+from heavytop.claims import elliptic
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.inverse import is_below_quarter, same_as
 from heavytop.claims.rational import Quotient
@@ -49,6 +50,7 @@ class Transcendental:
         self._divisors = divisors
         self._bases: list[tuple[str, Quotient, int]] = []
         self._functions: dict[tuple[str, ...], int] = {}
+        self._elliptic: dict[tuple[str, ...], tuple[int, int]] = {}
 
     # --- exponentials -----------------------------------------------------------------------------------------------
 
@@ -250,6 +252,36 @@ class Transcendental:
             t.sum((t.product((a[0], b[1])), t.product((a[1], b[0])))),
             t.sum((t.product((a[1], b[1])), t.product((minus, a[0], b[0])))),
         )
+
+    # --- Jacobi's functions -----------------------------------------------------------------------------------------
+
+    def jacobi(self, name: str, argument: Quotient, parameter: Quotient) -> Quotient:
+        """sn, cn, dn: sn is a free generator, cn one with cn² = 1 − sn², and dn = √(1 − m sn²) > 0."""
+        t = self._tower
+        key = _key("sn", argument, parameter)
+        if key not in self._elliptic:
+            self._elliptic[key] = self._new_elliptic(argument, parameter)
+        sine, cosine = self._elliptic[key]
+        if name != "dn":
+            return t.polynomial(t.gens[sine if name == "sn" else cosine])
+        s = t.polynomial(t.gens[sine])
+        square = t.sum((t.number(1), t.product((t.number(-1), parameter, s, s))))
+        below = t.signs.of(square.denominator)
+        above = square.numerator if below.value else t.times(square.numerator, square.denominator)
+        t.signs.declare(above, Sign(below.value or 1, True))  # where 0 ≤ m ≤ 1, which is a condition of each proof
+        return t.root(square)
+
+    def _new_elliptic(self, argument: Quotient, parameter: Quotient) -> tuple[int, int]:
+        t = self._tower
+        u, m = self._field.expression(argument), self._field.expression(parameter)
+        sine, cosine = elliptic.sn(u, m, evaluate=False), elliptic.cn(u, m, evaluate=False)
+        index = self._new("sn", sine, (argument, parameter), Sign(0, False))
+        partner = t.add_root(("cn", u, m), 1 - t.gens[index] ** 2, sign=0, kind="cn")
+        self._field.means(partner, cosine)
+        self._set_number(partner, cosine)
+        unit = (Fraction(-1), Fraction(1))
+        t.signs.ranges |= {index: unit, partner: unit}
+        return index, partner
 
     # --- logarithms and the rest ------------------------------------------------------------------------------------
 

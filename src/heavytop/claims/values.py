@@ -30,8 +30,9 @@ from heavytop.top.outputs import Output
 
 if TYPE_CHECKING:
     from heavytop.exact.bodies import BodyMotion
+    from heavytop.top.attitude import Attitude
     from heavytop.top.bodies import Body
-    from heavytop.top.equations import System
+    from heavytop.top.equations import Parameters, System
     from heavytop.top.integrals import Integral
 
 Text = Annotated[str, msgspec.Meta(max_length=20_000)]
@@ -299,9 +300,10 @@ def _judged(group: Sequence[Figure], known: Sequence[Fraction | arb]) -> list[Ju
         return same
     other = [judge_figure(figure, _negative(known[figure.component - 1])) for figure in group]
 
-    def rank(judged: Sequence[Judgement]) -> tuple[int, int, Fraction]:
+    def rank(judged: Sequence[Judgement]) -> tuple[int, Fraction]:
         verdicts = [each.holds for each in judged]
-        return int(False in verdicts), int(None in verdicts), sum((each.off[1] ** 2 for each in judged), Fraction(0))
+        worst = 2 if False in verdicts else 1 if None in verdicts else 0
+        return worst, sum((each.off[1] ** 2 for each in judged), Fraction(0))
 
     return min(same, other, key=rank)
 
@@ -457,29 +459,34 @@ class _KnownNumbers:
         return found
 
     def _integral(self, integral: Integral, bits: int) -> Fraction | arb:
-        """A first integral at the start: exactly, or of irrational data as a ball, in the axes given."""
+        """A first integral at the start: exactly, or as a ball of an irrational attitude."""
         resolved = self.motion.resolved
         if self._exact:
             p = self.system.parameters(resolved.top, resolved.start)
             return exact(integral.value(p, resolved.start.flat))
-        return self._integral_of_irrational(integral, bits)
+        return self._integral_in_given_axes(integral, bits)
 
-    @whole_evaluation
-    def _integral_of_irrational(self, integral: Integral, bits: int) -> arb:
-        from heavytop.top.attitude import rotated, transposed
+    def _integral_in_given_axes(self, integral: Integral, bits: int) -> Fraction | arb:
+        """The same where the principal axes or the attitude are irrational."""
         from heavytop.top.equations import Parameters
 
         body, start = self.body, self.start
         tensor = body.inertia if isinstance(body, HeavyTop) else body.tensor
+        p = Parameters(tensor, body.moment, body.rotor or (Fraction(0),) * 3)
+        if start.attitude is None or start.attitude.exact_rows() is not None:
+            return exact(integral.value(p, start.flat))
+        return self._integral_of_balls(integral, p, start.attitude, bits)
+
+    @whole_evaluation
+    def _integral_of_balls(self, integral: Integral, p: Parameters, attitude: Attitude, bits: int) -> arb:
+        from heavytop.top.attitude import rotated, transposed
+
         with working_precision(bits + 4 * _SPARE_BITS):
-            p = Parameters(_balls(tensor), _balls(body.moment), _balls(body.rotor or (Fraction(0),) * 3))
-            omega, gamma = _balls(start.omega), _balls(start.gamma)
-            if start.attitude is not None:
-                rows = start.attitude.rows(FUNCTIONS, ball)
-                gamma = rows[2]
-                if start.omega_space is not None:
-                    omega = rotated(transposed(rows), _balls(start.omega_space))
-            return arb(integral.value(p, (*omega, *gamma)))
+            rows = attitude.rows(FUNCTIONS, ball)
+            omega, space = _balls(self.start.omega), self.start.omega_space
+            if space is not None:
+                omega = rotated(transposed(rows), _balls(space))
+            return arb(integral.value(type(p)(*map(_balls, p)), (*omega, *rows[2])))
 
 
 def _balls(values: Any) -> Any:

@@ -11,6 +11,7 @@ and with S = √(a² − ab + b² + 3), A = (b − 2a − S)/3, κ = (a + b + 2S
 
     y = A x + 1/x,   z² = C2 x² + K − 1/x²,   Γ = (−κ (p x² + 1/b), κ (σ x² − 1), −κ x z),   |Γ| = κ/b
     x' = −z x:   v = |x| swings between the roots of f(v) = C2 v⁴ + K v² − 1 = v'²
+    v = √s1 dn(√(−C2 s1) t | (s1 − s2)/s1), s1 > s2 the roots of C2 s² + K s − 1:   Ω, γ have the period 2K/√(−C2 s1)
 
 M is level, |M|² = (1 + A² + C2) x² + 2A + K, and turns about γ at the rate |Γ| x/|M|².
 Source: A. I. Dokshevich (1966) has the frame; the formulas are derived here: the residuals of all six equations vanish.
@@ -18,7 +19,7 @@ Source: A. I. Dokshevich (1966) has the frame; the formulas are derived here: th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import isqrt
@@ -36,9 +37,9 @@ from heavytop.exact.gaps import Gap, Roots
 from heavytop.exact.motion import kept
 from heavytop.exact.scales import exponent
 from heavytop.exact.separated import decide
-from heavytop.precision import round_to, shown
+from heavytop.precision import exact, round_to, shown
 from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State, Vector, dot
+from heavytop.top.heavy_top import HeavyTop, State, Vector, dot, vector
 
 _TERMS = 1 << 14
 _REMEDY = "`dokshevich_motion` builds a top with such a motion."
@@ -391,11 +392,15 @@ class AlgebraicDokshevich(_Moving):
         return HeavyTop(self.inertia, 1, centre), State(values[:3], values[3:]).normalized(bits)
 
 
-def dokshevich_motion(inertia: Vector, place: Fraction = Fraction(1, 2)) -> AlgebraicDokshevich:
+def dokshevich_motion(inertia: Iterable[Any], place: Any = Fraction(1, 2)) -> AlgebraicDokshevich:
     """Dokshevich's motion of the Hess top with these moments, I2 between I1 and I3.
 
-    place: where M·r/|r| stands at t = 0, see :class:`AlgebraicDokshevich`.
+    place: where M·r/|r| stands at t = 0, see :class:`AlgebraicDokshevich`.  Both are read by
+    :func:`heavytop.precision.exact`.
     Raises InputError where there is no such top, and for a place out of range.
     """
-    i1, i2, i3 = map(Fraction, inertia)
-    return AlgebraicDokshevich((i1, i2, i3), Fraction(place))
+    try:
+        where = exact(place)
+    except InputError as error:
+        raise InputError(f"place: {error.cause}", error.remedy) from None
+    return AlgebraicDokshevich(vector(inertia, "inertia"), where)

@@ -231,9 +231,11 @@ class Trajectory(Tabular):
     def texts(self, of: str | Output | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
         """The states as full-precision decimal strings, ``nan`` and ``inf`` where they are, shape (n, 6) or (n, 9).
 
-        of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for one of these in place of the states, in
-            the shape of its array; each number is rounded once, from exact arithmetic on the native numbers.
-        point, pivot: as in :meth:`positions`.
+        Arguments:
+            of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for one of these in place of the
+                states, in the shape of its array; each number is rounded once, from exact arithmetic on the native
+                numbers.
+            point, pivot: as in :meth:`heavytop.integrate.trajectory.Trajectory.positions`.
 
         Raises InputError for another output, and for a run without attitude.
         """

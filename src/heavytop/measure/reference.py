@@ -97,9 +97,10 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     def texts(self, of: str | Output | None = None, *, point: Any = None, pivot: Any = None) -> list[Any]:
         """The values as decimal text, shape (n, 6).
 
-        of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for the values of that in place of the
-            states, in the shape of its array.
-        point, pivot: as in :meth:`positions`.
+        Arguments:
+            of: "quaternion", "matrix", "euler:ZXZ", "position" or "omega-space" for the values of that in place of the
+                states, in the shape of its array.
+            point, pivot: as in :meth:`heavytop.measure.reference.Reference.positions`.
 
         Raises InputError for another output, and for a reference without attitude.
         """
@@ -108,7 +109,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
         return [[ball.value for ball in state] for state in self.states]
 
     def balls(self, of: str | Output, *, point: Any = None, pivot: Any = None) -> list[Any]:
-        """An output as :class:`Ball`, in the shape of its array; "nan" within "inf" for what is not defined.
+        """An output as balls in the shape of its array; "nan" within "inf" for what is not defined.
 
         of, point, pivot: as in :meth:`texts`.  Each number is proven to ``digits``, relative to a size above 1; a
         position relative to |p|.

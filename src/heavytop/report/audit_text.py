@@ -32,6 +32,7 @@ def audit_text(report: Audit) -> RenderableType:
     if report.kind == "value":
         return Group(*parts, Text(), *values_text(report.rows), *_entry(report))
     parts += [Text(), _table(report), Text(), *_witnesses(report), *_conditions(report)]
+    parts += [Text(f'With assume = [..., "{bound}"] the verdict is: {verdict}.') for bound, verdict in report.deciding]
     if report.why:
         parts += [Text(), Text("Why, each step checked by the same algebra:")]
         parts += [Text(f"  [{VERDICTS[finding.holds]}] {finding.statement}") for finding in report.why]
@@ -64,7 +65,7 @@ def _table(report: Audit) -> Table:
 def _in_lines(expression: str) -> str:
     """The expression in lines of at most 20 characters, broken behind an operator or a space, never inside a name."""
     lines = [""]
-    for part in re.findall(r"[\w.]+'*\)*|\*\*|\W", expression):
+    for part in re.findall(r"[\w.]+'*\)*|\W", expression):
         if lines[-1] and len((lines[-1] + part).rstrip()) > _RESIDUAL:
             lines.append("")
         lines[-1] += part if lines[-1] else part.lstrip()

@@ -91,16 +91,16 @@ class Body:
 
     @property
     def axes(self) -> Tensor:
-        """The rows of A, v_given = A v_principal: exact where the principal axes are rational, else to 256 bits."""
+        """Rows of A with v_given = A v_principal; exact where the principal axes are rational, else to 256 bits."""
         return self.principal().axes
 
     @property
     def top(self) -> HeavyTop:
-        """The same body in principal axes: moments at the pivot, weight m g, centre; exact, or to 256 bits."""
+        """The same body in principal axes, with moments at the pivot, weight m g, centre; exact, or to 256 bits."""
         return self.top_in(self.principal())
 
     def top_in(self, principal: PrincipalAxes) -> HeavyTop:
-        """The heavy top of these principal axes; it lacks what :attr:`PrincipalAxes.left` says."""
+        """The heavy top of these principal axes; it lacks what ``principal.left`` says."""
         turn = transposed(principal.axes)
         centre = rotated(turn, self.centre)
         if self.rotor is None:
