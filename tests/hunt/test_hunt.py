@@ -30,7 +30,7 @@ def numbers(found: dict[str, object]) -> list[Fraction]:
 def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # in this process: one of its own takes seconds to begin
     monkeypatch.setitem(peers.BUILT_IN, f"planted:{fault}", peers.BuiltIn(f"hunted_integrators:{fault}"))
-    hunt = ht.hunt(f"planted:{fault}", budget=128, horizon=5)
+    hunt = ht.hunt(f"planted:{fault}", budget=128, horizon=2)
     assert hunt.found
     worst = hunt.found[0]
     assert max(map(digits, numbers(worst))) <= 3
@@ -47,10 +47,10 @@ def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.Mon
 
 
 def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst() -> None:
-    hunt = ht.hunt(budget=128, horizon=20, seed=3)
-    assert (hunt.found, hunt.motions, hunt.seed) == ([], 128, 3)
+    hunt = ht.hunt(budget=96, horizon=4, seed=3)
+    assert (hunt.found, hunt.motions, hunt.seed) == ([], 96, 3)
     assert "Nothing was found" in str(hunt)
-    assert "--budget 128 --seed 3" in str(hunt)
+    assert "--budget 96 --seed 3" in str(hunt)
 
 
 def test_the_command_line_prints_the_document_and_ends_with_1_where_anything_is_found() -> None:
@@ -133,3 +133,19 @@ found = "found.toml"
     assert first.count("[[top]]") >= 1
     assert KINDS["hunt"].measure(task, Saved()).outcome == "failed"
     assert Path("found.toml").read_text().startswith(first)
+
+
+def test_what_is_rounded_on_the_way_may_grow_by_more_than_what_is_rounded_at_the_start() -> None:
+    # a hunt of heyoka once found this motion, near the separatrix of a pendulum, and blamed heyoka
+    top = ht.HeavyTop(("199/1000000000", "239/1000000000", "134337/1000000000000"), 56, ("7/10000000", 0, 0))
+    start = ht.State(("1/50", 0, "-3/100"), (0, 0, 1))
+    meter = Meter(Integrator("heyoka"), ht.DOUBLE, Fraction(3), None)
+    (found,) = meter.measure([(top, start)])
+    assert meter.sharper(found).amplification > 2 * found.amplification
+    assert found.error < 100 * meter.sharper(found).explained(2.0**-52)
+
+
+def test_the_same_seed_searches_the_same() -> None:
+    one, two = (ht.hunt(budget=24, horizon=2, seed=9).hunted.worst for _ in range(2))
+    assert [m.motion for m in one] == [m.motion for m in two]
+    assert [m.error for m in one] == [m.error for m in two]

@@ -23,7 +23,7 @@ from heavytop.measure.integrator import Integrator
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number, real
 from heavytop.suite.hunt.apart import SECONDS, Apart, Run, follow
 from heavytop.suite.hunt.draw import Motion
-from heavytop.top.amplification import amplification, rate
+from heavytop.top.amplification import FOLLOWED, amplification, rate
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import State
 
@@ -104,10 +104,19 @@ class Meter:
         return follow(integrator, *motion, self.times, self.precision)
 
     def sharper(self, found: Measured) -> Measured:
-        """The same with the amplification over all directions, which is at least that over one."""
+        """The same with the amplification over all directions, from the start on and from each sample on: what is
+        rounded on the way may grow by more than what is rounded at the start.
+        """
         problem = Problem.of(*found.motion, self.precision, HEAVY_TOP)
-        whole = amplification(HEAVY_TOP, problem.parameters, problem.start.flat, self.horizon)
-        return replace(found, amplification=max(whole, found.amplification))
+        largest = amplification(HEAVY_TOP, problem.parameters, problem.start.flat, self.horizon)
+        (states,) = self._finely([replace(problem, precision=self._fine)])
+        for time, state in zip(self.times[:-1], states or (), strict=False):
+            # of a motion that is lost anyway no more is asked
+            if largest > FOLLOWED:
+                break
+            later = amplification(HEAVY_TOP, problem.parameters, tuple(state), self.horizon - time)
+            largest = max(largest, later)
+        return replace(found, amplification=max(largest, found.amplification))
 
     def _runs(
         self, integrator: Integrator, problems: Sequence[Problem], motions: Sequence[Motion], apart: Apart | None

@@ -25,7 +25,7 @@ _POOL = 24
 _MOST_FOUND = 3
 _MOST_HITS = 16
 _SHOWN = 3
-_SHARPENED = 12
+_SHARPENED = 6
 _LEAST_LAW = 0.05
 _LOST = 0.01
 """An error that would be explained up to here says nothing: the format has no digit left."""
