@@ -22,6 +22,7 @@ import mpmath
 
 from heavytop.__main__ import main
 
+HERE = Path(__file__).resolve().parent.parent
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -64,8 +65,13 @@ def _as_before(line: list[str]) -> Iterator[None]:
 
 
 def _is_temporary(module: object) -> bool:
-    """Whether it is an integrator of one test, whose name the next gives to another."""
-    return str(getattr(module, "__file__", None) or "").startswith(tempfile.gettempdir())
+    """Whether it is an integrator of one test, whose name the next gives to another.
+
+    The checkout and its environment may stand in a temporary folder themselves: what they hold is loaded once.
+    """
+    file = Path(getattr(module, "__file__", None) or "")
+    lasting = (HERE, Path(sys.prefix), Path(sys.base_prefix))
+    return file.is_relative_to(tempfile.gettempdir()) and not any(map(file.is_relative_to, lasting))
 
 
 def state() -> dict[str, object]:

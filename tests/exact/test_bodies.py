@@ -5,6 +5,7 @@ from itertools import permutations
 from random import Random
 from typing import Any
 
+import mpmath
 import pytest
 from flint import arb
 
@@ -246,3 +247,17 @@ def test_a_time_beyond_the_enclosure_is_out_of_reach_by_name() -> None:
 def test_rotations_of_the_independent_integration_are_rotations() -> None:
     rows = rotation([Fraction(1), Fraction(2), Fraction(3), Fraction(4)])
     assert multiplied(rows, transposed(rows)) == IDENTITY
+
+
+@pytest.mark.parametrize("angle", ["1e100", "1e300", "-1e1000"])
+@pytest.mark.parametrize("place", [1, 2])
+def test_angles_of_many_turns_are_known_at_once(angle: str, place: int) -> None:
+    angles = ["0.3", "0.5", "0.2"]
+    angles[place] = angle
+    start = ht.State(("1/10", "2/5", "9/10"), attitude=ht.Attitude.euler("ZYX", *angles))
+    known = ht.reference(ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), start, [0], 20)
+    with mpmath.workdps(1100):
+        b, c = (mpmath.mpf(text) for text in angles[1:])
+        gamma = (-mpmath.sin(b), mpmath.cos(b) * mpmath.sin(c), mpmath.cos(b) * mpmath.cos(c))
+        for value, ball in zip(gamma, known.states[0][3:], strict=True):
+            assert abs(value - mpmath.mpf(ball.value)) <= mpmath.mpf(ball.radius)

@@ -19,7 +19,7 @@ inertia = ["0.5", "0.7", "0.9", "0.1", "-0.05", "0.02"]
 omega = ["1", "2", "-3"]
 euler = "ZYX:30deg,0.2,1"
 [[top]]
-name = "wheel"
+name = "spinner"
 mass = "1"
 gravity = "0"
 centre = ["0", "0", "0"]
@@ -30,7 +30,7 @@ quaternion = ["1", "0", "0", "0"]
 """
 TABLE = """[[measure]]
 kind = "drift"
-cases = ["tilted", "wheel"]
+cases = ["tilted", "spinner"]
 attitude = {attitude}
 integrator = "{integrator}"
 runs = [{{ precision = "{precision}", horizon = "2", samples = 20 }}]
@@ -67,7 +67,7 @@ def test_the_states_are_those_of_a_run_without_attitude_to_rounding(tmp_path: Pa
 def test_the_band_of_a_body_with_a_rotor_is_rounding_noise(tmp_path: Path) -> None:
     """Reruns scale the rotor with the moments: else they are other motions, with bands of many decades."""
     found = rows(tmp_path, {"integrator": "heyoka", "precision": "double", "attitude": "true"})
-    row = found["wheel", "heyoka double"]
+    row = found["spinner", "heyoka double"]
     bands = [
         metric.band for name, metric in row.metrics.items() if name.startswith(("drift", "solution")) and metric.band
     ]

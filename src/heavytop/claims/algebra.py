@@ -26,6 +26,7 @@ _MAX_EXPONENT = 64
 _MAX_REFINEMENTS = 12
 _HYPERBOLIC = ("tanh", "sech", "sinh", "cosh", "coth", "csch")
 _INVERSE = ("asin", "acos", "atan", "atan2")
+_WEIERSTRASS = ("wp", "wpprime", "wp3", "wp3prime", "wpinverse")
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,6 +310,8 @@ class Field:
             return tower.divide(tower.absolute(first), first)
         if name == "log":
             return self._transcendental.logarithm(first)
+        if name in _WEIERSTRASS:
+            return self._transcendental.weierstrass(name, (first, arguments[1], arguments[2]))
         if name in NAMES:
             return self._transcendental.jacobi(name, first, arguments[1])
         if name in _INVERSE:

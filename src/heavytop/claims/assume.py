@@ -26,7 +26,7 @@ class Assumed:
     weak: tuple[sympy.Expr, ...]
 
 
-def comparisons(text: str) -> list[tuple[str, str]]:
+def comparisons(text: str, where: str = "assume") -> list[tuple[str, str]]:
     """(larger, smaller) of ``formula > formula``, and of each link of a chain such as ``0 < k < 1``.
 
     Raises InputError for anything else.
@@ -34,7 +34,7 @@ def comparisons(text: str) -> list[tuple[str, str]]:
     sign = ">" if ">" in text else "<"
     parts = [part.strip() for part in text.split(sign)]
     if len(parts) < 2 or not all(parts) or {"<", ">", "="} & set("".join(parts)):
-        raise InputError(f"assume: {text[:60]!r} is not understood.", "Write: formula > formula.")
+        raise InputError(f"{where}: {text[:60]!r} is not understood.", "Write: formula > formula.")
     links = list(pairwise(parts))
     return links if sign == ">" else [(right, left) for left, right in links]
 

@@ -15,6 +15,7 @@ from heavytop.claims.defined import at_values
 from heavytop.claims.elliptic import NAMES
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.sign import Sign, Unprovable
+from heavytop.claims.weierstrass import wpinverse
 
 _LONGEST = 120
 _BITS = 512
@@ -89,6 +90,12 @@ def condition(function: str, arguments: tuple[sympy.Expr, ...]) -> frozenset[Nee
         needs = {Need(Kind.NONZERO, sympy.cos(u))}
     elif function in ("coth", "csch"):
         needs = {Need(Kind.NONZERO, sympy.sinh(u))}
+    elif function in ("wp", "wpprime"):
+        text = f"{u} is no period of wp(u, {arguments[1]}, {arguments[2]})"
+        needs = {Need(Kind.NONZERO, wpinverse(*arguments), text)}
+    elif function in ("wp3", "wp3prime"):
+        _, g2, g3 = arguments
+        needs = {Need(Kind.POSITIVE, g2**3 - 27 * g3**2)}
     elif function in NAMES:
         m = arguments[1]
         needs = {Need(Kind.NONNEGATIVE, m), Need(Kind.NONNEGATIVE, 1 - m, f"{m} ≤ 1")}

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import ClassVar, Self
+from typing import Self
 
 import sympy
 from flint import arb
@@ -24,13 +24,14 @@ from heavytop.claims.relations import solve_relations
 from heavytop.claims.sign import Unprovable
 from heavytop.claims.statement import Setting
 from heavytop.claims.statements import SYSTEMS
+from heavytop.claims.tensor import minors, of_bodies, read_tensor
 from heavytop.errors import InputError, quoted
 from heavytop.precision import exact
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System, system
 
 TIME = sympy.Symbol("t", real=True)
 STATE = sympy.symbols("Omega1:4 gamma1:4", real=True)
-_RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
+RESERVED = {"t", "pi", *FUNCTION_NAMES, *(str(variable) for variable in STATE)}
 _SAMPLE_BITS = 512
 _MOST_BITS = 6_640
 """Of numerator and denominator of a number in a sample: 2000 digits."""
@@ -71,7 +72,11 @@ class Context:
         """The systems that the claim says something about."""
         if self.carried is not None:
             return (HEAVY_GYROSTAT,)
-        return tuple(system for system in SYSTEMS if system is not GYROSTAT or self.rotor is not None)
+        return tuple(system for system in SYSTEMS if system is not GYROSTAT or self._turns_about_two)
+
+    @property
+    def _turns_about_two(self) -> bool:
+        return self.rotor is not None and not isinstance(self.top.inertia[0], tuple)
 
     def parameters(self, system: System) -> Parameters:
         """Parameters of the field; raises InputError where the rotor of the file is none, or not that of the system."""
@@ -79,6 +84,9 @@ class Context:
             raise _other_rotor(system)
         if self.carried is not None:
             return self.top._replace(rotor=self.carried)
+        if system is GYROSTAT and isinstance(self.top.inertia[0], tuple):
+            cause = "gyrostat has its rotor on a principal axis, and top.inertia has products of inertia."
+            raise InputError(cause, "Give the three principal moments, or use heavy_gyrostat.")
         if system is GYROSTAT and self.rotor is None:
             raise InputError("The file gives no rotor, so it says nothing about gyrostat.", "Add rotor to [top].")
         return self.top._replace(rotor=sympy.Integer(0) if self.rotor is None else self.rotor)
@@ -95,12 +103,15 @@ def _other_rotor(system: System) -> InputError:
 
 def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Context:
     """Parsed parameters, assumptions, definitions and top; raises InputError for what cannot be understood."""
+    variables = tuple(variables)
+    reserved = RESERVED.union(map(str, variables))
     for name in (*content.parameters, *content.definitions):
-        if name in _RESERVED or (name in content.parameters and name in content.definitions):
-            raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(_RESERVED))}.")
+        if name in reserved or (name in content.parameters and name in content.definitions):
+            raise InputError(f"The name {name!r} is taken.", f"Taken are {', '.join(sorted(reserved))}.")
     above = [link for text in content.assume for link in comparisons(text)]
-    # the principal moments of a top are positive, said or not
-    positive = {left for left, right in above if right == "0"} | {text.strip() for text in content.top.inertia}
+    tensor = read_tensor(content.top.inertia)
+    # the moments of inertia of a top are positive, said or not
+    positive = {left for left, right in above if right == "0"} | {text.strip() for text in tensor.diagonal}
     symbols = {
         name: sympy.Symbol(name, positive=True) if name in positive else sympy.Symbol(name, real=True)
         for name in content.parameters
@@ -112,22 +123,23 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
     sides = [(parse(left, names, "assume"), parse(right, names, "assume")) for left, right in above]
     bounds = [(left.expression, right.expression) for left, right in sides]
     top = content.top
-    moments = three(top.inertia, names, "top.inertia")
+    moments = [parse(text, names, "top.inertia") for text in tensor.texts]
     arm = [*three(top.centre, names, "top.centre"), parse(top.weight, names, "top.weight")]
     rotor = parse(top.rotor, names, "top.rotor") if isinstance(top.rotor, str) else None
     carried = three(top.rotor, names, "top.rotor") if isinstance(top.rotor, list) else ()
     relations = [parse(text, names, "relations") for text in content.relations]
-    _check_constant("top.inertia", moments, _OF_THE_TOP)
-    _check_constant("top.centre", arm[:3], _OF_THE_TOP)
-    _check_constant("top.weight", arm[3:], _OF_THE_TOP)
-    _check_constant("top.rotor", carried, _OF_THE_TOP)
-    _check_constant("relations", relations, _OF_PARAMETERS)
+    _check_constant("top.inertia", moments, _OF_THE_TOP, variables)
+    _check_constant("top.centre", arm[:3], _OF_THE_TOP, variables)
+    _check_constant("top.weight", arm[3:], _OF_THE_TOP, variables)
+    _check_constant("top.rotor", carried, _OF_THE_TOP, variables)
+    _check_constant("relations", relations, _OF_PARAMETERS, variables)
     weight = arm.pop()
-    inertia, centre = (tuple(part.expression for part in parts) for parts in (moments, arm))
+    inertia = tensor.of([part.expression for part in moments])
+    centre = tuple(part.expression for part in arm)
     context = Context(
         names,
         symbols,
-        assume(bounds, needs_of(side for link in sides for side in link), inertia, symbols.values()),
+        assume(bounds, needs_of(side for link in sides for side in link), minors(inertia), symbols.values()),
         tuple(
             {symbols[name]: sample_number(value, name) for name, value in row.items()}
             for row in sample_rows(content.parameters)
@@ -135,7 +147,9 @@ def parse_context(content: ClaimFile, variables: Iterable[sympy.Symbol]) -> Cont
         tuple(relation.expression for relation in relations),
         Parameters(inertia, tuple(weight.expression * part for part in centre), sympy.Integer(0)),
         None if rotor is None else rotor.expression,
-        needs_of([*moments, *arm, weight, *carried, *relations]).union(*(condition("/", (part,)) for part in inertia)),
+        needs_of([*moments, *arm, weight, *carried, *relations]).union(
+            *(condition("/", (part,)) for part in minors(inertia)[-3:])
+        ),
         frozenset() if rotor is None else rotor.needs,
         tuple(part.expression for part in carried) or None,
     )
@@ -165,11 +179,11 @@ def three(texts: Iterable[str], names: dict[str, Formula], where: str) -> tuple[
     return first, second, third
 
 
-def _check_constant(where: str, formulas: Sequence[Formula], remedy: str) -> None:
-    """Raises InputError where a formula, or what it needs, depends on the time or the state, directly or not."""
+def _check_constant(where: str, formulas: Sequence[Formula], remedy: str, variables: Iterable[sympy.Symbol]) -> None:
+    """Raises InputError where a formula, or what it needs, depends on what moves, directly or not."""
     for formula in formulas:
         free = formula.expression.free_symbols.union(*(need.expression.free_symbols for need in formula.needs))
-        moving = sorted(map(str, free & {TIME, *STATE}))
+        moving = sorted(map(str, free & {TIME, *STATE, *variables}))
         if moving:
             text = quoted(str(formula.expression))[1:-1]
             raise InputError(f"{where}: {text} depends on {', '.join(moving)}.", remedy)
@@ -185,9 +199,11 @@ def _check_samples(context: Context, bounds: list[tuple[sympy.Expr, sympy.Expr]]
         for relation in context.relations:
             if is_exactly_zero(relation, sample) is False:
                 raise InputError(f"The sample {shown} breaks the relation {relation} = 0.", "Change the sample.")
-        for index, moment in enumerate(context.top.inertia, 1):
+        for index, moment in enumerate(minors(context.top.inertia), 1):
             if not _at(moment, sample) > 0:
-                raise InputError(f"The sample {shown} makes I{index} not positive.", "Change the sample.")
+                full = isinstance(context.top.inertia[0], tuple)
+                what = "the tensor of inertia not positive definite" if full else f"I{index} not positive"
+                raise InputError(f"The sample {shown} makes {what}.", "Change the sample.")
 
 
 def _at(expression: sympy.Expr, sample: dict[sympy.Symbol, Fraction]) -> arb:
@@ -226,6 +242,8 @@ def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
     A claim about one top is judged about that top, as the equations do not mind; one about many is not refuted by a
     top that no body is.
     """
+    if isinstance(inertia[0], tuple):
+        return of_bodies(inertia)
     if not any(moment.free_symbols for moment in inertia):
         return ()
     return tuple(Need(Kind.NONNEGATIVE, sum(inertia) - 2 * moment) for moment in inertia)
@@ -233,11 +251,15 @@ def _body_needs(inertia: Sequence[sympy.Expr]) -> tuple[Need, ...]:
 
 @dataclass(frozen=True)
 class FileClaim:
-    """A claim of a file; variables: what its formulas may hold beside its parameters."""
+    """A claim of a file."""
 
     content: ClaimFile
     context: Context = field(init=False)
-    variables: ClassVar[tuple[sympy.Symbol, ...]] = ()
+
+    @property
+    def variables(self) -> tuple[sympy.Symbol, ...]:
+        """What its formulas may hold beside its parameters."""
+        return ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "context", parse_context(self.content, self.variables))

@@ -11,6 +11,7 @@ from flint import arb
 
 from heavytop.claims.defined import Defined
 from heavytop.claims.sign import Unprovable
+from heavytop.claims.weierstrass import VALUES
 from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 
@@ -38,6 +39,7 @@ _FUNCTIONS: dict[str, Callable[..., arb]] = {
     "sn": lambda u, m: _jacobi(u, m)[0],
     "cn": lambda u, m: _jacobi(u, m)[1],
     "dn": lambda u, m: _jacobi(u, m)[2],
+    **VALUES,
 }
 
 

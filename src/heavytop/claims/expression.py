@@ -22,6 +22,7 @@ import sympy
 from heavytop.claims import elliptic
 from heavytop.claims.conditions import Need, condition
 from heavytop.claims.defined import Defined
+from heavytop.claims.weierstrass import WEIERSTRASS
 from heavytop.errors import InputError
 from heavytop.precision import exact
 
@@ -30,6 +31,7 @@ FUNCTIONS: dict[str, tuple[Any, int]] = {
     **{name: (getattr(sympy, name), 1) for name in _OF_ONE},
     "atan2": (sympy.atan2, 2),
     **{name: (getattr(elliptic, name), 2) for name in elliptic.NAMES},
+    **{name: (function, 3) for name, function in WEIERSTRASS.items()},
 }
 _MAX_LENGTH = 10_000
 _MAX_DEPTH = 60

@@ -24,15 +24,19 @@ _REMEDY = "See docs/claims-in-toml.md; worked examples are in src/heavytop/claim
 Text = Annotated[str, msgspec.Meta(max_length=20_000)]
 Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,30}$")]
 Three = Annotated[list[Text], msgspec.Meta(min_length=3, max_length=3)]
+Tensor = Annotated[list[Text | list[Text]], msgspec.Meta(min_length=3, max_length=9)]
 Samples = Annotated[list[Text], msgspec.Meta(min_length=1, max_length=8)]
 
 
 class TopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """[top]: principal moments, weight, centre of mass; the rotor, λ where the claim is about `gyrostat`, or k1, k2,
+    """[top]: moments of inertia, weight, centre of mass; the rotor, λ where the claim is about `gyrostat`, or k1, k2,
     k3 where it is about `heavy_gyrostat`.
+
+    inertia: three principal moments; or a tensor in other axes: six numbers I11, I22, I33, I12, I13, I23, nine row by
+    row, or three rows of three.
     """
 
-    inertia: Three
+    inertia: Tensor
     weight: Text
     centre: Three
     rotor: Text | Three | None = None
@@ -44,6 +48,19 @@ class MotionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     omega: Three | None = None
     gamma: Three | None = None
     angles: Three | None = None
+
+
+class QuadratureTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[quadrature]: the formulas of [motion] hold u, and t = F(u) + constant where u is between bounds.
+
+    time: F(u); or integrand: F'(u).  where: comparisons that bound u.  points: values of u to look for a witness at.
+    """
+
+    variable: Name
+    time: Text | None = None
+    integrand: Text | None = None
+    where: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
+    points: Samples | None = None
 
 
 class IntegralTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -81,6 +98,7 @@ class ClaimFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     definitions: Annotated[dict[Name, Text], msgspec.Meta(max_length=40)] = {}
     relations: Annotated[list[Text], msgspec.Meta(max_length=6)] = []
     motion: MotionTable | None = None
+    quadrature: QuadratureTable | None = None
     integral: IntegralTable | None = None
     entry: Entry | None = None
 
@@ -118,6 +136,8 @@ def claim_from_table(table: Mapping[str, Any], where: str) -> Auditable | ValueC
     wanted = "motion" if content.kind == "motion" else "integral"
     if tables[content.kind] is None or (content.motion is not None and content.integral is not None):
         raise InputError(f"{where}: kind {content.kind!r} needs the table [{wanted}], and no other claim.", _REMEDY)
+    if content.quadrature is not None and content.kind != "motion":
+        raise InputError(f"{where}: [quadrature] is about a motion, and kind = {content.kind!r}.", _REMEDY)
     if content.domain not in ("all", "t<=0", "t>0"):
         raise InputError(f"{where}: domain = {content.domain[:40]!r}.", 'Use "all", "t<=0" or "t>0".')
     content = msgspec.structs.replace(content, entry=entry)

@@ -8,7 +8,7 @@ from functools import lru_cache
 import sympy
 
 from heavytop.claims.algebra import Field
-from heavytop.claims.conditions import Kind, Need, written
+from heavytop.claims.conditions import Kind, Need, is_exactly_zero, written
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.proof import KEPT, Condition, Region
 from heavytop.claims.sign import NUMBER_BITS, PLUS, Unprovable
@@ -157,8 +157,7 @@ class Prover:
         if region is not None and region.field.relations_exclude_each_other():
             within = " within |gamma| = 1" if statement.flow is not None else ""
             return f"the relations exclude each other{within}: no motion lies on them"
-        on_sphere = ", at a state with |gamma| = 1" if statement.flow is not None else ""
-        return f"no sample is proven to lie on the relations{on_sphere}"
+        return _missed(statement, setting)
 
     def is_defined(self, statement: Statement, place: Place) -> bool:
         """Whether every formula and the residual is certainly defined and real at a place."""
@@ -224,6 +223,21 @@ class Prover:
             against = region.leaves(rate)
             reason = against or "its rate is a combination of the conditions"
             yield Condition(f"{text} = 0 is kept by the flow", not against, reason)
+
+
+def _missed(statement: Statement, setting: Setting) -> str:
+    """Which relation the first sample of a body misses, or bounds of the variable all points; for whom wrote them."""
+    on_sphere = ", at a state with |gamma| = 1" if statement.flow is not None else ""
+    for sample in setting.samples:
+        place = {setting.variable: statement.domain.points[0], **sample}
+        for zero in setting.zeros:
+            if is_exactly_zero(zero, place) is False:
+                used = ", ".join(f"{name} = {value}" for name, value in sample.items() if name in zero.free_symbols)
+                return f"no sample lies on the relations{on_sphere}: where {used}, {written(str(zero))} is not 0"
+        if not setting.zeros and statement.domain.facts:
+            points = ", ".join(map(str, statement.domain.points))
+            return f"no point tried lies where {statement.domain.label}: {setting.variable} = {points}"
+    return f"no sample is proven to lie on the relations{on_sphere}"
 
 
 def _is_kept(expression: sympy.Expr, statement: Statement) -> bool:

@@ -47,6 +47,8 @@ class Regularity:
                 return found
         if g.kind == "defined":
             return f"the definition of {g.meaning} is too large for the algebra"
+        if g.kind in ("wp", "wpinverse"):
+            return f"{g.meaning} has poles"
         wanted = "> 0" if analytic else "≥ 0"
         if g.kind == "root":
             return self._unless_positive(g.arguments[0], analytic, wanted)

@@ -9,7 +9,7 @@ from fractions import Fraction
 import sympy
 
 from heavytop.claims.algebra import Assumptions, Solution
-from heavytop.claims.conditions import Need, is_exactly_zero
+from heavytop.claims.conditions import Kind, Need, is_exactly_zero
 
 Place = dict[sympy.Symbol, Fraction]
 
@@ -160,13 +160,19 @@ class Setting:
             self.parameters,
         )
 
+    @property
+    def zeros(self) -> tuple[sympy.Expr, ...]:
+        """What is 0 wherever the claim is made."""
+        return (*self.relations, *(solution.symbol - solution.value for solution in self.solved))
+
     def places(self, statement: Statement) -> Iterator[Place]:
         """Exact parameters of bodies, and points of the domain of ``statement``, that lie on all relations, proven."""
-        zero = (*self.relations, *(solution.symbol - solution.value for solution in self.solved))
         for sample in self.samples:
             if not all(need.is_met(sample) for need in self.bodies):
                 continue
             for point in statement.domain.points:
                 place = {self.variable: point, **sample}
-                if all(is_exactly_zero(relation, place) for relation in zero):
+                if not all(Need(Kind.POSITIVE, fact).is_met(place) for fact in statement.domain.facts):
+                    continue
+                if all(is_exactly_zero(relation, place) for relation in self.zeros):
                     yield place

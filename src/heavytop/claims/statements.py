@@ -51,6 +51,7 @@ class Motion:
     rate: the derivative in time.  angles: (φ, θ); rates: (φ', θ', ψ').
     constants: (|γ|², C0, C1) that (1.3) should have; without them (1.3) says that the three are constant.
     needs: what Ω and γ need to be defined.  attitude, angle_needs, pole: as in Formulas.
+    clock: of a quadrature, F' and 1/F', which have to be continuous for the motion to exist.
     """
 
     branch: str
@@ -65,6 +66,7 @@ class Motion:
     attitude: tuple[sympy.Expr, ...] = ()
     angle_needs: frozenset[Need] = frozenset()
     pole: str = ""
+    clock: tuple[sympy.Expr, ...] = ()
 
     @property
     def state(self) -> tuple[sympy.Expr, ...]:
@@ -74,12 +76,12 @@ class Motion:
     @property
     def formulas(self) -> Formulas:
         """What the equations in Ω and γ rest on."""
-        return Formulas(self.state, self.needs)
+        return Formulas((*self.state, *self.clock), self.needs)
 
     @property
     def angle_formulas(self) -> Formulas:
         """What the equations in the angles rest on."""
-        return Formulas(self.state, self.needs, self.attitude, self.angle_needs, self.pole)
+        return Formulas((*self.state, *self.clock), self.needs, self.attitude, self.angle_needs, self.pole)
 
 
 def attitude(phi: sympy.Expr, theta: sympy.Expr, psi: sympy.Expr) -> tuple[sympy.Expr, ...]:
@@ -100,7 +102,7 @@ def motion_statements(motion: Motion, p: Parameters, system: System) -> Iterator
     turning = "(Omega + lambda*e2)" if system is GYROSTAT else "Omega"
     torque = "" if system is GYROSTAT else " + P*gamma x r"
     carried = ", M = I*Omega + k" if system is HEAVY_GYROSTAT else ""
-    field = system.field(p, y)
+    field = system.rates(p, y)
     for index, (value, claimed) in enumerate(zip(y, field, strict=True)):
         text = f"gamma' = gamma x {turning}" if index >= 3 else f"M' = M x {turning}{torque}{carried}"
         residual = motion.rate(value) - claimed
@@ -148,7 +150,7 @@ def why_not_equivalent() -> Sequence[Finding]:
     )
     p = Parameters(inertia, moment, sympy.Integer(0))
     state = (*omega, *gamma)
-    field = HEAVY_TOP.field(p, state)
+    field = HEAVY_TOP.rates(p, state)
     rates = (*field[:3], *(g + d for g, d in zip(field[3:], delta, strict=True)))
 
     def rate(value: sympy.Expr) -> sympy.Expr:

@@ -18,6 +18,7 @@ from heavytop.claims.evaluate import evaluate
 from heavytop.claims.inverse import is_below_quarter, same_as
 from heavytop.claims.rational import Quotient
 from heavytop.claims.sign import NUMBER_BITS, Sign, Unprovable, used
+from heavytop.claims.weierstrass import WEIERSTRASS, wpinverse
 
 if TYPE_CHECKING:
     from heavytop.claims.algebra import Field
@@ -50,6 +51,7 @@ class Transcendental:
         self._divisors = divisors
         self._bases: list[tuple[str, Quotient, int]] = []
         self._functions: dict[tuple[str, ...], int] = {}
+        self._weierstrass: dict[tuple[str, ...], tuple[int, int]] = {}
         self._elliptic: dict[tuple[str, ...], tuple[int, int]] = {}
 
     # --- exponentials -----------------------------------------------------------------------------------------------
@@ -282,6 +284,38 @@ class Transcendental:
         unit = (Fraction(-1), Fraction(1))
         t.signs.ranges |= {index: unit, partner: unit}
         return index, partner
+
+    def weierstrass(self, name: str, arguments: tuple[Quotient, Quotient, Quotient]) -> Quotient:
+        """℘ is a free generator, (L ℘')² = L² (4℘³ − g2 ℘ − g3) with a common denominator L of the invariants.
+
+        1/℘, which stands in conditions alone, is one of its own: it may be 0.
+        """
+        t, kind = self._tower, name.removesuffix("prime")
+        key = _key(kind, *arguments)
+        if key not in self._weierstrass:
+            self._weierstrass[key] = self._new_weierstrass(kind, arguments)
+        value, rate = self._weierstrass[key]
+        if kind == name:
+            return t.polynomial(t.gens[value])
+        scale = t.times(arguments[1].denominator, arguments[2].denominator)
+        return t.divide(t.polynomial(t.gens[rate]), t.polynomial(scale))
+
+    def _new_weierstrass(self, kind: str, arguments: tuple[Quotient, Quotient, Quotient]) -> tuple[int, int]:
+        t, (_, g2, g3) = self._tower, arguments
+        texts = [self._field.expression(part) for part in arguments]
+        if kind == "wpinverse":
+            index = self._new(kind, wpinverse(*texts, evaluate=False), arguments, Sign(0, False))
+            return index, index
+        value, rate = (WEIERSTRASS[kind + end](*texts, evaluate=False) for end in ("", "prime"))
+        index = self._new(kind, value, arguments, Sign(0, False))
+        p, scale = t.gens[index], t.times(g2.denominator, g3.denominator)
+        square = 4 * scale**2 * p**3
+        square -= scale * (g2.numerator * g3.denominator * p + g3.numerator * g2.denominator)
+        meaning = self._field.expression(Quotient(scale, t.one)) * rate
+        root = t.add_root((rate, scale), square, sign=0, kind=f"{kind}prime")
+        self._field.means(root, meaning)
+        self._set_number(root, meaning)
+        return index, root
 
     # --- logarithms and the rest ------------------------------------------------------------------------------------
 

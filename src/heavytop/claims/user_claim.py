@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
 
 import sympy
 
 from heavytop.claims.conditions import Need
-from heavytop.claims.context import TIME, Context, FileClaim, needs_of, sample_number, setting_of, three
-from heavytop.claims.defined import rate_along
+from heavytop.claims.context import Context, FileClaim, needs_of, sample_number, setting_of, three
 from heavytop.claims.expression import Formula
 from heavytop.claims.from_file import ClaimFile, MotionTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
 from heavytop.claims.prover import shortest
-from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Setting, Statement
+from heavytop.claims.quadrature import Clock, read_clock, variable_of
+from heavytop.claims.statement import AFTER, Setting, Statement
 from heavytop.claims.statements import SYMBOLIC, Motion, Triple, attitude, motion_statements
 from heavytop.errors import InputError
 from heavytop.top.angles import omega_from_angles
 from heavytop.top.equations import GYROSTAT, System
-
-_DOMAINS = {"all": ALL, "t<=0": BEFORE, "t>0": AFTER}
 
 
 def _expressions(formulas: tuple[Formula, Formula, Formula]) -> Triple:
@@ -33,20 +30,26 @@ class UserMotion(FileClaim):
     """A motion claimed in a file."""
 
     motion: Motion = field(init=False)
-    variables: ClassVar[tuple[sympy.Symbol, ...]] = (TIME,)
+    clock: Clock = field(init=False)
+
+    @property
+    def variables(self) -> tuple[sympy.Symbol, ...]:
+        """t, or the variable of the quadrature."""
+        return (variable_of(self.content),)
 
     def __post_init__(self) -> None:
         FileClaim.__post_init__(self)
         assert self.content.motion is not None
-        object.__setattr__(self, "context", _with_constant_rotor(self.context, _domain(self.content)))
-        motion = _read_motion(self.content, self.content.motion, self.context)
+        object.__setattr__(self, "clock", _with_times(read_clock(self.content, self.context), self.content))
+        object.__setattr__(self, "context", _with_constant_rotor(self.context, self.clock))
+        motion = _read_motion(self.content.motion, self.context, self.clock)
         object.__setattr__(self, "motion", motion)
 
     @property
     def setting(self) -> Setting:
         """The file's assumptions and samples; γ as the part through which residuals are written."""
         parts = tuple((f"gamma{index}", part) for index, part in enumerate(self.motion.gamma, 1))
-        return replace(setting_of(self.context, TIME), parts={"smooth": parts})
+        return replace(setting_of(self.context, self.clock.variable), parts={"smooth": parts})
 
     def statements(self, system: System) -> list[Statement]:
         """(1.1)-(1.3), (3.1) where angles are claimed, and (3.2) where γ is claimed beside them."""
@@ -79,20 +82,19 @@ def _is_of_motion(row: Row | Statement) -> bool:
     return row.equation in ("1.1", "1.2") or (row.equation, row.component) == ("1.3", 1)
 
 
-def _with_constant_rotor(context: Context, domain: Domain) -> Context:
+def _with_constant_rotor(context: Context, clock: Clock) -> Context:
     """The rotor as the algebra writes it, without t; raises InputError where t is left."""
-    if context.rotor is None or TIME not in context.rotor.free_symbols:
+    if context.rotor is None or clock.variable not in context.rotor.free_symbols:
         return context
-    rotor = shortest(context.rotor, setting_of(context, TIME), domain)
-    return context.with_rotor(rotor, TIME not in rotor.free_symbols)
+    rotor = shortest(context.rotor, setting_of(context, clock.variable), clock.domain)
+    return context.with_rotor(rotor, clock.variable not in rotor.free_symbols)
 
 
-def _read_motion(content: ClaimFile, table: MotionTable, context: Context) -> Motion:
-    rate = rate_along({TIME: sympy.Integer(1)})
-    names, needs, domain = context.names, context.needs, _domain(content)
+def _read_motion(table: MotionTable, context: Context, clock: Clock) -> Motion:
+    rate, domain, names, needs = clock.rate, clock.domain, context.names, context.needs | clock.needs
 
     def reduced(formulas: Triple) -> Triple:
-        first, second, third = (shortest(formula, setting_of(context, TIME), domain) for formula in formulas)
+        first, second, third = (shortest(formula, setting_of(context, clock.variable), domain) for formula in formulas)
         return first, second, third
 
     if table.angles is None and (table.omega is None or table.gamma is None):
@@ -117,17 +119,30 @@ def _read_motion(content: ClaimFile, table: MotionTable, context: Context) -> Mo
     else:
         omega, needs = omega_from_angles(gamma, phi, rates, SYMBOLIC), needs | angle_needs
     return Motion(
-        "smooth", domain, omega, gamma, rate, phi, rates, needs=needs, attitude=turned, angle_needs=angle_needs
+        "smooth",
+        domain,
+        omega,
+        gamma,
+        rate,
+        phi,
+        rates,
+        needs=needs,
+        attitude=turned,
+        angle_needs=angle_needs,
+        clock=clock.values,
     )
 
 
-def _domain(content: ClaimFile) -> Domain:
-    domain = _DOMAINS[content.domain]
+def _with_times(clock: Clock, content: ClaimFile) -> Clock:
+    """With the times of the file as the first that a witness is looked for at."""
+    domain = clock.domain
     if content.times is None:
-        return domain
+        return clock
     times = tuple(sample_number(time, "times") for time in content.times)
     if any(time * domain.sign < 0 or (domain is AFTER and time == 0) for time in times):
         raise InputError(
             f"A time of {', '.join(content.times)} lies outside {domain.label}.", "Change times or domain."
         )
-    return replace(domain, points=(*times, *(point for point in domain.points if point not in times)))
+    return replace(
+        clock, domain=replace(domain, points=(*times, *(point for point in domain.points if point not in times)))
+    )

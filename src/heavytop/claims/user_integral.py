@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import islice
-from typing import ClassVar
 
 import sympy
 
@@ -43,7 +42,11 @@ class UserIntegral(FileClaim):
 
     value: Formula = field(init=False)
     where: tuple[Formula, ...] = field(init=False)
-    variables: ClassVar[tuple[sympy.Symbol, ...]] = STATE
+
+    @property
+    def variables(self) -> tuple[sympy.Symbol, ...]:
+        """Ω and γ."""
+        return tuple(STATE)
 
     def __post_init__(self) -> None:
         FileClaim.__post_init__(self)
@@ -128,7 +131,7 @@ class UserIntegral(FileClaim):
 
     def _rate(self, system: System) -> Rate:
         """The derivative along the field of ``system``."""
-        rates = system.field(self.context.parameters(system), STATE)
+        rates = system.rates(self.context.parameters(system), STATE)
         return rate_along(dict(zip(STATE, rates, strict=True)))
 
     def _parts(self, value: sympy.Expr) -> tuple[sympy.Expr, ...]:

@@ -36,7 +36,9 @@ def list_(
     _lines({each["name"]: f"{each['system']:10} {each['about']}" for each in listed["cases"]}, indent=11)
     print("Bodies (cases too: the standard tests of other programs)")
     _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["bodies"]}, indent=15)
-    print(f"Plans\n  {', '.join(listed['plans'])}, or a TOML file")
+    plans = f"{', '.join(listed['plans'])}, or a TOML file"
+    print("Plans")
+    print(fill(plans, 80, initial_indent="  ", subsequent_indent="  "))
     print(f"Systems\n  {', '.join(listed['systems'])}")
     print("Number formats")
     _lines(listed["formats"])

@@ -44,6 +44,8 @@ from heavytop.top.vectors import Vector, cross, dot
 Finder = Callable[[HeavyTop, State, System], ExactSolution]
 _DATA_BITS = 256
 _GUARD_BITS = 96
+_MORE_BITS, _NEAR = (0, 512, 2048, 8192, 32768), 8
+"""Tried for angles of many turns, and how many units of the last bit a rotation may be off."""
 _ATTEMPTS = 4
 _MOST_BITS = 1 << 15
 _FOLLOWED_BITS = 512
@@ -95,12 +97,21 @@ def _start(start: State, bits: int) -> tuple[Vector, tuple[Vector, Vector, Vecto
     if attitude is None:
         return start.omega, None, (Fraction(0), Fraction(0))
     known = attitude.exact_rows()
-    rows = known or attitude.rational_rows(bits)
-    off = Fraction(0) if known else _distance(attitude, rows, bits)
+    rows, off = (known, Fraction(0)) if known else _near(attitude, bits)
     if start.omega_space is None:
         return start.omega, rows, (Fraction(0), off)
     turned = rotated(transposed(rows), start.omega_space)
     return turned, rows, (off * sum(map(abs, start.omega_space), Fraction(0)), off)
+
+
+def _near(attitude: Attitude, bits: int) -> tuple[tuple[Vector, Vector, Vector], Fraction]:
+    """A rational rotation, and how far its entries are off: about 2^-bits, of large angles by more working bits."""
+    for more in _MORE_BITS:
+        rows = attitude.rational_rows(bits + more)
+        off = _distance(attitude, rows, bits + more)
+        if off * 2**bits <= _NEAR:
+            break
+    return rows, off
 
 
 @whole_evaluation

@@ -28,6 +28,7 @@ from heavytop.exact.hess import Hess
 from heavytop.exact.hess_pendulum import HessPendulum
 from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.lagrange import Lagrange
+from heavytop.exact.lagrange_gyrostat import LagrangeGyrostat
 from heavytop.exact.pendulum import Pendulum
 from heavytop.exact.scales import require_handy
 from heavytop.exact.solution import ExactSolution
@@ -131,6 +132,7 @@ _GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
 
 _HEAVY_GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (_permanent_heavy_gyrostat, _KEEP),
+    (LagrangeGyrostat, CYCLIC),
     (ZhukovskyVolterra, _KEEP),
 )
 _CASES = {HEAVY_TOP.name: _HEAVY_TOP, GYROSTAT.name: _GYROSTAT, HEAVY_GYROSTAT.name: _HEAVY_GYROSTAT}

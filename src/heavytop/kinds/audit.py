@@ -182,7 +182,8 @@ def _of_entry(task: Task) -> Row:
 
 def _parted(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
     """Rows of the paper and of the library."""
-    return [row for row in rows if row.key.case in PAPER], [row for row in rows if row.key.case not in PAPER]
+    of_library = [row for row in rows if EXPECTED.text in row.metrics]
+    return [row for row in rows if EXPECTED.text not in row.metrics], of_library
 
 
 def _of_library(rows: Sequence[Row]) -> list[str]:

@@ -194,6 +194,13 @@ CASES: dict[str, Case] = {
             State(("3/10", "4/15", "24/25"), ("3/13", "4/13", "12/13")),
         ),
         Case(
+            "wheel",
+            "a spacecraft with a reaction wheel: no weight, any axis of the rotor",
+            HEAVY_GYROSTAT,
+            HeavyTop((350, 300, 400), 0, (0, 0, 0), (30, "-20", 60)),
+            State(("1/5", "-1/10", "3/20"), ("3/5", 0, "4/5")),
+        ),
+        Case(
             "heavy-gyrostat",
             "the generic top with a rotor: no closed form",
             HEAVY_GYROSTAT,

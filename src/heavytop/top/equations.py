@@ -104,6 +104,26 @@ def heavy_gyrostat(p: Parameters, y: Any) -> tuple[Any, ...]:
     )
 
 
+def _of_full_tensor(p: Parameters, y: Any, rotor: Any) -> tuple[Any, ...]:
+    """(1.1), (1.2) with products of inertia, ``p.inertia`` the three rows of the tensor, and k = ``rotor`` or None.
+
+    Ω' = I⁻¹ (M × Ω + γ × n), with I⁻¹ by the cofactors of the symmetric tensor.
+    """
+    (a, f, e), (_, b, d), (_, _, c) = rows = p.inertia
+    omega, gamma = y[:3], y[3:6]
+    m = tuple(dot(row, omega) for row in rows)
+    if rotor is not None:
+        m = tuple(own + part for own, part in zip(m, rotor, strict=True))
+    torque = tuple(own + part for own, part in zip(cross(m, omega), cross(gamma, p.moment), strict=True))
+    adjugate = (
+        (b * c - d * d, d * e - c * f, d * f - b * e),
+        (d * e - c * f, a * c - e * e, e * f - a * d),
+        (d * f - b * e, e * f - a * d, a * b - f * f),
+    )
+    determinant = dot(rows[0], adjugate[0])
+    return (*(dot(row, torque) / determinant for row in adjugate), *cross(gamma, omega))
+
+
 def _omega(p: Parameters, y: Any) -> tuple[Any, ...]:
     return tuple(y[:3])
 
@@ -148,6 +168,15 @@ class System:
             part, rest = tuple(rest[:size]), rest[size:]
             found[name] = part if size == 3 else part[0]
         return Parameters(**found)
+
+    def rates(self, p: Parameters, y: Any) -> tuple[Any, ...]:
+        """The field where ``p.inertia`` may be the three rows of a full tensor, with y in its axes.
+
+        :attr:`field` itself is for principal axes and has no branch: it is compiled.
+        """
+        if not isinstance(p.inertia[0], tuple):
+            return self.field(p, y)
+        return _of_full_tensor(p, y, p.rotor if "rotor" in self.enters else None)
 
     def attitude(self, p: Parameters, y: Any, xi: Any) -> tuple[Any, Any, Any]:
         """ξ' = ξ × ω for a vector ξ fixed in space."""

@@ -1,0 +1,141 @@
+"""Claims in Weierstrass' functions and about tops with products of inertia: proofs, their conditions, and traps."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import pytest
+import sympy
+
+from heavytop.claims import weierstrass
+from heavytop.claims.audit import audit_claim
+from heavytop.claims.evaluate import evaluate
+from heavytop.claims.from_file import claim_from_table
+from heavytop.claims.judge import Audit
+from heavytop.errors import InputError
+
+U, G2, G3 = sympy.symbols("u g2 g3", real=True)
+
+
+def _audit(rate: str, parameters: dict[str, Any] | None = None, assume: tuple[str, ...] = (), **parts: Any) -> Audit:
+    """A permanent rotation at a rate that is 1 if the formula is right."""
+    table = {
+        "name": "x",
+        "kind": "motion",
+        "parameters": parameters or {},
+        "assume": list(assume),
+        "top": {"inertia": ["1", "2", "3"], "weight": "0", "centre": ["0", "0", "0"]},
+        "motion": {"omega": ["0", "0", rate], "gamma": ["0", "0", "1"]},
+    }
+    return audit_claim(claim_from_table(table | parts, "x"))
+
+
+def _open(report: Audit) -> str:
+    return "; ".join(c.text for row in report.rows for c in row.conditions if not c.discharged)
+
+
+def _zero(p: str, g2: str, g3: str) -> str:
+    """1, if the differential equation holds."""
+    return f"1 + {p}prime(t, {g2}, {g3})^2 - 4*{p}(t, {g2}, {g3})^3 + {g2}*{p}(t, {g2}, {g3}) + {g3}"
+
+
+def test_the_branch_without_poles_satisfies_its_equation_where_the_roots_are_three() -> None:
+    assert _audit(_zero("wp3", "4", "1")).verdict == "holds"
+    assert _audit(_zero("wp3", "4", "1") + " + wp3(t, 4, 1)").verdict == "refuted"
+    samples = {"a": ["4", "5"], "b": ["1", "-1"]}
+    assert "a^3 - 27*b^2 > 0" in _open(_audit(_zero("wp3", "a", "b"), samples))
+    assert _audit(_zero("wp3", "a", "b"), samples, ("a^3 > 27*b^2",)).verdict == "holds"
+
+
+@pytest.mark.parametrize(("g2", "g3"), [("3", "1"), ("0", "0"), ("1", "3")])
+def test_colliding_and_complex_roots_leave_no_bounded_branch(g2: str, g3: str) -> None:
+    report = _audit(_zero("wp3", g2, g3))
+    assert report.verdict == "undecided"
+    assert "> 0" in _open(report)
+
+
+@pytest.mark.parametrize(
+    "rate", [_zero("wp", "4", "1"), "1 + 0*wp(t, 4, 1)", "1 + wp(t, 4, 1) - wp(t, 4, 1)", "wp(t, 1, 0)/wp(t, 1, 0)"]
+)
+@pytest.mark.parametrize("domain", ["all", "t<=0", "t>0"])
+def test_poles_on_the_real_line_are_never_passed_over(rate: str, domain: str) -> None:
+    report = _audit(rate, domain=domain)
+    assert report.verdict == "undecided"
+    assert "t is no period of wp(u, " in _open(report)
+
+
+def test_of_numbers_poles_are_excluded_by_balls() -> None:
+    assert _audit("1 + wp(1, 4, 1) - wp(1, 4, 1)").verdict == "holds"
+    assert _audit("1 + 0*wp(0, 4, 1)").verdict == "undecided"
+
+
+@pytest.mark.parametrize(
+    "rate", ["1 + wp3(t, 4, 1) - wp3(t, 4, 999/1000)", "wp3(t, 4, 1)", "1 + wp(t, 4, 1) - wp(2*t, 4, 1)"]
+)
+def test_what_is_false_is_refuted(rate: str) -> None:
+    assert _audit(rate).verdict == "refuted"
+
+
+def test_invariants_that_move_are_not_proven() -> None:
+    assert _audit("1 + wp3(t, 4 + t^2, 1)").verdict != "holds"
+
+
+@pytest.mark.parametrize(("g2", "g3"), [(4, 1), (4, -1), (5, 0), (1, 3), (-2, 1), (0, -2), (-3, 0)])
+def test_balls_of_weierstrass_functions_satisfy_their_equation_and_begin_as_their_series(g2: int, g3: int) -> None:
+    place = {U: Fraction(1, 50), G2: Fraction(g2), G3: Fraction(g3)}
+    p, q = (
+        float(evaluate(f(U, G2, G3, evaluate=False), place, 192).mid()) for f in (weierstrass.wp, weierstrass.wpprime)
+    )
+    u = 1 / 50
+    assert abs(p - (1 / u**2 + g2 * u**2 / 20 + g3 * u**4 / 28 + g2**2 * u**6 / 1200)) < 1e-11
+    assert abs(q - (-2 / u**3 + g2 * u / 10 + g3 * u**3 / 7)) < 1e-8
+    far = {**place, U: Fraction(7, 5)}
+    equation = (
+        weierstrass.wpprime(U, G2, G3) ** 2 - 4 * weierstrass.wp(U, G2, G3) ** 3 + G2 * weierstrass.wp(U, G2, G3) + G3
+    )
+    assert evaluate(equation, far, 192).contains(0)
+
+
+def _integral(value: str, inertia: list[Any], **parts: Any) -> str:
+    top = {"inertia": inertia, "weight": "1", "centre": ["1", "0", "2"], **parts.pop("top", {})}
+    table = {"name": "x", "kind": "integral", "top": top, "integral": {"value": value}, **parts}
+    return audit_claim(claim_from_table(table, "x")).verdict
+
+
+_FULL = "(3*Omega1 + Omega3/2)*gamma1 + 5*Omega2*gamma2 + (6*Omega3 + Omega1/2)*gamma3"
+
+
+@pytest.mark.parametrize(
+    "inertia",
+    [
+        ["3", "5", "6", "0", "1/2", "0"],
+        ["3", "0", "1/2", "0", "5", "0", "1/2", "0", "6"],
+        [["3", "0", "1/2"], ["0", "5", "0"], ["1/2", "0", "6"]],
+    ],
+)
+def test_integrals_with_products_of_inertia(inertia: list[Any]) -> None:
+    assert _integral(_FULL, inertia) == "holds"
+    assert _integral("3*Omega1*gamma1 + 5*Omega2*gamma2 + 6*Omega3*gamma3", inertia) == "refuted"
+
+
+def test_the_area_integral_of_any_tensor_with_any_rotor() -> None:
+    parameters = {"A": "3", "B": "4", "C": "5", "F": "1/2", "E": "1/4", "D": "1/3"}
+    value = (
+        "(A*Omega1 + F*Omega2 + E*Omega3 + 1)*gamma1 + (F*Omega1 + B*Omega2 + D*Omega3 + 2)*gamma2"
+        " + (E*Omega1 + D*Omega2 + C*Omega3 + 3)*gamma3"
+    )
+    top = {"rotor": ["1", "2", "3"]}
+    assert _integral(value, ["A", "B", "C", "F", "E", "D"], parameters=parameters, top=top) == "holds"
+    assert _integral(value.replace("+ 3)", "+ 2)"), ["A", "B", "C", "F", "E", "D"], parameters=parameters, top=top) == (
+        "refuted"
+    )
+
+
+@pytest.mark.parametrize(
+    "inertia",
+    [["1", "2"], ["1", "2", "3", "0", "0", "5"], [["1", "2", "0"], ["0", "4", "0"], ["0", "0", "3"]], ["1"] * 7],
+)
+def test_a_tensor_that_is_none_is_refused(inertia: list[Any]) -> None:
+    with pytest.raises(InputError):
+        _integral("Omega1", inertia)

@@ -1,0 +1,72 @@
+"""Lagrange's gyrostat: random ones, every naming of the axes, without weight, and what is refused."""
+
+import random
+from fractions import Fraction
+
+import pytest
+from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
+
+from heavytop.errors import NotInClass
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
+from heavytop.exact.balls import midpoint
+from heavytop.exact.catalogue import find
+from heavytop.exact.lagrange_gyrostat import LagrangeGyrostat
+from heavytop.exact.validated import Validated
+from heavytop.top.equations import HEAVY_GYROSTAT
+from heavytop.top.heavy_top import HeavyTop, State
+
+F = Fraction
+
+
+def random_motion(seed, weight=1):
+    rng = random.Random(seed)
+    moment = positive(rng)
+    top = HeavyTop(
+        (moment, moment, min(positive(rng), 2 * moment * F(15, 16))),
+        weight,
+        (0, 0, rational(rng, size=3)),
+        (0, 0, rational(rng, size=3)),
+    )
+    start = State([rational(rng, size=3) for _ in range(3)], [rational(rng, size=2) for _ in range(3)])
+    return LagrangeGyrostat(top, start)
+
+
+@pytest.mark.parametrize(("seed", "weight"), [*((seed, 1) for seed in range(8)), (8, 0), (9, 0), (10, -2)])
+def test_every_random_motion_solves_all_six_equations(seed, weight):
+    motion = random_motion(seed, weight)
+    assert_solves(motion, rational(random.Random(seed), size=30))
+    assert_narrow(motion, F(10**6))
+    assert_attitude(motion, rational(random.Random(seed + 50), size=30))
+    for time in (F(3, 2), F(-2)):
+        enclosed = Validated(motion.top, motion.start, HEAVY_GYROSTAT).state(time, 180)
+        assert all(a.overlaps(b) for a, b in zip(motion.state(time, 180), enclosed, strict=True))
+
+
+@pytest.mark.parametrize("axes", ALL)
+def test_it_is_found_under_every_naming_of_the_axes(axes):
+    motion = random_motion(3)
+    found = find(renamed_top(motion.top, axes), renamed_state(motion.start, axes), HEAVY_GYROSTAT)
+    assert isinstance(getattr(found, "solution", found), LagrangeGyrostat)
+    assert_solves(found, F(7, 3))
+    assert_attitude(found, F(7, 3))
+
+
+def test_units_do_not_matter():
+    unit, motion = F(10) ** 100, random_motion(4)
+    top, start = motion.top, motion.start
+    fast = HeavyTop(top.inertia, top.weight * unit**2, top.centre, [k * unit for k in top.rotor])
+    other = LagrangeGyrostat(fast, State([w * unit for w in start.omega], start.gamma))
+    factors = [unit] * 3 + [F(1)] * 3
+    for one, same, factor in zip(motion.state(F(7, 3), 170), other.state(F(7, 3) / unit, 900), factors, strict=True):
+        assert abs(midpoint(one) - midpoint(same) / factor) < F(1, 10**45)
+
+
+def test_what_is_outside_is_refused():
+    start = State((1, 2, 3), ("3/5", 0, "4/5"))
+    for top, cause in (
+        (HeavyTop((2, 2, 1), 1, (0, 0, 1), (1, 0, 1)), "not along axis 3"),
+        (HeavyTop((2, 3, 4), 1, (0, 0, 1), (0, 0, 1)), "I1 - I2"),
+        (HeavyTop((2, 2, 1), 1, (1, 0, 1), (0, 0, 1)), "not 0"),
+    ):
+        with pytest.raises(NotInClass, match=cause):
+            LagrangeGyrostat(top, start)
