@@ -172,7 +172,7 @@ class System:
     def rates(self, p: Parameters, y: Any) -> tuple[Any, ...]:
         """The field where ``p.inertia`` may be the three rows of a full tensor, with y in its axes.
 
-        :attr:`field` itself is for principal axes and has no branch: it is compiled.
+        ``field`` itself is for principal axes and has no branch: it is compiled.
         """
         if not isinstance(p.inertia[0], tuple):
             return self.field(p, y)
