@@ -10,12 +10,23 @@ from heavytop.kinds import KINDS
 ALSO_WORDS = {"drift", "growth", "audit", "score", "local_error", "hunt"}
 """Names that are quantities, sections or commands as well."""
 SOURCE = Path(__file__).parents[1] / "src" / "heavytop"
-GROUND = {"display", "errors", "former_names", "precision", "processes", "records", "version", "written_numbers"}
+GROUND = {
+    "display",
+    "errors",
+    "former_names",
+    "last_call",
+    "precision",
+    "processes",
+    "records",
+    "version",
+    "written_numbers",
+}
 MOTIONS = GROUND | {"top", "exact", "claims", "integrate"}
 MAY_IMPORT = {
     "errors": set(),
     "precision": {"errors"},
     "display": set(),
+    "last_call": set(),
     "processes": set(),
     "records": set(),
     "former_names": {"records"},

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from heavytop.api.events import events, poincare
     from heavytop.api.hunt import Hunt, hunt
     from heavytop.api.motions import ensemble, propagate, reference
+    from heavytop.api.prepared import Integrator, Propagated
     from heavytop.api.reports import Comparison, Report, compare, read_report, run
     from heavytop.api.scores import Score, Summary, drift, score
     from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
@@ -34,6 +35,7 @@ _PLACES = {
     "api.events": ("events", "poincare"),
     "api.hunt": ("Hunt", "hunt"),
     "api.motions": ("ensemble", "propagate", "reference"),
+    "api.prepared": ("Integrator", "Propagated"),
     "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
     "api.scores": ("Score", "Summary", "drift", "score"),
     "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
@@ -69,9 +71,11 @@ __all__ = [
     "HeavyTopError",
     "Hunt",
     "InputError",
+    "Integrator",
     "OutOfReach",
     "Outcome",
     "Precision",
+    "Propagated",
     "Reference",
     "ReferenceEvents",
     "Report",

@@ -23,6 +23,8 @@ REAL_BITS = range(24, 20001)
 _MAX_TEXT = 100_000
 LARGEST = Fraction(10) ** 150
 """Beyond this, physical data overflow in some float on the way; a change of units brings them back."""
+_LARGE_POWER = 498
+"""Numbers below 2^498 are not beyond it."""
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 _REMEDY = "Write an integer, a decimal such as 0.25 or 1e-3, or a fraction such as -2/5."
 
@@ -136,6 +138,8 @@ def exact(value: Any) -> Fraction:
         return value
     if isinstance(value, str):
         return _from_text(value)
+    if isinstance(value, float) and math.isfinite(value):
+        return Fraction(float(value))
     kind = type(value).__name__
     if kind == "mpfr":
         return _from_mpfr(value)
@@ -225,7 +229,8 @@ def exact_text(value: Fraction) -> str:
 
 def physical(value: Fraction, what: str) -> Fraction:
     """``value``; raises InputError if it is larger than 10^150."""
-    if abs(value) > LARGEST:
+    apart = value.numerator.bit_length() - value.denominator.bit_length()
+    if apart >= _LARGE_POWER and abs(value) > LARGEST:
         raise InputError(f"{what} = {shown(value)} is too large.", "Choose other units: numbers go up to 1e150.")
     return value
 
@@ -286,20 +291,30 @@ def number(value: Fraction, precision: Precision) -> Any:
     """
     import numpy
 
-    result: Any
     if precision.family == "double":
-        try:
-            result = numpy.float64(float(value))
-        except OverflowError:
-            result = numpy.float64(math.inf)
-    else:
-        result = _wide(*(_significand(value, precision.bits) if value else (0, 0)), precision)
+        return numpy.float64(_nearest_double(value))
+    result = _wide(*(_significand(value, precision.bits) if value else (0, 0)), precision)
     if not numpy.isfinite(result) or (result == 0 and value != 0):
-        raise InputError(
-            f"{decimal_text(value, 6)} is outside the exponent range of {precision.name}.",
-            "Choose other units, or a format with a wider range such as real:237.",
-        )
+        raise _out_of_range(value, precision)
     return result
+
+
+def _nearest_double(value: Fraction) -> float:
+    """``value`` rounded to nearest; raises InputError outside the exponents of doubles."""
+    try:
+        result = float(value)
+    except OverflowError:
+        raise _out_of_range(value, DOUBLE) from None
+    if math.isinf(result) or (result == 0 and value != 0):
+        raise _out_of_range(value, DOUBLE)
+    return result
+
+
+def _out_of_range(value: Fraction, precision: Precision) -> InputError:
+    return InputError(
+        f"{decimal_text(value, 6)} is outside the exponent range of {precision.name}.",
+        "Choose other units, or a format with a wider range such as real:237.",
+    )
 
 
 def numbers(values: Sequence[Fraction], precision: Precision) -> Sequence[Any]:
@@ -336,7 +351,7 @@ def _integer_and_exponent(significand: int, exponent: int) -> str:
 
 def rounded(value: Fraction, precision: Precision) -> Fraction:
     """The exact value of ``value`` rounded to ``precision``."""
-    return exact(number(value, precision))
+    return Fraction(_nearest_double(value)) if precision.family == "double" else exact(number(value, precision))
 
 
 def decimal_text(value: Fraction, digits: int) -> str:

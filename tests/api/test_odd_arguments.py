@@ -250,6 +250,8 @@ def test_one_odd_argument_is_answered_or_refused_in_words(
     for odd in itertools.chain(ODD[::6] if few else ODD, (make() for make in GENERATORS)):
         if name == "run" and isinstance(odd, str) and odd == "smoke":
             continue  # a plan that is there
+        if name == "claim_library" and (odd is None or (isinstance(odd, str) and odd == "heavy_top")):
+            continue  # most of it: tests/claims/test_library.py
         if argument in ("observer", "reached", "done") and callable(odd):
             continue  # what the caller's own function raises is the caller's
         answered(function, arguments | {argument: odd})

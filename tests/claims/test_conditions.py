@@ -97,10 +97,13 @@ ON_AXIS_1 = "0 1 2 1 0 0"
     ("table", "named"),
     [
         (free("sqrt(Omega1)", kind="relation", state=ON_AXIS_1), "Omega1"),
-        (free("Omega1^2 + 1", kind="relation", state=ON_AXIS_1), "no sample is proven to lie on the relations"),
+        (free("Omega1^2 + 1", kind="relation", state=ON_AXIS_1), "no sample lies on the relations"),
         (free("sqrt(Omega1^2)/Omega1"), "Omega1 ≠ 0"),
         (free("sqrt(Omega1) - sqrt(Omega1) + gamma1^2 + gamma2^2 + gamma3^2"), "Omega1 ≥ 0"),
-        (free("Omega3", ("Omega1", "Omega2"), state="1e-200 1 2 1 0 0"), "no sample is proven"),
+        (
+            free("Omega3", ("Omega1", "Omega2"), state="1e-200 1 2 1 0 0"),
+            "E-200, Omega1 is not 0",
+        ),
         (free("acos(2 + gamma1^2 + gamma2^2 + gamma3^2)"), "at no sample"),
     ],
 )

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, SupportsIndex, TypeAlias, TypeVar
 
 from heavytop.errors import InputError, quoted
+from heavytop.last_call import last_call
 from heavytop.precision import DOUBLE, Precision, exact, parse, physical, require, shown, usable_tolerance, whole
 from heavytop.top.bodies import Body
 from heavytop.top.equations import SYSTEMS, WHICH_SYSTEM, System, system_of
@@ -44,6 +45,11 @@ def motion(
     Raises InputError for other types, data beyond 1e150, and a γ off the unit sphere by more than rounding to
     ``precision`` explains.
     """
+    return _checked(top, start, precision, of_any_size)
+
+
+@last_call
+def _checked(top: object, start: object, precision: Precision, of_any_size: bool) -> tuple[HeavyTop | Body, State]:
     body: HeavyTop | Body = top if isinstance(top, Body) else is_a(top, HeavyTop, "top")
     state = is_a(start, State, "start")
     if not of_any_size:

@@ -13,6 +13,7 @@ from heavytop.claims.evaluate import evaluate
 from heavytop.claims.proof import KEPT, Condition, Region
 from heavytop.claims.sign import NUMBER_BITS, PLUS, Unprovable
 from heavytop.claims.statement import Domain, Place, Setting, Statement
+from heavytop.precision import shown
 
 _CONTINUOUS = "the formulas are real and continuous all over the domain"
 _ATTITUDE = "the attitude of the angles is continuous inside the domain"
@@ -232,8 +233,11 @@ def _missed(statement: Statement, setting: Setting) -> str:
         place = {setting.variable: statement.domain.points[0], **sample}
         for zero in setting.zeros:
             if is_exactly_zero(zero, place) is False:
-                used = ", ".join(f"{name} = {value}" for name, value in sample.items() if name in zero.free_symbols)
-                return f"no sample lies on the relations{on_sphere}: where {used}, {written(str(zero))} is not 0"
+                used = ", ".join(
+                    f"{name} = {shown(value)}" for name, value in sample.items() if name in zero.free_symbols
+                )
+                where = f"where {used}, {written(str(zero))} is not 0"
+                return f"no sample lies on the relations{on_sphere}: {where}"
         if not setting.zeros and statement.domain.facts:
             points = ", ".join(map(str, statement.domain.points))
             return f"no point tried lies where {statement.domain.label}: {setting.variable} = {points}"

@@ -17,6 +17,7 @@ import numpy
 from heavytop.errors import InputError
 from heavytop.integrate.selfcheck import check
 from heavytop.integrate.trajectory import Problem
+from heavytop.last_call import last_call
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, number, require, usable_tolerance
 from heavytop.top.equations import HEAVY_GYROSTAT, VARIABLES, Parameters, System
 
@@ -181,6 +182,7 @@ def load(engine: Any, problem: Problem) -> None:
     engine.time = number(Fraction(0), problem.precision)
 
 
+@last_call
 def arrays(problem: Problem) -> tuple[Any, Any]:
     """The parameters and the state that an engine is given, as native arrays."""
     p = problem.parameters

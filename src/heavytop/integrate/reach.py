@@ -12,6 +12,7 @@ from heavytop.top.rates import square_of_rate
 
 MOST_STEPS = 10**12
 """In double a step takes a microsecond: these take days."""
+_FAR_BELOW = 1e11
 
 
 def expected_steps(problem: Problem, end: Fraction, step: Fraction | None = None) -> int:
@@ -26,12 +27,21 @@ def expected_steps(problem: Problem, end: Fraction, step: Fraction | None = None
     return math.isqrt(square.numerator // square.denominator)
 
 
+def _is_near(problem: Problem, end: Fraction) -> bool:
+    """True only where the end is in reach by far; in doubles."""
+    try:
+        p, start, span = problem.parameters.mapped(float), tuple(map(float, problem.start.flat)), float(end)
+        return bool(span * span * square_of_rate(problem.system, p, start) < _FAR_BELOW**2)
+    except (OverflowError, ZeroDivisionError):
+        return False
+
+
 def require_reach(problem: Problem, end: Fraction, step_limit: int | None = None, step: Fraction | None = None) -> None:
     """Raises OutOfReach where a run to the time ``end`` takes more than :data:`MOST_STEPS` :func:`expected_steps`.
 
     A run that ``step_limit`` ends early is in reach.
     """
-    if step_limit is not None and step_limit <= MOST_STEPS:
+    if (step_limit is not None and step_limit <= MOST_STEPS) or (step is None and _is_near(problem, end)):
         return
     steps = expected_steps(problem, end, step)
     if steps > MOST_STEPS:

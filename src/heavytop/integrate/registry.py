@@ -10,7 +10,9 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from importlib.metadata import EntryPoint
+from types import FunctionType
 from typing import Any, NamedTuple
 
 from heavytop.errors import InputError, quoted
@@ -116,17 +118,27 @@ def _find(name: str) -> Integrator:
     return found
 
 
+@lru_cache(maxsize=16)
 def _load(place: str) -> Callable[..., Any]:
     found: Callable[..., Any] = EntryPoint("", place, "").load()
     return found
 
 
+@lru_cache(maxsize=64)
+def _names(function: Callable[..., Any]) -> frozenset[str] | None:
+    """What it takes by name; None where that is anything."""
+    parameters = inspect.signature(function).parameters
+    if any(each.kind is inspect.Parameter.VAR_KEYWORD for each in parameters.values()):
+        return None
+    return frozenset(parameters)
+
+
 def _with(function: Callable[..., Any], name: str, options: dict[str, Any]) -> Callable[..., Any]:
     """``function`` with these options; raises InputError for one that it does not have."""
-    parameters = inspect.signature(function).parameters
-    takes_any = any(each.kind is inspect.Parameter.VAR_KEYWORD for each in parameters.values())
+    # other callables may have no hash
+    names = (_names if isinstance(function, FunctionType) else _names.__wrapped__)(function)
     for option in options:
-        if option not in parameters and not takes_any:
+        if names is not None and option not in names:
             raise InputError(f"The integrator {name} has no {option}.", f"Leave it out, or use another than {name}.")
 
     def call(*arguments: Any, **more: Any) -> Any:

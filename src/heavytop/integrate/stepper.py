@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from time import perf_counter
 from typing import Any
 
@@ -59,6 +60,13 @@ class Stepper:
             if outcome is not Outcome.SUCCESS:
                 return outcome
         return Outcome.SUCCESS
+
+    def at(self, target: Any) -> tuple[Outcome, Any]:
+        """The outcome of :meth:`reach` and, where that is success, the state there."""
+        if target == 0:
+            return Outcome.SUCCESS, self.engine.state.copy()
+        outcome = self.reach(target)
+        return outcome, self.sample(target) if outcome is Outcome.SUCCESS else None
 
     def _beyond(self, target: Any) -> bool:
         return bool(self.engine.time >= target if self.forwards else self.engine.time <= target)
@@ -148,10 +156,13 @@ class Stepper:
         return self.engine.update_d_output(target).copy()
 
 
+def are_many(targets: Sequence[Any], precision: Precision) -> bool:
+    """Whether one call of heyoka may be worth its while."""
+    return len(targets) >= _MANY and precision.family in _ON_A_GRID
+
+
 def dense(engine: Any, targets: Sequence[Any], precision: Precision) -> bool:
-    """Whether there are many targets and few steps between them; takes the first step of ``engine`` to see."""
-    if len(targets) < _MANY or precision.family not in _ON_A_GRID:
-        return False
+    """Whether there are few steps between :func:`are_many` targets; takes the first step of ``engine`` to see."""
     engine.propagate_until(far(bool(targets[-1] >= 0), precision), max_steps=1)
     return abs(float(targets[-1])) <= _CLOSE * len(targets) * abs(float(engine.time))
 
@@ -181,6 +192,7 @@ def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: i
     return steps, states[len(start) :]
 
 
+@lru_cache(maxsize=64)
 def far(forwards: bool, precision: Precision) -> Any:
     """A time beyond every other."""
     return number(Fraction(2) ** 1000 * (1 if forwards else -1), precision)

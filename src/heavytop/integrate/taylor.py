@@ -8,7 +8,7 @@ from time import perf_counter
 from typing import Any
 
 from heavytop.integrate.engines import Compiled, compiled, load
-from heavytop.integrate.stepper import Stepper, dense, far, on_a_grid
+from heavytop.integrate.stepper import Stepper, are_many, dense, far, on_a_grid
 from heavytop.integrate.trajectory import Outcome, Place, Problem, TaylorStep, Trajectory
 from heavytop.precision import Precision, exact, number, numbers
 from heavytop.top.equations import HEAVY_TOP, Parameters, System
@@ -99,13 +99,9 @@ def follow(
         if stepper.rest is None:
             place.require_covered(stepper.steps)
     for target in targets[done:]:
-        if target == 0:
-            state = engine.state.copy()
-        else:
-            outcome = stepper.reach(target)
-            if outcome is not Outcome.SUCCESS:
-                break
-            state = stepper.sample(target)
+        outcome, state = stepper.at(target)
+        if outcome is not Outcome.SUCCESS:
+            break
         done += 1
         kept_times.append(exact(target))
         if observer is None:
@@ -119,11 +115,45 @@ def follow(
     )
 
 
+def states_at(
+    engine: Any, parameters: Any, start: Any, targets: Sequence[Any], step_limit: int | None, precision: Precision
+) -> tuple[Any, Outcome, Any, int]:
+    """(states at the targets that were reached, outcome, time reached, steps), the bits of :func:`follow`.
+
+    For who has native numbers already: ``parameters`` and ``start`` as arrays, targets that were checked.
+    """
+
+    def begin() -> None:
+        engine.pars[:] = parameters
+        engine.state[:] = start
+        engine.time = targets[0] * 0
+
+    if are_many(targets, precision):
+        begin()
+        if dense(engine, targets, precision):
+            begin()
+            found = on_a_grid(engine, targets, precision, step_limit)
+            if found is not None:
+                return found[1], Outcome.SUCCESS, targets[-1], found[0]
+    begin()
+    forwards = bool(targets[-1] >= 0)
+    stepper = Stepper(engine, forwards, step_limit, far(forwards, precision))
+    states: list[Any] = []
+    for target in targets:
+        outcome, state = stepper.at(target)
+        if outcome is not Outcome.SUCCESS:
+            return states, outcome, stepper.time, stepper.steps
+        states.append(state)
+    return states, Outcome.SUCCESS, targets[-1], stepper.steps
+
+
 def _in_one_call(
     tool: Compiled, engine: Any, problem: Problem, targets: Sequence[Any], step_limit: int | None
 ) -> Trajectory | None:
     """The motion at many targets close to each other, by heyoka alone; None where there are few, or where it fails."""
     began = perf_counter()
+    if not are_many(targets, problem.precision):
+        return None
     load(engine, problem)
     if not dense(engine, targets, problem.precision):
         return None

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, overload
 
 from heavytop.display import Lines, Table, Tabular, path_picture
 from heavytop.errors import InputError
+from heavytop.last_call import last_call
 from heavytop.precision import Precision, decimal_text, exact, native, native_text, number, rounded
 from heavytop.top.bodies import Frame
-from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State, cross
 from heavytop.top.integrals import Integral, holding
 from heavytop.top.outputs import Output, output
@@ -90,24 +91,35 @@ class Problem:
         xi: tuple[Fraction, ...] | None = None,
     ) -> Problem:
         """The problem rounded to ``precision``; the rotor is computed from the exact data first."""
-        given = system.parameters(top, start)
-
-        def both(values: Any) -> tuple[Fraction, ...]:
-            return tuple(rounded(value, precision) for value in values)
-
-        parameters = given.mapped(lambda value: rounded(Fraction(value), precision))
-        return cls(
-            system,
-            precision,
-            parameters,
-            State(both(start.omega), both(start.gamma)),
-            None if xi is None else both(xi),
-            (top, start),
-        )
+        return _rounded(top, start, precision, system, xi)
 
     def native(self, values: Any) -> list[Any]:
-        """Exact numbers as numbers of the format."""
+        """Numbers that are rounded to the format, as numbers of it."""
+        if self.precision.family == "double":
+            return [float(value) for value in values]
         return [number(exact(value), self.precision) for value in values]
+
+
+@last_call
+def _rounded(
+    top: HeavyTop, start: State, precision: Precision, system: System, xi: tuple[Fraction, ...] | None
+) -> Problem:
+    def both(values: Any) -> tuple[Fraction, ...]:
+        return tuple(rounded(value, precision) for value in values)
+
+    # of the gyrostat the start is part of them
+    parameters = _rounded_parameters(top, start if system is GYROSTAT else None, precision, system)
+    rounded_start = State(both(start.omega), both(start.gamma))
+    return Problem(system, precision, parameters, rounded_start, None if xi is None else both(xi), (top, start))
+
+
+@last_call
+def _rounded_parameters(top: HeavyTop, start: State | None, precision: Precision, system: System) -> Parameters:
+    given = system.parameters(top, _ANY_START if start is None else start)
+    return given.mapped(lambda value: rounded(Fraction(value), precision))
+
+
+_ANY_START = State((0, 0, 0), (0, 0, 1))
 
 
 class OtherFlags(InputError):

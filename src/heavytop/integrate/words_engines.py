@@ -5,12 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from math import ceil
 from threading import Lock
 
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Problem
 from heavytop.integrate.words_check import check
+from heavytop.last_call import last_call
 from heavytop.precision import DOUBLE, Precision, decimal_text
 from heavytop.top.equations import System
 from heavytop.words import eight, fixed, floating
@@ -56,6 +58,11 @@ class Arithmetic(ABC):
         """
 
 
+@lru_cache(maxsize=64)
+def _tolerance_text(tolerance: Fraction) -> str:
+    return decimal_text(tolerance, 6)
+
+
 @dataclass(frozen=True, slots=True)
 class DoubleDouble(Arithmetic):
     """106 bits that float, with plain doubles above an order n0.
@@ -73,7 +80,7 @@ class DoubleDouble(Arithmetic):
             "arithmetic": "double-double",
             "words": "2",
             "bits": str(floating.BITS),
-            "tolerance": decimal_text(self.tolerance, 6),
+            "tolerance": _tolerance_text(self.tolerance),
             "order": str(self.ladder.order),
             "step_rule": f"radius of convergence times 2^{self.ladder.reach:.3f}, ten bits",
             "plain_orders": f"where rounding is below 2^{self.ladder.room - 53:.1f}",
@@ -153,6 +160,7 @@ class WholeNumbers(Arithmetic):
         return 0.0
 
 
+@lru_cache(maxsize=64)
 def wanted_tolerance(precision: Precision, tolerance: Fraction | None) -> Fraction:
     """The local error to aim at, relative to the state.
 
@@ -182,6 +190,7 @@ def floats(wanted: Fraction, scaled: Scaled | None = None) -> DoubleDouble | Non
     return DoubleDouble(wanted, Ladder.of(inner), Ladder.of(inner, FALL_IN_LANES))
 
 
+@last_call
 def choose(problem: Problem, tolerance: Fraction | None) -> tuple[Arithmetic, Scaled]:
     """The arithmetic for a format, or for the tolerance where one is given, and the problem in its units.
 

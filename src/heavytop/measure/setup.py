@@ -28,22 +28,28 @@ Observer = Callable[[Fraction, Any], object]
 class Setup:
     """A motion in principal axes.
 
-    top, start: exact, of irrational data to many bits more than the format has.  xi: ξ at t = 0.
+    top, start: exact, of irrational data to many bits more than the format has.
+    carried: ξ at t = 0, where the data say it.
     frame: the axes given; None where they are the principal ones.
     """
 
     top: HeavyTop
     start: State
-    xi: Vector
+    carried: Vector | None
     system: System
     precision: Precision
     frame: Frame | None
+
+    @property
+    def xi(self) -> Vector:
+        """ξ at t = 0: of the attitude, else :func:`heavytop.top.angles.perpendicular` of γ."""
+        return perpendicular(self.start.gamma) if self.carried is None else self.carried
 
     @classmethod
     def of(cls, body: HeavyTop | Body, start: State, precision: Precision, system: System) -> Setup:
         """The motion of a body from ``start``."""
         if isinstance(body, HeavyTop) and start.attitude is None:
-            return cls(body, start, perpendicular(start.gamma), system, precision, None)
+            return cls(body, start, None, system, precision, None)
         found = resolve(body, start, precision.bits + _SPARE_BITS)
         xi = perpendicular(found.start.gamma) if found.xi is None else found.xi
         if not found.turned:

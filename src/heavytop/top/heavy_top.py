@@ -9,6 +9,7 @@ from math import isqrt
 from typing import Any
 
 from heavytop.errors import InputError, quoted
+from heavytop.last_call import last_call
 from heavytop.precision import decimal_text, exact, exact_text, physical, round_to, shown
 from heavytop.top.attitude import Attitude, rotated, transposed
 from heavytop.top.vectors import Vector as Vector
@@ -97,8 +98,16 @@ class HeavyTop:
 
 def require_physical(top: HeavyTop, start: State) -> None:
     """Raises InputError for data beyond 10^150, and moments below 10^-150, which overflow in some float on the way."""
+    _require_physical_top(top)
+    for what, values in (("omega", start.omega), ("gamma", start.gamma)):
+        for value in values:
+            physical(value, what)
+
+
+@last_call
+def _require_physical_top(top: HeavyTop) -> None:
     named = {"inertia": top.inertia, "weight": (top.weight,), "centre": top.centre, "rotor": top.rotor or ()}
-    for what, values in (named | {"omega": start.omega, "gamma": start.gamma}).items():
+    for what, values in named.items():
         for value in values:
             physical(value, what)
     physical(1 / min(top.inertia), "1/inertia")

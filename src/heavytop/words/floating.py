@@ -240,10 +240,17 @@ def _table(problem: Scaled, order: int, layout: Layout) -> Doubles:
     table = doubles(begin + order * layout.table_row)
     constants = table[:begin].reshape(layout.constants, 3, 8)
     rows = table[begin:].reshape(order, 1 + layout.constants, 8)
-    after = numpy.arange(1, order + 1)
-    rows[:, 0, :3] = [(n, *split(Fraction(1, int(n)))) for n in after]
-    for index, row in enumerate(flat):
-        for lane, c in enumerate(row):
-            constants[index, :, lane] = split_constant(c)
-            rows[:, 1 + index, lane] = float(c) / after
+    after = _after(order)
+    rows[:, 0, :3] = after
+    words = numpy.array([[split_constant(c) for c in row] for row in flat])
+    lanes = words.shape[1]
+    constants[: len(flat), :, :lanes] = words.transpose(0, 2, 1)
+    nearest = numpy.array([[float(c) for c in row] for row in flat])
+    rows[:, 1 : 1 + len(flat), :lanes] = nearest / after[:, :1, None]
     return table
+
+
+@lru_cache(maxsize=64)
+def _after(order: int) -> Doubles:
+    """n + 1 and the two words of 1/(n + 1), a row for each n."""
+    return numpy.array([(n, *split(Fraction(1, n))) for n in range(1, order + 1)])
