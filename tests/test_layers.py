@@ -7,7 +7,7 @@ import pytest
 
 from heavytop.kinds import KINDS
 
-ALSO_WORDS = {"drift", "growth", "audit", "score", "local_error"}
+ALSO_WORDS = {"drift", "growth", "audit", "score", "local_error", "hunt"}
 """Names that are quantities, sections or commands as well."""
 SOURCE = Path(__file__).parents[1] / "src" / "heavytop"
 GROUND = {"display", "errors", "former_names", "last_call", "precision", "processes", "records", "version"}

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from heavytop.api.claims import Audit, ClaimLibrary, audit, claim_library
     from heavytop.api.derivatives import DerivativeScore, score_derivatives
     from heavytop.api.events import events, poincare
+    from heavytop.api.hunt import Hunt, hunt
     from heavytop.api.motions import ensemble, propagate, reference
     from heavytop.api.prepared import Integrator, Propagated
     from heavytop.api.reports import Comparison, Report, compare, read_report, run
@@ -32,6 +33,7 @@ _PLACES = {
     "api.claims": ("Audit", "ClaimLibrary", "audit", "claim_library"),
     "api.derivatives": ("DerivativeScore", "score_derivatives"),
     "api.events": ("events", "poincare"),
+    "api.hunt": ("Hunt", "hunt"),
     "api.motions": ("ensemble", "propagate", "reference"),
     "api.prepared": ("Integrator", "Propagated"),
     "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
@@ -67,6 +69,7 @@ __all__ = [
     "Events",
     "HeavyTop",
     "HeavyTopError",
+    "Hunt",
     "InputError",
     "Integrator",
     "OutOfReach",
@@ -91,6 +94,7 @@ __all__ = [
     "ensemble",
     "events",
     "holding",
+    "hunt",
     "plot",
     "poincare",
     "propagate",

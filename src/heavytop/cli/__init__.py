@@ -16,7 +16,7 @@ from heavytop.cli.motion_output import with_file_of_latex
 from heavytop.errors import HeavyTopError
 
 # the commands, in the order of `heavytop --help`
-from heavytop.cli import run, reports, motions, score, claims, selftest, integrators, listing  # noqa: F401
+from heavytop.cli import run, reports, motions, score, claims, selftest, integrators, hunt, listing  # noqa: F401
 
 
 _COMPLETE = "_HEAVYTOP_COMPLETE"

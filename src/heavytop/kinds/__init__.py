@@ -10,6 +10,7 @@ from heavytop.kinds.claim_model import ClaimModel
 from heavytop.kinds.drift import Drift
 from heavytop.kinds.growth import Growth
 from heavytop.kinds.homoclinic import Homoclinic
+from heavytop.kinds.hunt import Hunt
 from heavytop.kinds.local_error import LocalError
 from heavytop.kinds.score import Score
 from heavytop.kinds.work_precision import WorkPrecision
@@ -25,6 +26,7 @@ _ALL: tuple[Kind, ...] = (
     Score(),
     WorkPrecision(),
     Growth(),
+    Hunt(),
 )
 KINDS: dict[str, Kind] = {kind.name: kind for kind in _ALL}
 """Each kind by its name in plans and rows."""

@@ -1,0 +1,1 @@
+"""The search for the motion that breaks an integrator: drawing, measuring, searching, shrinking, proving."""

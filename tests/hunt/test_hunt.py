@@ -1,0 +1,151 @@
+"""Planted faults are found, shrunk and proven; a healthy integrator has none."""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+import heavytop as ht
+from heavytop.integrate import peers
+from heavytop.kinds import KINDS
+from heavytop.measure.integrator import Integrator
+from heavytop.precision import exact
+from heavytop.suite.checkpoint import Saved
+from heavytop.suite.hunt.draw import FAMILIES, MOST_TURNS, drawn, possible, turns
+from heavytop.suite.hunt.measured import Meter
+from heavytop.suite.hunt.shrink import digits
+from heavytop.suite.plan import expand, load
+from in_process import heavytop
+
+FAULTS = Path(__file__).parents[1] / "hunted_integrators.py"
+NUMBERS = ("inertia", "centre", "omega", "gamma")
+
+
+def numbers(found: dict[str, object]) -> list[Fraction]:
+    return [exact(text) for key in NUMBERS for text in found[key]] + [exact(found["weight"])]  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("fault", ["branch", "rest"])
+def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # in this process: one of its own takes seconds to begin
+    monkeypatch.setitem(peers.BUILT_IN, f"planted:{fault}", peers.BuiltIn(f"hunted_integrators:{fault}"))
+    hunt = ht.hunt(f"planted:{fault}", budget=128, horizon=2)
+    assert hunt.found
+    worst = hunt.found[0]
+    assert max(map(digits, numbers(worst))) <= 3
+    assert max(len(part) for v in numbers(worst) for part in str(v).lstrip("-").split("/")) <= 3
+    if fault == "branch":
+        assert exact(worst["omega"][2]) < 0
+        assert exact(worst["gamma"][0]) > Fraction(9, 10)
+        assert hunt.hunted.proofs[0].proven
+        assert worst["ratio"] > 1e10
+    else:
+        assert worst["outcome"] == "failed"
+    assert worst["toml"].startswith("[[top]]\n")
+    assert "What is special" in str(hunt)
+
+
+def test_a_healthy_integrator_has_none_and_says_what_explains_its_worst() -> None:
+    hunt = ht.hunt(budget=96, horizon=4, seed=3)
+    assert (hunt.found, hunt.motions, hunt.seed) == ([], 96, 3)
+    assert "Nothing was found" in str(hunt)
+    assert "--budget 96 --seed 3" in str(hunt)
+
+
+def test_the_command_line_prints_the_document_and_ends_with_1_where_anything_is_found() -> None:
+    done = heavytop("hunt", "--limit", "1e-6", "--budget", 2, "--horizon", 1, "--family", "euler", "--json")
+    document = json.loads(done.stdout)
+    assert done.returncode == 1
+    assert set(document) == {"found", "motions", "seed"}
+    keys = "inertia weight centre omega gamma system digits_lost ratio outcome class command toml"
+    assert list(document["found"][0]) == keys.split()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("--budget", "0"),
+        ("--budget", "nan"),
+        ("--budget", "-5s"),
+        ("--horizon", "0"),
+        ("--horizon", "inf"),
+        ("--limit", "-1"),
+        ("--seed", "-1"),
+        ("--family", "hess"),
+        ("--integrator", "nobody"),
+        ("--against", "nobody"),
+        ("--against", "heyoka"),
+        ("--precision", "double-double"),
+    ],
+)
+def test_what_is_no_hunt_is_refused(wrong: tuple[str, str]) -> None:
+    done = heavytop("hunt", *wrong)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+
+
+def test_draws_are_bodies_of_their_family_and_depend_on_seed_and_index_alone() -> None:
+    for family in FAMILIES:
+        for index in range(1, 120, 7):
+            motion = drawn(5, index, family, Fraction(100))
+            assert motion == drawn(5, index, family, Fraction(100))
+            assert possible(motion, family, Fraction(100)) is not None
+            assert not motion[0].warnings()
+            assert sum(g * g for g in motion[1].gamma) == 1
+            assert turns(motion, Fraction(100)) <= MOST_TURNS
+
+
+def test_error_and_amplification_are_those_of_the_scorer_and_the_variational_equation() -> None:
+    from heavytop.top.amplification import amplification
+    from heavytop.top.equations import HEAVY_TOP
+
+    meter = Meter(Integrator("heyoka"), ht.DOUBLE, Fraction(10), None)
+    motions = [drawn(1, index, "any", Fraction(10)) for index in (0, 2, 4)]
+    for found in meter.measure(motions):
+        top, start = found.motion
+        states = ht.propagate(top, start, meter.times).states
+        scored = ht.score(meter.times, states, top=top, start=start)
+        worst = float(scored.distance["gamma"].max)
+        assert worst / 2 < found.error < 20 * worst
+        parameters = HEAVY_TOP.parameters(top, start)
+        whole = amplification(HEAVY_TOP, parameters, start.flat, Fraction(10))
+        assert whole / 10 < found.amplification < whole * 3
+
+
+def test_what_a_plan_finds_is_kept_and_measured_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    plan = """name = "hunted"
+[[measure]]
+kind = "hunt"
+horizon = "1"
+budget = 2
+family = "euler"
+limit = "1e-9"
+found = "found.toml"
+"""
+    Path("plan.toml").write_text(plan)
+    (task,) = expand(load("plan.toml", KINDS)[0])
+    row = KINDS["hunt"].measure(task, Saved())
+    assert row.outcome == "failed"
+    assert "heavytop propagate" in row.against
+    first = Path("found.toml").read_text()
+    assert first.count("[[top]]") >= 1
+    assert KINDS["hunt"].measure(task, Saved()).outcome == "failed"
+    assert Path("found.toml").read_text().startswith(first)
+
+
+def test_what_is_rounded_on_the_way_may_grow_by_more_than_what_is_rounded_at_the_start() -> None:
+    # a hunt of heyoka once found this motion, near the separatrix of a pendulum, and blamed heyoka
+    top = ht.HeavyTop(("199/1000000000", "239/1000000000", "134337/1000000000000"), 56, ("7/10000000", 0, 0))
+    start = ht.State(("1/50", 0, "-3/100"), (0, 0, 1))
+    meter = Meter(Integrator("heyoka"), ht.DOUBLE, Fraction(3), None)
+    (found,) = meter.measure([(top, start)])
+    assert meter.sharper(found).amplification > 2 * found.amplification
+    assert found.error < 100 * meter.sharper(found).explained(2.0**-52)
+
+
+def test_the_same_seed_searches_the_same() -> None:
+    one, two = (ht.hunt(budget=24, horizon=2, seed=9).hunted.worst for _ in range(2))
+    assert [m.motion for m in one] == [m.motion for m in two]
+    assert [m.error for m in one] == [m.error for m in two]

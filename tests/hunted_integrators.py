@@ -1,0 +1,56 @@
+"""heyoka with one planted fault each, which shows in a small part of the space alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy
+
+from heavytop.integrate.taylor import propagate
+from heavytop.integrate.trajectory import Trajectory
+from heavytop.precision import Precision
+from heavytop.top.equations import System
+from heavytop.top.heavy_top import HeavyTop, State
+
+Times = Sequence[Any]
+
+
+def healthy(top: HeavyTop, start: State, times: Times, precision: Precision, *, system: System) -> Trajectory:
+    """heyoka."""
+    return propagate(top, start, times, precision, system=system)
+
+
+def ratio(top: HeavyTop, start: State, times: Times, precision: Precision, *, system: System) -> Trajectory:
+    """An error of 1e-9 when I2/I3 is within 1 % of 2."""
+    run = propagate(top, start, times, precision, system=system)
+    off = abs(top.inertia[1] / top.inertia[2] - 2) <= Fraction(2, 100)
+    return replace(run, states=[state * (1 + 1e-9) for state in run.states]) if off else run
+
+
+def branch(top: HeavyTop, start: State, times: Times, precision: Precision, *, system: System) -> Trajectory:
+    """A wrong branch when Ω3 < 0 and γ1 > 0.9 at the start: the motion of Ω3 > 0."""
+    if start.omega[2] < 0 and start.gamma[0] > Fraction(9, 10):
+        omega = (start.omega[0], start.omega[1], -start.omega[2])
+        return propagate(top, State(omega, start.gamma), times, precision, system=system)
+    return propagate(top, start, times, precision, system=system)
+
+
+def spin(top: HeavyTop, start: State, times: Times, precision: Precision, *, system: System) -> Trajectory:
+    """Four digits lost above a spin of 50: the start is that much off."""
+    if sum(value * value for value in start.omega) > 50**2:
+        omega = [value * (1 + 10**4 * precision.eps) for value in start.omega]
+        return propagate(top, State(omega, start.gamma), times, precision, system=system)
+    return propagate(top, start, times, precision, system=system)
+
+
+def rest(top: HeavyTop, start: State, times: Times, precision: Precision, *, system: System) -> Trajectory:
+    """NaN within 1e-6 of an equilibrium: where the field is below that."""
+    field = system.field(system.parameters(top, start).mapped(Fraction), start.flat)
+    run = propagate(top, start, times, precision, system=system)
+    if math.hypot(*map(float, field)) < 1e-6:
+        return replace(run, states=[numpy.full(6, math.nan) for _ in run.states])
+    return run
