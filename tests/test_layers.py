@@ -12,16 +12,6 @@ ALSO_WORDS = {"drift", "growth", "audit", "score", "local_error", "hunt"}
 SOURCE = Path(__file__).parents[1] / "src" / "heavytop"
 GROUND = {"display", "errors", "former_names", "last_call", "precision", "processes", "records", "version"}
 GROUND |= {"written_numbers"}
-    "display",
-    "errors",
-    "former_names",
-    "last_call",
-    "precision",
-    "processes",
-    "records",
-    "version",
-    "written_numbers",
-}
 MOTIONS = GROUND | {"top", "exact", "claims", "integrate"}
 MAY_IMPORT = {
     "errors": set(),

@@ -85,7 +85,7 @@ def hunt(
     form = arguments.precision(precision)
     asked = asked_for(which, form, horizon, budget, family, against, limit, seed)
     try:
-        hunted = search(asked, advance)
+        hunted = search(asked, arguments.callback(advance, "advance"))
     finally:
         close_all()
     name = integrator if isinstance(integrator, str) else asked.integrator.name
@@ -108,7 +108,7 @@ def asked_for(
     other = None if against is None else named(against)
     if other is not None:
         require(other)
-    if family not in FAMILIES:
+    if not isinstance(family, str) or family not in FAMILIES:
         raise InputError(f"There is no family {quoted(family)}.", f"Use {', '.join(FAMILIES)}.")
     time = physical(exact(horizon), "horizon")
     if not time:
@@ -139,7 +139,9 @@ def _seed(value: int) -> int:
 
 def _budget(value: int | str) -> tuple[int | None, float | None]:
     """A number of motions, or seconds."""
-    text = str(value).strip() if isinstance(value, int | str) and not isinstance(value, bool) else ""
+    if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= _MOST:
+        return value, None
+    text = value.strip() if isinstance(value, str) else ""
     if re.fullmatch(r"[0-9]{1,9}", text) and 1 <= int(text) <= _MOST:
         return int(text), None
     if re.fullmatch(r"[0-9]{1,7}(\.[0-9]{1,3})?s", text) and 0 < float(text[:-1]) <= _MOST_SECONDS:
