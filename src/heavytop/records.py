@@ -255,6 +255,10 @@ class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     rotor: tuple[str, ...] = ()
 
 
+NOISE, NOT_MEASURED = "noise", "not measured"
+"""The flag of a row whose plan says ``noise = false``."""
+
+
 class Row(msgspec.Struct, gc=False):
     """One measurement, of one motion compared with one reference.
 

@@ -8,6 +8,8 @@ from fractions import Fraction
 from math import ceil
 from typing import Any
 
+from gmpy2 import mpq
+
 from heavytop.errors import Contradiction
 from heavytop.exact.quadratic import Quadratic, quadratic
 from heavytop.exact.step_series import lacking
@@ -58,7 +60,7 @@ class ScaledMotion:
     @classmethod
     def _in_units(cls, scaled: Scaled, p: Parameters, forwards: bool) -> ScaledMotion:
         system, size = scaled.system, len(scaled.state)
-        own = own_parameters(scaled, p)
+        own = own_parameters(scaled, p).mapped(mpq)
         sign = 1 if forwards else -1
 
         def given(state: tuple[Any, ...]) -> list[Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 from rich.console import RenderableType
@@ -20,12 +20,13 @@ from heavytop.measure.reruns import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact, number, parse, time_text
-from heavytop.records import Metric, Row, RowKey
+from heavytop.records import NOISE, NOT_MEASURED, Metric, Row, RowKey
 from heavytop.report.answers import digits_headline
 from heavytop.report.brief import digits_lines
 from heavytop.report.digits_chart import digits
 from heavytop.report.plots import growth
-from heavytop.report.text import DIGITS, NOISE, largest_over, motions, title
+from heavytop.report.text import DIGITS, largest_over, motions, title
+from heavytop.report.text import NOISE as ABOUT_NOISE
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import computed_row
@@ -33,7 +34,13 @@ from heavytop.suite.sampling import positive, uniform
 from heavytop.suite.task import Task, computed
 
 NAME = "drift"
-_ATTITUDE = "attitude"
+
+
+class Extent(NamedTuple):
+    """What is measured of a run beside the usual, or not."""
+
+    attitude: bool = False
+    noise: bool = True
 
 
 class Run(msgspec.Struct, forbid_unknown_fields=True):
@@ -49,12 +56,14 @@ class DriftTable(Table, tag=NAME):
 
     attitude: whether ξ rides along and its errors, and those of the centre of mass, are measured too; of heyoka and
     multiword: others are given Ω and γ alone.
+    noise: whether each motion is computed again with other roundings, which takes most of the time of a row.
     """
 
     cases: list[str]
     runs: list[Run]
     integrator: str = HEYOKA
     attitude: bool = False
+    noise: bool = True
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row."""
@@ -70,7 +79,7 @@ class DriftTable(Table, tag=NAME):
                 self.integrator,
                 case,
                 *times,
-                options=_ATTITUDE if self.attitude else None,
+                options=Extent(self.attitude, self.noise),
             )
             for case in map(find, self.cases)
             for precision, horizon, times in runs
@@ -92,13 +101,13 @@ class Drift(Kind):
 
     def cost(self, task: Task) -> float:
         """The reruns that tell the rounding noise and the truth take about a second."""
-        return 0.8 + task.run_seconds
+        return (0.8 if task.options.noise else 0.1) + task.run_seconds
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """Of one run.  Raises Contradiction where two proofs of the known motion exclude each other, InputError for a
         place reached with other flags.
         """
-        if task.options == _ATTITUDE and task.integrator.takes_many:
+        if task.options.attitude and task.integrator.takes_many:
             return _with_attitude(task)
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
@@ -118,8 +127,7 @@ class Drift(Kind):
         if task.integrator.takes_many:
             going_on = {"place": None if before is None else Place.of(before["run"], precision), "mark": mark}
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **going_on)
-        metrics = _banded(task, run, scorer)
-        return computed_row(task, run, metrics, scorer.series(time_text), scorer.against)
+        return _row(task, run, scorer)
 
     def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
         """Digits left at the longest horizon, or of an integrator of others beside heyoka's."""
@@ -133,13 +141,20 @@ class Drift(Kind):
             ),
             Text(f"  Both absolute, {largest_over(rows)}: a first integral that is kept proves no motion right."),
             Text(f"  {DIGITS}"),
-            Text(f"  {NOISE}"),
+            Text(f"  {ABOUT_NOISE}"),
             motions(rows),
         ]
 
     def brief(self, rows: Sequence[Row]) -> list[str]:
         """Digits right, a line a motion."""
         return digits_lines(rows, "Digits right, to |t|")
+
+
+def _row(task: Task, run: Trajectory, scorer: Scorer) -> Row:
+    if task.options.noise:
+        return computed_row(task, run, _banded(task, run, scorer), scorer.series(time_text), scorer.against)
+    plain = replace(run, flags=run.flags | {NOISE: NOT_MEASURED})
+    return computed_row(task, plain, scorer.metrics(), scorer.series(time_text), scorer.against)
 
 
 def _banded(task: Task, run: Trajectory, scorer: Scorer) -> dict[str, Metric]:
@@ -157,7 +172,7 @@ def _with_attitude(task: Task) -> Row:
     known = truth(replace(problem, xi=None), times)
     scorer = AttitudeScorer(problem, known, case.top, case.start, times, keep)
     run = integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, xi=xi)
-    return computed_row(task, run, _banded(task, run, scorer), scorer.series(time_text), scorer.against)
+    return _row(task, run, scorer)
 
 
 def _require_same_samples(scorer: Scorer, times: Sequence[Fraction], samples: int) -> None:

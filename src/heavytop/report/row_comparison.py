@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,7 +10,7 @@ import msgspec
 
 from heavytop.measure.rounding_noise import least
 from heavytop.precision import exact
-from heavytop.records import UNSUPPORTED, Identity, Metric, Quantity, Row
+from heavytop.records import NOISE, NOT_MEASURED, UNSUPPORTED, Identity, Metric, Quantity, Row
 from heavytop.report.against import weaker
 from heavytop.report.consistency import contradictions
 from heavytop.report.kind import Kinds, kind_of
@@ -21,7 +22,7 @@ from heavytop.report.policy import BITS, Limits, Lookup, Policy
 from heavytop.report.rounding_bound import RoundingBound
 from heavytop.report.series import judge_series
 from heavytop.report.timings import BAND, judge_repeated
-from heavytop.report.verdicts import MISSING, NAN, SAME, Judged, Verdict, beyond_limit, judge, judge_seconds
+from heavytop.report.verdicts import MISSING, NAN, SAME, Judged, Verdict, beyond_limit, judge, judge_seconds, size
 
 _STEPS = 2
 """The same method with the same setting takes as many steps, and evaluates the field as often: a factor beyond this is
@@ -192,6 +193,9 @@ class RowComparison:
             known = msgspec.structs.replace(known, band=noise)
         eps = self._eps(metric.quantity, old)
         judged = judge(known, found, limits, eps, self.policy.suspicious_digits, least_of, bound)
+        changed = judged[0] in (Verdict.WORSE, Verdict.BETTER) and limits.noise and not beyond_limit(match, limits)
+        if changed and self._is_by_rounding(metric, match, old):
+            return SAME
         if judged[0] in (Verdict.WORSE, Verdict.INCOMPARABLE):
             return judged
         if judged[0] is Verdict.SAME and metric.quantity != match.quantity:
@@ -237,6 +241,8 @@ class RowComparison:
                 continue
             exactly = any(metric.kind == "value" for metric in _of_series(name, old, "max", "final"))
             allowed = limits.value if exactly else max(limits.loss, self._noise(name, old, limits))
+            if not exactly and limits.noise and self._is_series_by_rounding(name, old, new):
+                allowed = math.inf
             judged = judge_series(series, match, allowed, limits.floor + self._eps(series.quantity, old), exactly)
             if judged[0] is Verdict.SAME and series.quantity != match.quantity:
                 judged = _ANOTHER
@@ -317,6 +323,20 @@ class RowComparison:
     def _eps(self, quantity: Quantity | None, row: Row) -> float:
         """log10 of the eps of a row, or of what its roundings add up to."""
         return (1 - row.bits) * BITS + kind_of(row, self.kinds).roundings(quantity, row.steps)
+
+    def _is_by_rounding(self, metric: Metric, match: Metric, old: Row) -> bool:
+        """Of a row whose noise was not measured: whether roundings alone make errors as large as either of the two."""
+        if old.flags.get(NOISE) != NOT_MEASURED or None in (metric.log10, match.log10) or metric.kind != "error":
+            return False
+        kind = kind_of(old, self.kinds)
+        largest = max(size(metric), size(match))
+        return kind.noise_is_reruns(metric) and RoundingBound(old, kind).explains(metric.quantity, largest)
+
+    def _is_series_by_rounding(self, name: str, old: Row, new: Row) -> bool:
+        """The same of what a series is largest."""
+        pairs = zip(_of_series(name, old, "max"), _of_series(name, new, "max"), strict=False)
+        found = [self._is_by_rounding(metric, match, old) for metric, match in pairs]
+        return bool(found) and all(found)
 
     def _noise(self, name: str, row: Row, limits: Limits) -> float:
         """Decades by which noise may move what a series or a law is about: as the metrics of its quantity."""

@@ -81,24 +81,34 @@ def _units(scale: Fraction) -> list[Fraction]:
 def _taken_apart(system: System, p: Parameters, scale: Fraction) -> tuple[NDArray[Any], NDArray[Any]]:
     """L, shape (6, 6), and symmetric B, shape (6, 6, 6), of the field L y + B(y, y) in units of ``scale``."""
     import numpy
+    from gmpy2 import mpq
 
-    units = _units(scale)
-    exactly = p.mapped(Fraction)
+    units = [mpq(unit) for unit in _units(scale)]
+    size, exactly = mpq(scale), p.mapped(mpq)
 
-    def field(*places: int) -> NDArray[Any]:
+    def field(*places: int) -> list[tuple[Any, Any]]:
+        """(even, odd) part of each rate."""
         y = [places.count(k) * unit for k, unit in enumerate(units)]
         there, opposite = system.field(exactly, y), system.field(exactly, [-value for value in y])
-        both = [((a + b) / 2, (a - b) / 2) for a, b in zip(there, opposite, strict=True)]
-        return numpy.array([[part / unit / scale for part in parts] for parts, unit in zip(both, units, strict=True)])
+        return [
+            ((a + b) / (2 * unit * size), (a - b) / (2 * unit * size))
+            for a, b, unit in zip(there, opposite, units, strict=True)
+        ]
 
     single = [field(j) for j in range(6)]
-    linear = numpy.array([part[:, 1] for part in single]).T.astype(float)
+    linear = numpy.array([[_nearest(part[i][1]) for part in single] for i in range(6)])
     products = numpy.empty((6, 6, 6))
     for j in range(6):
-        for k in range(j, 6):
-            mixed = (field(j, k) - single[j] - single[k])[:, 0] / 2 if j != k else single[j][:, 0]
-            products[:, j, k] = products[:, k, j] = mixed.astype(float)
+        products[:, j, j] = [_nearest(even) for even, _ in single[j]]
+        for k in range(j + 1, 6):
+            both = zip(field(j, k), single[j], single[k], strict=True)
+            products[:, j, k] = products[:, k, j] = [_nearest((a[0] - b[0] - c[0]) / 2) for a, b, c in both]
     return linear, products
+
+
+def _nearest(value: Any) -> float:
+    """The nearest double; raises OverflowError beyond them."""
+    return float(Fraction(int(value.numerator), int(value.denominator))) if value else 0.0
 
 
 def _followed(
