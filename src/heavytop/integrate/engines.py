@@ -188,4 +188,7 @@ def arrays(problem: Problem) -> tuple[Any, Any]:
     p = problem.parameters
     numbers = list(problem.system.entering(p))
     start = [*problem.start.flat, *(problem.xi or ())]
-    return numpy.array(problem.native(numbers)), numpy.array(problem.native(start))
+    found = numpy.array(problem.native(numbers)), numpy.array(problem.native(start))
+    for array in found:
+        array.setflags(write=False)  # kept for the next who asks
+    return found
