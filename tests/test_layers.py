@@ -91,17 +91,27 @@ def test_the_name_of_a_kind_stands_in_its_own_file() -> None:
 
 
 def test_no_files_import_one_another_in_a_circle() -> None:
-    modules = {".".join(("heavytop", *path.relative_to(SOURCE).with_suffix("").parts)): path for path in FILES}
-    graph = {name: {each for each in at_import(path) if each in modules} - {name} for name, path in modules.items()}
+    names = {path: ".".join(("heavytop", *path.relative_to(SOURCE).with_suffix("").parts)) for path in FILES}
+    modules = {name.removesuffix(".__init__"): path for path, name in names.items()}
+    graph = {name: {each for each in used_by(path) if each in modules} - {name} for name, path in modules.items()}
     while leaves := {name for name, used in graph.items() if not used & graph.keys()}:
         graph = {name: used for name, used in graph.items() if name not in leaves}
     assert not graph
 
 
-def at_import(path: Path) -> set[str]:
-    """What a file imports when it is imported itself, not for types and not when it is used."""
+def used_by(path: Path) -> set[str]:
+    """What a file imports, at its head or when it is used; not for types alone."""
+    tree = ast.parse(path.read_text("utf-8"))
+    for_types = {
+        id(node)
+        for block in ast.walk(tree)
+        if isinstance(block, ast.If) and "TYPE_CHECKING" in ast.dump(block.test)
+        for node in ast.walk(block)
+    }
     found = set()
-    for node in ast.parse(path.read_text("utf-8")).body:
+    for node in ast.walk(tree):
+        if id(node) in for_types:
+            continue
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):

@@ -101,7 +101,7 @@ def test_a_hard_limit_of_memory_below_its_own_is_kept(tmp_path):
     resource = pytest.importorskip("resource")
     code = (
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30));"
-        "from heavytop.claims.guard import _limit_memory; _limit_memory();"
+        "from heavytop.claims.guard import limit_memory; limit_memory();"
         "print(resource.getrlimit(resource.RLIMIT_AS)[0] >> 30)"
     )
     assert resource

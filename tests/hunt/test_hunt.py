@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import heavytop as ht
-from heavytop.integrate import peers
+from heavytop.integrate.peers.built_in import BUILT_IN, BuiltIn
 from heavytop.kinds import KINDS
 from heavytop.measure.integrator import Integrator
 from heavytop.precision import exact
@@ -29,7 +29,7 @@ def numbers(found: dict[str, object]) -> list[Fraction]:
 @pytest.mark.parametrize("fault", ["branch", "rest"])
 def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # in this process: one of its own takes seconds to begin
-    monkeypatch.setitem(peers.BUILT_IN, f"planted:{fault}", peers.BuiltIn(f"hunted_integrators:{fault}"))
+    monkeypatch.setitem(BUILT_IN, f"planted:{fault}", BuiltIn(f"hunted_integrators:{fault}"))
     hunt = ht.hunt(f"planted:{fault}", budget=128, horizon=2)
     assert hunt.found
     worst = hunt.found[0]

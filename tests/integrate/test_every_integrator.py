@@ -12,8 +12,9 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.exact.validated import Validated
-from heavytop.integrate import peers, reach, registry
+from heavytop.integrate import reach, registry
 from heavytop.integrate.broken import Integrator
+from heavytop.integrate.peers.built_in import BUILT_IN
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, exact, number
 from heavytop.suite.cases import CASES, Case
@@ -21,7 +22,7 @@ from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
 F = Fraction
-NAMES = [*dict.fromkeys([*registry.INTEGRATORS, *peers.BUILT_IN]), "planted fault"]
+NAMES = [*dict.fromkeys([*registry.INTEGRATORS, *BUILT_IN]), "planted fault"]
 GENERIC, GYROSTAT_CASE = CASES["generic"], CASES["gyrostat"]
 FORWARDS_ONLY = {"mpmath:odefun"}
 HANGING = HeavyTop((3, 2, 1), 1, (0, 0, F(1, 2))), State((0, 0, 0), (0, 0, 1))

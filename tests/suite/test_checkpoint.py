@@ -18,7 +18,7 @@ from heavytop.api.run_folder import prepare
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Metric, Report
-from heavytop.suite import workers
+from heavytop.suite import one_row
 from heavytop.suite.checkpoint import Checkpoint, Saved, locked
 from heavytop.suite.files import line
 from reports import Row, expand, load, measure, replace, store
@@ -223,7 +223,7 @@ def test_a_forged_place_with_its_checksum_is_measured_from_the_beginning(tmp_pat
 
 
 def measured_again(task, saved: Saved) -> bytes:
-    found = workers.measure(KINDS[task.key.kind], task, saved)
+    found = one_row.measure(KINDS[task.key.kind], task, saved)
     found.seconds = {}
     return msgspec.json.encode(found)
 

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
-from typing import Protocol, runtime_checkable
 
-from heavytop.claims.entry import Entry, file_of
+from heavytop.claims.auditable import Assuming, Auditable
+from heavytop.claims.entry import file_of
+from heavytop.claims.from_file import read_claim
 from heavytop.claims.guard import in_time
-from heavytop.claims.judge import Audit, Finding, Row, judge, verdict_of
-from heavytop.claims.statement import Setting, Statement
+from heavytop.claims.judge import Audit, Row, judge, verdict_of
 from heavytop.claims.values import ValueClaim
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.top.equations import System, system
@@ -21,40 +21,6 @@ _SEARCH, _MOST_FOUND = 6.0, 3
 """Seconds for assumptions that would decide a claim, and how many of them are said."""
 
 
-class Auditable(Protocol):
-    """A claim whose formulas can be put into equations."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def source(self) -> str: ...
-
-    @property
-    def kind(self) -> str: ...
-
-    @property
-    def entry(self) -> Entry | None: ...
-
-    @property
-    def setting(self) -> Setting: ...
-
-    def about(self, asked: System | None) -> System:
-        """The system that it is judged about, where that one is asked for, or none; raises InputError for another."""
-        ...
-
-    def statements(self, system: System) -> list[Statement]:
-        """Every equation that the claim should satisfy as a motion of ``system``, and its own steps."""
-        ...
-
-    def explain(self, about: System, rows: Sequence[Row]) -> tuple[list[Finding], tuple[str, ...]]:
-        """The steps that explain the verdict, and the names of the systems whose motions the claim is.
-
-        rows: the verdicts about the system ``about``, so that they need not be found again.
-        """
-        ...
-
-
 def paper_claim(name: str) -> Auditable:
     """The paper's claim of that name, one of :data:`PAPER`."""
     from heavytop.claims.ershkov_audit import GeneralClaim, PartialClaim
@@ -62,26 +28,10 @@ def paper_claim(name: str) -> Auditable:
     return GeneralClaim() if name == "ershkov-general" else PartialClaim()
 
 
-@runtime_checkable
-class Assuming(Auditable, Protocol):
-    """A claim with parameters, of which more may be assumed."""
-
-    @property
-    def unassumed(self) -> list[str]:
-        """Parameters of which the claim assumes nothing."""
-        ...
-
-    def assuming(self, bound: str) -> Auditable:
-        """The same claim with one assumption more; raises InputError where a sample breaks it."""
-        ...
-
-
 def find_claim(name: str) -> Auditable | ValueClaim:
     """The paper's claim of that name, or the claim in the TOML file at that path; raises InputError for neither."""
     if name in PAPER:
         return paper_claim(name)
-    from heavytop.claims.from_file import read_claim
-
     return read_claim(_path(name))
 
 

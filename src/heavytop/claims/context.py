@@ -13,12 +13,12 @@ from flint import arb
 from msgspec import structs
 
 from heavytop.claims.assume import Assumed, assume, comparisons
+from heavytop.claims.claim_file import ClaimFile, sample_rows
 from heavytop.claims.conditions import Kind, Need, condition, is_exactly_zero
 from heavytop.claims.entry import Entry
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import FUNCTIONS as FUNCTION_NAMES
 from heavytop.claims.expression import Formula, parse, symbol
-from heavytop.claims.from_file import ClaimFile, sample_rows
 from heavytop.claims.real_zeros import conditions_for_zero
 from heavytop.claims.relations import solve_relations
 from heavytop.claims.sign import Unprovable

@@ -22,7 +22,9 @@ _BYTES = 3 << 30
 # the process ends itself that much later, where nobody is left to stop it
 _GRACE = 2
 # the program of the child: it imports nothing of the caller's script, so that this needs no main guard there
-_CHILD = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from heavytop.claims.guard import child; child()"
+_CHILD = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from heavytop.claims.audit_process import child; child()"
+)
 _NO_MEMORY = b"Unable to allocate memory"
 _TOO_LARGE = "Use fewer independent roots and exponentials, lower powers, or split the claim."
 
@@ -89,27 +91,7 @@ def _end_of(done: subprocess.CompletedProcess[bytes]) -> str:
     return f"ended without an answer, exit code {done.returncode}" + "".join(f": {line[:200]}" for line in last)
 
 
-def child() -> None:
-    """The audit of ``sys.argv[2:]`` = path, system, seconds: a JSON document of :class:`Answer` on standard output."""
-    path, system_name, seconds = sys.argv[2:]
-    if hasattr(signal, "alarm"):
-        signal.alarm(int(seconds))
-    _limit_memory()
-    from heavytop.claims.audit import audit_claim, find_claim
-    from heavytop.top.equations import system
-
-    try:
-        answer = Answer(report=audit_claim(find_claim(path), system(system_name) if system_name else None))
-    except HeavyTopError as error:
-        answer = Answer(error=(_printable(error.cause), error.remedy))
-    except MemoryError:
-        answer = Answer(memory=True)
-    except RecursionError:
-        answer = Answer(depth=True)
-    sys.stdout.buffer.write(msgspec.json.encode(answer))
-
-
-def _limit_memory() -> None:
+def limit_memory() -> None:
     """Where the platform can: Windows has no such limit."""
     try:
         import resource
@@ -118,8 +100,3 @@ def _limit_memory() -> None:
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     most = _BYTES if hard == resource.RLIM_INFINITY else min(_BYTES, hard)
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
-
-
-def _printable(text: str) -> str:
-    """Text that JSON can carry: a path may hold bytes that are no characters."""
-    return text.encode(errors="replace").decode()

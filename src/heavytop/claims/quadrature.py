@@ -14,11 +14,11 @@ from itertools import pairwise
 import sympy
 
 from heavytop.claims.assume import comparisons
+from heavytop.claims.claim_file import ClaimFile, QuadratureTable
 from heavytop.claims.conditions import Need, condition
 from heavytop.claims.context import RESERVED, TIME, Context, needs_of, sample_number
 from heavytop.claims.defined import rate_along
 from heavytop.claims.expression import parse
-from heavytop.claims.from_file import ClaimFile, QuadratureTable
 from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain
 from heavytop.errors import InputError
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import sympy
 
+from heavytop.claims.claim_file import ClaimFile, MotionTable
 from heavytop.claims.conditions import Need
 from heavytop.claims.context import Context, FileClaim, needs_of, sample_number, setting_of, three
 from heavytop.claims.expression import Formula
-from heavytop.claims.from_file import ClaimFile, MotionTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
 from heavytop.claims.prover import shortest
 from heavytop.claims.quadrature import Clock, read_clock, variable_of

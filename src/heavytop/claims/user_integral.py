@@ -11,12 +11,12 @@ from itertools import islice
 import sympy
 
 from heavytop.claims.algebra import Assumptions, Field
+from heavytop.claims.claim_file import IntegralTable
 from heavytop.claims.conditions import Need, is_exactly_zero
 from heavytop.claims.context import STATE, TIME, Context, FileClaim, needs_of, sample_number, setting_of
 from heavytop.claims.defined import rate_along
 from heavytop.claims.evaluate import evaluate
 from heavytop.claims.expression import Formula, parse
-from heavytop.claims.from_file import IntegralTable
 from heavytop.claims.judge import Finding, Row, judge, verdict_of
 from heavytop.claims.real_zeros import all_over, conditions_for_zero, on_conditions
 from heavytop.claims.sample_search import states_on

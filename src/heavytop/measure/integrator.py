@@ -12,6 +12,7 @@ from heavytop.integrate import peers, registry, taylor
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
+from heavytop.integrate.peers.built_in import BUILT_IN
 from heavytop.integrate.peers.contract import require_equal
 from heavytop.integrate.peers.source import Source
 from heavytop.integrate.taylor import Observer
@@ -57,7 +58,7 @@ class Integrator:
     @property
     def of_another_package(self) -> bool:
         """Whether it is believed nothing that can be measured."""
-        return not self.fault and self.name not in registry.INTEGRATORS and self.name not in peers.BUILT_IN
+        return not self.fault and self.name not in registry.INTEGRATORS and self.name not in BUILT_IN
 
     @property
     def hands_over_steps(self) -> bool:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from heavytop.integrate.peers import BUILT_IN
+from heavytop.integrate.peers.built_in import BUILT_IN
 from heavytop.precision import parse
 from heavytop.records import UNMEASURED, Quantity, Row
 

@@ -23,9 +23,9 @@ from heavytop.processes import ChildContext, Guard
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Kind, Kinds
+from heavytop.suite.one_row import begin_worker, died, ended_its_process, measure
 from heavytop.suite.rows import failed
 from heavytop.suite.task import Task
-from heavytop.suite.workers import begin_worker, died, ended_its_process, measure
 
 _BASE = 30.0
 """Seconds that every row may take."""

@@ -6,9 +6,6 @@ worker is a process, whatever the number of its threads.
 
 from __future__ import annotations
 
-import gc
-import os
-import signal
 from collections import Counter, deque
 from collections.abc import Callable, Container, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
@@ -16,18 +13,17 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import cache
 from importlib import metadata
-from multiprocessing import parent_process
 from operator import itemgetter
-from threading import Lock, Thread
+from threading import Lock
 from typing import Any
 
-from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported
-from heavytop.integrate.peers.command import begin_row
-from heavytop.integrate.trajectory import OtherFlags
+from heavytop.errors import HeavyTopError, InputError
 from heavytop.processes import ChildContext
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Kind, Kinds
+from heavytop.suite.limited import in_limited_processes
+from heavytop.suite.one_row import RESUME, begin_worker, died, ended_its_process, measure
 from heavytop.suite.task import Task
 
 _AHEAD = 4
@@ -35,7 +31,6 @@ _ANSWER = 10.0
 """Seconds that a Dask scheduler has to answer."""
 _PATIENCE = 30
 """Seconds without any worker after which a cluster is given up."""
-_RESUME = "Finished rows are kept: run again with --resume"
 _SAME = "Install the same versions on every machine."
 _one_task = Lock()
 """A Dask worker with several threads measures one task at a time all the same: another beside it would spoil the
@@ -84,8 +79,6 @@ def rows(
     if scheduler is not None:
         yield from _on_cluster(tasks, kinds, queue, scheduler, begun)
     elif third_party:
-        from heavytop.suite.limited import in_limited_processes
-
         yield from in_limited_processes(tasks, kinds, queue, workers, saved, begun, row_timeout)
     elif workers > 1:
         yield from _in_processes(tasks, kinds, queue, workers, saved, begun)
@@ -141,13 +134,6 @@ def _in_processes(
                 raise died(tasks[worst], times) from None
 
 
-def died(task: Task, times: int) -> HeavyTopError:
-    """That a task of this program ended its process each time."""
-    return HeavyTopError(
-        f"A worker process died {times} times during {task.label}.", f"{_RESUME}, perhaps with fewer --workers."
-    )
-
-
 def _on_cluster(
     tasks: Sequence[Task], kinds: Kinds, queue: deque[int], scheduler: str, begun: Callable[[Task], None]
 ) -> Iterator[tuple[int, Row]]:
@@ -173,7 +159,7 @@ def _on_cluster(
                         yield index, ended_its_process(tasks[index], error.allowed_failures + 1)
                         continue
                     raise HeavyTopError(
-                        f"{error.allowed_failures + 1} workers died during {tasks[index].label}.", f"{_RESUME}."
+                        f"{error.allowed_failures + 1} workers died during {tasks[index].label}.", f"{RESUME}."
                     ) from None
                 except RuntimeError as error:
                     if "deserialization" in str(error):
@@ -181,7 +167,7 @@ def _on_cluster(
                     raise
                 yield index, row
         except (CancelledError, OSError):
-            raise HeavyTopError(f"The scheduler {scheduler} was lost.", f"{_RESUME}.") from None
+            raise HeavyTopError(f"The scheduler {scheduler} was lost.", f"{RESUME}.") from None
 
 
 def _windowed(
@@ -203,51 +189,11 @@ def _windowed(
         finished = wait(under_way, timeout=_PATIENCE, return_when=FIRST_COMPLETED).done
         if not finished and limit == 0:
             raise HeavyTopError(
-                "The cluster has lost all its workers.", f"Start some where heavytop is installed.  {_RESUME}."
+                "The cluster has lost all its workers.", f"Start some where heavytop is installed.  {RESUME}."
             )
         for future in finished:
             yield under_way[future], future
             del under_way[future]
-
-
-def measure(kind: Kind, task: Task, saved: Saved) -> Row:
-    """The row of ``task``, also where it cannot be known; raises InputError with its name for impossible data."""
-    from heavytop.suite.rows import data_of, failed, unmeasured
-
-    begin_row()
-    try:
-        task.require_reach()
-        row = _taken_up(kind, task, saved)
-        row.data = data_of(task.case)
-        return row
-    except PeerFailed as error:
-        return failed(task, error.cause)
-    except Unsupported as error:
-        return unmeasured(task, error)
-    except (OutOfReach, Contradiction) as error:
-        return unmeasured(task, error)
-    except InputError as error:
-        raise InputError(f"{task.label}: {error.cause}", error.remedy) from None
-
-
-def _taken_up(kind: Kind, task: Task, saved: Saved) -> Row:
-    """The row, from its saved place on where that is a place of it: else it is measured from the beginning."""
-    try:
-        return kind.measure(task, saved)
-    except (OtherFlags, OutOfReach, Contradiction, PeerFailed, Unsupported):
-        raise
-    except Exception:
-        if not saved.taken:
-            raise
-    saved.forget()
-    return kind.measure(task, saved)
-
-
-def ended_its_process(task: Task, times: int) -> Row:
-    """The failed row of a task whose third-party integrator ended its process."""
-    from heavytop.suite.rows import failed
-
-    return failed(task, f"{task.key.subject.name} ended its process {times} times")
 
 
 def _measure_as(expected: Versions, kind: Kind, task: Task) -> Row:
@@ -258,23 +204,6 @@ def _measure_as(expected: Versions, kind: Kind, task: Task) -> Row:
         raise InputError(f"A worker has {', '.join(other)}.", _SAME)
     with _one_task:
         return measure(kind, task, Saved())
-
-
-def begin_worker(*_kinds: Kind) -> None:
-    """In a new process, which leaves interrupts to its parent.
-
-    With the kinds all that measures was imported.  None of it is garbage ever: it is not looked at again.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_the_parent, daemon=True).start()
-    gc.freeze()
-
-
-def _end_with_the_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
 
 
 @contextmanager

@@ -19,12 +19,12 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from fractions import Fraction
 from importlib.metadata import EntryPoint, entry_points
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from heavytop.errors import InputError, PeerFailed
 from heavytop.former_names import INTEGRATORS as FORMER
+from heavytop.integrate.peers.built_in import BUILT_IN
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile, Source
@@ -32,7 +32,6 @@ from heavytop.integrate.trajectory import Outcome, Trajectory
 from heavytop.processes import ChildContext
 
 GROUP = "heavytop.peers"
-HERE = "heavytop.integrate.peers"
 _REMEDY = "Install the peers with: pip install 'heavytop[peers]'"
 
 Peer = Callable[..., Trajectory]
@@ -40,37 +39,6 @@ STEP_LIMIT = 10**7
 """Steps that are handed to a third-party integrator as a limit, where it takes one."""
 _PATIENCE = 60
 """Seconds that a third-party package has to say what it is set by."""
-
-
-class BuiltIn(NamedTuple):
-    """Where one of this program's is, as ``module:name``, and the modules of extras that it needs."""
-
-    place: str
-    needs: tuple[str, ...] = ()
-
-    @property
-    def lacks(self) -> str:
-        """The first of them that is not installed; "" where none lacks."""
-        return next((module for module in self.needs if find_spec(module) is None), "")
-
-
-BUILT_IN = {
-    "heyoka": BuiltIn("heavytop.integrate.taylor:propagate"),
-    "heyoka:constants": BuiltIn(f"{HERE}.heyoka_taylor:constants"),
-    "heyoka:lanes": BuiltIn(f"{HERE}.heyoka_taylor:lanes"),
-    "multiword": BuiltIn("heavytop.integrate.words:propagate_words"),
-    "scipy:DOP853": BuiltIn(f"{HERE}.scipy_ivp:dop853", ("scipy",)),
-    "scipy:LSODA": BuiltIn(f"{HERE}.scipy_ivp:lsoda", ("scipy",)),
-    "scipy:Radau": BuiltIn(f"{HERE}.scipy_ivp:radau", ("scipy",)),
-    "cyrk:DOP853": BuiltIn(f"{HERE}.cyrk:dop853", ("CyRK", "numba")),
-    "cyrk:Vern8": BuiltIn(f"{HERE}.cyrk:vern8", ("CyRK", "numba")),
-    "sundials:CVODE": BuiltIn(f"{HERE}.sundials:cvode", ("sksundae",)),
-    "diffrax:Dopri8": BuiltIn(f"{HERE}.diffrax_dopri8:dopri8", ("diffrax",)),
-    "mpmath:odefun": BuiltIn(f"{HERE}.mpmath_taylor:odefun"),
-    "splitting:2": BuiltIn(f"{HERE}.splitting:order2"),
-    "splitting:4": BuiltIn(f"{HERE}.splitting:order4"),
-    "splitting:8": BuiltIn(f"{HERE}.splitting:order8"),
-}
 
 
 def known() -> dict[str, EntryPoint]:
