@@ -114,7 +114,8 @@ class Survey(Kind):
 
 def _names(task: Task, motions: Drawn) -> dict[str, object]:
     chunk = task.case
-    assert isinstance(chunk, Chunk) and chunk.sweep is not None
+    assert isinstance(chunk, Chunk)
+    assert chunk.sweep is not None
     same = {
         "sweep": chunk.sweep.name,
         "integrator": task.key.subject.name,

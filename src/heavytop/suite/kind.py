@@ -43,7 +43,7 @@ class Kind(Protocol):
 
     name: in a plan and in the rows.  table: its table in a plan, tagged with the name; None where no plan asks for it.
     concludes: whether all rows of the kind together come to more rows.
-    gathers: whether its rows are parts, which stand in no report but by what :mod:`heavytop.suite.survey` makes of them.
+    gathers: whether its rows are parts of one that :mod:`heavytop.suite.survey` makes of them for the report.
     """
 
     name: str

@@ -81,12 +81,13 @@ class Gathered:
     def row(self) -> Row:
         """The row of the report."""
         chunk = self._task.case
-        assert isinstance(chunk, Chunk) and chunk.sweep is not None
+        assert isinstance(chunk, Chunk)
+        assert chunk.sweep is not None
         name, cases = chunk.sweep.name, chunk.sweep.cases()
         motions = sum(self._outcomes.values())
         failed = motions - self._outcomes.get(Outcome.SUCCESS.value, 0)
         counts = {Quantity(COUNT, outcome): n for outcome, n in sorted(self._outcomes.items())}
-        metrics = {q: Metric(str(n), math.log10(n), "count") for q, n in counts.items()}
+        metrics = {q: Metric(str(n), math.log10(n), "value") for q, n in counts.items()}
         for column, values in self._values.items():
             metrics |= _quantiles(Quantity(*_QUANTITIES[column]), numpy.sort(numpy.concatenate(values)))
         return msgspec.structs.replace(
@@ -144,7 +145,8 @@ def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
         if not isinstance(row.chunk, bytes):
             others.append(row)
             continue
-        assert isinstance(task.case, Chunk) and task.case.sweep is not None
+        assert isinstance(task.case, Chunk)
+        assert task.case.sweep is not None
         key = msgspec.structs.replace(row.key, case=task.case.sweep.name)
         sums.setdefault(key, Gathered(row, task)).take(row)
     return [*(each.row() for each in sums.values()), *others]

@@ -1,7 +1,7 @@
 """The records of a chunk: errors, digits, drifts, steps and outcomes of many motions, as columns.
 
 The reference is a run in double-double arithmetic, eight motions in lanes; its radius is the distance from a second run
-with another order and other steps.  The first motion of each chunk has a proven reference too, and a computed one that is
+with another order and other steps.  The first motion of each chunk has a proven one too, and a computed one that is
 further from it than ten of its radii and rounding is a contradiction.
 """
 
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy
 
-from heavytop.errors import Contradiction, HeavyTopError, OutOfReach
+from heavytop.errors import Contradiction, PeerFailed
 from heavytop.exact.balls import midpoint, radius
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.integrate.words_ensemble import propagate_words_ensemble
@@ -44,7 +44,7 @@ def measured(
     """Each quantity over the motions.  Errors of Ω are in 1/time unit, drifts in units of the integral; NaN where a run
     or its reference did not reach the horizon.
 
-    Raises Contradiction where the computed reference is off the proven one.
+    Raises Contradiction where the computed reference is off the proven one, PeerFailed where every run failed.
     """
     runs = _runs(integrator, drawn.problems, times, options)
     states = _pairs([run[1] for run in runs], len(times))
@@ -68,16 +68,19 @@ def _runs(
         runs = integrator.propagate_many(problems, times, threads=1, **options)
     else:
         runs = [_alone(integrator, problem, times, options) for problem in problems]
+        failures = [run for run in runs if isinstance(run, PeerFailed)]
+        if len(failures) == len(runs):
+            raise failures[0]
+        runs = [(Outcome.FAILED.value, (), 0) if isinstance(run, PeerFailed) else run for run in runs]
     return [run if isinstance(run, tuple) else (run.outcome.value, run.states, run.steps) for run in runs]
 
 
 def _alone(integrator: Integrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]) -> Any:
+    """Outcome, states and steps; PeerFailed, not raised, where the integrator failed."""
     try:
         (run,) = integrator.propagate_many([problem], times, threads=1, **options)
-    except OutOfReach:
-        raise
-    except HeavyTopError:
-        return Outcome.FAILED.value, (), 0
+    except PeerFailed as error:
+        return error
     short = run.outcome is Outcome.SUCCESS and len(run.states) < len(times)
     return (Outcome.INCOMPLETE if short else run.outcome).value, run.states, run.steps
 
@@ -98,7 +101,9 @@ def _pairs(states: Sequence[Sequence[Any]], samples: int) -> Pairs:
 
 
 def _truth(problems: Sequence[Problem], times: Sequence[Fraction]) -> tuple[Pairs, Any]:
-    """The reference, and the largest distance of the second run from it, absolute."""
+    """The reference, and the largest distance of the second run from it, absolute, a rounding of the format added, for
+    short motions often agree in every bit.
+    """
     fine = [replace(each, precision=DOUBLE_DOUBLE) for each in problems]
     targets = [number(time, DOUBLE_DOUBLE) for time in times]
     found = [
@@ -109,7 +114,9 @@ def _truth(problems: Sequence[Problem], times: Sequence[Fraction]) -> tuple[Pair
         )
     ]
     with numpy.errstate(all="ignore"):
-        return found[0], numpy.abs((found[0] - found[1]).high).max(axis=(1, 2))
+        apart = numpy.abs((found[0] - found[1]).high).max(axis=(1, 2))
+        size = numpy.abs(found[0].high).max(axis=(1, 2))
+        return found[0], apart + float(DOUBLE_DOUBLE.eps) * numpy.maximum(1.0, size)
 
 
 def _errors(states: Pairs, truth: Pairs, times: Sequence[Fraction], precision: Precision) -> Columns:

@@ -25,7 +25,9 @@ class Pairs:
     @classmethod
     def of(cls, value: Any) -> Pairs:
         """An array or a number that doubles hold."""
-        return value if isinstance(value, Pairs) else cls(numpy.asarray(value, float), numpy.zeros(1))
+        if isinstance(value, Pairs):
+            return value
+        return cls(numpy.asarray(value, float), numpy.zeros(1))
 
     def __add__(self, other: Any) -> Pairs:
         one = Pairs.of(other)
@@ -40,10 +42,11 @@ class Pairs:
         return Pairs(-self.high, -self.low)
 
     def __sub__(self, other: Any) -> Pairs:
-        return self + -Pairs.of(other)
+        return self.__add__(-Pairs.of(other))
 
     def __rsub__(self, other: Any) -> Pairs:
-        return Pairs.of(other) + -self
+        opposite = -self
+        return opposite.__add__(other)
 
     def __mul__(self, other: Any) -> Pairs:
         one = Pairs.of(other)
@@ -58,7 +61,8 @@ class Pairs:
         rest = self - one * first
         second = rest.high / one.high
         third = (rest - one * second).high / one.high
-        return Pairs(*_quick(*_two_sum(first, second))) + third
+        two = Pairs(*_quick(*_two_sum(first, second)))
+        return two.__add__(third)
 
     def __abs__(self) -> Pairs:
         sign = numpy.where(self.high < 0, -1.0, 1.0)
