@@ -65,17 +65,18 @@ def _runs(
 ) -> list[tuple[str, Sequence[Any], int]]:
     """Outcome, states and steps of each; one after the other where the integrator has no lanes."""
     if integrator.takes_many:
-        runs = integrator.propagate_many(problems, times, threads=1, **options)
-    else:
-        runs = [_alone(integrator, problem, times, options) for problem in problems]
-        failures = [run for run in runs if isinstance(run, PeerFailed)]
-        if len(failures) == len(runs):
-            raise failures[0]
-        runs = [(Outcome.FAILED.value, (), 0) if isinstance(run, PeerFailed) else run for run in runs]
-    return [run if isinstance(run, tuple) else (run.outcome.value, run.states, run.steps) for run in runs]
+        many = integrator.propagate_many(problems, times, threads=1, **options)
+        return [(run.outcome.value, run.states, run.steps) for run in many]
+    runs = [_alone(integrator, problem, times, options) for problem in problems]
+    failures = [run for run in runs if isinstance(run, PeerFailed)]
+    if len(failures) == len(runs):
+        raise failures[0]
+    return [(Outcome.FAILED.value, (), 0) if isinstance(run, PeerFailed) else run for run in runs]
 
 
-def _alone(integrator: Integrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]) -> Any:
+def _alone(
+    integrator: Integrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]
+) -> tuple[str, Sequence[Any], int] | PeerFailed:
     """Outcome, states and steps; PeerFailed, not raised, where the integrator failed."""
     try:
         (run,) = integrator.propagate_many([problem], times, threads=1, **options)
