@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from heavytop.api.prepared import Integrator, Propagated
     from heavytop.api.reports import Comparison, Report, compare, read_report, run
     from heavytop.api.scores import Score, Summary, drift, score
+    from heavytop.api.surveys import read_survey
     from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
     from heavytop.event_times.records import Events, ReferenceEvents, Section
     from heavytop.integrate.trajectory import Outcome, Trajectory
@@ -38,6 +39,7 @@ _PLACES = {
     "api.prepared": ("Integrator", "Propagated"),
     "api.reports": ("Comparison", "Report", "compare", "read_report", "run"),
     "api.scores": ("Score", "Summary", "drift", "score"),
+    "api.surveys": ("read_survey",),
     "errors": ("Contradiction", "HeavyTopError", "InputError", "OutOfReach"),
     "event_times.records": ("Events", "ReferenceEvents", "Section"),
     "integrate.trajectory": ("Outcome", "Trajectory"),
@@ -99,6 +101,7 @@ __all__ = [
     "poincare",
     "propagate",
     "read_report",
+    "read_survey",
     "real",
     "reference",
     "run",

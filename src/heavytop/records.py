@@ -257,6 +257,18 @@ class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 NOISE, NOT_MEASURED = "noise", "not measured"
 """The flag of a row whose plan says ``noise = false``."""
+class Worst(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """One of the worst motions of a survey: its case, index in the sweep, outcome, error and digits right (none where
+    the run failed), exact data, and the command that measures it alone.
+    """
+
+    case: str
+    index: Count
+    outcome: str
+    error: str
+    digits_right: float | None
+    data: Data
+    command: str
 
 
 class Row(msgspec.Struct, gc=False):
@@ -272,6 +284,7 @@ class Row(msgspec.Struct, gc=False):
     amplification: the largest factor by which the motion itself has amplified a change of its start up to the horizon,
     an estimate; null where no single motion is integrated.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
+    worst: of a survey, first the worst.  chunk: Parquet bytes of a part of one; no report holds it.
     """
 
     case: str
@@ -301,6 +314,8 @@ class Row(msgspec.Struct, gc=False):
     evaluations: Count | None = None
     data: Data | None = None
     amplification: Annotated[float, msgspec.Meta(ge=1)] | None = None
+    worst: tuple[Worst, ...] | msgspec.UnsetType = msgspec.UNSET
+    chunk: bytes | msgspec.UnsetType = msgspec.UNSET
 
     @property
     def identity(self) -> Identity:

@@ -31,6 +31,8 @@ from heavytop.suite.checkpoint import Checkpoint, identity_of
 from heavytop.suite.plan import read, warnings
 from heavytop.suite.run import Progress, unheard
 from heavytop.suite.run import run as run_tasks
+from heavytop.suite.survey import table as survey
+from heavytop.suite.survey.gathered import contents, gathered
 from heavytop.suite.task import Task
 
 PAGE = "report.html"
@@ -95,7 +97,7 @@ class Run:
                 laws = run_tasks(
                     self.tasks, KINDS, rows, progress, self.workers, self.scheduler, begun, self.row_timeout
                 )
-                return self._write(report, lambda: chain(rows.rows(range(len(self.tasks))), laws))
+                return self._write(report, self._reported(rows, laws))
         except OSError as error:
             raise InputError(
                 f"{self.directory} cannot be written: {error}.",
@@ -110,6 +112,17 @@ class Run:
                 name = printable(row_name(row.identity))[:60]
                 raise InputError(f"{rows.path} holds the row {name}, which is not row {index} of this plan.", _ANOTHER)
             check_rows(rows.path, [row], KINDS)
+
+    def _reported(self, rows: Checkpoint, laws: Sequence[Row]) -> Callable[[], Iterator[Row]]:
+        """A stream of the report's rows at each call; surveys become a row each, and their file is written."""
+        indices = range(len(self.tasks))
+        parts = [i for i, row in zip(indices, rows.rows(indices), strict=True) if KINDS[row.key.kind].gathers]
+        if not parts:
+            return lambda: chain(rows.rows(indices), laws)
+        survey.write(self.directory / survey.FILE, contents(rows.rows(parts)))
+        found = gathered(zip(map(self.tasks.__getitem__, parts), rows.rows(parts), strict=True))
+        others = sorted(set(indices).difference(parts))
+        return lambda: chain(rows.rows(others), found, laws)
 
     def _write(self, report: Report, rows: Callable[[], Iterator[Row]]) -> Ended:
         """Write all that a finished run leaves.  rows: a new stream of all rows at each call."""
@@ -184,7 +197,7 @@ def require_fit(directory: Path, resume: bool) -> None:
     begun = checkpoint.FILE in content
     content -= {name for name in content if checkpoint.OURS.fullmatch(name) and (resume or name != checkpoint.FILE)}
     if resume and begun:
-        content -= {store.FILE, store.DIGEST, PAGE, parquet.FILE}  # written, but not yet cleared up after
+        content -= {store.FILE, store.DIGEST, PAGE, parquet.FILE, survey.FILE}  # written, but not yet cleared up after
     if content:
         remedy = "Give a new folder with --out." + (" Or go on with --resume." if begun else "")
         raise InputError(f"{directory} already holds {', '.join(sorted(content)[:5])}.", remedy)

@@ -13,6 +13,7 @@ from heavytop.kinds.homoclinic import Homoclinic
 from heavytop.kinds.hunt import Hunt
 from heavytop.kinds.local_error import LocalError
 from heavytop.kinds.score import Score
+from heavytop.kinds.survey import Survey
 from heavytop.kinds.work_precision import WorkPrecision
 
 _ALL: tuple[Kind, ...] = (
@@ -27,6 +28,7 @@ _ALL: tuple[Kind, ...] = (
     WorkPrecision(),
     Growth(),
     Hunt(),
+    Survey(),
 )
 KINDS: dict[str, Kind] = {kind.name: kind for kind in _ALL}
 """Each kind by its name in plans and rows."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import msgspec
 
@@ -20,7 +20,12 @@ Find = Callable[[str], Case]
 
 
 class Table(msgspec.Struct, forbid_unknown_fields=True, tag_field="kind"):
-    """A table `[[measure]]` of a plan; unknown keys are errors."""
+    """A table `[[measure]]` of a plan; unknown keys are errors.
+
+    chunked: whether its tasks are chunks of a sweep, not single motions.
+    """
+
+    chunked: ClassVar[bool] = False
 
     def tasks(self, find: Find) -> list[Task]:
         """One a row; raises InputError for an impossible value."""
@@ -38,11 +43,13 @@ class Kind(Protocol):
 
     name: in a plan and in the rows.  table: its table in a plan, tagged with the name; None where no plan asks for it.
     concludes: whether all rows of the kind together come to more rows.
+    gathers: whether its rows are parts of one that :mod:`heavytop.suite.survey` makes of them for the report.
     """
 
     name: str
     table: type[Table] | None = None
     concludes: bool = False
+    gathers: bool = False
 
     def measure(self, task: Task, saved: Saved) -> Row:
         """The row of ``task``; a run that fails is a row with its outcome.

@@ -9,7 +9,7 @@ from bisect import bisect_right
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
-from functools import reduce
+from functools import partial, reduce
 from importlib import resources
 from itertools import accumulate
 from operator import or_
@@ -235,7 +235,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, Source] | None = Non
     parts = [
         ([replace(task, seed=seed) for task in table.tasks(lambda name: case(name, known))], cases)
         for whole in plan.measure
-        for table, cases in _parts(whole, swept)
+        for table, cases in _parts(whole, _chunked(plan, swept) if whole.chunked else swept)
     ]
     sources: dict[str, Source | None] = {}
     seen: dict[RowKey, str] = {}
@@ -300,6 +300,16 @@ def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
                 raise InputError(f"The sweeps {other.name} and {sweep.name} are the same.", "Take one of them out.")
         swept[f"sweep:{sweep.name}"] = sweep.cases()
     return swept
+
+
+def _chunked(plan: Plan, swept: Mapping[str, Sequence[Case]]) -> dict[str, Sequence[Case]]:
+    """The chunks of each sweep, by the same names."""
+    from heavytop.suite.survey.drawn import chunks, number_of
+
+    return {
+        name: Lazy(number_of(cases), partial(chunks, sweep, cases))
+        for sweep, (name, cases) in zip(plan.sweep, swept.items(), strict=True)
+    }
 
 
 def _require_name(name: str, what: str) -> None:

@@ -132,7 +132,10 @@ class Random(Strict, tag="random"):
         """The tops; each depends on the seed and its own index alone."""
         return Lazy(_bounded(self.name, self.count), self._case)
 
-    def _case(self, index: int) -> Case:
+    def integers(self, index: int) -> tuple[int, ...]:
+        """Fourteen that make a motion: thousandths of the three moments, of the weight, of centre and omega; the three
+        numerators of gamma and their denominator.
+        """
         # of Python's generator, random() alone is promised to stay the same from version to version
         draw = Generator(f"{self.seed}/{index}").random
 
@@ -141,27 +144,32 @@ class Random(Strict, tag="random"):
 
         x, y, z, weight = (1500 + thousandths() for _ in range(4))
         a, b, c = (thousandths() for _ in range(3))
-        omega = [Fraction(thousandths(), 1000) for _ in range(3)]
+        omega = [thousandths() for _ in range(3)]
         if self.family == "euler":
             a, b, c = 0, 0, 0
         elif self.family == "lagrange":
             y, a, b = x, 0, 0
         elif self.family == "kovalevskaya":
             y, z, c = x, 3 * x, 0
-        inertia = [Fraction(i, 1000) for i in (y + z, z + x, x + y)]
-        top = HeavyTop(inertia, Fraction(weight, 1000), [Fraction(i, 1000) for i in (a, b, c)])
-        return Case(f"{self.name}[{index}]", "drawn at random", HEAVY_TOP, top, State(omega, _direction(thousandths)))
+        return (y + z, z + x, x + y, weight, a, b, c, *omega, *_direction(thousandths))
+
+    def _case(self, index: int) -> Case:
+        parts = self.integers(index)
+        inertia, centre, omega = ([Fraction(i, 1000) for i in parts[at : at + 3]] for at in (0, 4, 7))
+        top = HeavyTop(inertia, Fraction(parts[3], 1000), centre)
+        gamma = [Fraction(i, parts[13]) for i in parts[10:13]]
+        return Case(f"{self.name}[{index}]", "drawn at random", HEAVY_TOP, top, State(omega, gamma))
 
 
-def _direction(draw: Callable[[], int]) -> list[Fraction]:
-    """A rational unit vector, uniform on the sphere: the last row of the rotation by a uniform quaternion."""
+def _direction(draw: Callable[[], int]) -> tuple[int, int, int, int]:
+    """A rational unit vector, uniform on the sphere: the last row of the rotation by a uniform quaternion; its three
+    numerators and their denominator.
+    """
     while True:
         p, q, r, s = (draw() for _ in range(4))
         norm = p * p + q * q + r * r + s * s
         if norm < 1_000_000:
-            return [
-                Fraction(i, norm) for i in (2 * (q * s - p * r), 2 * (r * s + p * q), p * p + s * s - q * q - r * r)
-            ]
+            return 2 * (q * s - p * r), 2 * (r * s + p * q), p * p + s * s - q * q - r * r, norm
 
 
 Sweep = Grid | Random

@@ -21,6 +21,8 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
+from gmpy2 import mpq
+
 from heavytop.top.equations import Parameters, System
 
 ZERO = 6
@@ -123,18 +125,20 @@ class Coefficients:
 def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
     """Those of the field, exactly, for exact parameters."""
 
-    def unit(*axes: int) -> list[Fraction]:
-        return [Fraction(int(axis in axes)) for axis in range(6)]
+    exactly = p.mapped(mpq)  # quicker than Fractions, and as exact
+
+    def unit(*axes: int) -> list[Any]:
+        return [mpq(int(axis in axes)) for axis in range(6)]
 
     def rates(y: Sequence[Any]) -> Sequence[Any]:
-        return system.field(p, y)
+        return system.field(exactly, y)
 
-    half = Fraction(1, 2)
+    half = mpq(1, 2)
     others = ((1, 2), (2, 0), (0, 1))
     at, against = ([rates([sign * v for v in unit(j)]) for j in range(6)] for sign in (1, -1))
     products = [rates(unit(i, j))[k] - at[i][k] - at[j][k] for k, (i, j) in enumerate(others)]
     linear = [[(a - b) / 2 for a, b in zip(*pair, strict=True)] for pair in zip(at, against, strict=True)]
-    permuted = [[Fraction(0) if j == ZERO else linear[j][k] for k, j in enumerate(row[:6])] for row in turned(system)]
+    permuted = [[mpq(0) if j == ZERO else linear[j][k] for k, j in enumerate(row[:6])] for row in turned(system)]
     rows = [_eight(row) for row in ([*products, half, half, half], *permuted)]
     torques = _TORQUES[system.name]
     sizes = [[abs(c) for row in part for c in row] for part in (rows[1 : 1 + torques], rows[1 + torques :])]
@@ -147,7 +151,7 @@ def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
 
 
 def _eight(row: Sequence[Any]) -> tuple[Fraction, ...]:
-    return tuple(Fraction(c) for c in row) + (Fraction(0),) * (8 - len(row))
+    return tuple(Fraction(int(c.numerator), int(c.denominator)) for c in row) + (Fraction(0),) * (8 - len(row))
 
 
 def rates(system: System, given: Coefficients, y: Sequence[Any]) -> list[Any]:

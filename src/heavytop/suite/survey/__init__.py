@@ -1,0 +1,1 @@
+"""Surveys: many motions in arrays, from the draw to the disk."""

@@ -1,0 +1,92 @@
+"""Arrays of double-doubles as a ring, so that first integrals written once are evaluated for many motions at once.
+
+Relative errors of a few 2^-104 an operation (Dekker 1971; Joldes, Muller, Popescu 2017), while no product of two words
+leaves the normal range: |values| from 1e-140 to 1e140.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy
+
+_SPLIT = 134217729.0
+"""2^27 + 1, of Dekker's splitting."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """high + low, arrays of one shape with |low| <= ulp(high)/2."""
+
+    high: Any
+    low: Any
+
+    @classmethod
+    def of(cls, value: Any) -> Pairs:
+        """An array or a number that doubles hold."""
+        if isinstance(value, Pairs):
+            return value
+        return cls(numpy.asarray(value, float), numpy.zeros(1))
+
+    def __add__(self, other: Any) -> Pairs:
+        one = Pairs.of(other)
+        total, off = _two_sum(self.high, one.high)
+        low, rest = _two_sum(self.low, one.low)
+        total, off = _quick(total, off + low)
+        return Pairs(*_quick(total, off + rest))
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Pairs:
+        return Pairs(-self.high, -self.low)
+
+    def __sub__(self, other: Any) -> Pairs:
+        return self.__add__(-Pairs.of(other))
+
+    def __rsub__(self, other: Any) -> Pairs:
+        opposite = -self
+        return opposite.__add__(other)
+
+    def __mul__(self, other: Any) -> Pairs:
+        one = Pairs.of(other)
+        product, off = _two_product(self.high, one.high)
+        return Pairs(*_quick(product, off + (self.high * one.low + self.low * one.high)))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Pairs:
+        one = Pairs.of(other)
+        first = self.high / one.high
+        rest = self - one * first
+        second = rest.high / one.high
+        third = (rest - one * second).high / one.high
+        two = Pairs(*_quick(*_two_sum(first, second)))
+        return two.__add__(third)
+
+    def __abs__(self) -> Pairs:
+        sign = numpy.where(self.high < 0, -1.0, 1.0)
+        return Pairs(sign * self.high, sign * self.low)
+
+
+def _two_sum(a: Any, b: Any) -> tuple[Any, Any]:
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
+
+
+def _quick(a: Any, b: Any) -> tuple[Any, Any]:
+    total = a + b
+    return total, b - (total - a)
+
+
+def _halves(a: Any) -> tuple[Any, Any]:
+    product = _SPLIT * a
+    high = product - (product - a)
+    return high, a - high
+
+
+def _two_product(a: Any, b: Any) -> tuple[Any, Any]:
+    product = a * b
+    (a1, a2), (b1, b2) = _halves(a), _halves(b)
+    return product, ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2

@@ -1,0 +1,200 @@
+"""A survey: the records equal what the scorer says of each motion alone, and the file its row of the report."""
+
+from __future__ import annotations
+
+import json
+import math
+from fractions import Fraction
+from pathlib import Path
+from random import Random as Dice
+
+import numpy
+import pytest
+from tests.in_process import heavytop
+
+import heavytop as ht
+from heavytop.errors import Contradiction, InputError
+from heavytop.integrate.ensemble import propagate_ensemble
+from heavytop.integrate.trajectory import Problem
+from heavytop.kinds import KINDS
+from heavytop.measure.integrator import Integrator
+from heavytop.measure.scorer import Scorer
+from heavytop.measure.truth import truth
+from heavytop.precision import DOUBLE, exact
+from heavytop.suite.plan import read
+from heavytop.suite.survey import measured as records
+from heavytop.suite.survey.drawn import chunks, drawn
+from heavytop.suite.survey.pairs import Pairs
+from heavytop.suite.sweeps import Grid, Random
+
+TIMES = [Fraction(n) for n in (1, 2, 3)]
+SWEEP = """
+[[sweep]]
+kind = "random"
+name = "many"
+seed = 3
+count = {count}
+[[measure]]
+kind = "survey"
+cases = ["sweep:many"]
+horizon = "3"
+samples = 3
+{more}
+"""
+
+
+def plan(folder: Path, count: int = 5, more: str = "") -> Path:
+    file = folder / "plan.toml"
+    file.write_text('name = "many"\n' + SWEEP.format(count=count, more=more))
+    return file
+
+
+@pytest.mark.parametrize("family", ["any", "euler", "lagrange", "kovalevskaya"])
+def test_records_equal_the_scorers(family: str) -> None:
+    sweep = Random(name="s", seed=7, count=4, family=family)  # type: ignore[arg-type]
+    motions = drawn(chunks(sweep, sweep.cases(), 0), DOUBLE)
+    found = records.measured(motions, Integrator("heyoka"), TIMES, DOUBLE, {})
+    runs = propagate_ensemble(motions.problems, TIMES, threads=1)
+    for place, (case, run) in enumerate(zip(sweep.cases(), runs, strict=True)):
+        problem = Problem.of(case.top, case.start, DOUBLE)
+        assert problem == motions.problems[place]
+        scorer = Scorer(problem, truth(problem, TIMES))
+        for time, state in zip(run.times, run.states, strict=True):
+            scorer(time, state)
+        metrics = scorer.metrics()
+        for name, part in (("error_max", "relative"), ("error_omega", "omega"), ("error_gamma", "gamma")):
+            expected = float(metrics[f"solution_error_{part}_max"])
+            assert found[name][place] == pytest.approx(expected, rel=1e-7)
+        for name in ("gamma_squared", "area", "energy"):
+            assert found[f"drift_{name}"][place] == pytest.approx(float(metrics[f"drift_{name}_max"]), rel=1e-7)
+        further = [float(m) for key, m in metrics.items() if key.startswith("drift_") and key.endswith("_max")][3:]
+        value = found["drift_further"][place]
+        assert value == pytest.approx(max(further), rel=1e-7) if further else math.isnan(value)
+        assert found["steps"][place] == run.steps
+        assert 0 < found["reference_radius"][place] < 1e-24
+    kind = {"any": "general"}.get(family, family)
+    assert motions.classes == [kind] * 4
+
+
+def test_pairs_are_a_ring_to_a_hundred_bits() -> None:
+    dice = Dice(5)
+    for _ in range(200):
+        a, b = (Pairs.of(numpy.array([dice.uniform(-1, 1) * 10.0 ** dice.randint(-20, 20)])) for _ in range(2))
+        c = a * b + a
+        one, two = (Fraction(float(x.high[0])) for x in (a, b))
+
+        def value(pair: Pairs) -> Fraction:
+            return Fraction(float(pair.high[0])) + Fraction(float(pair.low[0]))
+
+        for pair, true in (
+            (c, one * two + one), (c / b, value(c) / two), (1 - c, 1 - value(c)), (abs(-c), abs(value(c))),
+        ):  # fmt: skip
+            assert abs(value(pair) - true) <= abs(true) * Fraction(1, 2**98)
+
+
+def test_a_grid_is_drawn_as_its_cases() -> None:
+    omega = [["0.1", "0", "1e-3"], ["1/3", "1", "0"]]
+    axis = ["0", "0", "1"]
+    sweep = Grid(name="g", inertia=["3", "2", "1"], weight="1", centre=axis, omega=omega, gamma=axis)  # type: ignore[arg-type]
+    cases = sweep.cases()
+    motions = drawn(chunks(sweep, cases, 0), DOUBLE)
+    assert motions.problems == [Problem.of(case.top, case.start, DOUBLE) for case in cases]
+
+
+def test_a_reference_that_is_off_is_a_contradiction(monkeypatch: pytest.MonkeyPatch) -> None:
+    sweep = Random(name="s", seed=7, count=2, family="lagrange")
+    motions = drawn(chunks(sweep, sweep.cases(), 0), DOUBLE)
+    computed = records._truth
+
+    def off(*given: object) -> object:
+        pairs, radius = computed(*given)  # type: ignore[arg-type]
+        return Pairs(pairs.high, pairs.low + 1e-20), radius
+
+    monkeypatch.setattr(records, "_truth", off)
+    with pytest.raises(Contradiction, match="off the proven one"):
+        records.measured(motions, Integrator("heyoka"), TIMES, DOUBLE, {})
+
+
+def test_a_run_writes_a_row_and_a_record_a_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("heavytop.suite.survey.drawn.CHUNK", 4)
+    run = heavytop("run", "--plan", plan(tmp_path, 9), "--out", tmp_path / "out", "--workers", 1)
+    assert run.returncode == 0, run.stderr
+    (row,) = json.loads((tmp_path / "out" / "report.json").read_text())["rows"]
+    table = ht.read_survey(tmp_path / "out")
+    assert list(table["index"]) == list(range(9))
+    assert row["metrics"]["motions_success"]["value"] == "9"
+    assert float(row["metrics"]["solution_error_relative_max"]["value"]) == pytest.approx(table.error_max.max())
+    worst = row["worst"]
+    assert [each["index"] for each in worst] == list(table.error_max.sort_values(ascending=False).index)
+    case = Random(name="many", seed=3, count=9).cases()[worst[0]["index"]]
+    assert tuple(map(exact, worst[0]["data"]["omega"])) == case.start.omega
+    assert list(ht.read_survey(tmp_path / "out", columns=["digits_right"]).columns) == ["digits_right"]
+    again = heavytop(*worst[0]["command"].partition("|")[0].split()[1:])
+    state = json.loads(again.stdout)
+    assert state
+
+
+def test_a_resumed_run_leaves_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("heavytop.suite.survey.drawn.CHUNK", 3)
+    file, whole, half = plan(tmp_path, 6), tmp_path / "whole", tmp_path / "half"
+    ht.run(file, whole, workers=1)
+    kind = KINDS["survey"]
+    measure = kind.measure
+
+    def stopped(task: object, saved: object) -> object:
+        if task.case.first:  # type: ignore[attr-defined]
+            raise KeyboardInterrupt
+        return measure(task, saved)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(kind, "measure", stopped)
+        with pytest.raises(KeyboardInterrupt):
+            ht.run(file, half, workers=1)
+    ht.run(file, half, workers=1, resume=True)
+    name = "survey.parquet"
+    assert (whole / name).read_bytes() == (half / name).read_bytes()
+    assert [r.worst for r in ht.read_report(whole).rows] == [r.worst for r in ht.read_report(half).rows]
+
+
+def test_an_integrator_without_lanes_is_surveyed_too() -> None:
+    sweep = Random(name="s", seed=7, count=2)
+    motions = drawn(chunks(sweep, sweep.cases(), 0), DOUBLE)
+    found = records.measured(motions, Integrator("scipy:DOP853"), TIMES, DOUBLE, {})
+    assert found["outcome"] == ["success"] * 2
+    assert all(found["error_max"] > 0)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ('precision = "quad"', "no survey in quad"),
+        ('tolerance = "nan"', "not a finite number"),
+        ("samples = 0", "samples"),
+        ('integrator = "none-such"', "none-such"),
+    ],
+)
+def test_impossible_surveys_are_refused(tmp_path: Path, more: str, said: str) -> None:
+    if more == "samples = 0":
+        file = plan(tmp_path)
+        file.write_text(file.read_text().replace("samples = 3", more))
+    else:
+        file = plan(tmp_path, more=more)
+    with pytest.raises(InputError, match=said):
+        read(str(file), KINDS)
+
+
+def test_a_survey_of_a_single_case_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "p.toml"
+    file.write_text('name = "x"\n[[measure]]\nkind = "survey"\ncases = ["euler"]\nhorizon = "1"\n')
+    with pytest.raises(InputError, match="sweep"):
+        read(str(file), KINDS)
+
+
+def test_columns_and_folders_that_are_not_there_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no survey"):
+        ht.read_survey(tmp_path)
+    (tmp_path / "survey.parquet").write_bytes(b"")
+    with pytest.raises(InputError, match="cannot be read"):
+        ht.read_survey(tmp_path)
+    with pytest.raises(InputError, match="none of a survey"):
+        ht.read_survey(tmp_path, columns=["nothing"])
