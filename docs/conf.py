@@ -53,7 +53,8 @@ nitpicky = True
 # of other packages no inventory is at hand offline; of the inner rooms the pages show none
 nitpick_ignore_regex = [
     ("py:.*", r"(fractions|decimal|collections|os|pathlib|typing|enum|numpy|np|pandas|msgspec|NDArray)\b.*"),
-    ("py:.*", r"(Any|Callable|Iterable|Sequence|Fraction|Decimal|Path|PathLike|Enum|TypeAlias|SupportsIndex|Struct|Numbers?)"),
+    ("py:.*", r"(Any|Callable|Iterable|Sequence|Fraction|Decimal|Path|PathLike|Enum|TypeAlias|SupportsIndex)"),
+    ("py:.*", r"(Struct|Numbers?)"),
     ("py:.*", r"heavytop\.[a-z_]+\..*"),
 ]
 

@@ -257,6 +257,8 @@ class Data(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 NOISE, NOT_MEASURED = "noise", "not measured"
 """The flag of a row whose plan says ``noise = false``."""
+
+
 class Worst(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """One of the worst motions of a survey: its case, index in the sweep, outcome, error and digits right (none where
     the run failed), exact data, and the command that measures it alone.
