@@ -221,6 +221,7 @@ GOOD: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "advance": None,
         },
     ),
+    "read_survey": (ht.read_survey, {"path": "nowhere", "columns": None, "lazy": False}),
     "read_report": (ht.read_report, {"path": "nowhere"}),
     "compare": (
         ht.compare,

@@ -196,5 +196,5 @@ def test_columns_and_folders_that_are_not_there_are_refused(tmp_path: Path) -> N
     (tmp_path / "survey.parquet").write_bytes(b"")
     with pytest.raises(InputError, match="cannot be read"):
         ht.read_survey(tmp_path)
-    with pytest.raises(InputError, match="none of a survey"):
+    with pytest.raises(InputError, match="no column"):
         ht.read_survey(tmp_path, columns=["nothing"])

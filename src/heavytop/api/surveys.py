@@ -9,6 +9,7 @@ from typing import Any
 from heavytop.api import arguments
 from heavytop.errors import InputError, quoted
 from heavytop.suite.survey.table import COLUMNS, FILE
+from heavytop.top.vectors import ordered
 
 
 def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None = None, lazy: bool = False) -> Any:
@@ -29,14 +30,13 @@ def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None =
     """
     where = arguments.path(path, "path")
     file = where / FILE if where.is_dir() else where
+    known = f"Use {', '.join(COLUMNS)}."
+    wanted = None if columns is None else [columns] if isinstance(columns, str) else ordered(columns, "columns", known)
+    for name in wanted or ():
+        if not isinstance(name, str) or name not in COLUMNS:
+            raise InputError(f"There is no column {quoted(name)} in a survey.", known)
     if not file.is_file():
         raise InputError(f"There is no survey at {where}.", f"Give the folder of a run that holds {FILE}.")
-    if isinstance(columns, str):
-        columns = [columns]
-    for name in columns or ():
-        if name not in COLUMNS:
-            raise InputError(f"columns = {quoted(str(name))} is none of a survey.", f"Use {', '.join(COLUMNS)}.")
-    wanted = None if columns is None else list(columns)
     if arguments.flag(lazy, "lazy"):
         try:
             import polars
