@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import traceback
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -58,10 +58,15 @@ def _as_before(line: list[str]) -> Iterator[None]:
     finally:
         sys.argv = argv
         signal.signal(signal.SIGINT, interrupt)
-        for name in sys.modules.keys() - loaded:
-            if _is_temporary(sys.modules[name]):
-                del sys.modules[name]
+        forget_integrators(loaded)
     assert state() == before
+
+
+def forget_integrators(loaded: Collection[str]) -> None:
+    """Unload the integrators of tests that were loaded since ``loaded`` were all modules there are."""
+    for name in sys.modules.keys() - loaded:
+        if _is_temporary(sys.modules[name]):
+            del sys.modules[name]
 
 
 def _is_temporary(module: object) -> bool:
