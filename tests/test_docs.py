@@ -23,7 +23,7 @@ from heavytop.cli import app
 from heavytop.integrate.peers.source import commands_in
 from heavytop.kinds import KINDS
 from heavytop.report import policy
-from heavytop.report.brief import brief
+from heavytop.report.terminal import brief
 from heavytop.suite import plan
 
 NOT_CODE = {

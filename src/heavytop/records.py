@@ -22,6 +22,8 @@ UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED, UNSUPPORTED, OUT_OF_TIME
 failed: a third-party integrator raised an error, or gave back what is no trajectory.  unsupported: it declares that it
 cannot do what was asked, which is no failure.  out_of_time: it was stopped at the time limit of its row."""
 
+FINEST = "eps"
+"""In the place of a tolerance: the finest that an integrator offers."""
 EXACT = "exact"
 """The precision of a row in which no format is involved."""
 Direction = Literal["", "forward", "backward"]
@@ -169,6 +171,13 @@ class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     def setting(self) -> str:
         """``tolerance=1e-9`` or ``step=1/50``; "" where neither is asked for."""
         return f"tolerance={self.tolerance}" if self.tolerance else f"step={self.step}" if self.step else ""
+
+    @property
+    def asked(self) -> str:
+        """The same in words: ``tolerance 1e-9``, ``step 1/50``, or ``finest``."""
+        if FINEST in (self.tolerance, self.step):
+            return "finest"
+        return f"tolerance {self.tolerance}" if self.tolerance else f"step {self.step}" if self.step else ""
 
 
 class RowKey(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):

@@ -21,11 +21,11 @@ from heavytop.kinds import KINDS
 from heavytop.precision import whole
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report import html, overview, parquet, store
-from heavytop.report.brief import brief
 from heavytop.report.checks import check_rows
 from heavytop.report.environment import environment
 from heavytop.report.names import row_name
 from heavytop.report.printable import printable
+from heavytop.report.terminal import brief
 from heavytop.suite import checkpoint
 from heavytop.suite.checkpoint import Checkpoint, identity_of
 from heavytop.suite.plan import read, warnings

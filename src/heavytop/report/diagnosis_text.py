@@ -5,7 +5,7 @@ from __future__ import annotations
 from heavytop.measure.diagnosis import AS_AT_START, VARIES, Diagnosis
 from heavytop.measure.suspects import FLOOR
 from heavytop.report.convention_text import is_convention, sentence
-from heavytop.report.text import short
+from heavytop.report.printable import short
 
 _SENTENCES = {
     "gamma_down": "γ points down in these states: with −γ they fit",

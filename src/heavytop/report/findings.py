@@ -18,9 +18,9 @@ from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.measure.local_error import ORDER
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
+from heavytop.report.printable import short
 from heavytop.report.row_comparison import Finding
 from heavytop.report.section import clip
-from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
 from heavytop.report.work_precision import ERRORS
 
@@ -266,10 +266,13 @@ def _digits(row: Row | None) -> float | None:
 def _where(row: Identity, at: bool = True) -> str:
     """``lagrange at T = 100 (mine:rk4, step 1/100, double)``."""
     key = row.key
-    asked = key.subject.setting.replace("=", " ")
-    inside = ", ".join(part for part in (clip(key.subject.name, 40), asked, row.precision) if part)
+    inside = ", ".join(part for part in (clip(key.subject.name, 40), key.subject.asked, row.precision) if part)
     end = f" at T = {short(key.horizon.removeprefix('-'))}" if at and key.horizon not in ("", "0") else ""
-    return f"{clip(row.case.split('/T=')[0], 40)}{end} ({inside})"
+    return f"{_case(row)}{end} ({inside})"
+
+
+def _case(row: Identity) -> str:
+    return clip(f"{row.key.case}/{row.key.direction}" if row.key.direction else row.key.case, 40)
 
 
 def _on(rows: Sequence[Identity]) -> str:
@@ -308,7 +311,7 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
     for row in (change.identity for change in changes.rows):
         changed.setdefault((row.case, row.key.subject.name, row.precision), set()).add(row)
     for key, rows in changed.items():
-        case, name, precision = key
+        _, name, precision = key
         for coarse, fine in pairwise(sorted(changes.points.get(key, []))):
             spans = [b - a for a, b in zip(coarse.steps, fine.steps, strict=True)]
             if min(spans) > 0:
@@ -316,7 +319,7 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
                 before, after = (fall / span for fall, span in zip(falls, spans, strict=True))
                 if abs(after - before) >= _ORDER_MOVED:
                     steps = " to ".join(f"{10 ** each.steps[0]:.0f}" for each in (coarse, fine))
-                    where = f"{clip(case.split('/T=')[0], 40)} from {steps} steps ({clip(name, 40)}, {precision})"
+                    where = f"{_case(next(iter(rows)))} from {steps} steps ({clip(name, 40)}, {precision})"
                     said = f"Order observed {max(before, 0):.1f} → {max(after, 0):.1f} on {where}."
                     yield name, after - before, Sentence(said, frozenset(rows))
 

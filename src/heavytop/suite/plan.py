@@ -29,12 +29,12 @@ from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.integrator import require as require_integrator
 from heavytop.measure.rounding_noise import MOST_SEEDS
 from heavytop.precision import exact, number, require
-from heavytop.records import RowKey
+from heavytop.records import FINEST, RowKey
 from heavytop.suite.cases import CASES, Case, case, named_bodies, require_possible
 from heavytop.suite.files import read_whole
 from heavytop.suite.kind import Kinds, Table
 from heavytop.suite.sweeps import Lazy, Sweep
-from heavytop.suite.task import FINEST, Task
+from heavytop.suite.task import Task
 from heavytop.top.bodies import Body
 from heavytop.top.equations import system_of
 from heavytop.top.given_motion import motion_of

@@ -16,11 +16,8 @@ from heavytop.measure.computed_reference import seconds_a_step as words_seconds
 from heavytop.measure.integrator import HEYOKA, MULTIWORD, Integrator
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.precision import Precision, exact, parse
-from heavytop.records import EXACT, RowKey, Subject
+from heavytop.records import EXACT, FINEST, RowKey, Subject
 from heavytop.suite.cases import Case
-
-FINEST = "eps"
-"""In the place of a tolerance: the finest that an integrator offers."""
 
 
 @dataclass(frozen=True, slots=True)
