@@ -62,8 +62,7 @@ def test_the_first_lines_say_how_good_it_is() -> None:
         r"8\.9 of 16 digits right at every sample up to T = 8; heyoka in double keeps 1\d\.\d\.", lines[0]
     )
     narrow = printed(found, 79)
-    assert narrow[0] == "8.9 of 16 digits right at every sample up to T = 8;"
-    assert re.fullmatch(r"heyoka in double keeps 1\d\.\d\.", narrow[1])
+    assert re.fullmatch(r"8\.9 of 16 digits right .* heyoka in double keeps 1\d\.\d\.", " ".join(narrow[:2]))
     assert "The error is mostly across the flow." in lines[:3]
     assert max(map(len, lines)) <= 80
     assert found.peer is not None

@@ -184,20 +184,11 @@ class Growth(Kind):
         notes = ["Detects: the smallest relative fault per step that these starts distinguish from rounding noise."]
         if chaotic:
             notes.append("Rate: the median over the starts of their finite-time rates.")
-        columns = (
-            "case",
-            "format",
-            "quantity",
-            "starts",
-            "grows like",
-            "exponent or rate [95 %]",
-            "detects",
-            "lost at |t|",
-        )
+        columns = ["case", "format", "quantity", "starts", "grows like", "exponent or rate [95 %]", "detects"]
+        columns.append("lost at |t|")
         title = "Growth laws: root mean square over the starts, drift of the first integrals and distance from truth"
-        yield Cells(
-            title, [*columns, "lost at |t|"], [_cells(row, law) for row in rows for law in row.laws.values()], notes
-        )
+        cells = [_cells(row, law) for row in rows for law in row.laws.values()]
+        yield Cells(title, columns, cells, notes)
         yield from (Chart(digits), Chart(over_time))
 
 

@@ -60,9 +60,6 @@ def _place(row: Row) -> tuple[str, int, str]:
     return row.case, row.bits, row.horizon
 
 
-_MOST_COLUMNS = 4
-
-
 def named(rows: Sequence[Row]) -> Callable[[Row], str]:
     """What a row is called among these: its case, and its integrator where they have several."""
     several = len({row.key.subject.name for row in rows}) > 1
@@ -82,11 +79,10 @@ def in_columns(title: str, cell: Callable[[Row], str], rows: Sequence[Row]) -> l
         return []
     in_order = sorted(rows, key=lambda row: (0, "") if one_format else (row.bits, row.precision))
     columns = list(dict.fromkeys(row.key.subject.name if one_format else row.precision for row in in_order))
-    columns = columns[:_MOST_COLUMNS]
     cells = [[found.get(column, "-") for column in columns] for found in lines.values()]
     columns = [clip(column, 13) for column in columns]
     room = 78 - sum(2 + max(map(len, column)) for column in zip(columns, *cells, strict=True))
-    named_cells = [[clip(name, max(room, 16)), *found] for name, found in zip(lines, cells, strict=True)]
+    named_cells = [[clip(name, min(max(room, 16), 39)), *found] for name, found in zip(lines, cells, strict=True)]
     return [Table(title, ["", *columns], named_cells, shown=In.SHORT)]
 
 
@@ -119,17 +115,8 @@ def _digits_until(row: Row) -> str:
 
 def motions(title: str, rows: Sequence[Row], notes: Sequence[str]) -> Table:
     """Digits right, distance from the true motion and drift of every integral, a line a row."""
-    columns = (
-        "case",
-        "format",
-        "T",
-        "steps",
-        "outcome",
-        "digits right",
-        "error along",
-        "across",
-        "drift of each integral",
-    )
+    columns = ["case", "format", "T", "steps", "outcome", "digits right", "error along", "across"]
+    columns.append("drift of each integral")
     return Table(title, columns, [_motion(row) for row in rows], notes, left=True)
 
 

@@ -100,13 +100,13 @@ class Lines:
         widths = [
             max(cell_len(word) for row in cells for word in [*row[i].split(" "), ""]) for i in range(len(columns))
         ]
-        if sum(widths) + 2 * len(widths) > options.max_width:
-            yield from ([Text(self.head)] if self.head else [])
-            yield from _blocks(columns, rows, options.max_width)
-            return
         wides = [max(cell_len(row[index]) for row in cells) for index in range(len(columns))]
         edge = not self.head
         room = options.max_width - sum(wide + 2 for wide in wides[1:]) - 2 * edge
+        if sum(widths) + 2 * len(widths) > options.max_width or (self.head and room < widths[0]):
+            yield from ([Text(self.head)] if self.head else [])
+            yield from _blocks(columns, rows, options.max_width)
+            return
         if widths[0] + 2 <= room < wides[0]:
             for row in rows:  # what is broken is indented
                 row[0] = Text("\n".join(wrapped(row[0].plain, "  ", "", room)), style=row[0].style)
