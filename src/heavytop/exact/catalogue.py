@@ -20,7 +20,7 @@ from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.exact.dokshevich import Dokshevich
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
-from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin, Sretensky
 from heavytop.exact.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.grioli import Grioli
 from heavytop.exact.gyrostat import Gyrostat
@@ -134,6 +134,7 @@ _HEAVY_GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
     (_permanent_heavy_gyrostat, _KEEP),
     (LagrangeGyrostat, CYCLIC),
     (ZhukovskyVolterra, _KEEP),
+    (Sretensky, CYCLIC),
 )
 _CASES = {HEAVY_TOP.name: _HEAVY_TOP, GYROSTAT.name: _GYROSTAT, HEAVY_GYROSTAT.name: _HEAVY_GYROSTAT}
 

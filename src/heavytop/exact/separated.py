@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, NoReturn
 
 from flint import arb, arb_series
@@ -40,6 +41,16 @@ def require_plane_centre(name: str, ratio: int, top: HeavyTop, start: State) -> 
         )
     if not any(start.gamma):
         raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
+
+
+def require_axial_rotor(name: str, top: HeavyTop) -> None:
+    """Raises NotInClass where the momentum of the rotor is not along axis 3."""
+    across = (top.rotor or (Fraction(0),) * 3)[:2]
+    if any(across):
+        raise NotInClass(
+            f"k = ({shown(across[0])}, {shown(across[1])}, ...) is not along axis 3.",
+            f"The rotor of {name} is along its axis of symmetry.",
+        )
 
 
 def decide(
