@@ -4,7 +4,6 @@ import re
 from fractions import Fraction
 
 import pytest
-from proofs import assert_solves
 
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.axes import ALL, Renamed, renamed_state, renamed_top
@@ -30,6 +29,7 @@ from heavytop.exact.validated import Validated
 from heavytop.precision import round_to
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_solves
 
 F = Fraction
 UNIT = (F(2, 3), F(-1, 3), F(2, 3))

@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
-from proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.ershkov_partial import ErshkovPartial
@@ -21,6 +20,7 @@ from heavytop.exact.staude import (
 )
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 
 def random_grioli(rng):
