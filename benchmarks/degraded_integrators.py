@@ -3,7 +3,8 @@
 200 pairs of reports, a better one and a worse one: 140 are measured, of an integrator that has one of a dozen faults or
 none (`tests/support/degraded_integrators.py`), 60 are rows of `results/default` with edited errors and bands.  From the
 better to the worse, no verdict may be same or better.  100 of them the other way round: no verdict, and no step of a
-history, may be worse.  What makes some error larger, or is given a wide band, is no repair.  Exit code 1 where one fails.
+history, may be worse.  What makes some error larger, or is given a wide band, is no repair.  Exit code 1 where one
+fails.
 """
 
 from __future__ import annotations

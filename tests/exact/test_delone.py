@@ -97,7 +97,7 @@ def test_beside_the_permanent_rotation_every_digit_comes_out():
         ((2, 2, "3/4"), (1, 0, 0), (1, 0, 0), "I1 - 2 I3 = 1/2"),
         ((2, 2, 1), (1, 0, "1/9"), (1, 0, 0), "1/9"),
         ((2, 2, 1), (0, 0, 0), (1, 0, 0), "P r != 0"),
-        ((2, 2, 1), (1, 0, 0), (1, 1, 0), r"xi = -1 \+ i \(2\)"),
+        ((2, 2, 1), (1, 0, 0), (1, 1, 0), r"xi = \(-1, 2\)"),
     ],
 )
 def test_what_is_outside_is_refused_with_the_test_that_failed(inertia, centre, omega, message):

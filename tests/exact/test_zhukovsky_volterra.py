@@ -133,5 +133,5 @@ def test_limits_are_refused_by_name_and_enclosed(inertia, rotor):
 
 
 def test_a_weight_is_refused():
-    with pytest.raises(NotInClass, match="has no weight"):
+    with pytest.raises(NotInClass, match="needs P r = 0"):
         ZhukovskyVolterra(HeavyTop((3, 2, 1), 1, (0, 0, 1), (1, 0, 0)), START)
