@@ -10,7 +10,6 @@ from random import Random as Dice
 
 import numpy
 import pytest
-from tests.in_process import heavytop
 
 import heavytop as ht
 from heavytop.errors import Contradiction, InputError
@@ -26,6 +25,7 @@ from heavytop.suite.plan import read
 from heavytop.suite.survey import measured as records
 from heavytop.suite.survey.drawn import chunks, drawn
 from heavytop.suite.sweeps import Grid, Random
+from support.in_process import heavytop
 
 TIMES = [Fraction(n) for n in (1, 2, 3)]
 SWEEP = """

@@ -20,19 +20,18 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.errors import LevelNotDone
 from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.conditions import GAMMA, LEVEL_MOMENTUM, plane_top
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import distance_of_others
 from heavytop.exact.goryachev_chaplygin_abel import Motion
 from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude
 from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, roots, separated_start
 from heavytop.exact.motion import kept
-from heavytop.exact.separated import REMEDY, decide, refuse, require_plane_centre
-from heavytop.precision import shown
-from heavytop.top.heavy_top import dot
+from heavytop.exact.separated import REMEDY, decide, refuse
 
 _DISTANCE = 1e-5
 """cosh β − 1 (:mod:`heavytop.exact.gaps`) where the Fourier series take nearly 2^17 terms for 50 digits."""
@@ -46,15 +45,11 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
     """
 
     method = "closed form: Goryachev-Chaplygin, inversion of Abel's integrals"
+    body = plane_top(4)
+    starts = GAMMA, LEVEL_MOMENTUM
 
     def __post_init__(self) -> None:
-        require_plane_centre("Goryachev-Chaplygin", 4, self.top, self.start)
-        area = dot(self.top.angular_momentum(self.start.omega), self.start.gamma)
-        if area != 0:
-            raise NotInClass(
-                f"Goryachev-Chaplygin needs M·gamma = 0, but M·gamma = {shown(area)}.",
-                "Only motions of zero area integral are solved: choose Omega3 so that it vanishes.",
-            )
+        ClosedForm.__post_init__(self)
         _require_done(Level.of(self.top, self.start))
 
     def evaluate(self, time: Fraction) -> list[Any]:
