@@ -22,20 +22,19 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.errors import LevelNotDone
 from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.conditions import AXIAL_ROTOR, GAMMA, LEVEL_MOMENTUM, plane_top
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import distance_of_others
 from heavytop.exact.goryachev_chaplygin_abel import Motion
 from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude
 from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, roots, separated_start
 from heavytop.exact.motion import kept
-from heavytop.exact.separated import REMEDY, decide, refuse, require_axial_rotor, require_plane_centre
-from heavytop.precision import shown
+from heavytop.exact.separated import REMEDY, decide, refuse
 from heavytop.top.equations import HEAVY_GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State, dot
 
 _DISTANCE = 1e-5
 """cosh β − 1 (:mod:`heavytop.exact.gaps`) where the Fourier series take nearly 2^17 terms for 50 digits."""
@@ -49,10 +48,11 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
     """
 
     method = "closed form: Goryachev-Chaplygin, inversion of Abel's integrals"
+    body = plane_top(4)
+    starts = GAMMA, LEVEL_MOMENTUM
 
     def __post_init__(self) -> None:
-        require_plane_centre("Goryachev-Chaplygin", 4, self.top, self.start)
-        _require_level_momentum("Goryachev-Chaplygin", self.top, self.start)
+        ClosedForm.__post_init__(self)
         _require_done(Level.of(self.top, self.start))
 
     def evaluate(self, time: Fraction) -> list[Any]:
@@ -74,22 +74,7 @@ class Sretensky(GoryachevChaplygin):
 
     method = "closed form: Sretensky's gyrostat, inversion of Abel's integrals"
     system = HEAVY_GYROSTAT
-
-    def __post_init__(self) -> None:
-        require_axial_rotor("Sretensky's gyrostat", self.top)
-        require_plane_centre("Sretensky's gyrostat", 4, self.top, self.start)
-        _require_level_momentum("Sretensky's gyrostat", self.top, self.start)
-        _require_done(Level.of(self.top, self.start))
-
-
-def _require_level_momentum(name: str, top: HeavyTop, start: State) -> None:
-    """Raises NotInClass unless M·γ = 0, with the rotor's momentum in M."""
-    area = dot(top.angular_momentum(start.omega), start.gamma)
-    if area != 0:
-        raise NotInClass(
-            f"{name} needs M·gamma = 0, but M·gamma = {shown(area)}.",
-            "Only motions of zero area integral are solved: choose Omega3 so that it vanishes.",
-        )
+    body = *GoryachevChaplygin.body, AXIAL_ROTOR
 
 
 @kept

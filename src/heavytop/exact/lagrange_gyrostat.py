@@ -18,9 +18,9 @@ from flint import arb
 
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, instant
+from heavytop.exact.conditions import AXIAL_ROTOR, SYMMETRIC
 from heavytop.exact.flint_context import series_length
 from heavytop.exact.lagrange import Lagrange
-from heavytop.exact.separated import require_axial_rotor
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -36,9 +36,10 @@ class LagrangeGyrostat(ClosedForm):
 
     method = "closed form: Lagrange's gyrostat, Weierstrass functions of gamma3"
     system = HEAVY_GYROSTAT
+    body = *SYMMETRIC, AXIAL_ROTOR
 
     def __post_init__(self) -> None:
-        require_axial_rotor("Lagrange's gyrostat", self.top)
+        ClosedForm.__post_init__(self)
         self.made["top"] = self._top()
 
     def _top(self) -> Lagrange:

@@ -23,6 +23,7 @@ from flint import arb, fmpq_mat, fmpq_poly
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball, rational, to_bits
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, rotate
+from heavytop.exact.conditions import equilibrium, require
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot, vector
@@ -36,12 +37,7 @@ class Staude(WithAttitude):
     method = "closed form: permanent rotation"
 
     def __post_init__(self) -> None:
-        field = self.system.field(self.system.parameters(self.top, self.start), self.start.flat)
-        if any(field):
-            raise NotInClass(
-                f"Not a permanent rotation: (Omega', gamma') = ({', '.join(map(shown, field))}), not 0.",
-                "`staude_rotations` finds those of a top.",
-            )
+        require("A permanent rotation", (equilibrium(self.system),), self.top, self.start)
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
