@@ -25,7 +25,7 @@ from heavytop.report.consistency import contradictions
 from heavytop.report.terminal import brief, summary
 from heavytop.suite import workers
 from heavytop.suite.task import Task
-from reports import expand, load, rows
+from support.reports import expand, load, rows
 
 PLAN = """name = "tiny"
 [[measure]]
