@@ -45,7 +45,7 @@ class ToyTable(Table, tag="toy"):
         return [
             Task(
                 RowKey("toy", case.name, case.system.name, Subject("given", f"times {factor}")),
-                case.name,
+                "",
                 f"times {factor}",
                 case,
                 options=int(factor),

@@ -197,7 +197,7 @@ def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatc
 def test_the_laws_are_said_in_words(tmp_path: Path) -> None:
     console = Console(width=160, record=True, file=StringIO())
     (task,) = tasks(tmp_path, '"kovalevskaya"', 'precision = "double", horizon = "2e3", starts = 9, decades = 4')
-    console.print(summary(Report("s", {"name": "own"}, {}, [measure(replace(task, title="mine"))])))
+    console.print(summary(Report("s", {"name": "own"}, {}, [measure(task.of(replace(task.case, name="mine")))])))
     text = console.export_text()
     assert "Growth laws" in text
     (line,) = [line for line in text.splitlines() if "energy" in line]

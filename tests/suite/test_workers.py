@@ -121,7 +121,7 @@ def poisoned(tasks) -> list[Task]:
 
 
 def with_case(task: Task, name: str, case: object) -> Task:
-    return replace(task, title=name, case=case)
+    return replace(task, key=msgspec.structs.replace(task.key, case=name), case=case)
 
 
 def kill(pid: int) -> None:

@@ -47,7 +47,7 @@ class AuditTable(Table, tag=NAME):
                 keys += [RowKey(NAME, claim, system, Subject("claimed", claim)) for system in self.systems]
             else:
                 keys += [RowKey(NAME, name, own_system(name), Subject("claimed", name)) for name in _entries(claim)]
-        return [Task(key, key.case, NAME) for key in keys]
+        return [Task(key, "", NAME) for key in keys]
 
 
 def _entries(claim: str) -> list[str]:

@@ -54,7 +54,7 @@ class ClaimEvaluationTable(Table, tag=NAME):
                     for form in ("printed", "stable"):
                         subject = Subject("claimed", "(4.2)-(4.6)", form=form)
                         key = RowKey(NAME, case.name, GYROSTAT.name, subject, precision.name, direction, end)
-                        tasks.append(Task(key, f"{case.name}/{direction}", f"formula:{form}", case, signs, signs))
+                        tasks.append(Task(key, f"/{direction}", f"formula:{form}", case, signs, signs))
         return tasks
 
 

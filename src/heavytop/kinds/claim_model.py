@@ -66,7 +66,7 @@ class ClaimModelTable(Table, tag=NAME):
                     subject = Subject("claimed", "(4.2)-(4.6)", branch=branch)
                     end = time_text(signs[1][-1])
                     key = RowKey(NAME, case.name, HEAVY_TOP.name, subject, direction=direction, horizon=end)
-                    tasks.append(Task(key, f"{case.name}/{direction}", f"claim:{branch}", case, *signs))
+                    tasks.append(Task(key, f"/{direction}", f"claim:{branch}", case, *signs))
         return tasks
 
 

@@ -72,7 +72,7 @@ class DriftTable(Table, tag=NAME):
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, precision, horizon=horizon),
-                case.name,
+                "",
                 self.integrator,
                 case,
                 *times,

@@ -114,7 +114,7 @@ def _task(case: Case, run: Run, integrator: str) -> Task:
     asked = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}
     subject = computed(integrator, seed=run.seed, **asked)
     key = RowKey(NAME, case.name, case.system.name, subject, precision.name, horizon=time_text(horizon))
-    return Task(key, case.name, f"{integrator} {subject.variant}".rstrip(), case, times, times, run)
+    return Task(key, "", f"{integrator} {subject.variant}".rstrip(), case, times, times, run)
 
 
 class _Done(msgspec.Struct):

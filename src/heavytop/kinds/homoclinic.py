@@ -70,8 +70,7 @@ class HomoclinicTable(Table, tag=NAME):
                     subject = computed(self.integrator)
                     name, horizon = precision.name, time_text(signs[-1])
                     key = RowKey(NAME, case.name, case.system.name, subject, name, direction, horizon)
-                    title = f"{case.name}/{direction}"
-                    tasks.append(Task(key, title, self.integrator, case, signs, signed(keep, direction)))
+                    tasks.append(Task(key, f"/{direction}", self.integrator, case, signs, signed(keep, direction)))
         return tasks
 
 

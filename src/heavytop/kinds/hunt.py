@@ -58,7 +58,7 @@ class HuntTable(Table, tag=NAME):
         name = f"{self.family}-{self.seed}"
         key = RowKey(NAME, name, "heavy_top", computed(self.integrator), parse(self.precision).name)
         options = time_text(horizon), self.budget, self.family, self.against, self.limit, self.seed, self.found
-        return [Task(key, name, self.integrator, options=options)]
+        return [Task(key, "", self.integrator, options=options)]
 
 
 class Hunt(Kind):

@@ -49,7 +49,7 @@ class LocalErrorTable(Table, tag=NAME):
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, parse(precision).name, horizon=horizon),
-                case.name,
+                "",
                 self.integrator,
                 case,
                 times,

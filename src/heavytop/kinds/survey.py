@@ -57,7 +57,7 @@ class SurveyTable(Table, tag=NAME):
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, precision.name, horizon=time_text(horizon)),
-                case.name,
+                "",
                 self.integrator,
                 case,
                 times,

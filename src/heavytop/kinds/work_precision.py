@@ -97,7 +97,7 @@ class WorkPrecisionTable(Table, tag=NAME):
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, precision, horizon=end),
-                f"{case.name}/T={self.horizon}",
+                f"/T={self.horizon}",
                 f"{subject.name} {subject.setting}",
                 case,
                 *times,

@@ -177,7 +177,7 @@ def metric_cells(row: Row) -> list[list[str]]:
 
 def quantities(changed: Change) -> list[tuple[str, Finding]]:
     """Each quantity of a row that changed with the statistics of it that did, and the worst finding about it."""
-    return [(statistics(name, found), found[0]) for name, found in folded(changed)]
+    return [(statistics(changed, name, found), found[0]) for name, found in folded(changed)]
 
 
 def commands(report: Report) -> list[str]:

@@ -251,7 +251,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, Source] | None = Non
                 other = "" if seen[work] == task.label else f", also as {seen[work]}"
                 raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "Name each once.")
             if task.label in seen.values():  # one case at several horizons
-                templates[place] = replace(task, title=f"{task.title}/T={task.key.horizon}")
+                templates[place] = replace(task, suffix=f"{task.suffix}/T={task.key.horizon}")
             seen[work] = templates[place].label
             _require_fit(task)
     if not seen:
