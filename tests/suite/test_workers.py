@@ -57,8 +57,7 @@ def measured(tasks, processes: int, scheduler: str | None = None, after_first: C
         assert index not in found
         if not found:
             after_first()
-        found[index] = row
-        row.seconds = {}
+        found[index] = msgspec.structs.replace(row, seconds={})
     return [found[index] for index in range(len(tasks))]
 
 

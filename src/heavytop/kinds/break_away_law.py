@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 
 import numpy
+from msgspec.structs import replace
 
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
@@ -89,8 +90,7 @@ def _law_row(members: Sequence[Row], slope: Fraction, expected: Fraction, noise:
 
 
 def _with_band(metric: Metric, relative: float) -> Metric:
-    metric.band = round(math.log10(1 + abs(relative)), 4)
-    return metric
+    return replace(metric, band=round(math.log10(1 + abs(relative)), 4))
 
 
 _Place = tuple[str, Direction, str]

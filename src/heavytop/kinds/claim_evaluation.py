@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from fractions import Fraction
 
+from msgspec.structs import replace
+
 from heavytop.exact.balls import working_precision
 from heavytop.kinds.base import Kind
 from heavytop.kinds.claim_section import claim_error
@@ -101,9 +103,9 @@ class ClaimEvaluation(Kind):
         measured = f"{CLAIM}, {form} form, evaluated in {precision.name}; times of the series are k t"
         against = Against("proven", "the same form exactly evaluated from the same rounded data")
         row = exact_row(task, measured, against, by_name(metrics), precision.bits, series)
-        row.horizon = row.time_reached = task.key.horizon
-        row.finite = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
-        return row
+        end = task.key.horizon
+        whole = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
+        return replace(row, horizon=end, time_reached=end, finite=whole)
 
     def contradictions(self, row: Row) -> Iterator[str]:
         """A series holds every sample: those that are not finite are counted, and the last begin somewhere."""

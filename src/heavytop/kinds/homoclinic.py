@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import lru_cache
 
+from msgspec.structs import replace
+
 from heavytop.errors import OutOfReach
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind
@@ -255,7 +257,8 @@ def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric]) -> dict
     escapes = [abs(each) for each in escaped if each is not None]
     own = metrics[ESCAPE.text]
     if own.log10 is not None and len(escapes) == len(escaped):
-        own.band = escape_band(exact(own.value), escapes, case.rate, task.precision.bits)
+        band = escape_band(exact(own.value), escapes, case.rate, task.precision.bits)
+        metrics = metrics | {ESCAPE.text: replace(own, band=band)}
     return metrics
 
 
