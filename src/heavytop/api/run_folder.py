@@ -114,7 +114,7 @@ class Run:
             check_rows(rows.path, [row], KINDS)
 
     def _reported(self, rows: Checkpoint, laws: Sequence[Row]) -> Callable[[], Iterable[Row]]:
-        """The report's rows at each call, read from the disk once unless they are too many to hold; surveys become a row
+        """The report's rows at each call, read from the disk once unless they are too many; surveys become a row
         each, and their file is written.
         """
         indices = range(len(self.tasks))
