@@ -28,7 +28,7 @@ def test_no_field_of_a_record_can_be_set(record: object) -> None:
             setattr(record, name, getattr(record, name))
 
 
-@pytest.mark.parametrize(("a", "b"), product(METRICS, METRICS))
+@pytest.mark.parametrize(("a", "b"), list(product(METRICS, METRICS)))
 def test_equality_and_order_of_metrics_agree(a: Metric, b: Metric) -> None:
     if a == b:
         assert a <= b
