@@ -14,7 +14,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_poly, fmpz_poly
 
-from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.errors import InputError, OutOfReach, Unsupported, quoted
 from heavytop.integrate import registry
 from heavytop.integrate.engines import compiled as compile_heyoka
 from heavytop.integrate.engines import load
@@ -280,12 +280,12 @@ _DENSE: dict[str, type[Dense]] = {
 def dense(
     integrator: Any, problem: Problem, until: Fraction, tolerance: Fraction | None, step_limit: int | None
 ) -> Dense:
-    """A run of that integrator; raises InputError for one that hands over no polynomial of its steps."""
+    """A run of that integrator; raises Unsupported for one that hands over no polynomial of its steps."""
     found = registry.INTEGRATORS.get(integrator) if isinstance(integrator, str) else None
     made = _DENSE.get(found.propagate) if found else None
     if made is None:
         known = " and ".join(name for name, each in registry.INTEGRATORS.items() if each.propagate in _DENSE)
-        raise InputError(
+        raise Unsupported(
             f"The integrator {quoted(integrator)} hands over no polynomial of its steps.",
             f"Events are located by {known}.",
         )
