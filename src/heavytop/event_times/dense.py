@@ -14,7 +14,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_poly, fmpz_poly
 
-from heavytop.errors import InputError, OutOfReach, Unsupported, quoted
+from heavytop.errors import OutOfReach, Unsupported, quoted
 from heavytop.integrate import registry
 from heavytop.integrate.engines import compiled as compile_heyoka
 from heavytop.integrate.engines import load
