@@ -25,7 +25,7 @@ from heavytop.report.consistency import contradictions
 from heavytop.suite import workers
 from heavytop.suite.plan import read
 from heavytop.suite.task import Task
-from reports import rows
+from support.reports import rows
 
 PLAN = """name = "tiny"
 [[measure]]
