@@ -12,7 +12,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.integrate import peers
-from heavytop.integrate.peers.built_in import BUILT_IN
+from heavytop.integrate.integrator import INTEGRATORS
 from heavytop.integrate.peers.double import Solved, count, double_peer, rates
 from heavytop.integrate.peers.mpmath_taylor import odefun
 from heavytop.integrate.taylor import propagate
@@ -24,7 +24,7 @@ from helpers import run_peer
 
 TIMES = [Fraction(1, 3), Fraction(2), Fraction(5)]
 FINE = Fraction(1, 10**12)
-PEERS = [name for name in BUILT_IN if name not in ("heyoka", "mpmath:odefun")]
+PEERS = [name for name in INTEGRATORS if name not in ("heyoka", "mpmath:odefun")]
 
 
 def distance(one, other) -> Fraction:

@@ -20,7 +20,7 @@ from heavytop.errors import Contradiction, PeerFailed
 from heavytop.exact.balls import midpoint, radius
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.integrate.words_ensemble import propagate_words_ensemble
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.truth import Known, known_motion
 from heavytop.precision import DOUBLE_DOUBLE, Precision, exact, number
 from heavytop.suite.survey.drawn import Drawn
@@ -39,7 +39,7 @@ Columns = dict[str, Any]
 
 
 def measured(
-    drawn: Drawn, integrator: Integrator, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
+    drawn: Drawn, integrator: ChosenIntegrator, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
 ) -> Columns:
     """Each quantity over the motions.  Errors of Ω are in 1/time unit, drifts in units of the integral; NaN where a run
     or its reference did not reach the horizon.
@@ -61,10 +61,10 @@ def measured(
 
 
 def _runs(
-    integrator: Integrator, problems: Sequence[Problem], times: Sequence[Fraction], options: dict[str, Any]
+    integrator: ChosenIntegrator, problems: Sequence[Problem], times: Sequence[Fraction], options: dict[str, Any]
 ) -> list[tuple[str, Sequence[Any], int]]:
     """Outcome, states and steps of each; one after the other where the integrator has no lanes."""
-    if integrator.takes_many:
+    if integrator.supports_ensemble:
         many = integrator.propagate_many(problems, times, threads=1, **options)
         return [(run.outcome.value, run.states, run.steps) for run in many]
     runs = [_alone(integrator, problem, times, options) for problem in problems]
@@ -75,7 +75,7 @@ def _runs(
 
 
 def _alone(
-    integrator: Integrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]
+    integrator: ChosenIntegrator, problem: Problem, times: Sequence[Fraction], options: dict[str, Any]
 ) -> tuple[str, Sequence[Any], int] | PeerFailed:
     """Outcome, states and steps; PeerFailed, not raised, where the integrator failed."""
     try:
