@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
-from proofs import assert_agrees, assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.attitude import attitude_of
@@ -14,6 +13,15 @@ from heavytop.exact.bobylev_steklov import BobylevSteklov, bobylev_steklov_motio
 from heavytop.exact.catalogue import find
 from heavytop.exact.motion import initial_xi
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import (
+    assert_agrees,
+    assert_attitude,
+    assert_meets,
+    assert_narrow,
+    assert_solves,
+    positive,
+    rational,
+)
 
 TINY = Fraction(1, 10**30)
 

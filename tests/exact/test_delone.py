@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 from flint import arb
-from proofs import assert_agrees, assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.attitude import attitude_of
@@ -16,6 +15,15 @@ from heavytop.exact.balls import working_precision
 from heavytop.exact.catalogue import find
 from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import (
+    assert_agrees,
+    assert_attitude,
+    assert_meets,
+    assert_narrow,
+    assert_solves,
+    positive,
+    rational,
+)
 
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text())
 TINY = Fraction(1, 10**30)

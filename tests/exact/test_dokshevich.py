@@ -7,7 +7,6 @@ from math import isqrt
 import mpmath
 import pytest
 from flint import arb
-from proofs import AsRounded, assert_algebraic_solves, assert_attitude, assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import InputError, NotInClass, OutOfReach
 from heavytop.exact.axes import ALL, renamed_state, renamed_top
@@ -16,6 +15,15 @@ from heavytop.exact.catalogue import find
 from heavytop.exact.dokshevich import Dokshevich, dokshevich_motion
 from heavytop.exact.validated import Validated
 from heavytop.top.heavy_top import HeavyTop, State, dot
+from support.proofs import (
+    AsRounded,
+    assert_algebraic_solves,
+    assert_attitude,
+    assert_narrow,
+    assert_solves,
+    positive,
+    rational,
+)
 
 F = Fraction
 # (tangent u, S - b, w, z/x) with rational S and axes: found by a search over small fractions

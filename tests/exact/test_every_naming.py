@@ -9,8 +9,8 @@ from fractions import Fraction
 
 import pytest
 from flint import ctx
-from test_catalogue import SAMPLES
 
+from exact.test_catalogue import SAMPLES
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact import catalogue
 from heavytop.exact.axes import ALL, renamed_state, renamed_top

@@ -4,7 +4,6 @@ import random
 from fractions import Fraction
 
 import pytest
-from proofs import assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import NotInClass
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
@@ -12,6 +11,7 @@ from heavytop.exact.resting import Rest
 from heavytop.exact.validated import Validated
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_narrow, assert_solves, positive, rational
 
 F = Fraction
 UP = (F(0), F(0), F(1))

@@ -6,7 +6,6 @@ from fractions import Fraction
 from time import process_time
 
 import pytest
-from proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact import goryachev_chaplygin_rest
@@ -18,6 +17,7 @@ from heavytop.exact.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.validated import Validated
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
 
 F = Fraction
 TOP = HeavyTop((4, 4, 1), 1, (1, 0, 0))

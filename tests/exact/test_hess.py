@@ -7,7 +7,6 @@ from time import process_time
 
 import pytest
 from flint import acb, arb, arb_mat
-from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
@@ -20,6 +19,7 @@ from heavytop.exact.validated import Validated
 from heavytop.measure.reference import reference
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State, dot
+from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 F = Fraction
 TOP = HeavyTop((8, 6, 3), 1, (1, 0, 2))

@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import pytest
 from flint import acb, acb_series, arb
-from proofs import assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import Undecided, ball, midpoint, working_precision
@@ -17,6 +16,7 @@ from heavytop.exact.kovalevskaya_theta import ThetaMotion
 from heavytop.exact.resting import Rest
 from heavytop.exact.validated import Validated
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_narrow, assert_solves, positive, rational, triple
 
 F = Fraction
 UP = (F(0), F(0), F(1))

@@ -4,7 +4,6 @@ import random
 from fractions import Fraction
 
 import pytest
-from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import NotInClass
 from heavytop.exact.axes import ALL, renamed_state, renamed_top
@@ -14,6 +13,7 @@ from heavytop.exact.lagrange_gyrostat import LagrangeGyrostat
 from heavytop.exact.validated import Validated
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 F = Fraction
 

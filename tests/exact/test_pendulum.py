@@ -5,11 +5,11 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
-from proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass
 from heavytop.exact.pendulum import Pendulum
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 TINY = Fraction(1, 10**30)
 

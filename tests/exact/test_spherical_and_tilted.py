@@ -6,7 +6,6 @@ from itertools import product
 from time import process_time
 
 import pytest
-from proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass
 from heavytop.exact.catalogue import find, matches
@@ -15,6 +14,7 @@ from heavytop.exact.pendulum import Pendulum
 from heavytop.exact.spherical import SphericalTop
 from heavytop.exact.validated import Validated
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from support.proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
 
 F = Fraction
 UNIT = (F(2, 3), F(-1, 3), F(2, 3))

@@ -4,7 +4,6 @@ import random
 from fractions import Fraction
 
 import pytest
-from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import midpoint, radius
@@ -12,6 +11,7 @@ from heavytop.exact.catalogue import find
 from heavytop.exact.steklov import Steklov, quadratics, steklov_motion
 from heavytop.exact.validated import Validated
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 F = Fraction
 

@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import mpmath
 import pytest
-from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 import heavytop as ht
 from heavytop.errors import LevelNotDone, NotInClass
@@ -17,6 +16,7 @@ from heavytop.exact.validated import Validated
 from heavytop.exact.zhukovsky_volterra import ZhukovskyVolterra
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State, dot
+from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 F = Fraction
 START = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))

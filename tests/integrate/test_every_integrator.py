@@ -24,7 +24,7 @@ from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, exact, number, real
 from heavytop.suite.cases import CASES, Case
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
-from in_process import heavytop
+from support.in_process import heavytop
 
 F = Fraction
 NAMES = [*INTEGRATORS, "planted fault"]
