@@ -7,6 +7,7 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass
+from heavytop.exact.catalogue import find
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.grioli import Grioli, grioli_motion
 from heavytop.exact.staude import (
@@ -18,7 +19,7 @@ from heavytop.exact.staude import (
     staude_rotations,
     staude_stability,
 )
-from heavytop.top.equations import GYROSTAT
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
@@ -73,6 +74,24 @@ def test_every_permanent_rotation_solves_all_six_equations(seed):
     rng = random.Random(seed)
     motion = staude_motion(triple(rng, positive), triple(rng), rational(rng), rational(rng))
     assert_solves(motion, rational(rng, size=100))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_permanent_rotation_of_a_gyrostat_solves_all_six_equations(seed):
+    rng = random.Random(seed)
+    data = triple(rng, positive), triple(rng), rational(rng), rational(rng)
+    motion = staude_motion(*data, rotor=(positive(rng), rational(rng), rational(rng)))
+    assert find(motion.top, motion.start, HEAVY_GYROSTAT).method == motion.method
+    assert_solves(motion, Fraction(7, 3))
+    assert_attitude(motion, Fraction(7, 3))
+
+
+def test_staudes_condition_has_no_rotor():
+    top = HeavyTop((3, 2, 1), 1, (1, 2, 3), (0, 0, 1))
+    with pytest.raises(NotInClass, match="rotor"):
+        staude_rotations(top)
+    with pytest.raises(NotInClass, match="rotor"):
+        staude_rate_squared(top, (1, 0, 0))
 
 
 def test_the_attitude_of_a_permanent_rotation_turns_with_it():

@@ -24,7 +24,7 @@ from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.exact.dokshevich import Dokshevich
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
-from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin, Sretensky
 from heavytop.exact.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.grioli import Grioli
 from heavytop.exact.gyrostat import Gyrostat
@@ -131,6 +131,7 @@ _CLASSES: dict[str, tuple[Class, ...]] = {
         _steady(HEAVY_GYROSTAT),
         Class.of(LagrangeGyrostat, CYCLIC),
         Class.of(ZhukovskyVolterra, _KEEP),
+        Class.of(Sretensky, CYCLIC),
     ),
 }
 

@@ -130,6 +130,7 @@ SYMMETRIC = (
     Condition("I1 = I2", "I1 - I2", lambda top, _: (_differ(top, 0, 1),)),
     Condition("P a = P b = 0", "P a, P b", lambda top, _: top.moment[:2]),
 )
+AXIAL_ROTOR = Condition("k1 = k2 = 0", "k1, k2", lambda top, _: (top.rotor or (Fraction(0),) * 3)[:2])
 SPHERICAL = Condition("I1 = I2 = I3", "I1 - I2, I2 - I3", lambda top, _: (_differ(top, 0, 1), _differ(top, 1, 2)))
 GAMMA = Condition("gamma != 0", "gamma", lambda _, start: start.gamma, any)
 LEVEL_MOMENTUM = Condition("M·gamma = 0", "M·gamma", _area)

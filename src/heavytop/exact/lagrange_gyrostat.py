@@ -18,7 +18,7 @@ from flint import arb
 
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, instant
-from heavytop.exact.conditions import SYMMETRIC, Condition
+from heavytop.exact.conditions import AXIAL_ROTOR, SYMMETRIC
 from heavytop.exact.flint_context import series_length
 from heavytop.exact.lagrange import Lagrange
 from heavytop.top.equations import HEAVY_GYROSTAT
@@ -36,7 +36,7 @@ class LagrangeGyrostat(ClosedForm):
 
     method = "closed form: Lagrange's gyrostat, Weierstrass functions of gamma3"
     system = HEAVY_GYROSTAT
-    body = *SYMMETRIC, Condition("k1 = k2 = 0", "k1, k2", lambda top, _: (top.rotor or (Fraction(0),) * 3)[:2])
+    body = *SYMMETRIC, AXIAL_ROTOR
 
     def __post_init__(self) -> None:
         ClosedForm.__post_init__(self)
