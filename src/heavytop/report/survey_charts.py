@@ -48,7 +48,7 @@ def survey_charts(sources: Sources, first: Iterable[str] = ()) -> Section | None
             "the more digits are lost in it (the median). Each of the worst motions is drawn as the path of the "
             f"vertical γ on the unit sphere in body axes, seen from (1, 1, 1), up to t = {_LONGEST}; dashed behind.",
         ],
-        columns=["survey", "motion", "outcome", "error", "digits right", "inertia", "P", "r", "Ω", "γ", "command"],
+        columns=["sweep", "motion", "outcome", "error", "digits right", "inertia", "P", "r", "Ω", "γ", "command"],
         across=2,
         place=5,
     )
