@@ -198,3 +198,19 @@ def test_columns_and_folders_that_are_not_there_are_refused(tmp_path: Path) -> N
         ht.read_survey(tmp_path)
     with pytest.raises(InputError, match="no column"):
         ht.read_survey(tmp_path, columns=["nothing"])
+
+
+def test_the_page_draws_the_worst_motions_and_the_map_asked_for(tmp_path: Path) -> None:
+    file = plan(tmp_path, 45, 'map = ["omega3", "gamma3"]')
+    ht.run(file, tmp_path / "out", workers=1)
+    (row,) = ht.read_report(tmp_path / "out").rows
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Digits lost over omega3 and gamma3" in page
+    assert isinstance(row.worst, tuple)
+    assert all(f">{each.index}<" in page for each in row.worst)
+    assert sum(row.spread.histograms["error_max"].counts) == 45  # type: ignore[union-attr]
+
+
+def test_a_map_without_two_axes_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="two axes"):
+        read(str(plan(tmp_path, more='map = ["omega1"]')), KINDS)
