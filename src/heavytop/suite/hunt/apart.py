@@ -112,15 +112,7 @@ class Apart:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-<<<<<<< HEAD
-def _hello(integrator: Integrator) -> int:
-=======
-def _lead_group() -> None:
-    os.setpgid(0, 0)
-
-
 def _hello(integrator: ChosenIntegrator) -> int:
->>>>>>> main
     """The number of the process; what the integrator imports is imported now, and not in the time of a motion."""
     begin_row()
     with suppress(HeavyTopError):
