@@ -22,7 +22,7 @@ import msgspec
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, quoted
 from heavytop.former_names import INTEGRATORS as FORMER
 from heavytop.former_names import current
-from heavytop.integrate.peers.built_in import BUILT_IN
+from heavytop.integrate.integrator import INTEGRATORS
 from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import contained, quiet, said
 from heavytop.precision import exact, parse
@@ -235,7 +235,7 @@ def command_of(table: Any, folder: Path, where: str) -> Command:
 def _require_possible(command: Command) -> None:
     if not re.fullmatch(_NAME, command.name):
         raise InputError(f"the name {quoted(command.name)} is not letters, digits and ._:+- alone.")
-    if command.name in BUILT_IN or command.name in FORMER:
+    if command.name in INTEGRATORS or command.name in FORMER:
         raise InputError(f"the name {command.name} is that of a built-in integrator.")
     if not command.command or not all(part and "\0" not in part for part in command.command[:1]):
         raise InputError("command is empty.")
