@@ -14,7 +14,8 @@ from heavytop.kinds.base import Kind
 from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse, time_text
 from heavytop.records import Against, Beside, Metric, Row, RowKey
-from heavytop.report.document import Block, Card, In, Note
+from heavytop.report.document import Block, Card, Chart, In, Note
+from heavytop.report.survey_charts import survey_charts
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import exact_row
@@ -22,7 +23,7 @@ from heavytop.suite.sampling import positive, uniform
 from heavytop.suite.survey.drawn import Chunk, Drawn, drawn
 from heavytop.suite.survey.gathered import of_motions
 from heavytop.suite.survey.measured import measured
-from heavytop.suite.survey.table import chunk_bytes
+from heavytop.suite.survey.table import DATA, chunk_bytes
 from heavytop.suite.task import Task, computed
 
 NAME = "survey"
@@ -31,7 +32,10 @@ _METHOD = "two runs of multiword in double-double, of different orders"
 
 
 class SurveyTable(Table, tag=NAME):
-    """cases: sweeps, as ``sweep:NAME``.  samples: uniform, to the horizon; precision: double or extended."""
+    """cases: sweeps, as ``sweep:NAME``.  samples: uniform, to the horizon; precision: double or extended.
+
+    map: two data by the names of their columns, over which digits lost are drawn; none for the first two that vary.
+    """
 
     cases: list[str]
     horizon: str
@@ -39,6 +43,7 @@ class SurveyTable(Table, tag=NAME):
     samples: int = 10
     integrator: str = HEYOKA
     tolerance: str = ""
+    map: list[str] = msgspec.field(default_factory=list)
     chunked: ClassVar[bool] = True
 
     def tasks(self, find: Find) -> list[Task]:
@@ -52,6 +57,10 @@ class SurveyTable(Table, tag=NAME):
         (horizon,) = positive([self.horizon], "horizon")
         if self.tolerance:
             positive([self.tolerance], "tolerance")
+        if self.map and (len(set(self.map)) != 2 or len(self.map) != 2 or not set(self.map) <= set(DATA)):
+            raise InputError(
+                f"A map over {quoted(', '.join(self.map))} has no two axes.", f"Use two of {', '.join(DATA)}."
+            )
         times, _ = uniform(horizon, self.samples)
         subject = computed(self.integrator, tolerance=self.tolerance)
         return [
@@ -61,6 +70,7 @@ class SurveyTable(Table, tag=NAME):
                 self.integrator,
                 case,
                 times,
+                options=tuple(self.map),
             )
             for case in map(find, self.cases)
         ]
@@ -102,6 +112,7 @@ class Survey(Kind):
         """A line a row."""
         lines = [Note(_line(row)) for row in rows]
         yield Card("Surveys: a record for each motion in survey.parquet", lines, shown=In.SHORT | In.FULL | In.PAGE)
+        yield Chart(survey_charts)
 
 
 def _names(task: Task, motions: Drawn) -> dict[str, object]:
