@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import EntryPoint
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, Protocol
 
 from heavytop.precision import FORMATS
 from heavytop.top.equations import SYSTEMS
@@ -19,6 +19,19 @@ from heavytop.top.equations import SYSTEMS
 _EVERY = (*(form.name for form in FORMATS), "real")
 _SYSTEMS = tuple(system.name for system in SYSTEMS)
 _HERE = "heavytop.integrate"
+
+
+class Source(Protocol):
+    """An integrator that is defined outside this program and every package."""
+
+    @property
+    def name(self) -> str:
+        """In rows and messages."""
+        ...
+
+    def load(self) -> Callable[..., Any]:
+        """The peer; raises InputError where there is none."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +85,17 @@ class Integrator:
 def foreign(name: str, place: str | Callable[..., Any] = "") -> Integrator:
     """One of another package, or of a source: nothing is known of what it can do."""
     return Integrator(name, place, None, None, "", own=False)
+
+
+def name_of(which: str | Source) -> str:
+    """The name in rows of an integrator that is named or defined by its source."""
+    return which if isinstance(which, str) else which.name
+
+
+def described(which: str | Source) -> Integrator:
+    """What is known of it, without looking for it: of one that is not this program's, nothing."""
+    own = INTEGRATORS.get(which) if isinstance(which, str) else None
+    return own or foreign(name_of(which))
 
 
 def load(place: str | Callable[..., Any]) -> Any:

@@ -15,7 +15,7 @@ from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.integrate import peers
-from heavytop.integrate.integrator import loaded
+from heavytop.integrate.integrator import described, loaded, name_of
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.source import Source
 from heavytop.integrate.reach import require_reach
@@ -49,10 +49,10 @@ def propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., An
 
 
 def _unguarded(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
-    name = peers.name_of(which)
+    name = name_of(which)
     if isinstance(which, Command):
         return _with(CommandIntegrator(which), name, options)
-    found = peers.described(which)
+    found = described(which)
     if found.streams:
         return _with(loaded(found.propagate), name, options)
     _with(peers.peer(which), name, options)
@@ -63,7 +63,7 @@ def watched(
     which: str | Source, options: dict[str, Any], observer: Callable[[Fraction, Any], None]
 ) -> Callable[..., Any]:
     """The same as :func:`propagator`, with every state given to ``observer``: by a peer at the end of its run."""
-    if peers.described(which).streams:
+    if described(which).streams:
         return propagator(which, {**options, "observer": observer})
     run = propagator(which, options)
 
@@ -81,7 +81,7 @@ def ensemble_propagator(which: str | Source, options: dict[str, Any]) -> Callabl
 
     Its calls raise OutOfReach as those of :func:`propagator`.
     """
-    found, name = peers.described(which), peers.name_of(which)
+    found, name = described(which), name_of(which)
     if not found.ensemble:
         peers.require(which)
         raise InputError(f"The integrator {name} runs one motion at a time.", "Call propagate for each.")

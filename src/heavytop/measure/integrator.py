@@ -12,7 +12,7 @@ from heavytop.integrate import peers, registry
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
-from heavytop.integrate.integrator import Integrator, load
+from heavytop.integrate.integrator import Integrator, described, load
 from heavytop.integrate.peers.contract import require_equal
 from heavytop.integrate.peers.source import Source
 from heavytop.integrate.taylor import Observer
@@ -47,7 +47,7 @@ class ChosenIntegrator:
     @property
     def can(self) -> Integrator:
         """What it can do."""
-        return FAULTS[self.fault].integrator if self.fault else peers.described(self.which)
+        return FAULTS[self.fault].integrator if self.fault else described(self.which)
 
     @property
     def supports_ensemble(self) -> bool:

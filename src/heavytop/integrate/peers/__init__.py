@@ -24,7 +24,8 @@ from typing import Any
 
 from heavytop.errors import InputError, PeerFailed, quoted
 from heavytop.former_names import INTEGRATORS as FORMER
-from heavytop.integrate.integrator import INTEGRATORS, Integrator, foreign, load
+from heavytop.integrate.integrator import INTEGRATORS, Integrator, described, foreign, load
+from heavytop.integrate.integrator import name_of as name_of
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile, Source
@@ -48,17 +49,6 @@ def known() -> dict[str, Integrator]:
         if entry.name not in FORMER:
             found.setdefault(entry.name, foreign(entry.name, entry.value))
     return found
-
-
-def described(which: str | Source) -> Integrator:
-    """What is known of it, without looking for it: of one that is not this program's, nothing."""
-    own = INTEGRATORS.get(which) if isinstance(which, str) else None
-    return own or foreign(name_of(which))
-
-
-def name_of(which: str | Source) -> str:
-    """The name in rows of an integrator that is named or defined by its source."""
-    return which if isinstance(which, str) else which.name
 
 
 def is_third_party(name: str) -> bool:

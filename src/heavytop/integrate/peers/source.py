@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 
@@ -23,6 +23,7 @@ from heavytop.errors import HeavyTopError, InputError, PeerFailed, quoted
 from heavytop.former_names import INTEGRATORS as FORMER
 from heavytop.former_names import current
 from heavytop.integrate.integrator import INTEGRATORS
+from heavytop.integrate.integrator import Source as Source
 from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import contained, quiet, said
 from heavytop.precision import exact, parse
@@ -34,19 +35,6 @@ _TOML = re.compile(r"(?s)(.+\.toml)(?::(.*))?")
 _SHOWN = "docs/commands.md shows every key."
 _FORMS = "A peer takes (top, start, times, precision, *, system, tolerance), a solver takes what is given alone."
 _MOST_SECONDS = 10**7
-
-
-class Source(Protocol):
-    """An integrator that is defined outside this program and every package."""
-
-    @property
-    def name(self) -> str:
-        """In rows and messages."""
-        ...
-
-    def load(self) -> Callable[..., Any]:
-        """The peer; raises InputError where there is none."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
