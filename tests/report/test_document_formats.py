@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 from heavytop.kinds import KINDS
@@ -10,6 +11,7 @@ from heavytop.records import SCHEMA, Report
 from heavytop.report.document_formats import to_json, to_markdown
 from support import in_process
 from support.report_helpers import claim_rows
+from support.reports import store
 from support.small_reports import error, row
 
 MADE = Report(
@@ -42,9 +44,16 @@ def test_markdown_is_escaped_and_every_row_has_all_cells() -> None:
     assert text.startswith("### Plan p\\|q: ")
     assert "- **refuted** The claimed solution is not a motion of the heavy top." in text
     rows = [line for line in text.splitlines() if line.startswith("| ")]
-    table = rows[rows.index(next(line for line in rows if "largest" in line)) :]
-    assert len({line.count(" | ") for line in table[:3]}) == 1
-    assert "3.25e-997" in table[2]
+    place = rows.index(next(line for line in rows if "largest" in line))
+    assert "3.25e-997" in rows[place + 2]
+
+
+def test_every_row_of_a_markdown_table_has_the_cells_of_its_head() -> None:
+    report = store.read(Path(__file__).parents[2] / "results" / "default")
+    tables = re.findall(r"(?:^\| .*\n)+", to_markdown(report, KINDS), re.MULTILINE)
+    assert len(tables) >= 5
+    for table in tables:
+        assert len({len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}) == 1
 
 
 def test_show_prints_and_writes_them(tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ def _block(block: Block) -> dict[str, Any]:
                 "rows": rows,
             }
         case Card():
-            inside = [*block.lines, *([block.table] if block.table else [])]
+            inside: list[Block] = [*block.lines, *([block.table] if block.table else [])]
             return name | {"title": block.title, "note": block.note, "blocks": [_block(each) for each in inside]}
     raise TypeError(block)
 
@@ -76,7 +76,7 @@ def _markdown(block: Block) -> Iterator[str]:
             if block.title:
                 yield from (f"#### {escaped(block.title)}", "")
             yield from (line for note in block.notes for line in (escaped(note), ""))
-            yield _row(block.columns)
+            yield _row([escaped_cell(column) for column in block.columns])
             yield _row(["---" if place < block.words else "---:" for place in range(len(block.columns))])
             yield from (_row([escaped_cell(cell_text(cell)) for cell in row]) for row in block.rows)
             yield ""
