@@ -21,11 +21,17 @@ from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact
+from heavytop.records import SCHEMA, Row
+from heavytop.report.policy import Policy
+from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import read
+from heavytop.suite.rows import failed
 from heavytop.suite.survey import measured as records
 from heavytop.suite.survey.drawn import chunks, drawn
+from heavytop.suite.survey.gathered import gathered
 from heavytop.suite.sweeps import Grid, Random
 from support.in_process import heavytop
+from support.reports import compare
 
 TIMES = [Fraction(n) for n in (1, 2, 3)]
 SWEEP = """
@@ -132,6 +138,26 @@ def test_a_run_writes_a_row_and_a_record_a_motion(tmp_path: Path, monkeypatch: p
     again = heavytop(*worst[0]["command"].partition("|")[0].split()[1:])
     state = json.loads(again.stdout)
     assert state
+
+
+def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("heavytop.suite.survey.drawn.CHUNK", 2)
+    tasks = list(read(str(plan(tmp_path, 4)), KINDS)[2])
+    rows = [KINDS["survey"].measure(task, Saved()) for task in tasks]
+    lost = [failed(task, "heyoka gave up") for task in tasks]
+
+    def report(*parts: Row) -> ht.Report:
+        return ht.Report(SCHEMA, {"name": "many"}, {}, gathered(zip(tasks, parts, strict=True)))
+
+    whole, part, none = report(*rows), report(rows[0], lost[1]), report(*lost)
+    assert [row.metrics["motions_success"].value for each in (whole, part) for row in each.rows] == ["4", "2"]
+    for bad, first in ((part, 2), (none, 0)):
+        found = compare(whole, bad, Policy())
+        assert (found.verdict, found.exit_code, len(found.findings)) == ("worse", 1, 1)
+        assert f"heyoka gave up in many[{first}]" in found.findings[0].reason
+    assert compare(none, none, Policy()).verdict == "same"
 
 
 def test_a_resumed_run_leaves_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

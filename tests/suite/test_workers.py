@@ -20,11 +20,13 @@ from rich.console import Console
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.kinds import KINDS
 from heavytop.measure.digits import digits_kept
-from heavytop.records import Row
+from heavytop.records import SCHEMA, Report, Row
 from heavytop.report.consistency import contradictions
+from heavytop.report.terminal import brief, summary
 from heavytop.suite import workers
+from heavytop.suite.plan import read
 from heavytop.suite.task import Task
-from support.reports import expand, load, rows
+from support.reports import rows
 
 PLAN = """name = "tiny"
 [[measure]]
@@ -37,7 +39,7 @@ runs = [{ precision = "double", horizon = "5", samples = 5 }, { precision = "ext
 def tasks_of(folder: Path, text: str):
     file = folder / "tiny.toml"
     file.write_text(text)
-    return expand(load(str(file))[0])
+    return read(str(file), KINDS)[2]
 
 
 @pytest.fixture(scope="module")
@@ -56,8 +58,7 @@ def measured(tasks, processes: int, scheduler: str | None = None, after_first: C
         assert index not in found
         if not found:
             after_first()
-        found[index] = row
-        row.seconds = {}
+        found[index] = msgspec.structs.replace(row, seconds={})
     return [found[index] for index in range(len(tasks))]
 
 
@@ -96,8 +97,8 @@ def test_every_kind_of_truth_is_the_same_in_one_process_and_in_two(tmp_path: Pat
     assert lost.finite
     assert digits_kept(lost) == 0
     assert list(contradictions(lost, KINDS["drift"])) == []
-    for surface in (summary_of([lost]), "\n".join(KINDS["drift"].brief([lost]))):
-        assert str(ends) in surface
+    assert str(ends) in summary_of([lost])
+    assert f"from {ends}" in brief(Report(SCHEMA, {}, {}, []), [lost], KINDS)
 
 
 class Poison:
@@ -111,7 +112,7 @@ class Poison:
 
 def summary_of(found: list[Row]) -> str:
     console = Console(width=200, file=StringIO())
-    console.print(*KINDS["drift"].summary(found))
+    console.print(summary(Report(SCHEMA, {}, {}, found), KINDS))
     return console.file.getvalue()
 
 
@@ -120,7 +121,7 @@ def poisoned(tasks) -> list[Task]:
 
 
 def with_case(task: Task, name: str, case: object) -> Task:
-    return replace(task, title=name, case=case)
+    return replace(task, key=msgspec.structs.replace(task.key, case=name), case=case)
 
 
 def kill(pid: int) -> None:
@@ -240,6 +241,43 @@ def test_a_cluster_gives_the_same_rows_as_this_process_even_if_a_worker_is_kille
 ) -> None:
     assert measured(tasks, 1, cluster) == expected
     assert measured(tasks, 1, cluster, after_first=lambda: kill(worker_pids()[0])) == expected
+
+
+THIRD_PARTY = """
+import os, re, subprocess
+from heavytop.integrate.peers.double import Solved
+
+def good(given):
+    return Solved([given.start + 1e-9 for _ in given.times], given.times[-1], 10)
+
+def stuck(given):
+    subprocess.Popen(["sleep", "876"], start_new_session=True)
+    re.match("(a+)+$", 60 * "a" + "b")
+
+def dies(given):
+    os._exit(3)
+"""
+
+
+@dask
+def test_on_a_cluster_too_rows_of_others_end_and_their_workers_live(
+    tmp_path: Path, cluster: str, worker_pids, tasks
+) -> None:
+    (tmp_path / "mine.py").write_text(THIRD_PARTY)
+    names = [f"mine.py:{name}" for name in ("good", "stuck", "dies")]
+    tables = [
+        f'[[measure]]\nkind = "drift"\ncases = ["pendulum"]\nintegrator = "{name}"\n'
+        'runs = [{ precision = "double", horizon = "1", samples = 2 }]\n'
+        for name in names
+    ]
+    theirs = tasks_of(tmp_path, f'name = "theirs"\nintegrators = {names}\n'.replace("'", '"') + "".join(tables))
+    before = worker_pids()
+    found = dict(workers.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=12.0))
+    assert [found[index].outcome for index in range(4)] == ["success", "out_of_time", "failed", "success"]
+    assert found[1].against == "nothing: mine.py:stuck was stopped after 12 s in pendulum"
+    assert "mine.py:dies ended its process 3 times" in found[2].against
+    assert worker_pids() == before
+    assert not subprocess.run(["pgrep", "-f", "^sleep 876$"], capture_output=True, check=False).stdout
 
 
 @dask

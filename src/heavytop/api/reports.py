@@ -23,8 +23,8 @@ from heavytop.report import store
 from heavytop.report.comparison_text import headline, metric_name, values
 from heavytop.report.names import row_name
 from heavytop.report.parquet import COLUMNS, lines
-from heavytop.report.printable import printable
-from heavytop.report.text import drifts, failed, short
+from heavytop.report.printable import printable, short
+from heavytop.report.text import drifts, failed
 
 if TYPE_CHECKING:
     import pandas

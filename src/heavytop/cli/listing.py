@@ -33,7 +33,7 @@ def list_(
         print_json(listed)
         return 0
     print("Cases (--case NAME shows the data)")
-    _lines({each["name"]: f"{each['system']:10} {each['about']}" for each in listed["cases"]}, indent=11)
+    _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["cases"]}, indent=15)
     print("Bodies (cases too: the standard tests of other programs)")
     _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["bodies"]}, indent=15)
     plans = f"{', '.join(listed['plans'])}, or a TOML file"

@@ -14,7 +14,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_poly, fmpz_poly
 
-from heavytop.errors import InputError, OutOfReach, quoted
+from heavytop.errors import OutOfReach, Unsupported, quoted
 from heavytop.integrate.engines import compiled as compile_heyoka
 from heavytop.integrate.engines import load
 from heavytop.integrate.reach import expected_steps
@@ -279,10 +279,10 @@ _DENSE: dict[str, type[Dense]] = {
 def dense(
     integrator: Any, problem: Problem, until: Fraction, tolerance: Fraction | None, step_limit: int | None
 ) -> Dense:
-    """A run of that integrator; raises InputError for one that hands over no polynomial of its steps."""
+    """A run of that integrator; raises Unsupported for one that hands over no polynomial of its steps."""
     made = _DENSE.get(integrator) if isinstance(integrator, str) else None
     if made is None:
-        raise InputError(
+        raise Unsupported(
             f"The integrator {quoted(integrator)} hands over no polynomial of its steps.",
             f"Events are located by {' and '.join(_DENSE)}.",
         )

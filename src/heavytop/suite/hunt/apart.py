@@ -18,7 +18,7 @@ from heavytop.integrate.peers.command import Command, begin_row
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import Precision
-from heavytop.processes import ChildContext, Guard
+from heavytop.processes import ChildContext, Guard, lead_group, new_mark
 from heavytop.records import FAILED, OUT_OF_TIME
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
@@ -87,14 +87,15 @@ class Apart:
             return Run(FAILED, (), f"{self._integrator.name} ended its whole process")
 
     def _begin(self) -> None:
-        self._pool = ProcessPoolExecutor(1, mp_context=ChildContext(), initializer=_lead_group)
+        mark = new_mark()
+        self._pool = ProcessPoolExecutor(1, mp_context=ChildContext(), initializer=lead_group, initargs=(mark,))
         try:
             process = self._pool.submit(_hello, self._integrator).result(timeout=_BEGIN)
         except TimeoutError:
             self.end()
             raise PeerFailed(f"{self._integrator.name} cannot be loaded within {_BEGIN:.3g} s") from None
         with suppress(OSError):
-            self._guard = Guard(process)
+            self._guard = Guard(process, mark)
 
     def end(self) -> None:
         """Kill the process and whatever it started."""
@@ -109,10 +110,6 @@ class Apart:
             guard.end()
         if pool is not None:
             pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _lead_group() -> None:
-    os.setpgid(0, 0)
 
 
 def _hello(integrator: ChosenIntegrator) -> int:

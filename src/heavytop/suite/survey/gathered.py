@@ -132,7 +132,8 @@ def _quantiles(quantity: Quantity, values: Any) -> dict[Quantity, Metric]:
         half = _NORMAL * math.sqrt(n * p * (1 - p))
         low, high = max(0, math.floor(rank - half)), min(n - 1, math.ceil(rank + half))
         if p < 1 and values[low] > 0:
-            metric.band = round(min(100.0, (math.log10(values[high]) - math.log10(values[low])) / 2), 4)
+            width = math.log10(values[high]) - math.log10(values[low])
+            metric = msgspec.structs.replace(metric, band=round(min(100.0, width / 2), 4))
         found[quantity.over(name)] = metric
     return found
 
@@ -156,18 +157,36 @@ def _command(task: Task, case: Case, bad: _Bad) -> str:
 
 
 def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
-    """One row for each sweep and integrator, in the order of the plan; a chunk that was not measured stays a row."""
-    sums: dict[Any, Gathered] = {}
-    others: list[Row] = []
+    """One row for each sweep and integrator, in the order of the plan.
+
+    A survey with a chunk that was not measured ends as the first such chunk does: what the others came to stays in it.
+    """
+    sums: dict[Any, Gathered | None] = {}
+    lost: dict[Any, Row] = {}
     for task, row in rows:
-        if not isinstance(row.chunk, bytes):
-            others.append(row)
-            continue
         assert isinstance(task.case, Chunk)
         assert task.case.sweep is not None
         key = msgspec.structs.replace(row.key, case=task.case.sweep.name)
-        sums.setdefault(key, Gathered(row, task)).take(row)
-    return [*(each.row() for each in sums.values()), *others]
+        found = sums.setdefault(key, None)
+        if not isinstance(row.chunk, bytes):
+            lost.setdefault(key, msgspec.structs.replace(row, case=key.case, key=key))
+            continue
+        if found is None:
+            found = sums[key] = Gathered(row, task)
+        found.take(row)
+    return [_survey(each, lost.get(key)) for key, each in sums.items()]
+
+
+def _survey(measured: Gathered | None, lost: Row | None) -> Row:
+    """The row of a survey: what its measured chunks came to, with the outcome of a lost one."""
+    if measured is None:
+        assert lost is not None
+        return lost
+    row = measured.row()
+    if lost is None:
+        return row
+    ended = {name: getattr(lost, name) for name in ("outcome", "time_reached", "finite", "reference", "against")}
+    return msgspec.structs.replace(row, **ended)
 
 
 def contents(rows: Iterator[Row]) -> Iterator[bytes]:
