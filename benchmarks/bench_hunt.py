@@ -2,8 +2,8 @@
 
     python benchmarks/bench_hunt.py [SEED ...]
 
-Each fault of tests/hunted_integrators.py is hunted as a file, in a process of its own, over T = 100 with a budget of
-120 s; processor seconds of this process and its children are what is reported.  The healthy one comes last.
+Each fault of tests/support/hunted_integrators.py is hunted as a file, in a process of its own, over T = 100 with a
+budget of 120 s; processor seconds of this process and its children are what is reported.  The healthy one comes last.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from time import perf_counter
 
 import heavytop as ht
 
-FAULTS = Path(__file__).parents[1] / "tests" / "hunted_integrators.py"
+FAULTS = Path(__file__).parents[1] / "tests" / "support" / "hunted_integrators.py"
 
 
 def processor_seconds() -> float:

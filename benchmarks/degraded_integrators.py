@@ -1,9 +1,10 @@
 """Degradations and repairs of an integrator as a comparison sees them: `benchmarks/degraded_integrators.py [SEED]`.
 
 200 pairs of reports, a better one and a worse one: 140 are measured, of an integrator that has one of a dozen faults or
-none (`tests/degraded_integrators.py`), 60 are rows of `results/default` with edited errors and bands.  From the better
-to the worse, no verdict may be same or better.  100 of them the other way round: no verdict, and no step of a history,
-may be worse.  What makes some error larger, or is given a wide band, is no repair.  Exit code 1 where one fails.
+none (`tests/support/degraded_integrators.py`), 60 are rows of `results/default` with edited errors and bands.  From the
+better to the worse, no verdict may be same or better.  100 of them the other way round: no verdict, and no step of a
+history, may be worse.  What makes some error larger, or is given a wide band, is no repair.  Exit code 1 where one
+fails.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
-from degraded_integrators import WIDE, edited_pairs, installed, marked_worse, pairs, repaired, verdict  # noqa: E402
-from reports import store  # noqa: E402
+from support.degraded_integrators import WIDE, edited_pairs, installed, marked_worse, pairs, repaired, verdict  # noqa: E402
+from support.reports import store  # noqa: E402
 
 MEASURED, EDITED, REPAIRS = 140, 60, 100
 

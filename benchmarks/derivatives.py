@@ -16,15 +16,14 @@ from fractions import Fraction
 from pathlib import Path
 from random import Random
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "exact"))
-
-from derivative_laws import BITS, difference, holds, known, largest_radius, laws, of
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from heavytop.errors import HeavyTopError
 from heavytop.exact.balls import working_precision
 from heavytop.measure.rounding_noise import FACTORS
 from heavytop.suite.cases import CASES, Case
 from heavytop.suite.starts import ensemble_of, one_motion
+from support.derivative_laws import BITS, difference, holds, known, largest_radius, laws, of
 
 
 def main() -> int:

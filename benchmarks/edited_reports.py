@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
-from edited_reports import trials  # noqa: E402
+from support.edited_reports import trials  # noqa: E402
 
 
 def main(count: int, seed: int, reports: list[Path]) -> int:

@@ -27,7 +27,7 @@ from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.chaplygin import chaplygin_motion
 from heavytop.exact.dokshevich import AlgebraicDokshevich, dokshevich_motion
 from heavytop.exact.goryachev import goryachev_motion
-from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin, Sretensky
 from heavytop.exact.hess import Hess
 from heavytop.exact.hess_pendulum import HessPendulum
 from heavytop.exact.kovalevskaya import Kovalevskaya
@@ -85,6 +85,13 @@ def goryachev_chaplygin(random: Random) -> GoryachevChaplygin:
     top = HeavyTop((4 * i3, 4 * i3, i3), 1, (positive(random), rational(random), 0))
     w1, w2 = rational(random, 2), rational(random, 2)
     return GoryachevChaplygin(top, State((w1, w2, -4 * (w1 * g1 + w2 * g2) / g3), (g1, g2, g3)))
+
+
+def sretensky(random: Random) -> Sretensky:
+    plain, rotor = goryachev_chaplygin(random), rational(random, 1)
+    top, (w1, w2, w3) = plain.top, plain.start.omega
+    carrying = HeavyTop(top.inertia, top.weight, top.centre, (0, 0, rotor * top.inertia[2]))
+    return Sretensky(carrying, State((w1, w2, w3 - rotor), plain.start.gamma))
 
 
 def with_a_common_root(random: Random) -> GoryachevChaplygin:
@@ -166,10 +173,10 @@ def residual(motion: Any, time: Fraction) -> float:
     series = motion.series(time, 3, BITS_60)
     with working_precision(2 * BITS_60):
         if isinstance(motion, AlgebraicMotion | AlgebraicDokshevich):
-            inertia, moment = motion.inertia, motion.moment(2 * BITS_60)
+            p = Parameters([ball(i) for i in motion.inertia], motion.moment(2 * BITS_60), arb(0))
         else:
-            inertia, moment = motion.top.inertia, [ball(n) for n in motion.top.moment]
-        rates = HEAVY_TOP.field(Parameters([ball(i) for i in inertia], moment, arb(0)), series)
+            p = motion.system.parameters(motion.top, motion.start).mapped(lambda value: ball(F(value)))
+        rates = getattr(motion, "system", HEAVY_TOP).field(p, series)
         values = [(y.derivative() - rate)[k] for y, rate in zip(series, rates, strict=True) for k in (0, 1)]
     assert all(value.contains(0) for value in values)
     return max(float(value.rad()) for value in values)
@@ -199,7 +206,7 @@ def survey(name: str, family: FAMILY, count: int, seed: int) -> None:
         for step in range(1, 4):
             motion.state(LATE + step, BITS_50)
         states.append((process_time() - began) / 3)
-        enclosure = Validated(*data(motion), effort=10.0)
+        enclosure = Validated(*data(motion), getattr(motion, "system", HEAVY_TOP), effort=10.0)
         try:
             for time in (F(10), F(-10)):
                 pairs = list(zip(motion.state(time, BITS_50), enclosure.state(time, BITS_50), strict=True))
@@ -259,6 +266,7 @@ def main() -> None:
     surveys: list[tuple[str, FAMILY, int]] = [
         ("Kovalevskaya", kovalevskaya, count),
         ("Goryachev-Chaplygin", goryachev_chaplygin, count),
+        ("Sretensky", sretensky, count),
         ("Kovalevskaya on a degenerate level", on_a_level, count // 5),
         ("Goryachev-Chaplygin with G = 0", with_a_common_root, count // 5),
         ("Hess", hess, count),
@@ -274,7 +282,11 @@ def main() -> None:
     ]
     if not only:
         meeting(seed)
-    for name, family in (("Kovalevskaya", kovalevskaya), ("Goryachev-Chaplygin", goryachev_chaplygin)):
+    for name, family in (
+        ("Kovalevskaya", kovalevskaya),
+        ("Goryachev-Chaplygin", goryachev_chaplygin),
+        ("Sretensky", sretensky),
+    ):
         if only in f"attitude of {name}":
             attitudes(name, family, count, seed)
     for name, family, number in surveys:

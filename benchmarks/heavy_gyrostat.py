@@ -10,15 +10,14 @@ from fractions import Fraction
 from pathlib import Path
 from random import Random
 
-sys.path[:0] = [str(Path(__file__).parents[1] / "tests"), str(Path(__file__).parents[1] / "tests" / "integrate")]
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from test_heavy_gyrostat import _exactly, _fraction, independent  # noqa: E402
-
-import heavytop as ht  # noqa: E402
-from heavytop.exact.validated import Validated  # noqa: E402
-from heavytop.precision import exact  # noqa: E402
-from heavytop.top.angles import perpendicular  # noqa: E402
-from helpers import fraction, positive, unit_vector, vector  # noqa: E402
+import heavytop as ht
+from heavytop.exact.validated import Validated
+from heavytop.precision import exact
+from heavytop.top.angles import perpendicular
+from integrate.test_heavy_gyrostat import _exactly, _fraction, independent
+from support.helpers import fraction, positive, unit_vector, vector
 
 
 def main(motions: int = 20, digits: int = 50) -> None:

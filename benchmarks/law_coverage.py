@@ -17,7 +17,7 @@ import numpy
 from heavytop.measure.growth import Ensemble, law
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from synthetic_ensembles import EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic
+from support.synthetic_ensembles import EXPONENT, NAMES, STEP, TIMES, chaotic, synthetic
 
 RATE = 0.15
 FINE = 10 ** (numpy.arange(32 * 4 + 1) / 32)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from in_process import forget_integrators
+from support.in_process import forget_integrators
 
 HERE = Path(__file__).parent
 SLOW = frozenset((HERE / "slow.txt").read_text("utf-8").split())

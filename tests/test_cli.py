@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import in_process
 from heavytop.cli import app
 from heavytop.version import commit
-from helpers import VECTORS
+from support import in_process
+from support.helpers import VECTORS
 
 COMMAND = [sys.executable, "-m", "heavytop"]
 TINY = """name = "tiny"

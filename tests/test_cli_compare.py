@@ -8,8 +8,8 @@ import pytest
 import typer
 
 from heavytop.cli import run_command_line
-from reports import store
-from small_reports import error, report, row
+from support.reports import store
+from support.small_reports import error, report, row
 
 
 @pytest.fixture

@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import in_process
 from heavytop.cli import app
 from heavytop.cli.motion_output import with_file_of_latex
 from heavytop.errors import InputError
 from heavytop.suite.score import assess
 from heavytop.suite.trajectory_file import read
+from support import in_process
 
 SHOWN = "quaternion,matrix,euler:ZXZ,position,omega-space"
 KEYS = {"quaternion": (4,), "matrix": (3, 3), "euler": (3,), "position": (3,), "omega_space": (3,)}

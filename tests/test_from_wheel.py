@@ -82,7 +82,7 @@ def installed(folder: Path, wheel: Path) -> Path:
 
 
 def test_a_program_in_c_has_a_gate_in_five_commands(wheel: Path, tmp_path: Path) -> None:
-    """From nothing; `tests/from_a_wheel.py` does it with the whole plan, as the README has it."""
+    """From nothing; `tests/support/from_a_wheel.py` does it with the whole plan, as the README has it."""
     if not all(map(shutil.which, ("cc", "make"))):
         pytest.skip("there is no compiler of C here")
     heavytop = installed(tmp_path, wheel) / "heavytop"

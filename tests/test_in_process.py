@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-import in_process
+from support import in_process
 
 
 def test_integrators_of_a_test_go_and_libraries_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

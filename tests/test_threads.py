@@ -33,7 +33,7 @@ from heavytop.suite.cases import CASES
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import holding
-from helpers import run_peer
+from support.helpers import run_peer
 
 F = Fraction
 FORMATS = (DOUBLE, EXTENDED, QUAD, real(100))

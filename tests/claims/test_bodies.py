@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import pytest
 import sympy
-from test_where import TOPS
 
+from claims.test_where import TOPS
 from heavytop.claims.algebra import Field
 from heavytop.claims.audit import audit_claim
 from heavytop.claims.context import STATE, TIME

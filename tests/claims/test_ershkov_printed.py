@@ -11,7 +11,7 @@ from heavytop.claims.ershkov import PartialCase
 from heavytop.exact.balls import FUNCTIONS, ball, working_precision
 from heavytop.measure.claim_error import evaluation_error, exact_claim, first_failure
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, number, real
-from helpers import positive
+from support.helpers import positive
 
 
 def random_case(random: Random) -> PartialCase:

@@ -10,11 +10,11 @@ import msgspec
 import pytest
 
 import heavytop as ht
-import in_process
 from heavytop.claims import entry as entries
 from heavytop.claims import verdicts
 from heavytop.claims.from_file import claim_from_table
 from heavytop.suite import claim_library
+from support import in_process
 
 HEAD: dict[str, Any] = {
     "id": "spin-of-a-symmetric-top",

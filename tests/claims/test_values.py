@@ -12,7 +12,6 @@ import mpmath
 import pytest
 from rich.console import Console
 
-import in_process
 from heavytop.claims import entry as entries
 from heavytop.claims import verdicts
 from heavytop.claims.audit import audit_claim
@@ -26,6 +25,7 @@ from heavytop.kinds.audit import AuditTable
 from heavytop.report.audit_text import audit_text
 from heavytop.suite.checkpoint import Saved
 from heavytop.top.equations import system
+from support import in_process
 
 TOP = {"inertia": ["3", "2", "1"], "weight": "1", "centre": ["1/2", "1/3", "1/5"]}
 START = {"omega": ["1/10", "2/5", "9/10"], "gamma": ["3/5", "0", "4/5"]}

@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
-from proofs import AsRounded, assert_algebraic_solves, assert_attitude
 
 from heavytop.errors import InputError, NotInClass, OutOfReach
 from heavytop.exact.balls import midpoint, radius
@@ -17,6 +16,7 @@ from heavytop.exact.one_gap import Curve, gaps
 from heavytop.exact.reduced import polynomial
 from heavytop.exact.steklov import quadratics
 from heavytop.exact.validated import Validated
+from support.proofs import AsRounded, assert_algebraic_solves, assert_attitude
 
 F = Fraction
 # builder, B from and to, sign of the other number

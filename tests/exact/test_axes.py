@@ -3,7 +3,6 @@
 from fractions import Fraction
 
 import pytest
-from proofs import assert_attitude, assert_solves
 
 from heavytop.errors import NotInClass
 from heavytop.exact.axes import ALL, Renamed, inverse, renamed_state, renamed_top
@@ -14,6 +13,7 @@ from heavytop.exact.grioli import grioli_motion
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_attitude, assert_solves
 
 UNIT = (Fraction(2, 3), Fraction(-1, 3), Fraction(2, 3))
 STEKLOV = bobylev_steklov_motion(

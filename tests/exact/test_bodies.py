@@ -10,13 +10,13 @@ import pytest
 from flint import arb
 
 import heavytop as ht
-from full_tensor import integrate, rotation
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.balls import midpoint, radius
 from heavytop.exact.bodies import BodyMotion, resolve
 from heavytop.top.attitude import Attitude, multiplied, transposed
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.principal import IDENTITY, principal_axes
+from support.full_tensor import integrate, rotation
 
 BITS = 110
 TILTED = [["0.5", "0.1", "-0.05"], ["0.1", "0.7", "0.02"], ["-0.05", "0.02", "0.9"]]

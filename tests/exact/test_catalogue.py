@@ -4,12 +4,12 @@ import re
 from fractions import Fraction
 
 import pytest
-from proofs import assert_solves
 
 from heavytop.errors import InputError, OutOfReach
 from heavytop.exact.axes import ALL, Renamed, renamed_state, renamed_top
 from heavytop.exact.bobylev_steklov import BobylevSteklov, bobylev_steklov_motion
-from heavytop.exact.catalogue import find, matches
+from heavytop.exact.catalogue import find, matches, table
+from heavytop.exact.closed_form import ClosedForm
 from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.exact.dokshevich import Dokshevich
 from heavytop.exact.ershkov_partial import ErshkovPartial
@@ -30,6 +30,7 @@ from heavytop.exact.validated import Validated
 from heavytop.precision import round_to
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_solves
 
 F = Fraction
 UNIT = (F(2, 3), F(-1, 3), F(2, 3))
@@ -114,6 +115,24 @@ def test_the_validated_enclosure_agrees_to_fifty_digits_at_ten(case):
 def test_a_generic_motion_is_left_to_the_enclosure():
     top, start = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
     assert kind(find(top, start)) is Validated
+
+
+def test_no_class_is_tried_whose_conditions_fail(monkeypatch):
+    """The Kovalevskaya top's own constructor runs, and no other."""
+    tried = []
+    monkeypatch.setattr(ClosedForm, "__post_init__", lambda found: tried.append(type(found)))
+    sample = SAMPLES[Kovalevskaya]
+    find(sample.top, sample.start)
+    find(HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5")), State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5")))
+    assert tried == [Kovalevskaya]
+
+
+def test_the_table_of_the_classes_is_readable():
+    lines = table()
+    assert len({line[:2] for line in lines}) == len(lines) == 23
+    body = "I1 = I2 = 2 I3; P c = 0; P r != 0"
+    assert ("heavy_top", "Kovalevskaya", body, "gamma != 0; xi != 0") in lines
+    assert ("heavy_top", "Delone", body, "xi = 0") in lines
 
 
 UNIT_UP = F(2, 3), F(2, 3), F(1, 3)

@@ -9,7 +9,6 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from derivative_laws import BITS, SIX, chain, difference, holds, known, largest_radius, laws, of
 from flint import arb
 
 from heavytop.exact import derivatives as module
@@ -22,6 +21,7 @@ from heavytop.exact.step_derivatives import step_derivatives
 from heavytop.exact.validated import Validated
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
+from support.derivative_laws import BITS, SIX, chain, difference, holds, known, largest_radius, laws, of
 
 GENERIC = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 WITH_ROTOR = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"), rotor=("1/4", "-1/3", "2"))

@@ -9,15 +9,6 @@ from pathlib import Path
 
 import mpmath
 import pytest
-from elliptic_helpers import (
-    assert_same,
-    assert_solves_its_equations,
-    assert_starts_there,
-    in_balls,
-    positive,
-    rational,
-    vector,
-)
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass
@@ -30,6 +21,15 @@ from heavytop.exact.weierstrass import DegenerateLattice, Lattice
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from support.elliptic_helpers import (
+    assert_same,
+    assert_solves_its_equations,
+    assert_starts_there,
+    in_balls,
+    positive,
+    rational,
+    vector,
+)
 
 F = Fraction
 TINY = F(1, 10**30)

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 from flint import arb
-from proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import working_precision
 from heavytop.exact.euler import Euler
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text())
 TINY = Fraction(1, 10**30)

@@ -4,7 +4,6 @@ import random
 from fractions import Fraction
 
 import pytest
-from proofs import assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import NotInClass
 from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
@@ -12,6 +11,7 @@ from heavytop.exact.resting import Rest
 from heavytop.exact.validated import Validated
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_narrow, assert_solves, positive, rational
 
 F = Fraction
 UP = (F(0), F(0), F(1))
@@ -104,11 +104,11 @@ def test_what_is_outside_is_refused_with_the_test_that_failed():
     start = State(("3/4", "1/2", 0), UP)
     with pytest.raises(NotInClass, match="I1 - 4 I3 = -1"):
         GoryachevChaplygin(HeavyTop((3, 3, 1), 1, (1, 0, 0)), start)
-    with pytest.raises(NotInClass, match=r"P r = \(1, 0, 1\)"):
+    with pytest.raises(NotInClass, match="P c = 1"):
         GoryachevChaplygin(HeavyTop((4, 4, 1), 1, (1, 0, 1)), start)
     with pytest.raises(NotInClass, match="M·gamma = 1/7"):
         motion_from((F(1), F(0)), ("3/4", "1/2", "1/7"), UP)
-    with pytest.raises(NotInClass, match="gamma = 0"):
+    with pytest.raises(NotInClass, match=r"gamma = \(0, 0, 0\)"):
         motion_from((F(1), F(0)), ("3/4", "1/2", "1/7"), (0, 0, 0))
 
 

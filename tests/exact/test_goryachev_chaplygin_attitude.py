@@ -5,9 +5,8 @@ from fractions import Fraction
 import mpmath
 import pytest
 from flint import fmpq_mpoly_ctx
-from proofs import assert_attitude, assert_meets
-from test_goryachev_chaplygin import UP, motion_from, random_motion
 
+from exact.test_goryachev_chaplygin import UP, motion_from, random_motion
 from heavytop.errors import OutOfReach
 from heavytop.exact.attitude import attitude_of
 from heavytop.exact.axes import ALL, renamed_state, renamed_top
@@ -15,6 +14,7 @@ from heavytop.exact.balls import ball, working_precision
 from heavytop.exact.catalogue import find
 from heavytop.exact.goryachev_chaplygin import _motion
 from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude, Torus
+from support.proofs import assert_attitude, assert_meets
 
 F = Fraction
 PLAIN = motion_from((F(1), F(0)), ("3/2", 1, 0), UP)

@@ -7,7 +7,6 @@ from time import process_time
 
 import pytest
 from flint import acb, arb, arb_mat
-from proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
@@ -20,6 +19,7 @@ from heavytop.exact.validated import Validated
 from heavytop.measure.reference import reference
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State, dot
+from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 F = Fraction
 TOP = HeavyTop((8, 6, 3), 1, (1, 0, 2))
@@ -158,19 +158,19 @@ def test_the_cases_of_the_plans_are_of_the_class():
 def test_what_is_outside_is_refused_with_the_test_that_failed():
     start = State(("3/4", "1/2", -1), (0, 1, 0))
     for case in (Hess, HessPendulum):
-        with pytest.raises(NotInClass, match=r"P r = \(1, 1, 2\)"):
+        with pytest.raises(NotInClass, match="P b = 1"):
             case(HeavyTop((8, 6, 3), 1, (1, 1, 2)), start)
-        with pytest.raises(NotInClass, match="off by -20/3"):
+        with pytest.raises(NotInClass, match="the difference = -20/3"):
             case(HeavyTop((8, "17/3", 3), 1, (1, 0, 2)), start)
         with pytest.raises(NotInClass, match="M·P r = 3"):
             case(TOP, State(("9/8", "1/2", -1), (0, 1, 0)))
-        with pytest.raises(NotInClass, match="gamma = 0"):
+        with pytest.raises(NotInClass, match=r"gamma = \(0, 0, 0\)"):
             case(TOP, State(start.omega, (0, 0, 0)))
     with pytest.raises(NotInClass, match="M·gamma = 3"):
         HessPendulum(TOP, start)
     with pytest.raises(NotInClass, match="M·gamma = 0"):
         Hess(TOP, State(("3/4", 0, -1), (0, 1, 0)))
-    with pytest.raises(NotInClass, match="a pendulum's"):
+    with pytest.raises(NotInClass, match="off axis 2"):
         HessPendulum(TOP, State((0, 3, 0), (1, 0, 1)))
 
 

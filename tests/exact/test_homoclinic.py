@@ -12,7 +12,7 @@ from heavytop.exact.delone import DeloneHomoclinic
 from heavytop.exact.ershkov_partial import ErshkovPartial, hyperbolic, hyperbolic_angles
 from heavytop.top.angles import attitude_from_angles, gamma_from_angles, perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
-from helpers import VECTORS, positive
+from support.helpers import VECTORS, positive
 
 T, S = sympy.symbols("T S")
 

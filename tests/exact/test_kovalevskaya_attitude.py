@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
-from proofs import assert_attitude, assert_meets, positive, rational, triple
 
 from heavytop.errors import OutOfReach
 from heavytop.exact.attitude import attitude_of
@@ -16,6 +15,7 @@ from heavytop.exact.kovalevskaya import Kovalevskaya
 from heavytop.exact.kovalevskaya_attitude import along_gamma, level_vector
 from heavytop.exact.kovalevskaya_level import Level, start_of
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from support.proofs import assert_attitude, assert_meets, positive, rational, triple
 
 F = Fraction
 UP, TILTED, OTHER = (F(0), F(0), F(1)), (F(2, 7), F(3, 7), F(6, 7)), (F(2, 3), F(2, 3), F(1, 3))

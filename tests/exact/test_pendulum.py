@@ -5,11 +5,11 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
-from proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass
 from heavytop.exact.pendulum import Pendulum
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 TINY = Fraction(1, 10**30)
 
@@ -83,10 +83,15 @@ def test_the_independent_integration_agrees_to_fifty_digits():
 @pytest.mark.parametrize(
     ("omega", "gamma", "centre", "message"),
     [
-        ((1, 1, 0), (0, 0, 1), (0, 1, 0), r"Omega = \(1, 1, 0\) is not along a principal axis"),
-        ((1, 0, 0), ("3/5", 0, "4/5"), (0, 1, 0), r"gamma·e = 3/5 are not both 0"),
-        ((1, 0, 0), (0, 0, 1), ("1/7", 1, 0), r"P r·e = 1/7 and"),
-        ((0, 0, 0), ("3/5", 0, "4/5"), (0, 1, 0), r"At rest, .* = \(-4/5, 0, 3/5\) is not along a principal axis"),
+        ((1, 1, 0), (0, 0, 1), (0, 1, 0), r"along a principal axis, but I e x e = \(0, 0, 1\)"),
+        ((1, 0, 0), ("3/5", 0, "4/5"), (0, 1, 0), r"P r·e = 0, gamma·e = 3/5"),
+        ((1, 0, 0), (0, 0, 1), ("1/7", 1, 0), r"P r·e = 1/7, "),
+        (
+            (0, 0, 0),
+            ("3/5", 0, "4/5"),
+            (0, 1, 0),
+            r"at rest, along a principal axis, but I e x e = \(0, 3/2, 0\)",
+        ),
         ((1, 0, 0), (0, 0, 1), (0, 0, 0), r"P r != 0"),
     ],
 )

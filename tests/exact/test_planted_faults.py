@@ -5,12 +5,12 @@ from fractions import Fraction
 
 import pytest
 from flint import arb
-from proofs import assert_agrees, assert_attitude, assert_solves
 
 from heavytop.exact.axes import Renamed
 from heavytop.exact.balls import working_precision
 from heavytop.exact.euler import Euler
 from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_agrees, assert_attitude, assert_solves
 
 GAMMA = (Fraction(2, 3), Fraction(-1, 3), Fraction(2, 3))
 EULER = Euler(HeavyTop((3, 2, 1), 1, (0, 0, 0)), State((1, "1/2", "-1/3"), GAMMA))

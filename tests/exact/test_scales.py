@@ -6,8 +6,8 @@ from itertools import product
 from time import process_time
 
 import pytest
-from test_every_naming import MOTIONS
 
+from exact.test_every_naming import MOTIONS
 from heavytop.errors import OutOfReach
 from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.catalogue import find

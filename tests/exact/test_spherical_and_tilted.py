@@ -6,7 +6,6 @@ from itertools import product
 from time import process_time
 
 import pytest
-from proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
 
 from heavytop.errors import NotInClass
 from heavytop.exact.catalogue import find, matches
@@ -15,6 +14,7 @@ from heavytop.exact.pendulum import Pendulum
 from heavytop.exact.spherical import SphericalTop
 from heavytop.exact.validated import Validated
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from support.proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
 
 F = Fraction
 UNIT = (F(2, 3), F(-1, 3), F(2, 3))
@@ -136,14 +136,14 @@ def test_several_forms_of_one_motion_agree():
 def test_what_is_outside_is_refused_with_the_test_that_failed():
     with pytest.raises(NotInClass, match="I2 - I3 = 1/7"):
         SphericalTop(HeavyTop((2, 2, "13/7"), 1, (1, 2, 3)), State((1, 2, 3), UNIT))
-    with pytest.raises(NotInClass, match="P r = 0"):
+    with pytest.raises(NotInClass, match="P r != 0"):
         SphericalTop(HeavyTop((2, 2, 2), 0, (1, 2, 3)), State((1, 2, 3), UNIT))
     tilted = HeavyTop((2, 2, 1), 1, (4, -3, 1))
     gamma = (F(4), F(-3), F(2))
     assert Pendulum(tilted, State((3, 4, 0), gamma)).axis == (F(3, 4), 1, 0)
-    with pytest.raises(NotInClass, match=r"Omega = \(3, 4, 1/9\) is not along a principal axis"):
+    with pytest.raises(NotInClass, match="along a principal axis, but I e x e = "):
         Pendulum(tilted, State((3, 4, "1/9"), gamma))
-    with pytest.raises(NotInClass, match=r"P r·e = 0 and gamma·e = 1/4 are not both 0"):
+    with pytest.raises(NotInClass, match="P r·e = 0, gamma·e = 1/4"):
         Pendulum(tilted, State((3, 4, 0), (4, F(-11, 4), 2)))
-    with pytest.raises(NotInClass, match=r"torque gamma x P r = .* is not along a principal axis"):
+    with pytest.raises(NotInClass, match="the torque at rest, along a principal axis"):
         Pendulum(HeavyTop((2, 2, 1), 1, (1, 2, 3)), State((0, 0, 0), UNIT))

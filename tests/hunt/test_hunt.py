@@ -16,9 +16,9 @@ from heavytop.suite.hunt.draw import FAMILIES, MOST_TURNS, drawn, possible, turn
 from heavytop.suite.hunt.measured import Meter
 from heavytop.suite.hunt.shrink import digits
 from heavytop.suite.plan import expand, load
-from in_process import heavytop
+from support.in_process import heavytop
 
-FAULTS = Path(__file__).parents[1] / "hunted_integrators.py"
+FAULTS = Path(__file__).parents[1] / "support" / "hunted_integrators.py"
 NUMBERS = ("inertia", "centre", "omega", "gamma")
 
 
@@ -29,7 +29,7 @@ def numbers(found: dict[str, object]) -> list[Fraction]:
 @pytest.mark.parametrize("fault", ["branch", "rest"])
 def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # in this process: one of its own takes seconds to begin
-    monkeypatch.setitem(BUILT_IN, f"planted:{fault}", BuiltIn(f"hunted_integrators:{fault}"))
+    monkeypatch.setitem(BUILT_IN, f"planted:{fault}", BuiltIn(f"support.hunted_integrators:{fault}"))
     hunt = ht.hunt(f"planted:{fault}", budget=128, horizon=2)
     assert hunt.found
     worst = hunt.found[0]

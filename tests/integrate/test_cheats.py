@@ -11,7 +11,7 @@ from heavytop.kinds import KINDS, work_precision
 from heavytop.records import Row
 from heavytop.suite.cases import CASES
 from heavytop.suite.workers import rows as measured
-from reports import expand, load
+from support.reports import expand, load
 
 MODULE = '''
 import os

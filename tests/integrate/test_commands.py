@@ -29,7 +29,7 @@ from heavytop.suite.integrator_check import check
 from heavytop.top.equations import GYROSTAT
 from heavytop.written_numbers import number as written
 
-PROGRAM = Path(__file__).parents[1] / "faulty_program.py"
+PROGRAM = Path(__file__).parents[1] / "support" / "faulty_program.py"
 CASE = CASES["generic"]
 TIMES = [Fraction(1, 2), Fraction(1)]
 SLOW = "1"

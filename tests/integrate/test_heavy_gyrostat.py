@@ -30,7 +30,7 @@ from heavytop.precision import DOUBLE, exact, parse
 from heavytop.suite.cases import CASES
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State, cross
-from helpers import unit_vector, vector
+from support.helpers import unit_vector, vector
 
 F = Fraction
 CASE = CASES["heavy-gyrostat"]

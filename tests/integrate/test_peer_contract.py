@@ -21,8 +21,8 @@ from heavytop.records import Report
 from heavytop.report.junit import comparison_junit
 from heavytop.report.policy import Policy
 from heavytop.suite.cases import CASES
-from helpers import run_peer, without_progress
-from reports import all_good, compare, expand, html, load, measure, plan_of
+from support.helpers import run_peer, without_progress
+from support.reports import all_good, compare, expand, html, load, measure, plan_of
 
 CASE = CASES["euler"]
 TIMES = [Fraction(1, 2), Fraction(2)]

@@ -20,7 +20,7 @@ from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, QUAD, exact, real
 from heavytop.suite.cases import CASES
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
-from helpers import run_peer
+from support.helpers import run_peer
 
 TIMES = [Fraction(1, 3), Fraction(2), Fraction(5)]
 FINE = Fraction(1, 10**12)

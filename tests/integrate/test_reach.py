@@ -13,7 +13,7 @@ from heavytop.integrate import registry
 from heavytop.integrate.reach import MOST_STEPS, require_reach
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.top.rates import square_of_rate
-from reports import expand, load, rows
+from support.reports import expand, load, rows
 
 TOP = ht.HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 START = ht.State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))

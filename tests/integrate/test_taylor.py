@@ -16,7 +16,7 @@ from heavytop.top.angles import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State, dot
 from heavytop.top.times import check_times
-from helpers import VECTORS, start_of, top_of
+from support.helpers import VECTORS, start_of, top_of
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))

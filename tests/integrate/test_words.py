@@ -24,7 +24,7 @@ from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State, dot
 from heavytop.words import double_double, floating, recurrence
 from heavytop.words.machine import once
-from helpers import VECTORS, start_of, top_of, unit_vector
+from support.helpers import VECTORS, start_of, top_of, unit_vector
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))

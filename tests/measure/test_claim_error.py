@@ -14,7 +14,7 @@ from heavytop.kinds.claim_model import true_motion
 from heavytop.measure.claim_error import claim_attitude, exact_claim, model_error
 from heavytop.measure.computed_reference import ComputedReference, compute
 from heavytop.measure.parting import CLAIM_XI
-from helpers import VECTORS
+from support.helpers import VECTORS
 
 TWO = PartialCase(Fraction(1), Fraction(2), Fraction(1))
 SIX = PartialCase(Fraction(1), Fraction(6), Fraction(1))

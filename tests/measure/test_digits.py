@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-import in_process
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
 from heavytop.measure.truth import known_motion
@@ -18,8 +17,9 @@ from heavytop.report.overview import worst
 from heavytop.suite.cases import CASES
 from heavytop.suite.given import Given
 from heavytop.suite.score import score
-from report_helpers import error, row
-from reports import html, replace, summary
+from support import in_process
+from support.report_helpers import error, row
+from support.reports import html, replace, summary
 
 FULL = 53 * math.log10(2)
 TIMES = [Fraction(i) for i in range(1, 5)]

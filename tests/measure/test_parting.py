@@ -11,7 +11,7 @@ from heavytop.measure import parting as module
 from heavytop.measure.claim_error import exact_claim
 from heavytop.measure.parting import CLOSE, PARTED, parting, true_solution
 from heavytop.precision import exact
-from reports import expand, load, measure
+from support.reports import expand, load, measure
 
 HORIZON = Fraction(2)
 KNOWN = [(2, "smooth", 1, "0.2014"), (2, "printed", 1, "0.0100"), (2, "printed", -1, "0.2014")]

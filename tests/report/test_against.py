@@ -22,7 +22,7 @@ from heavytop.precision import DOUBLE
 from heavytop.records import Against
 from heavytop.report.against import weaker
 from heavytop.suite.cases import CASES
-from reports import expand, measure, plan_of
+from support.reports import expand, measure, plan_of
 
 ONE = Fraction(1)
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from heavytop.errors import InputError
 from heavytop.records import Law, Metric
 from heavytop.report.policy import Policy
-from reports import compare, store
-from small_reports import error, report, row
+from support.reports import compare, store
+from support.small_reports import error, report, row
 
 GOOD = report(
     row(laws={"drift_energy": Law("t^0.5", 64, 0.5, 0.4, 0.6)}),

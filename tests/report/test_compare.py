@@ -13,8 +13,8 @@ from heavytop.records import Against, Data, Law, Metric, Row, Series
 from heavytop.report.policy import Policy, Rule, Timings
 from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict, judge_seconds
-from reports import compare, replace, store
-from small_reports import error, report, row
+from support.reports import compare, replace, store
+from support.small_reports import error, report, row
 
 RESULTS = Path(__file__).parents[2] / "results"
 

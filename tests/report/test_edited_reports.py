@@ -6,14 +6,14 @@ from random import Random
 
 import pytest
 
-from edited_reports import EDITS, document_of, trials
 from heavytop.errors import InputError
 from heavytop.records import Against, Certified, Law, Metric, Row, Series
 from heavytop.report.laws import judge_law
 from heavytop.report.policy import Policy
 from heavytop.report.series import judge_series
-from reports import compare, contradictions, replace, store
-from small_reports import error, report, row
+from support.edited_reports import EDITS, document_of, trials
+from support.reports import compare, contradictions, replace, store
+from support.small_reports import error, report, row
 
 RESULTS = Path(__file__).parents[2] / "results"
 

@@ -10,7 +10,7 @@ from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Law, Metric, Report, Row, Series
 from heavytop.report import store
 from heavytop.report.brief import LINES, MOST_ROWS, WIDTH, brief, fitted
-from small_reports import error, row
+from support.small_reports import error, row
 
 RESULTS = Path(__file__).parents[2] / "results"
 

@@ -13,13 +13,13 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 
-import in_process
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.records import Report
 from heavytop.report.export import FORMATS, LOST, export
 from heavytop.report.names import row_name
-from reports import store
+from support import in_process
+from support.reports import store
 
 ROOT = Path(__file__).parents[2]
 

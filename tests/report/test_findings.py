@@ -7,9 +7,9 @@ from heavytop.precision import exact
 from heavytop.records import Against, Law, Row, Subject
 from heavytop.report.findings import MOST
 from heavytop.report.policy import Policy
-from report_helpers import error
-from reports import compare, replace
-from small_reports import report, row
+from support.report_helpers import error
+from support.reports import compare, replace
+from support.small_reports import report, row
 
 DIGITS = "solution_error_relative_max"
 

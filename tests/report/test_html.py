@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-import in_process
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.measure.digits import RELATIVE
@@ -19,8 +18,9 @@ from heavytop.report.html import MOST_ROWS
 from heavytop.report.policy import Policy
 from heavytop.report.section import MOST_PLOTS, Section, points
 from heavytop.report.svg import apart, decades, finish, new_axes
-from report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row, work
-from reports import compare, html, replace, store
+from support import in_process
+from support.report_helpers import HOSTILE, TIMES, claim_rows, error, full_report, power, row, work
+from support.reports import compare, html, replace, store
 
 RESULTS = Path(__file__).parents[2] / "results" / "default"
 

@@ -9,8 +9,8 @@ from heavytop.records import SCHEMA, Report, Series
 from heavytop.report.method_growth import alike, method_growth, trend
 from heavytop.report.policy import Policy
 from heavytop.report.svg import quiet_style
-from report_helpers import GROWTH, HOSTILE, LONG, WORK, law, method
-from reports import compare, comparison_page
+from support.report_helpers import GROWTH, HOSTILE, LONG, WORK, law, method
+from support.reports import compare, comparison_page
 
 T = numpy.array([float(time) for time in LONG])
 

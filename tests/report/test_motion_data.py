@@ -17,8 +17,8 @@ from heavytop.suite.cases import CASES
 from heavytop.suite.given import of_arrays
 from heavytop.suite.rows import data_of
 from heavytop.suite.score import score
-from reports import compare, expand, load, measure, replace, rows, store
-from small_reports import report, row
+from support.reports import compare, expand, load, measure, replace, rows, store
+from support.small_reports import report, row
 
 DATA = Data(("3", "2", "1/3"), "3/2", ("0", "1/5", "-1"), ("1/10", "0", "9/10"), ("3/5", "0", "-4/5"))
 NAMES = ("inertia", "weight", "centre", "omega", "gamma")

@@ -24,8 +24,8 @@ from heavytop.report.markdown import comparison_markdown
 from heavytop.report.policy import Policy
 from heavytop.report.section import logarithm
 from heavytop.report.text import table
-from reports import compare, comparison_page, history, replace, report_page, summary
-from small_reports import error, report, row
+from support.reports import compare, comparison_page, history, replace, report_page, summary
+from support.small_reports import error, report, row
 
 GOLDEN = Path(__file__).parent / "golden"
 HOSTILE = 'a | b <script>alert("1")</script>\n`x`\x01' + "y" * 10_000

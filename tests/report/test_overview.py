@@ -6,7 +6,7 @@ from rich.console import Console
 
 from heavytop.records import SCHEMA, Metric, Report
 from heavytop.report.overview import worst
-from reports import Row
+from support.reports import Row
 
 
 def row(index: int, value: str, log10: float | None, outcome: str = "success") -> Row:

@@ -21,8 +21,8 @@ from heavytop.report.score_page import score_page, score_report
 from heavytop.suite.cases import CASES
 from heavytop.suite.given import of_arrays
 from heavytop.suite.score import Assessment, assess
-from report_helpers import HOSTILE, error, full_report
-from reports import compare, history, html, replace, store
+from support.report_helpers import HOSTILE, error, full_report
+from support.reports import compare, history, html, replace, store
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")

@@ -10,7 +10,7 @@ from heavytop.errors import InputError
 from heavytop.records import Data, Law, Metric
 from heavytop.report import parquet
 from heavytop.report.parquet import COLUMNS, check_name, require_pyarrow, write
-from reports import Row
+from support.reports import Row
 
 pytest.importorskip("pyarrow")
 PLAN = {"name": "p", "sha256": "0" * 64}

@@ -9,8 +9,8 @@ from heavytop.precision import exact
 from heavytop.records import Law, Row
 from heavytop.report.policy import Policy, adjusted, load
 from heavytop.report.verdicts import Verdict
-from reports import compare, replace
-from small_reports import error, report, row
+from support.reports import compare, replace
+from support.small_reports import error, report, row
 
 
 def policy(tmp_path: Path, text: str) -> Policy:

@@ -8,8 +8,6 @@ from fractions import Fraction
 
 import pytest
 
-import degraded_integrators as degraded
-from degraded_integrators import HEALTHY, Method, marked_worse, report_of, verdict
 from heavytop.kinds import KINDS
 from heavytop.measure.reruns import some_of
 from heavytop.records import Against, Data, Metric, Quantity, Row, Series
@@ -18,8 +16,10 @@ from heavytop.report.policy import Policy, Rule
 from heavytop.report.rounding_bound import RoundingBound
 from heavytop.top.amplification import amplification
 from heavytop.top.equations import HEAVY_TOP, Parameters
-from reports import compare, replace
-from small_reports import error, report, row
+from support import degraded_integrators as degraded
+from support.degraded_integrators import HEALTHY, Method, marked_worse, report_of, verdict
+from support.reports import compare, replace
+from support.small_reports import error, report, row
 
 FREE = Data(("4", "2", "1"), "0", ("0", "0", "0"), ("3", "1/2", "1/3"), ("3/5", "0", "4/5"))
 UPRIGHT = Data(("1", "1", "1/2"), "1", ("0", "0", "1"), ("0", "0", "0"), ("0", "0", "1"))

@@ -9,8 +9,8 @@ from heavytop.kinds import work_precision
 from heavytop.measure.timed_calls import Repeats
 from heavytop.records import Row
 from heavytop.report.policy import Policy, Rule, Timings
-from reports import compare, expand, load, measure, replace, store
-from small_reports import report, row
+from support.reports import compare, expand, load, measure, replace, store
+from support.small_reports import report, row
 
 ENVIRONMENT = {
     "packages": {"heavytop": "1", "heyoka": "7"},

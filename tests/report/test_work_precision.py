@@ -14,7 +14,7 @@ from heavytop.report.pictures import draw_report
 from heavytop.report.svg import quiet_style
 from heavytop.report.work_plots import work_precision
 from heavytop.report.work_precision import Line, Point, beside_ours, leads, panels
-from reports import Row, summary
+from support.reports import Row, summary
 
 KIND = ("svg", "pdf")
 

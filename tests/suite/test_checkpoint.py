@@ -21,8 +21,9 @@ from heavytop.records import SCHEMA, Metric, Report
 from heavytop.suite import one_row
 from heavytop.suite.checkpoint import Checkpoint, Saved, locked
 from heavytop.suite.files import line
-from reports import Row, expand, load, measure, replace, store
+from support.reports import Row, expand, load, measure, replace, store
 
+SUPPORT = Path(__file__).parents[1] / "support"
 IDENTITY = {"plan name": "tiny", "heavytop": "0.1.0"}
 PLAN = """name = "tiny"
 [[measure]]
@@ -357,7 +358,7 @@ def test_a_kill_at_every_call_that_changes_the_disk_changes_nothing(tmp_path: Pa
     plan.write_text(PLAN.split("[[measure]]\nkind")[0] + '[[measure]]\nkind = "audit"\n'
                     'claims = ["ershkov-partial"]\nsystems = ["heavy_top", "gyrostat"]\n')  # fmt: skip
     done = subprocess.run(
-        [sys.executable, str(Path(__file__).with_name("killed_everywhere.py")), str(plan), str(tmp_path / "out")],
+        [sys.executable, str(SUPPORT / "killed_everywhere.py"), str(plan), str(tmp_path / "out")],
         capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

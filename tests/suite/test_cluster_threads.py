@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from reports import expand, load, rows
+from support.reports import expand, load, rows
 
 PLAN = """name = "threads"
 [[measure]]

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 import heavytop as ht
-import in_process
 from heavytop import former_names
 from heavytop.api.run_folder import prepare
 from heavytop.errors import InputError
@@ -20,7 +19,8 @@ from heavytop.report.policy import Policy
 from heavytop.report.store import DIGEST, FILE
 from heavytop.suite.files import line, verified
 from heavytop.suite.plan import former
-from reports import compare, plan_of, read_plan, store
+from support import in_process
+from support.reports import compare, plan_of, read_plan, store
 
 TOP = ht.HeavyTop(inertia=(3, 2, 1), weight=1, centre=("1/2", "1/3", "1/5"))
 START = ht.State(omega=("1/10", "2/5", "9/10"), gamma=("3/5", 0, "4/5"))

@@ -27,7 +27,7 @@ from heavytop.suite.starts import ensemble_of
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import cross
 from heavytop.top.integrals import holding
-from reports import compare, expand, load, measure, summary
+from support.reports import compare, expand, load, measure, summary
 
 CLASSES = ("euler", "lagrange", "kovalevskaya", "generic", "gyrostat")
 

@@ -9,7 +9,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.suite.plan import read
-from reports import measure
+from support.reports import measure
 
 PLAN = """
 name = "mine"

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from kills import TINY, kill_and_resume
+from support.kills import TINY, kill_and_resume
 
 
 def test_kills_change_nothing(tmp_path: Path) -> None:
-    """Two of them; ``python tests/suite/kills.py PLAN KILLS`` makes as many as one likes."""
+    """Two of them; ``python tests/support/kills.py PLAN KILLS`` makes as many as one likes."""
     plan = tmp_path / "kills.toml"
     plan.write_text(TINY)
     runs = kill_and_resume(str(plan), 2)

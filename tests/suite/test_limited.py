@@ -19,10 +19,10 @@ from heavytop.kinds import KINDS
 from heavytop.report.policy import Policy
 from heavytop.suite.limited import RowLimits
 from heavytop.suite.plan import read
-from helpers import without_progress
-from reports import all_good, compare, rows
+from support.helpers import without_progress
+from support.reports import all_good, compare, rows
 
-PROGRAM = Path(__file__).parents[1] / "faulty_program.py"
+PROGRAM = Path(__file__).parents[1] / "support" / "faulty_program.py"
 MODULE = """
 import os, re, subprocess, time
 from pathlib import Path

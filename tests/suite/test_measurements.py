@@ -10,7 +10,7 @@ from heavytop.integrate import reach
 from heavytop.kinds.break_away_law import break_away_law
 from heavytop.precision import time_text
 from heavytop.suite.task import Task
-from reports import expand, load, measure
+from support.reports import expand, load, measure
 
 TASKS = expand(load("default")[0])
 

@@ -11,9 +11,9 @@ from heavytop.errors import InputError
 from heavytop.suite.cases import CASES, case
 from heavytop.suite.plan import BUILT_IN, warnings
 from heavytop.suite.sampling import log_spaced
-from reports import expand, load
-from reports import plan_of as plan_from
-from reports import read_plan as read
+from support.reports import expand, load
+from support.reports import plan_of as plan_from
+from support.reports import read_plan as read
 
 MEASURE = '[[measure]]\nkind = "drift"\ncases = ["euler"]\nruns = [{ precision = "double", horizon = "10" }]\n'
 TOP = (

@@ -11,7 +11,7 @@ from heavytop.precision import decimal_text, exact
 from heavytop.records import SCHEMA, Report, Row, Series
 from heavytop.report.policy import Policy
 from heavytop.report.verdicts import Verdict
-from reports import compare, contradictions, expand, measure, plan_of, replace
+from support.reports import compare, contradictions, expand, measure, plan_of, replace
 
 PLAN = plan_of(
     {

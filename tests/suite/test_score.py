@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import in_process
 from heavytop.errors import InputError
 from heavytop.integrate.taylor import propagate
 from heavytop.measure.motion import compute
@@ -20,6 +19,7 @@ from heavytop.suite.cases import CASES
 from heavytop.suite.score import digits_kept, score
 from heavytop.suite.trajectory_file import read
 from heavytop.top.equations import HEAVY_TOP
+from support import in_process
 
 DOCS = Path(__file__).parents[2] / "docs"
 LAGRANGE = CASES["lagrange"]

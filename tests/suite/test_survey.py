@@ -10,11 +10,11 @@ from random import Random as Dice
 
 import numpy
 import pytest
-from tests.in_process import heavytop
 
 import heavytop as ht
 from heavytop.errors import Contradiction, InputError
 from heavytop.integrate.ensemble import propagate_ensemble
+from heavytop.integrate.pair_arrays import Pairs
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds import KINDS
 from heavytop.measure.integrator import Integrator
@@ -24,8 +24,8 @@ from heavytop.precision import DOUBLE, exact
 from heavytop.suite.plan import read
 from heavytop.suite.survey import measured as records
 from heavytop.suite.survey.drawn import chunks, drawn
-from heavytop.suite.survey.pairs import Pairs
 from heavytop.suite.sweeps import Grid, Random
+from support.in_process import heavytop
 
 TIMES = [Fraction(n) for n in (1, 2, 3)]
 SWEEP = """
@@ -98,7 +98,7 @@ def test_a_grid_is_drawn_as_its_cases() -> None:
     sweep = Grid(name="g", inertia=["3", "2", "1"], weight="1", centre=axis, omega=omega, gamma=axis)  # type: ignore[arg-type]
     cases = sweep.cases()
     motions = drawn(chunks(sweep, cases, 0), DOUBLE)
-    assert motions.problems == [Problem.of(case.top, case.start, DOUBLE) for case in cases]
+    assert list(motions.problems) == [Problem.of(case.top, case.start, DOUBLE) for case in cases]
 
 
 def test_a_reference_that_is_off_is_a_contradiction(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from heavytop.exact.catalogue import find
 from heavytop.kinds import KINDS
 from heavytop.suite.sweeps import Random
 from heavytop.top.heavy_top import dot
-from reports import expand, load, rows
+from support.reports import expand, load, rows
 
 GRID = """[[sweep]]
 kind = "grid"

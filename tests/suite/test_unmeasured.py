@@ -8,9 +8,9 @@ from heavytop.errors import Contradiction, InputError, OutOfReach
 from heavytop.measure import truth
 from heavytop.report.policy import Policy
 from heavytop.suite.rows import unmeasured
-from helpers import without_progress
-from in_process import heavytop
-from reports import all_good, compare, expand, load, replace, rows, store
+from support.helpers import without_progress
+from support.in_process import heavytop
+from support.reports import all_good, compare, expand, load, replace, rows, store
 
 PLAN = """name = "far"
 [[measure]]

@@ -18,7 +18,7 @@ from heavytop.report.method_growth import trend
 from heavytop.report.policy import Policy
 from heavytop.report.work_precision import panels
 from heavytop.suite.cases import CASES
-from reports import compare, expand, load, measure
+from support.reports import compare, expand, load, measure
 
 HEAD = 'name = "p"\n[[measure]]\nkind = "work_precision"\n'
 

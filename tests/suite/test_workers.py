@@ -24,7 +24,7 @@ from heavytop.records import Row
 from heavytop.report.consistency import contradictions
 from heavytop.suite import workers
 from heavytop.suite.task import Task
-from reports import expand, load, rows
+from support.reports import expand, load, rows
 
 PLAN = """name = "tiny"
 [[measure]]

@@ -17,7 +17,7 @@ from heavytop.top.angles import (
     unwrap,
 )
 from heavytop.top.heavy_top import cross, dot
-from helpers import unit_vector
+from support.helpers import unit_vector
 
 
 def test_the_angles_come_back_from_gamma_and_xi() -> None:

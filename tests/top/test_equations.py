@@ -12,7 +12,7 @@ from heavytop.exact.balls import ball, working_precision
 from heavytop.integrate.engines import expressions
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, Parameters
 from heavytop.top.heavy_top import HeavyTop, State, cross
-from helpers import fraction, positive, unit_vector, vector
+from support.helpers import fraction, positive, unit_vector, vector
 
 
 def random_problem(random: Random):

@@ -24,7 +24,7 @@ from heavytop.top.equations import (
 from heavytop.top.heavy_top import HeavyTop, State, cross, data_texts, dot, require_physical
 from heavytop.top.integrals import area_with_rotor, holding, kovalevskaya_yehia, largest, sretensky
 from heavytop.top.rates import square_of_rate
-from helpers import fraction, positive, unit_vector, vector
+from support.helpers import fraction, positive, unit_vector, vector
 
 STARTS = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
 

@@ -8,7 +8,7 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
 from heavytop.top.heavy_top import HeavyTop, State, dot, require_physical
-from helpers import unit_vector, vector
+from support.helpers import unit_vector, vector
 
 
 def test_numbers_of_every_kind_are_taken_exactly() -> None:

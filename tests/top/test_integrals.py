@@ -11,7 +11,7 @@ from heavytop.top import equations
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
 from heavytop.top.integrals import holding
-from helpers import fraction, positive, unit_vector, vector
+from support.helpers import fraction, positive, unit_vector, vector
 
 
 def rational(value) -> fmpq:

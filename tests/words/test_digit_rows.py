@@ -8,7 +8,6 @@ from typing import Any
 import numpy
 import pytest
 from llvmlite import ir
-from words_helpers import LEVELS, problem
 
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.words import digit_rows, digit_sums
@@ -22,6 +21,7 @@ from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
 from heavytop.words.vector import INT, INT_POINTER, LANES, POINTER, function
 from heavytop.words.whole import Whole
+from support.words_helpers import LEVELS, problem
 
 LARGEST = 2**23 + 4
 

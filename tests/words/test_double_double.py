@@ -13,7 +13,6 @@ from random import Random
 import numpy
 import pytest
 from llvmlite import ir
-from words_helpers import LEVELS, problem
 
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.words import double_double as dd
@@ -24,6 +23,7 @@ from heavytop.words.pairs import by_constant, log2, power_of_two, split, split_c
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
 from heavytop.words.vector import DOUBLE, POINTER, function
+from support.words_helpers import LEVELS, problem
 
 HERE = str(Path(__file__).parent)
 FINEST, COARSE = Fraction(1, 2**105), Fraction(1, 10**16)

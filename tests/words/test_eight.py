@@ -3,14 +3,14 @@
 from fractions import Fraction
 
 import pytest
-from words_helpers import LEVELS
 
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.words.eight import Eight, exact_state
 from heavytop.words.floating import FALL_IN_LANES, Floating, Ladder
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
-from helpers import rotor
+from support.helpers import rotor
+from support.words_helpers import LEVELS
 
 FINE = Ladder.of(Fraction(1, 2**105), FALL_IN_LANES)
 SPAN = Fraction(20)

@@ -7,7 +7,6 @@ from random import Random
 import numpy
 import pytest
 from llvmlite import ir
-from words_helpers import LEVELS, problem
 
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.words import fixed, kernels
@@ -19,6 +18,7 @@ from heavytop.words.machine import DOUBLES, Machine, compiled, doubles, once, po
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
 from heavytop.words.vector import INT, POINTER, function
+from support.words_helpers import LEVELS, problem
 
 HORIZON = 2
 WRONG_ULP = 1e6

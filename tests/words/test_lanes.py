@@ -8,7 +8,7 @@ import pytest
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.words.lanes import coefficients, rates
 from heavytop.words.scaled import Scaled
-from helpers import fraction, positive, rotor, vector
+from support.helpers import fraction, positive, rotor, vector
 
 
 @pytest.mark.parametrize("system", [HEAVY_TOP, GYROSTAT, HEAVY_GYROSTAT], ids=lambda system: system.name)

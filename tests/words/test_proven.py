@@ -6,7 +6,6 @@ from random import Random
 
 import numpy
 import pytest
-from words_helpers import LEVELS
 
 from heavytop.exact.scaled_motion import ScaledMotion
 from heavytop.exact.step_series import lacking
@@ -17,7 +16,8 @@ from heavytop.words.kernels import Grid
 from heavytop.words.lanes import LEFT, RIGHT
 from heavytop.words.machine import doubles, pointer
 from heavytop.words.proven import Carrier
-from helpers import rotor
+from support.helpers import rotor
+from support.words_helpers import LEVELS
 
 
 def some_motion(random: Random, system=HEAVY_TOP, attitude: bool = False, decades: int = 0) -> ScaledMotion:

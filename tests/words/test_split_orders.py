@@ -6,7 +6,6 @@ from math import floor
 from random import Random
 
 import pytest
-from words_helpers import problem
 
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.words import double_double as dd
@@ -16,7 +15,8 @@ from heavytop.words.floating import Floating, Ladder
 from heavytop.words.recurrence import MOST_ORDER
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
-from helpers import rotor
+from support.helpers import rotor
+from support.words_helpers import problem
 
 FINE = Ladder.of(Fraction(1, 2**70))
 ALL_PAIRS = replace(FINE, depth=-1000.0)

@@ -4,7 +4,6 @@ from fractions import Fraction
 from random import Random
 
 import pytest
-from words_helpers import problem
 
 from heavytop.exact.balls import midpoint
 from heavytop.exact.validated import Validated
@@ -17,7 +16,8 @@ from heavytop.words.lanes import rates
 from heavytop.words.run import Status
 from heavytop.words.scaled import Scaled
 from heavytop.words.whole import Whole, field_of
-from helpers import fraction, positive, rotor, vector
+from support.helpers import fraction, positive, rotor, vector
+from support.words_helpers import problem
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 START = State(("1/8", "3/8", "7/8"), ("5/8", 0, "3/4"))

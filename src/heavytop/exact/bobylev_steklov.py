@@ -21,10 +21,11 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import InputError, NotInClass
+from heavytop.errors import InputError
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.bobylev_steklov_attitude import carried, prepared_axis
 from heavytop.exact.closed_form import ClosedForm, balls, half_angle, instant, rotate, series_length, sign
+from heavytop.exact.conditions import ON_AXIS_1, Condition
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.lagrange import across
 from heavytop.exact.motion import initial_xi, kept
@@ -34,27 +35,20 @@ from heavytop.top.equations import heavy_top
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
 
+def _off(top: HeavyTop, start: State) -> tuple[Fraction]:
+    return (top.moment[0] * start.gamma[2] - top.inertia[2] * start.omega[0] * start.omega[2],)
+
+
 @dataclass(frozen=True, slots=True)
 class BobylevSteklov(ClosedForm):
     """Every Bobylev-Steklov motion with r on axis 1 and I1 = 2 I3.  Raises NotInClass where an equality fails."""
 
     method = "closed form: Bobylev-Steklov, Jacobi functions"
-
-    def __post_init__(self) -> None:
-        (i1, _, i3), n = self.top.inertia, self.top.moment
-        p, w2, w3 = self.start.omega
-        remedy = "`bobylev_steklov_motion` builds a top with such a motion."
-        if n[0] == 0 or n[1] != 0 or n[2] != 0:
-            raise NotInClass(
-                f"Bobylev-Steklov needs r on axis 1, P r != 0; P r = ({', '.join(map(shown, n))}).", remedy
-            )
-        if i1 != 2 * i3:
-            raise NotInClass(f"Bobylev-Steklov needs I1 = 2 I3, but I1 - 2 I3 = {shown(i1 - 2 * i3)}.", remedy)
-        if w2 != 0:
-            raise NotInClass(f"Bobylev-Steklov needs Omega2 = 0, but Omega2 = {shown(w2)}.", remedy)
-        off = n[0] * self.start.gamma[2] - i3 * p * w3
-        if off != 0:
-            raise NotInClass(f"P a gamma3 - I3 Omega1 Omega3 = {shown(off)}, not 0.", remedy)
+    body = *ON_AXIS_1, Condition("I1 = 2 I3", "I1 - 2 I3", lambda top, _: (top.inertia[0] - 2 * top.inertia[2],))
+    starts = (
+        Condition("Omega2 = 0", "Omega2", lambda _, start: start.omega[1:2]),
+        Condition("P a gamma3 = I3 Omega1 Omega3", "P a gamma3 - I3 Omega1 Omega3", _off),
+    )
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""

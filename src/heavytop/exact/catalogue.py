@@ -2,7 +2,8 @@
 
 Constants first, then elementary functions, then elliptic and hyperelliptic ones; the validated enclosure for
 every other motion.
-Each case class makes its own test: its constructor raises NotInClass, saying which equality failed and by how much.
+A class is found by its exact conditions, first on the body and then on the start (:mod:`heavytop.exact.conditions`);
+:func:`table` writes them down.  Its constructor makes the same test, and raises NotInClass with what fails.
 """
 
 from __future__ import annotations
@@ -10,17 +11,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 
 from flint import arb
 
-from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
+from heavytop.errors import LevelNotDone, OutOfReach
 from heavytop.exact.axes import ALL, CYCLIC, Axes, Renamed, inverse, renamed_state, renamed_top
 from heavytop.exact.bobylev_steklov import BobylevSteklov
+from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.conditions import Conditions, equilibrium, hold
 from heavytop.exact.delone import Delone, DeloneHomoclinic
 from heavytop.exact.dokshevich import Dokshevich
 from heavytop.exact.ershkov_partial import ErshkovPartial
 from heavytop.exact.euler import Euler
-from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin, Sretensky
 from heavytop.exact.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.grioli import Grioli
 from heavytop.exact.gyrostat import Gyrostat
@@ -37,40 +41,10 @@ from heavytop.exact.staude import Staude
 from heavytop.exact.steklov import Steklov
 from heavytop.exact.validated import Validated
 from heavytop.exact.zhukovsky_volterra import ZhukovskyVolterra
-from heavytop.precision import shown
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 
-Case = Callable[[HeavyTop, State], ExactSolution]
-
 _KEEP: tuple[Axes, ...] = ALL[:1]
-
-
-def _delone_homoclinic(top: HeavyTop, start: State) -> ExactSolution:
-    return _same(DeloneHomoclinic(start.omega[2] / 2, top.inertia[0]), top, start)
-
-
-def _ershkov_partial(top: HeavyTop, start: State) -> ExactSolution:
-    i1, _, i3 = top.inertia
-    return _same(ErshkovPartial(start.omega[2] * i3 / i1, i1, i3), top, start)
-
-
-def _same(found: ExactSolution, top: HeavyTop, start: State) -> ExactSolution:
-    """The motion found; raises NotInClass unless its top and start are these, exactly."""
-    if (found.top, found.start) != (top, start):
-        raise NotInClass(
-            f"{found.method} is of another top or start.",
-            f"It starts from ({', '.join(map(shown, found.start.flat))}).",
-        )
-    return found
-
-
-def _permanent_gyrostat(top: HeavyTop, start: State) -> ExactSolution:
-    return Staude(top, start, GYROSTAT)
-
-
-def _permanent_heavy_gyrostat(top: HeavyTop, start: State) -> ExactSolution:
-    return Staude(top, start, HEAVY_GYROSTAT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,37 +79,71 @@ class OnLevel(Validated):
             raise OutOfReach(f"{error.cause} {self.level}", error.remedy) from error
 
 
-# the case, and the namings of the axes under which it looks different
-_HEAVY_TOP: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
-    (Staude, _KEEP),
-    (Grioli, CYCLIC),
-    (_delone_homoclinic, ALL),
-    (Euler, _KEEP),
-    (Pendulum, _KEEP),
-    (Lagrange, CYCLIC),
-    (SphericalTop, _KEEP),
-    (BobylevSteklov, ALL),
-    (HessPendulum, CYCLIC),
-    (Delone, CYCLIC),
-    (Steklov, CYCLIC),
-    (Dokshevich, CYCLIC),
-    (Hess, CYCLIC),
-    (Kovalevskaya, CYCLIC),
-    (GoryachevChaplyginRest, CYCLIC),
-    (GoryachevChaplygin, CYCLIC),
-)
-_GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
-    (_permanent_gyrostat, _KEEP),
-    (_ershkov_partial, _KEEP),
-    (Gyrostat.of, _KEEP),
-)
+@dataclass(frozen=True, slots=True)
+class Class:
+    """A class of motions: exact conditions on the body, on the start, and what makes the closed form of one.
 
-_HEAVY_GYROSTAT: tuple[tuple[Case, tuple[Axes, ...]], ...] = (
-    (_permanent_heavy_gyrostat, _KEEP),
-    (LagrangeGyrostat, CYCLIC),
-    (ZhukovskyVolterra, _KEEP),
-)
-_CASES = {HEAVY_TOP.name: _HEAVY_TOP, GYROSTAT.name: _GYROSTAT, HEAVY_GYROSTAT.name: _HEAVY_GYROSTAT}
+    namings: of the axes, under which the class looks different.
+    """
+
+    name: str
+    body: Conditions
+    starts: Conditions
+    build: Callable[[HeavyTop, State], ExactSolution]
+    namings: tuple[Axes, ...]
+
+    @classmethod
+    def of(cls, case: type[ClosedForm], namings: tuple[Axes, ...]) -> Class:
+        """By the case's own conditions and constructor."""
+        return cls(case.__name__, case.body, case.starts, case, namings)
+
+
+def _steady(system: System) -> Class:
+    return Class("Staude", (), (equilibrium(system),), partial(Staude, system=system), _KEEP)
+
+
+# the simplest forms first
+_CLASSES: dict[str, tuple[Class, ...]] = {
+    HEAVY_TOP.name: (
+        _steady(HEAVY_TOP),
+        Class.of(Grioli, CYCLIC),
+        Class("DeloneHomoclinic", DeloneHomoclinic.body, DeloneHomoclinic.starts, DeloneHomoclinic.of, ALL),
+        Class.of(Euler, _KEEP),
+        Class.of(Pendulum, _KEEP),
+        Class.of(Lagrange, CYCLIC),
+        Class.of(SphericalTop, _KEEP),
+        Class.of(BobylevSteklov, ALL),
+        Class.of(HessPendulum, CYCLIC),
+        Class.of(Delone, CYCLIC),
+        Class.of(Steklov, CYCLIC),
+        Class.of(Dokshevich, CYCLIC),
+        Class.of(Hess, CYCLIC),
+        Class.of(Kovalevskaya, CYCLIC),
+        Class.of(GoryachevChaplyginRest, CYCLIC),
+        Class.of(GoryachevChaplygin, CYCLIC),
+    ),
+    GYROSTAT.name: (
+        _steady(GYROSTAT),
+        Class("ErshkovPartial", ErshkovPartial.body, ErshkovPartial.starts, ErshkovPartial.of, _KEEP),
+        Class("Gyrostat", (), (), Gyrostat.of, _KEEP),
+    ),
+    HEAVY_GYROSTAT.name: (
+        _steady(HEAVY_GYROSTAT),
+        Class.of(LagrangeGyrostat, CYCLIC),
+        Class.of(ZhukovskyVolterra, _KEEP),
+        Class.of(Sretensky, CYCLIC),
+    ),
+}
+
+
+def table() -> list[tuple[str, str, str, str]]:
+    """A line a class, in the order of trial: system, class, conditions on the body, conditions on the start."""
+
+    def text(conditions: Conditions) -> str:
+        return "; ".join(each.text for each in conditions) or "any"
+
+    rows = [(system, each) for system, classes in _CLASSES.items() for each in classes]
+    return [(system, each.name, text(each.body), text(each.starts)) for system, each in rows]
 
 
 def matches(top: HeavyTop, start: State, system: System = HEAVY_TOP) -> Iterator[ExactSolution]:
@@ -150,14 +158,15 @@ def _attempts(top: HeavyTop, start: State, system: System) -> Iterator[ExactSolu
     """:func:`matches`, and why there is none where a class has the motion but does not cover its level."""
     require_handy(top, start)
     system.parameters(top, start)
-    for case, namings in _CASES[system.name]:
-        for axes in namings:
-            try:
-                found = case(renamed_top(top, axes), renamed_state(start, axes))
-            except LevelNotDone as error:
-                yield LevelNotDone(f"{getattr(case, '__name__', '')}: {error.cause}", error.remedy)
+    for each in _CLASSES[system.name]:
+        for axes in each.namings:
+            named, begun = renamed_top(top, axes), renamed_state(start, axes)
+            if not (hold(each.body, named, begun) and hold(each.starts, named, begun)):
                 continue
-            except NotInClass:
+            try:
+                found = each.build(named, begun)
+            except LevelNotDone as error:
+                yield LevelNotDone(f"{each.name}: {error.cause}", error.remedy)
                 continue
             yield found if axes == _KEEP[0] else Renamed(found, inverse(axes))
             break

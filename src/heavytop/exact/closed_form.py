@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 from flint import acb, acb_series, arb, arb_series
 
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
+from heavytop.exact.conditions import Conditions, require
 from heavytop.exact.flint_context import coefficient, current_length
 from heavytop.exact.flint_context import series_length as series_length
 from heavytop.exact.motion import initial_xi
@@ -109,15 +110,21 @@ class Evaluated(ABC):
 
 @dataclass(frozen=True, slots=True)
 class ClosedForm(Evaluated):
-    """The motion of ``top`` from ``start``; the dataclass of each case brings ``method``, and its tests.
+    """The motion of ``top`` from ``start``; the dataclass of each case brings ``method`` and its conditions.
 
+    body, starts: exact conditions on the top and on the start; the constructor raises NotInClass where one fails.
     made: what :func:`heavytop.exact.motion.kept` keeps.
     """
 
     top: HeavyTop
     start: State
     method: ClassVar[str]
+    body: ClassVar[Conditions] = ()
+    starts: ClassVar[Conditions] = ()
     made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        require(type(self).__name__, (*self.body, *self.starts), self.top, self.start)
 
     @property
     def system(self) -> System:

@@ -38,6 +38,7 @@ from heavytop.errors import NotInClass
 from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, WithAngles, balls, constant, instant, series_length, tanh_sech
+from heavytop.exact.conditions import XI, Condition, apart, plane_top, positive
 from heavytop.exact.delone_attitude import DeloneAzimuth
 from heavytop.exact.flint_context import current_length
 from heavytop.exact.kovalevskaya_level import Level
@@ -46,7 +47,6 @@ from heavytop.exact.quartic import PreparedMotion, QuarticMotion
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.integrals import kovalevskaya_xi
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,20 +57,8 @@ class Delone(WithBearing, ClosedForm):
     """
 
     method = "closed form: Delone class of the Kovalevskaya top, Weierstrass functions"
-
-    def __post_init__(self) -> None:
-        (i1, i2, i3), (n1, n2, n3) = self.top.inertia, self.top.moment
-        remedy = "The class is I1 = I2 = 2 I3, c = 0, (Omega1 + i Omega2)^2 = (P/I3) (a + ib) (gamma1 + i gamma2)."
-        if i1 != i2 or i1 != 2 * i3:
-            differences = f"I1 - I2 = {shown(i1 - i2)}, I1 - 2 I3 = {shown(i1 - 2 * i3)}"
-            raise NotInClass(f"Delone needs I1 = I2 = 2 I3; {differences}.", remedy)
-        if n3 != 0 or n1 == n2 == 0:
-            raise NotInClass(
-                f"Delone needs P c = 0 and P r != 0, but P r = ({', '.join(map(shown, (n1, n2, n3)))}).", remedy
-            )
-        xi = kovalevskaya_xi(HEAVY_TOP.parameters(self.top, self.start), self.start.flat, (0, 1, 2))
-        if any(xi):
-            raise NotInClass(f"Delone needs xi = 0, but xi = {shown(xi[0])} + i ({shown(xi[1])}).", remedy)
+    body = plane_top(2)
+    starts = (XI,)
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -150,10 +138,24 @@ class DeloneHomoclinic(WithAngles):
     i1: Fraction
     method = "closed form: Delone homoclinic"
     system = HEAVY_TOP
+    body = plane_top(2)
+    starts = (
+        Condition("Omega3 > 0", "Omega3", lambda _, start: start.omega[2:], positive),
+        Condition(
+            "the top and start of alpha = Omega3/2",
+            "the difference",
+            lambda top, start: apart(DeloneHomoclinic.of(top, start), top, start),
+        ),
+    )
 
     def __post_init__(self) -> None:
         if self.alpha <= 0 or self.i1 <= 0:
             raise NotInClass(f"alpha = {shown(self.alpha)}, I1 = {shown(self.i1)}.", "Both must be positive.")
+
+    @classmethod
+    def of(cls, top: HeavyTop, start: State) -> DeloneHomoclinic:
+        """The motion with this I1 and Ω3."""
+        return cls(start.omega[2] / 2, top.inertia[0])
 
     @property
     def top(self) -> HeavyTop:

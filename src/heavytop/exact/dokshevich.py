@@ -27,11 +27,12 @@ from typing import Any
 
 from flint import acb, arb, arb_series
 
-from heavytop.errors import InputError, NotInClass
+from heavytop.errors import InputError
 from heavytop.exact.abel import Inversion
 from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
 from heavytop.exact.balls import Undecided, ball, midpoint, to_bits
 from heavytop.exact.closed_form import ClosedForm, sign
+from heavytop.exact.conditions import HESS, IN_PLANE_13, NOT_ACROSS_CENTRE, Condition, differ, positive
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import Gap, Roots
 from heavytop.exact.motion import kept
@@ -195,42 +196,17 @@ class _Moving(WithBearing):
         return time * Fraction(2) ** (exponent(_data(self)[3]) // 2)
 
 
-@dataclass(frozen=True, slots=True)
-class Dokshevich(_Moving, ClosedForm):
-    """A motion of Dokshevich with exact data; S is rational then.
-
-    Raises NotInClass unless top and start satisfy the equalities above exactly.
-    """
-
-    method = "closed form: Dokshevich, inversion of an elliptic integral"
-
-    def __post_init__(self) -> None:
-        _require(self.top, self.start)
-        _require_reach(self)
-
-
 Data = tuple[Vector, Fraction, _Constants, Fraction]
 """(I1, I2, I3), n1²/|n|², the constants, and β² B: exact where S is rational, else the last two are not used."""
 
 
 def _numbers(top: HeavyTop) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
-    """(|n|², β, a, b, ε): e3 = ε times axis 2; raises NotInClass for what is no Hess top."""
-    (i1, i2, i3), (n1, n2, n3) = top.inertia, top.moment
-    if n2 != 0 or n1 == 0 or n3 == 0:
-        raise NotInClass(
-            f"Dokshevich needs P b = 0, P a != 0, P c != 0; P r = ({', '.join(map(shown, (n1, n2, n3)))}).",
-            "Rename the axes if need be.",
-        )
-    off = i1 * (i2 - i3) * n1 * n1 - i3 * (i1 - i2) * n3 * n3
-    if off != 0:
-        raise NotInClass(f"I1 (I2 - I3) a^2 - I3 (I1 - I2) c^2 = {shown(off)} times P^2, not 0.", _REMEDY)
+    """(|n|², β, a, b, ε): e3 = ε times axis 2."""
+    (i1, i2, i3), (n1, _, n3) = top.inertia, top.moment
     square = n1 * n1 + n3 * n3
     skew = n1 * n3 * (1 / i1 - 1 / i3) / square
-    if skew == 0:
-        raise NotInClass("All moments of inertia are equal.", _REMEDY)
-    turned = Fraction(sign(skew))
     along = (n1 * n1 / i1 + n3 * n3 / i3) / square
-    return square, abs(skew), along / abs(skew), 1 / (i2 * abs(skew)), turned
+    return square, abs(skew), along / abs(skew), 1 / (i2 * abs(skew)), Fraction(sign(skew))
 
 
 def _rational_root(square: Fraction) -> Fraction | None:
@@ -240,38 +216,80 @@ def _rational_root(square: Fraction) -> Fraction | None:
     return root if root * root == square else None
 
 
-def _require(top: HeavyTop, start: State) -> tuple[Data, Fraction, Fraction, Fraction]:
-    """The data, and |n|² , X = M·n and Z = M·e3 at the start; raises NotInClass where an equality fails."""
-    square, skew, a, b, turned = _numbers(top)
-    momentum, n, gamma = top.angular_momentum(start.omega), top.moment, start.gamma
-    side: Vector = (turned * n[2], Fraction(0), -turned * n[0])  # e2 times |n|
-    x, y, z = dot(momentum, n), dot(momentum, side), turned * momentum[1]
-    if x == 0:
-        raise NotInClass("M·r = 0 at the start, which is Hess' own motion.", _REMEDY)
-    root = _rational_root(a * a - a * b + b * b + 3)
-    if root is None:
-        raise NotInClass("a^2 - ab + b^2 + 3 is the square of no rational number: the start would not be one.", _REMEDY)
-    c = _Constants(a, b, root)
-    unit = (x * y - c.slope * x * x) / square  # B
-    if unit <= 0 or c.lead >= 0:
-        raise NotInClass(f"B = x y - A x^2 = {shown(unit)} is not positive.", _REMEDY)
+def _root_square(top: HeavyTop, _start: State) -> tuple[Fraction]:
+    """S²."""
+    _, _, a, b, _ = _numbers(top)
+    return (a * a - a * b + b * b + 3,)
+
+
+def _has_root(values: Sequence[Fraction]) -> bool:
+    return _rational_root(values[0]) is not None
+
+
+def _constants(top: HeavyTop) -> _Constants:
+    """Of a top with rational S."""
+    _, _, a, b, _ = _numbers(top)
+    return _Constants(a, b, _rational_root(_root_square(top, State((0, 0, 0), (0, 0, 0)))[0]))
+
+
+def _components(top: HeavyTop, start: State) -> tuple[Fraction, Fraction, Fraction]:
+    """B, and M·n and M·e3 at the start."""
+    square, _, _, _, turned = _numbers(top)
+    momentum, n = top.angular_momentum(start.omega), top.moment
+    x, y, z = dot(momentum, n), turned * (momentum[0] * n[2] - momentum[2] * n[0]), turned * momentum[1]
+    return (x * y - _constants(top).slope * x * x) / square, x, z
+
+
+def _levels_off(top: HeavyTop, start: State) -> list[Fraction]:
+    """What z² and the three components of γ lack, in units of B."""
+    square, skew, _, b, turned = _numbers(top)
+    (unit, x, z), c, n, gamma = _components(top, start), _constants(top), top.moment, start.gamma
     v2 = x * x / (square * unit)
-    levels = (
-        (z * z / unit - (c.lead * v2 + c.middle - 1 / v2), "z^2"),
-        (dot(gamma, n) / (skew * unit) - c.size * (c.first * v2 + 1 / b), "gamma along r"),
-        (dot(gamma, side) / (skew * unit) - c.size * (1 - c.second * v2), "gamma across r"),
-        (turned * gamma[1] * square / skew - c.size * x * z, "gamma2"),
+    return [
+        z * z / unit - (c.lead * v2 + c.middle - 1 / v2),
+        dot(gamma, n) / (skew * unit) - c.size * (c.first * v2 + 1 / b),
+        turned * (gamma[0] * n[2] - gamma[2] * n[0]) / (skew * unit) - c.size * (1 - c.second * v2),
+        turned * gamma[1] * square / skew - c.size * x * z,
+    ]
+
+
+def _exact(top: HeavyTop, start: State) -> tuple[Data, Fraction, Fraction, Fraction]:
+    """The data, and |n|², X = M·n and Z = M·e3 at the start."""
+    (square, skew, *_), (unit, x, z) = _numbers(top), _components(top, start)
+    return (top.inertia, top.moment[0] ** 2 / square, _constants(top), skew * skew * unit), square, x, z
+
+
+@dataclass(frozen=True, slots=True)
+class Dokshevich(_Moving, ClosedForm):
+    """A motion of Dokshevich with exact data; S is rational then.
+
+    Raises NotInClass unless top and start satisfy the equalities above exactly.
+    """
+
+    method = "closed form: Dokshevich, inversion of an elliptic integral"
+    body = (
+        IN_PLANE_13,
+        Condition("P a != 0, P c != 0", "P a, P c", lambda top, _: (top.moment[0], top.moment[2]), differ),
+        Condition("I1 != I3", "I1 - I3", lambda top, _: (top.inertia[0] - top.inertia[2],), any),
+        HESS,
+        Condition("S^2 = a^2 - ab + b^2 + 3 the square of a rational number", "S^2", _root_square, _has_root),
+        Condition("C2 < 0", "-C2", lambda top, _: (-_constants(top).lead,), positive),
     )
-    for off, what in levels:
-        if off != 0:
-            raise NotInClass(f"{what} is off Dokshevich's by {shown(off)}.", _REMEDY)
-    return (top.inertia, n[0] * n[0] / square, c, skew * skew * unit), square, x, z
+    starts = (
+        NOT_ACROSS_CENTRE,
+        Condition("B = x y - A x^2 > 0", "B", lambda top, start: (_components(top, start)[0],), positive),
+        Condition("z^2 and gamma as they follow from x", "z^2, gamma along r, across r, gamma2", _levels_off),
+    )
+
+    def __post_init__(self) -> None:
+        ClosedForm.__post_init__(self)
+        _require_reach(self)
 
 
 def _all(motion: Dokshevich) -> tuple[Data, Fraction, Fraction, Fraction]:
-    """:func:`_require`, once."""
+    """:func:`_exact`, once."""
     if "exact" not in motion.made:
-        motion.made["exact"] = _require(motion.top, motion.start)
+        motion.made["exact"] = _exact(motion.top, motion.start)
     found: tuple[Data, Fraction, Fraction, Fraction] = motion.made["exact"]
     return found
 

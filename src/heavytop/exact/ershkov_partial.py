@@ -20,6 +20,7 @@ from flint import arb, arb_series
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
 from heavytop.exact.closed_form import WithAngles, instant, tanh_sech
+from heavytop.exact.conditions import Condition, apart, positive
 from heavytop.precision import shown
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
@@ -48,6 +49,18 @@ class ErshkovPartial(WithAngles):
     i3: Fraction
     method = "closed form: gyrostat, hyperbolic (4.2)-(4.6)"
     system = GYROSTAT
+    body = (
+        Condition("I1 = I2", "I1 - I2", lambda top, _: (top.inertia[0] - top.inertia[1],)),
+        Condition("I1 > I3", "I1 - I3", lambda top, _: (top.inertia[0] - top.inertia[2],), positive),
+    )
+    starts = (
+        Condition("Omega3 > 0", "Omega3", lambda _, start: start.omega[2:], positive),
+        Condition(
+            "the top and start of alpha = I3 Omega3/I1",
+            "the difference",
+            lambda top, start: apart(ErshkovPartial.of(top, start), top, start),
+        ),
+    )
 
     def __post_init__(self) -> None:
         if self.alpha <= 0:
@@ -56,6 +69,12 @@ class ErshkovPartial(WithAngles):
             raise NotInClass(
                 f"I1 = {shown(self.i1)}, I3 = {shown(self.i3)}.", "The partial case (4.1) needs I1 = I2 > I3 > 0."
             )
+
+    @classmethod
+    def of(cls, top: HeavyTop, start: State) -> ErshkovPartial:
+        """The motion with these moments and Ω3."""
+        i1, _, i3 = top.inertia
+        return cls(start.omega[2] * i3 / i1, i1, i3)
 
     @property
     def rate(self) -> Fraction:

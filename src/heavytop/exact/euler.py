@@ -30,13 +30,12 @@ from typing import Any
 
 from flint import acb, arb
 
-from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, rotate, sign, unit
+from heavytop.exact.conditions import NO_TORQUE
 from heavytop.exact.jacobi import Jacobi, Wave, jacobi, legendre_f, wave
 from heavytop.exact.motion import kept
 from heavytop.exact.weierstrass import imag, real
-from heavytop.precision import shown
 from heavytop.top.heavy_top import cross, dot
 
 _EVEN = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
@@ -47,13 +46,7 @@ class Euler(WithAttitude):
     """Every motion of a top without moment of the weight.  Raises NotInClass unless P r = 0 exactly."""
 
     method = "closed form: Euler-Poinsot, Jacobi functions"
-
-    def __post_init__(self) -> None:
-        if any(self.top.moment):
-            moment = ", ".join(map(shown, self.top.moment))
-            raise NotInClass(
-                f"Euler-Poinsot needs P r = 0, but P r = ({moment}).", "Set the weight or the centre of mass to 0."
-            )
+    body = (NO_TORQUE,)
 
     @property
     def steady(self) -> bool:

@@ -1,14 +1,16 @@
-"""Goryachev-Chaplygin: I1 = I2 = 4 I3, c = 0, M·γ = 0, by inversion of Abel's integrals.
+"""Goryachev-Chaplygin: I1 = I2 = 4 I3, c = 0, M·γ = 0, by inversion of Abel's integrals; Sretensky's gyrostat too.
 
-The centre of mass may lie anywhere in the plane of the equal moments, and |γ| be anything but 0.  The separated
-variables (:mod:`heavytop.exact.goryachev_chaplygin_abel`) move along a straight line in Abel's integrals, at a cost
-that does not depend on the time; the attitude is beside them (:mod:`heavytop.exact.goryachev_chaplygin_attitude`).
+Sretensky's gyrostat is that top with a rotor along axis 3, on M·γ = 0 with M = IΩ + k.  The centre of mass may lie
+anywhere in the plane of the equal moments, and |γ| be anything but 0.  The separated variables
+(:mod:`heavytop.exact.goryachev_chaplygin_abel`) move along a straight line in Abel's integrals, at a cost that does not
+depend on the time; the attitude is beside them (:mod:`heavytop.exact.goryachev_chaplygin_attitude`).
 
 Levels where f has a multiple root are found exactly.  Where it lies outside both gaps they are levels like any other.
 Where one variable tends to it the motion is asymptotic (:mod:`heavytop.exact.asymptotic`), and one may rest on it
-(:mod:`heavytop.exact.resting`).  Motions where both tend to it (G = 0: :mod:`heavytop.exact.goryachev_chaplygin_rest`)
-or both rest are refused; so are motions so near to them that the Fourier series do not resolve them, with the distance.
-Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904).
+(:mod:`heavytop.exact.resting`).  Motions where both tend to it (G = 0; without a rotor:
+:mod:`heavytop.exact.goryachev_chaplygin_rest`) or both rest are refused; so are motions so near to them that the
+Fourier series do not resolve them, with the distance.
+Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); L. N. Sretensky, Doklady Akad. Nauk SSSR 149 (1963) 292.
 """
 
 from __future__ import annotations
@@ -20,19 +22,19 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.errors import LevelNotDone
 from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.conditions import AXIAL_ROTOR, GAMMA, LEVEL_MOMENTUM, plane_top
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import distance_of_others
 from heavytop.exact.goryachev_chaplygin_abel import Motion
 from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude
 from heavytop.exact.goryachev_chaplygin_level import Level, Root, gap_ends, roots, separated_start
 from heavytop.exact.motion import kept
-from heavytop.exact.separated import REMEDY, decide, refuse, require_plane_centre
-from heavytop.precision import shown
-from heavytop.top.heavy_top import dot
+from heavytop.exact.separated import REMEDY, decide, refuse
+from heavytop.top.equations import HEAVY_GYROSTAT
 
 _DISTANCE = 1e-5
 """cosh β − 1 (:mod:`heavytop.exact.gaps`) where the Fourier series take nearly 2^17 terms for 50 digits."""
@@ -46,15 +48,11 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
     """
 
     method = "closed form: Goryachev-Chaplygin, inversion of Abel's integrals"
+    body = plane_top(4)
+    starts = GAMMA, LEVEL_MOMENTUM
 
     def __post_init__(self) -> None:
-        require_plane_centre("Goryachev-Chaplygin", 4, self.top, self.start)
-        area = dot(self.top.angular_momentum(self.start.omega), self.start.gamma)
-        if area != 0:
-            raise NotInClass(
-                f"Goryachev-Chaplygin needs M·gamma = 0, but M·gamma = {shown(area)}.",
-                "Only motions of zero area integral are solved: choose Omega3 so that it vanishes.",
-            )
+        ClosedForm.__post_init__(self)
         _require_done(Level.of(self.top, self.start))
 
     def evaluate(self, time: Fraction) -> list[Any]:
@@ -64,6 +62,19 @@ class GoryachevChaplygin(WithBearing, ClosedForm):
     def bearing(self, time: Fraction) -> Bearing:
         """See :class:`heavytop.exact.azimuth.WithBearing`: not for asymptotic motions, nor to very many digits."""
         return _attitude(self).bearing(time)
+
+
+@dataclass(frozen=True, slots=True)
+class Sretensky(GoryachevChaplygin):
+    """A motion of Sretensky's gyrostat with the small moment and the rotor on axis 3.
+
+    Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, k1 = k2 = 0, M·γ = 0 with M = IΩ + k, and γ ≠ 0, and on
+    the levels not done.
+    """
+
+    method = "closed form: Sretensky's gyrostat, inversion of Abel's integrals"
+    system = HEAVY_GYROSTAT
+    body = *GoryachevChaplygin.body, AXIAL_ROTOR
 
 
 @kept
@@ -91,9 +102,11 @@ def _require_done(level: Level) -> None:
     def test() -> None:
         curve = roots(level)
         ends = gap_ends(level, curve, separated_start(level))
-        # 0 is a root of both factors only, once of each, or twice for h = a
+        # 0 is a root of both factors only, once of each, or more often for h = ±a
         if any(min(curve[number].counts) > 0 for pair in ends for number in pair):
-            raise LevelNotDone("The level is degenerate: G = 0, and both separated variables tend to 0.", REMEDY)
+            raise LevelNotDone(
+                "The level is degenerate: G = 0, and both separated variables, or one, tend to 0.", REMEDY
+            )
         moving = [(low, high) for low, high in ends if low != high]
         if resting is not None and all(_passes(curve, pair, resting) for pair in moving):
             raise LevelNotDone("The level is degenerate: one variable rests, and the other passes it.", REMEDY)

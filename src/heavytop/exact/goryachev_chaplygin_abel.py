@@ -1,9 +1,10 @@
-"""The Goryachev-Chaplygin top by real Abel inversion: its state from the phases of the two separated variables.
+"""Goryachev and Chaplygin's top, and Sretensky's gyrostat, by real Abel inversion: the state from two phases.
 
-With I = (4, 4, 1),
-n = (c, 0, 0) (:mod:`heavytop.exact.reduced`), s = p² + q² and a = c|γ|
+With I = (4, 4, 1), a rotor k = (0, 0, λ), λ = 0 for the top, n = (c, 0, 0) (:mod:`heavytop.exact.reduced`), on M·γ = 0,
+with s = p² + q², ρ = r + λ = M3 and a = c|γ|
 
-    h = 2s + r²/2 + cγ1,   G = r s − c p γ3,   u1,2 = ½ (r ± √(r² + 16 s)),   u1 ≥ 0 ≥ u2,   X(u) = ½ (u³ − 2h u − 4G)
+    h = 2s + r²/2 + cγ1 − λ²/2,   G = (r − λ) s − c p γ3,   u1,2 = ½ (ρ ± √(ρ² + 16 s)),   u1 ≥ 0 ≥ u2
+    X(u) = ½ (u³ − 2λ u² − 2h u − 4G)
     x_k = X(u_k) = c (2pγ3 − γ1 u_k),   y_k = u_k' (u_k − u_other) = c (2qγ3 − γ2 u_k),   x_k² + y_k² = a² u_k²
     f(u) = a² u² − X² = (au − X)(au + X),   y_k² = f(u_k),   Σ du/y = 0,   Σ u du/y = dt
 
@@ -14,11 +15,12 @@ f has rational coefficients.  u_k = m + d cos θ_k, f = (u − lo)(hi − u) g (
 With α_k = √|au_k − X(u_k)|, β_k = √|au_k + X(u_k)|, analytic in θ_k, y1 = α1 β1, y2 = −α2 β2, and one sign σ for the
 whole motion
 
-    r = u1 + u2        p = σ (α1β2 + α2β1)/(4a)           q = −σ (β1β2 − α1α2)/(4a)
+    r = u1 + u2 − λ    p = σ (α1β2 + α2β1)/(4a)           q = −σ (β1β2 − α1α2)/(4a)
     γ1 = −(X(u1) − X(u2))/(c (u1 − u2))     γ2 = −(α1β1 + α2β2)/(c (u1 − u2))     γ3 = −σ (α1β2 − α2β1)/(c (u1 − u2))
 
 so that turning points are points like any other.  σ is found by exclusion at the start.
-Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); signs and recovery derived here from the integrals.
+Source: Chaplygin, Trudy otd. fiz. nauk 12 (1904); L. N. Sretensky, Doklady Akad. Nauk SSSR 149 (1963) 292.
+Signs, recovery and the place of λ derived here from the integrals (tests/exact/test_sretensky.py).
 """
 
 from __future__ import annotations
@@ -108,14 +110,14 @@ class Motion:
     def turned(self, phases: Sequence[Any], turns: Sequence[int]) -> list[Any]:
         """The six components in the turned frame."""
         (u1, a1, b1), (u2, a2, b2) = (self.halves(k, phases[k], turns[k]) for k in (0, 1))
-        h, apart = ball(self.level.energy), 1 / (self.moment * (u1 - u2))
+        h, rotor, apart = ball(self.level.energy), ball(self.level.rotor), 1 / (self.moment * (u1 - u2))
         quarter = self.sign / (4 * self.size)
         # (X(u1) − X(u2))/(u1 − u2)
-        slope = (u1 * u1 + u1 * u2 + u2 * u2 - 2 * h) / 2
+        slope = (u1 * u1 + u1 * u2 + u2 * u2) / 2 - rotor * (u1 + u2) - h
         return [
             quarter * (a1 * b2 + a2 * b1),
             quarter * (a1 * a2 - b1 * b2),
-            u1 + u2,
+            u1 + u2 - rotor,
             -slope / self.moment,
             -(a1 * b1 + a2 * b2) * apart,
             -self.sign * (a1 * b2 - a2 * b1) * apart,

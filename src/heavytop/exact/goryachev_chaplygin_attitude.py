@@ -1,7 +1,7 @@
-"""Attitude of the Goryachev-Chaplygin top at any time: the azimuth of M, by Fourier series of two frequencies.
+"""Attitude of Goryachev and Chaplygin's top and of Sretensky's gyrostat: the azimuth of M, by Fourier series.
 
 On M·γ = 0 the angular momentum is level, and M' = γ × n in space turns it about γ at the rate |γ| n·M/M².  In the
-notation of :mod:`heavytop.exact.goryachev_chaplygin_abel`, M = (4p, 4q, r), M² = 16 s + r² = (u1 − u2)², its azimuth
+notation of :mod:`heavytop.exact.goryachev_chaplygin_abel`, M = (4p, 4q, ρ), M² = 16 s + ρ² = (u1 − u2)², its azimuth
 has
 
     Λ' = 4ap/(u1 − u2)² = σ (α1β2 + α2β1)/(u1 − u2)².
@@ -15,10 +15,12 @@ along a straight line (:mod:`heavytop.exact.two_frequencies`), at any time.  No 
 splits into integrals of one variable each: Λ would then grow alike along all closed motions of a resonant torus, and
 the coefficients of the resonant terms of dΛ/ds do not vanish there (tests/exact/test_goryachev_chaplygin_attitude.py).
 
-Strips.  In s, up to signs, u' = αβ, α' = ½ (a − X'(u)) β, β' = ½ (a + X'(u)) α, X'(u) = 3u²/2 − h: polynomials.  From
-any real s the solution goes on upwards, s + iy, where it stays within (A, B, C) of (u, α, β) at s, as long as
+Strips.  In s, up to signs, u' = αβ, α' = ½ (a − X'(u)) β, β' = ½ (a + X'(u)) α, X'(u) = 3u²/2 − 2λu − h: polynomials.
+From any real s the solution goes on upwards, s + iy, where it stays within (A, B, C) of (u, α, β) at s, as long as
 
-    A' = (|α| + B)(|β| + C),   B' = ½ (|a − X'| + E)(|β| + C),   C' = ½ (|a + X'| + E)(|α| + B),   E = 3|u|A + 3A²/2
+    A' = (|α| + B)(|β| + C),   B' = ½ (|a − X'| + E)(|β| + C),   C' = ½ (|a + X'| + E)(|α| + B)
+
+with E = (3|u| + 2|λ|)A + 3A²/2
 
 has a solution from 0 that is finite, and so it is analytic on the strip where this holds from every real s.
 """
@@ -64,13 +66,13 @@ class Strip:
     def of(cls, motion: Motion, gap: Gap, other: arb) -> Strip:
         """u stays nearer to where it is at Im s = 0 than _ROOM of the way to ``other``, the end of the other gap."""
         place, alpha, beta, less, more, away = _sizes(motion, gap, other)
-        room = _ROOM / _ROUNDING * away
+        room, twice = _ROOM / _ROUNDING * away, 2 * _ROUNDING * float(abs(motion.level.rotor))
         off = [np.zeros(_CELLS)] * 3
         scale, height, grown = alpha.max() + beta.max(), 0.0, off
 
         def rates(near: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
             a, b, c = near
-            excess, first, second = 3 * a * place + 1.5 * a * a, alpha + b, beta + c
+            excess, first, second = (3 * place + twice) * a + 1.5 * a * a, alpha + b, beta + c
             return [first * second, (less + excess) * second / 2, (more + excess) * first / 2]
 
         for _ in range(5 * _STEPS):
@@ -91,11 +93,12 @@ def _sizes(motion: Motion, gap: Gap, other: arb) -> NDArray[np.float64]:
     rows = []
     with working_precision(_BOUND_BITS):
         a, h, constant = motion.size, ball(motion.level.energy), 2 * ball(motion.level.third)
-        half = arb.pi() / (2 * _CELLS)
+        rotor, half = ball(motion.level.rotor), arb.pi() / (2 * _CELLS)
         for i in range(_CELLS):
             u = gap.position((2 * i + 1) * half + arb(0, half.upper()))
             center, spread = u.mid(), arb(0, u.rad())
-            slope, value = 3 * u * u / 2 - h, center * (center * center / 2 - h) - constant
+            slope = (3 * u / 2 - 2 * rotor) * u - h
+            value = center * ((center / 2 - rotor) * center - h) - constant
             squares = [abs(a * center - side * value + (a - side * slope) * spread) for side in (1, -1)]
             row = [abs(u), *(square.upper().sqrt() for square in squares), abs(a - slope), abs(a + slope)]
             rows.append([_ROUNDING * float(x.upper()) for x in row] + [float(abs(u - other).lower()) / _ROUNDING])
@@ -226,8 +229,9 @@ class GoryachevChaplyginAttitude:
         moving = 1 if uniform[0].gap is None else 0
         angles = [one.rate * s for one, s in zip(uniform, passed, strict=True)]
         p, q, r, *gamma = self.motion.turned(phases, turns)
-        level, turned = self.motion.level, self.integral.at(angles, passed[moving] - self.began[moving])
-        return Bearing.of(level.in_body(gamma), level.in_body([4 * p, 4 * q, r]), turned)
+        level, rotor = self.motion.level, ball(self.motion.level.rotor)
+        turned = self.integral.at(angles, passed[moving] - self.began[moving])
+        return Bearing.of(level.in_body(gamma), level.in_body([4 * p, 4 * q, r + rotor]), turned)
 
 
 def _reach(variable: Variable) -> arb:

@@ -1,4 +1,4 @@
-"""The exact level of a Goryachev-Chaplygin start, the roots of its curve, and u1, u2 there.
+"""The exact level of a Goryachev-Chaplygin or Sretensky start, the roots of its curve, and u1, u2 there.
 
 Notation as in :mod:`heavytop.exact.goryachev_chaplygin_abel`.
 """
@@ -16,7 +16,7 @@ from flint import acb, arb, fmpq_poly
 from heavytop.exact.balls import Undecided, ball, midpoint
 from heavytop.exact.reduced import Reduced, polynomial
 from heavytop.top.equations import Parameters
-from heavytop.top.integrals import goryachev_chaplygin
+from heavytop.top.integrals import sretensky
 
 
 class Level(Reduced):
@@ -26,26 +26,31 @@ class Level(Reduced):
 
     @property
     def energy(self) -> Fraction:
-        """h."""
+        """h, the energy less λ²/2."""
         w1, w2, w3 = self.omega
-        return 2 * (w1 * w1 + w2 * w2) + w3 * w3 / 2 + self.along(self.gamma)
+        return 2 * (w1 * w1 + w2 * w2) + (w3 * w3 - self.rotor * self.rotor) / 2 + self.along(self.gamma)
+
+    @property
+    def axial_momentum(self) -> Fraction:
+        """ρ = r + λ."""
+        return self.omega[2] + self.rotor
 
     @property
     def third(self) -> Fraction:
-        """G, Goryachev and Chaplygin's integral."""
-        one = Parameters((4, 4, 1), (*self.moment, 0), 0)
-        return Fraction(goryachev_chaplygin(one, (*self.omega, *self.gamma), (0, 1, 2)))
+        """G, Sretensky's integral: without a rotor Goryachev and Chaplygin's."""
+        one = Parameters((4, 4, 1), (*self.moment, 0), (0, 0, self.rotor))
+        return Fraction(sretensky(one, (*self.omega, *self.gamma), (0, 1, 2)))
 
     def sextic(self) -> fmpq_poly:
         """f."""
         zero, square = Fraction(0), self.moment_square * self.gamma_square
-        cubic = polynomial(-4 * self.third, -2 * self.energy, zero, Fraction(1))
+        cubic = polynomial(-4 * self.third, -2 * self.energy, -2 * self.rotor, Fraction(1))
         return polynomial(zero, zero, 4 * square) - cubic * cubic
 
     def separated(self) -> fmpq_poly:
-        """u² − r u − 4s, with the roots u1, u2."""
-        w1, w2, w3 = self.omega
-        return polynomial(-4 * (w1 * w1 + w2 * w2), -w3, Fraction(1))
+        """u² − ρ u − 4s, with the roots u1, u2."""
+        w1, w2, _ = self.omega
+        return polynomial(-4 * (w1 * w1 + w2 * w2), -self.axial_momentum, Fraction(1))
 
     def resting(self) -> Fraction | None:
         """The double root of f where u1 or u2 rests; 0 where both rest, None where none does."""
@@ -73,13 +78,14 @@ class Root:
 def roots(level: Level) -> list[Root]:
     """The roots of f at the working precision; raises Undecided where it does not tell their factor."""
     h, constant, a = ball(level.energy), 4 * ball(level.third), size_of(level)
+    rotor = ball(level.rotor)
     found: list[Root] = []
     pairs: Any = level.sextic().complex_roots()
     for value, many in pairs:
         if value.is_zero():
             found.append(Root(acb(value), (many // 2, many - many // 2)))
             continue
-        cubics = [value * (value * value - 2 * (h + side * a)) - constant for side in (1, -1)]
+        cubics = [value * (value * (value - 2 * rotor) - 2 * (h + side * a)) - constant for side in (1, -1)]
         of = [cubic.contains(0) for cubic in cubics]
         if sum(of) != 1:
             raise Undecided
@@ -94,11 +100,11 @@ def size_of(level: Level) -> arb:
 
 def separated_start(level: Level) -> tuple[arb, arb]:
     """u1, u2 at t = 0; of the two the one that cancels comes from the product."""
-    w1, w2, w3 = level.omega
+    (w1, w2, _), axial = level.omega, level.axial_momentum
     square = w1 * w1 + w2 * w2
-    larger = (abs(ball(w3)) + ball(w3 * w3 + 16 * square).sqrt()) / 2
+    larger = (abs(ball(axial)) + ball(axial * axial + 16 * square).sqrt()) / 2
     smaller = 4 * ball(square) / larger
-    return (larger, -smaller) if w3 >= 0 else (smaller, -larger)
+    return (larger, -smaller) if axial >= 0 else (smaller, -larger)
 
 
 def gap_ends(level: Level, curve: Sequence[Root], places: Sequence[arb]) -> list[tuple[int, int]]:

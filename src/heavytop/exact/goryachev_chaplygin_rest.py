@@ -52,19 +52,31 @@ from typing import Any, TypeVar
 
 from flint import acb, arb
 
-from heavytop.errors import NotInClass, OutOfReach
+from heavytop.errors import OutOfReach
 from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import Undecided, ball
 from heavytop.exact.closed_form import ClosedForm, constant, instant, series_length
+from heavytop.exact.conditions import GAMMA, LEVEL_MOMENTUM, Condition, plane_top
 from heavytop.exact.goryachev_chaplygin_level import Level, separated_start, size_of
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import in_units
-from heavytop.exact.separated import require_plane_centre
-from heavytop.precision import shown
-from heavytop.top.heavy_top import dot
+from heavytop.top.heavy_top import HeavyTop, State
 
 _MOST_VALUES = 1 << 14
+
+
+def _room_of(top: HeavyTop, start: State) -> tuple[Fraction]:
+    return (_room(Level.of(top, start)),)
+
+
+def _not_negative(values: Sequence[Fraction]) -> bool:
+    return values[0] >= 0
+
+
+def _off_axis(_top: HeavyTop, start: State) -> Sequence[Fraction]:
+    """Ω1, Ω2, and γ3 at rest."""
+    return (*start.omega[:2], Fraction(0) if start.omega[2] else start.gamma[2])
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,22 +89,14 @@ class GoryachevChaplyginRest(WithBearing, ClosedForm):
     """
 
     method = "closed form: Goryachev, through rest, Jacobi functions"
-
-    def __post_init__(self) -> None:
-        require_plane_centre("Goryachev's motion", 4, self.top, self.start)
-        area = dot(self.top.angular_momentum(self.start.omega), self.start.gamma)
-        if area != 0:
-            raise NotInClass(f"It needs M·gamma = 0, but M·gamma = {shown(area)}.", "Choose Omega3 accordingly.")
-        level = Level.of(self.top, self.start)
-        if level.third != 0:
-            raise NotInClass(f"It needs G = 0, but G = {shown(level.third)}.", "Use GoryachevChaplygin.")
-        room = _room(level)
-        if room < 0:
-            raise NotInClass(
-                f"h^2 exceeds |P r|^2 |gamma|^2 by {shown(-room)}: it never comes to rest.", "Use GoryachevChaplygin."
-            )
-        if not any(level.omega[:2]) and (level.omega[2] or level.gamma[2] == 0):
-            raise NotInClass("It turns about axis 3, or is in equilibrium.", "Such a motion is a pendulum's.")
+    body = plane_top(4)
+    starts = (
+        GAMMA,
+        LEVEL_MOMENTUM,
+        Condition("G = 0", "G", lambda top, start: (Level.of(top, start).third,)),
+        Condition("h^2 <= |P r|^2 |gamma|^2", "the right side less the left", _room_of, _not_negative),
+        Condition("M or the torque off axis 3", "one of these", _off_axis, any),
+    )
 
     def own_time(self, time: Fraction) -> Fraction:
         """In the level's unit."""

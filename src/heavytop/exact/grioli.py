@@ -19,11 +19,25 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from heavytop.errors import InputError, NotInClass
+from heavytop.errors import InputError
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, half_angle
-from heavytop.precision import shown
+from heavytop.exact.conditions import IN_PLANE_13, TORQUE, Condition
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
+
+
+def _section(top: HeavyTop, _start: State) -> tuple[Fraction]:
+    (i1, i2, i3), n = top.inertia, top.moment
+    return ((i2 - i3) * n[0] ** 2 - (i1 - i2) * n[2] ** 2,)
+
+
+def _rates(top: HeavyTop, start: State) -> tuple[Fraction]:
+    omega, n = start.omega, top.moment
+    return (Fraction(dot(omega, omega) * dot(n, n) - 2 * dot(omega, n) ** 2),)
+
+
+def _gamma_off(top: HeavyTop, start: State) -> list[Fraction]:
+    return [g - wanted for g, wanted in zip(start.gamma, _gamma(top, start.omega), strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,26 +45,17 @@ class Grioli(WithAttitude):
     """Every Grioli precession of a top with b = 0.  Raises NotInClass where the top, Ω or γ is not one's exactly."""
 
     method = "closed form: Grioli regular precession"
-
-    def __post_init__(self) -> None:
-        (i1, i2, i3), n, omega = self.top.inertia, self.top.moment, self.start.omega
-        remedy = "`grioli_motion` builds a top with such a motion."
-        if n[1] != 0 or not any(n) or i1 == i3:
-            raise NotInClass(
-                f"Grioli needs P b = 0, P r != 0, I1 != I3; here P b = {shown(n[1])}, I1 - I3 = {shown(i1 - i3)}.",
-                remedy,
-            )
-        section = (i2 - i3) * n[0] ** 2 - (i1 - i2) * n[2] ** 2
-        if section != 0:
-            raise NotInClass(
-                f"Grioli needs (I2 - I3) a^2 = (I1 - I2) c^2; times P^2 it is off by {shown(section)}.", remedy
-            )
-        rates = dot(omega, omega) * dot(n, n) - 2 * dot(omega, n) ** 2
-        if rates != 0 or not any(omega):
-            raise NotInClass(f"Spin and precession differ: |Omega|^2 |n|^2 - 2 (Omega·n)^2 = {shown(rates)}.", remedy)
-        off = [g - wanted for g, wanted in zip(self.start.gamma, _gamma(self.top, omega), strict=True)]
-        if any(off):
-            raise NotInClass(f"gamma is off Grioli's by ({', '.join(map(shown, off))}).", remedy)
+    body = (
+        IN_PLANE_13,
+        TORQUE,
+        Condition("I1 != I3", "I1 - I3", lambda top, _: (top.inertia[0] - top.inertia[2],), any),
+        Condition("(I2 - I3) a^2 = (I1 - I2) c^2", "P^2 times the difference", _section),
+    )
+    starts = (
+        Condition("Omega != 0", "Omega", lambda _, start: start.omega, any),
+        Condition("|Omega|^2 |P r|^2 = 2 (Omega·P r)^2", "the difference of spin and precession", _rates),
+        Condition("gamma as it follows from Omega", "the difference", _gamma_off),
+    )
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""

@@ -30,14 +30,15 @@ from typing import Any
 
 from flint import acb, arb, arb_mat, arb_series
 
-from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.errors import LevelNotDone
 from heavytop.exact.abel import Inversion
 from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
 from heavytop.exact.balls import Undecided, ball
 from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.conditions import ACROSS_CENTRE, GAMMA, HESS_TOP, INCLINED_MOMENTUM
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import Gap, Roots
-from heavytop.exact.hess_level import Level, require_hess
+from heavytop.exact.hess_level import Level
 from heavytop.exact.hess_transfer import System2, Transfer, plan
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import in_units
@@ -57,12 +58,12 @@ class Hess(WithBearing, ClosedForm):
     """
 
     method = "closed form: Hess, elliptic height and the matrix of a linear system over its period"
+    body = HESS_TOP
+    starts = ACROSS_CENTRE, GAMMA, INCLINED_MOMENTUM
 
     def __post_init__(self) -> None:
-        require_hess(self.top, self.start)
+        ClosedForm.__post_init__(self)
         level = Level.of(self.top, self.start)
-        if level.area == 0:
-            raise NotInClass("M·gamma = 0: the motion is elementary.", "Use HessPendulum.")
         cubic = level.cubic()
         if cubic.gcd(cubic.derivative()).degree() > 0:
             raise LevelNotDone("The level is degenerate: P r·gamma rests at a double root.", REMEDY)

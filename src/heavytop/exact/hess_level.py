@@ -11,34 +11,12 @@ from typing import Any
 
 from flint import acb, arb, fmpq_poly
 
-from heavytop.errors import NotInClass
 from heavytop.exact.balls import Undecided, ball, midpoint
 from heavytop.exact.gaps import MOST_TERMS, Gap, Roots
 from heavytop.exact.reduced import polynomial
 from heavytop.exact.scales import exponent, unit_of_time
-from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State, dot
-
-
-def require_hess(top: HeavyTop, start: State) -> None:
-    """Raises NotInClass unless top and start satisfy Hess' conditions exactly."""
-    (i1, i2, i3), (a, b, c) = top.inertia, top.moment
-    if b != 0 or not (a or c):
-        raise NotInClass(
-            f"Hess needs P b = 0 and P r != 0; P r = ({', '.join(map(shown, (a, b, c)))}).", "Rename the axes."
-        )
-    section = i1 * (i2 - i3) * a * a - i3 * (i1 - i2) * c * c
-    if section != 0:
-        raise NotInClass(
-            f"Hess needs I1 (I2 - I3) a^2 = I3 (I1 - I2) c^2; times P^2 it is off by {shown(section)}.",
-            "Choose another centre of mass.",
-        )
-    along = dot(top.angular_momentum(start.omega), top.moment)
-    if along != 0:
-        raise NotInClass(f"Hess needs M·P r = 0, but M·P r = {shown(along)}.", "Choose Omega3 so that it vanishes.")
-    if not any(start.gamma):
-        raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
 
 
 @dataclass(frozen=True, slots=True)

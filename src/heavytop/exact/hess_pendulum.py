@@ -24,14 +24,26 @@ from typing import Any
 
 from flint import arb, arb_series
 
-from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, constant, sign, tanh_sech
-from heavytop.exact.hess_level import require_hess
+from heavytop.exact.conditions import ACROSS_CENTRE, GAMMA, HESS_TOP, LEVEL_MOMENTUM, Condition
 from heavytop.exact.motion import kept
 from heavytop.exact.pendulum import Swing, swing
-from heavytop.precision import shown
 from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+
+
+def _direction(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
+    """(N cos φ, sin φ) at t = 0 but for a positive factor: of M, or at rest of the side where sin ϑ > 0."""
+    a, _, c = top.moment
+    if any(start.omega):
+        m1, m2, m3 = top.angular_momentum(start.omega)
+        return c * m1 - a * m3, m2
+    g1, g2, g3 = start.gamma
+    return g2 * (a * a + c * c), a * g3 - c * g1
+
+
+def _in_plane(top: HeavyTop, start: State) -> tuple[Fraction]:
+    return (_direction(top, start)[0],)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,16 +55,13 @@ class HessPendulum(WithAttitude):
     """
 
     method = "closed form: Hess with zero area integral, Jacobi functions"
-
-    def __post_init__(self) -> None:
-        require_hess(self.top, self.start)
-        area = dot(self.top.angular_momentum(self.start.omega), self.start.gamma)
-        if area != 0:
-            raise NotInClass(f"The motion is elementary for M·gamma = 0 only; M·gamma = {shown(area)}.", "Use Hess.")
-        if _direction(self.top, self.start)[0] == 0:
-            raise NotInClass(
-                "M and the torque have no component in the plane of axes 1 and 3.", "Such a motion is a pendulum's."
-            )
+    body = HESS_TOP
+    starts = (
+        ACROSS_CENTRE,
+        GAMMA,
+        LEVEL_MOMENTUM,
+        Condition("M, or the torque, off axis 2", "its part in the plane of axes 1 and 3", _in_plane, any),
+    )
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -71,16 +80,6 @@ class HessPendulum(WithAttitude):
 def _path(case: HessPendulum) -> tuple[_Path, list[list[arb]]]:
     path = _Path.of(case.top, case.start)
     return path, path.at(arb(0))[0]
-
-
-def _direction(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
-    """(N cos φ, sin φ) at t = 0 but for a positive factor: of M, or at rest of the side where sin ϑ > 0."""
-    a, _, c = top.moment
-    if any(start.omega):
-        m1, m2, m3 = top.angular_momentum(start.omega)
-        return c * m1 - a * m3, m2
-    g1, g2, g3 = start.gamma
-    return g2 * (a * a + c * c), a * g3 - c * g1
 
 
 @dataclass(frozen=True, slots=True)

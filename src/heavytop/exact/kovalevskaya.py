@@ -33,6 +33,7 @@ from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
 from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import to_bits
 from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.conditions import GAMMA, NOT_XI, plane_top
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.kovalevskaya_abel import AbelMotion
 from heavytop.exact.kovalevskaya_attitude import KovalevskayaAttitude
@@ -40,7 +41,7 @@ from heavytop.exact.kovalevskaya_gaps import Interval, intervals, ordered, pole
 from heavytop.exact.kovalevskaya_level import Level, Root, roots, start_of
 from heavytop.exact.kovalevskaya_theta import ThetaMotion, separation
 from heavytop.exact.motion import kept
-from heavytop.exact.separated import REMEDY, decide, refuse, require_plane_centre
+from heavytop.exact.separated import REMEDY, decide, refuse
 from heavytop.precision import shown
 
 MOST_TERMS = 1 << 14
@@ -58,9 +59,11 @@ class Kovalevskaya(WithBearing, ClosedForm):
     """
 
     method = "closed form: Kovalevskaya, inversion of Abel's integrals"
+    body = plane_top(2)
+    starts = GAMMA, NOT_XI
 
     def __post_init__(self) -> None:
-        require_plane_centre("Kovalevskaya", 2, self.top, self.start)
+        ClosedForm.__post_init__(self)
         _require_done(Level.of(self.top, self.start))
 
     def evaluate(self, time: Fraction) -> list[Any]:
@@ -134,8 +137,6 @@ def _has_thetas(level: Level) -> bool:
 def _require_done(level: Level) -> None:
     """Raises NotInClass on the levels that are not done here."""
     cubic, double = level.cubic(), level.double()
-    if level.fourth == 0:
-        raise NotInClass("k = 0: the motion is in Delone's class.", "Use that class: its motions are elliptic.")
     if cubic.gcd(cubic.derivative()).degree() > 0:
         raise LevelNotDone("The level is degenerate: the cubic (w + h)(w^2 + G) - C^2/2 has a double root.", REMEDY)
     name = "The level is degenerate"

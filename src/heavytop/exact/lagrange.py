@@ -35,15 +35,14 @@ from typing import Any
 
 from flint import acb, arb
 
-from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, balls, rotate
+from heavytop.exact.conditions import SYMMETRIC
 from heavytop.exact.flint_context import coefficient, current_length, series_length
 from heavytop.exact.motion import initial_xi, kept, taylor, turned
 from heavytop.exact.quartic import Companions, PreparedMotion, QuarticMotion
 from heavytop.exact.second_kind import Winding
 from heavytop.exact.weierstrass import imag, real
-from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import Vector, cross, dot
 
@@ -58,19 +57,7 @@ class Lagrange(ClosedForm):
     """
 
     method = "closed form: Lagrange, Weierstrass functions of gamma3"
-
-    def __post_init__(self) -> None:
-        i1, i2, _ = self.top.inertia
-        if i1 != i2:
-            raise NotInClass(
-                f"I1 - I2 = {shown(i1 - i2)}, not 0.", "Lagrange's top has I1 = I2: rename the axes if need be."
-            )
-        if any(self.top.moment[:2]):
-            n1, n2, _ = self.top.moment
-            raise NotInClass(
-                f"P a = {shown(n1)}, P b = {shown(n2)}, not 0.",
-                "Lagrange's top has its centre of mass on axis 3, that of symmetry.",
-            )
+    body = SYMMETRIC
 
     @property
     def frame(self) -> tuple[Vector, Vector]:

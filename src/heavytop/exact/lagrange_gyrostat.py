@@ -16,12 +16,11 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, instant
+from heavytop.exact.conditions import AXIAL_ROTOR, SYMMETRIC
 from heavytop.exact.flint_context import series_length
 from heavytop.exact.lagrange import Lagrange
-from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -37,14 +36,10 @@ class LagrangeGyrostat(ClosedForm):
 
     method = "closed form: Lagrange's gyrostat, Weierstrass functions of gamma3"
     system = HEAVY_GYROSTAT
+    body = *SYMMETRIC, AXIAL_ROTOR
 
     def __post_init__(self) -> None:
-        across = (self.top.rotor or (Fraction(0),) * 3)[:2]
-        if any(across):
-            raise NotInClass(
-                f"k = ({shown(across[0])}, {shown(across[1])}, ...) is not along axis 3.",
-                "The rotor of Lagrange's gyrostat is along its axis of symmetry.",
-            )
+        ClosedForm.__post_init__(self)
         self.made["top"] = self._top()
 
     def _top(self) -> Lagrange:

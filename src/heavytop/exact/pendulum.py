@@ -25,15 +25,32 @@ from typing import Any
 
 from flint import arb
 
-from heavytop.errors import NotInClass
 from heavytop.exact.balls import ball, whole
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, sign
+from heavytop.exact.conditions import GAMMA, TORQUE, Condition
 from heavytop.exact.jacobi import Jacobi, jacobi, legendre_f
 from heavytop.exact.motion import kept
-from heavytop.precision import shown
-from heavytop.top.heavy_top import Vector, cross, dot
+from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
 _REMEDY = "It turns about a principal axis, with P r and gamma across it."
+
+
+def _axis(top: HeavyTop, start: State) -> Vector:
+    """Ω, or γ × n at rest, in units of its largest component; 0 in equilibrium."""
+    direction = start.omega if any(start.omega) else cross(start.gamma, top.moment)
+    largest = max(map(abs, direction)) or Fraction(1)
+    first, second, third = (component / largest for component in direction)
+    return first, second, third
+
+
+def _off_principal(top: HeavyTop, start: State) -> Vector:
+    axis = _axis(top, start)
+    return cross(top.angular_momentum(axis), axis)
+
+
+def _off_plane(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
+    axis = _axis(top, start)
+    return dot(top.moment, axis), dot(start.gamma, axis)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,39 +62,22 @@ class Pendulum(WithAttitude):
     """
 
     method = "closed form: physical pendulum, Jacobi functions"
-
-    def __post_init__(self) -> None:
-        moment, gamma, axis = self.top.moment, self.start.gamma, self.axis
-        if not any(moment) or not any(gamma):
-            raise NotInClass("A pendulum needs P r != 0 and gamma != 0.", "Without a torque the motion is Euler's.")
-        name = "Omega" if any(self.start.omega) else "At rest, the torque gamma x P r"
-        written = f"{name} = ({', '.join(map(shown, self._direction()))})"
-        if any(cross(self.top.angular_momentum(axis), axis)):
-            raise NotInClass(f"Not a pendulum: {written} is not along a principal axis.", _REMEDY)
-        along, up = dot(moment, axis), dot(gamma, axis)
-        if along or up:
-            raise NotInClass(
-                f"Not a pendulum: {written}, and along this axis e, P r·e = {shown(along)} and gamma·e = {shown(up)} "
-                "are not both 0.",
-                _REMEDY,
-            )
-
-    def _direction(self) -> Vector:
-        omega, torque = self.start.omega, cross(self.start.gamma, self.top.moment)
-        return omega if any(omega) else torque
+    body = (TORQUE,)
+    starts = (
+        GAMMA,
+        Condition("Omega, or the torque at rest, along a principal axis", "I e x e", _off_principal),
+        Condition("P r and gamma across this axis", "P r·e, gamma·e", _off_plane),
+    )
 
     @property
     def axis(self) -> Vector:
         """A vector along the axis it turns about, its largest component ± 1; 0 where it is in equilibrium."""
-        direction = self._direction()
-        largest = max(map(abs, direction)) or Fraction(1)
-        first, second, third = (component / largest for component in direction)
-        return first, second, third
+        return _axis(self.top, self.start)
 
     @property
     def steady(self) -> bool:
         """It stands still: at rest where no torque acts."""
-        return not any(self._direction())
+        return not any(self.axis)
 
     def evaluate(self, time: Fraction) -> list[Any]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""

@@ -1,7 +1,8 @@
 """A top with I1 = I2 and P c = 0, in sizes of about 1 and turned so that its moment of weight is (c, 0, 0).
 
-Divided by I3 the equations hold for n/I3.  With exact powers of two Ω = rate Ω', γ = size γ', t = t'/rate they hold for
-n' = n size/(I3 rate²); and a turn about axis 3, the axis of symmetry, takes n' to (c, 0, 0).
+Divided by I3 the equations hold for n/I3, and for λ = k3/I3 of a rotor along axis 3.  With exact powers of two
+Ω = rate Ω', γ = size γ', t = t'/rate they hold for n' = n size/(I3 rate²) and λ' = λ/rate; and a turn about axis 3, the
+axis of symmetry, takes n' to (c, 0, 0).
 """
 
 from __future__ import annotations
@@ -19,25 +20,32 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 @dataclass(frozen=True, slots=True)
 class Reduced:
-    """The exact data of a start in the units of ``rate`` and ``size``; moment: n' on axes 1 and 2."""
+    """The exact data of a start in the units of ``rate`` and ``size``; moment: n' on axes 1 and 2; rotor: λ'."""
 
     rate: Fraction
     size: Fraction
     moment: tuple[Fraction, Fraction]
     omega: tuple[Fraction, Fraction, Fraction]
     gamma: tuple[Fraction, Fraction, Fraction]
+    rotor: Fraction
 
     @classmethod
     def of(cls, top: HeavyTop, start: State) -> Self:
-        """From a top with I1 = I2 and P c = 0."""
+        """From a top with I1 = I2 and P c = 0; a rotor lies along axis 3."""
         i3 = top.inertia[2]
         n1, n2 = (n / i3 for n in top.moment[:2])
         size = _power_of_two(max(map(abs, start.gamma)))
-        rate = _power_of_two(max(*map(abs, start.omega), _root_of_two(max(abs(n1), abs(n2)) * size)))
+        rotor = top.rotor[2] / i3 if top.rotor else Fraction(0)
+        rate = _power_of_two(max(*map(abs, start.omega), abs(rotor), _root_of_two(max(abs(n1), abs(n2)) * size)))
         (o1, o2, o3), (g1, g2, g3) = start.omega, start.gamma
         lift = size / rate**2
         return cls(
-            rate, size, (n1 * lift, n2 * lift), (o1 / rate, o2 / rate, o3 / rate), (g1 / size, g2 / size, g3 / size)
+            rate,
+            size,
+            (n1 * lift, n2 * lift),
+            (o1 / rate, o2 / rate, o3 / rate),
+            (g1 / size, g2 / size, g3 / size),
+            rotor / rate,
         )
 
     @property

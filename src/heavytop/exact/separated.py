@@ -13,33 +13,16 @@ from typing import Any, NoReturn
 
 from flint import arb, arb_series
 
-from heavytop.errors import LevelNotDone, NotInClass, OutOfReach
+from heavytop.errors import LevelNotDone, OutOfReach
 from heavytop.exact.abel import Inversion, Variable
 from heavytop.exact.asymptotic import Approach
 from heavytop.exact.balls import Undecided, working_precision
 from heavytop.exact.flint_context import current_length
 from heavytop.exact.gaps import Gap, Roots
 from heavytop.exact.resting import Beside, Rest
-from heavytop.precision import shown
-from heavytop.top.heavy_top import HeavyTop, State
 
 REMEDY = "The validated enclosure holds for every motion."
 _DECISIONS, _RIGHT = (64, 256, 1024, 4096), 10
-
-
-def require_plane_centre(name: str, ratio: int, top: HeavyTop, start: State) -> None:
-    """Raises NotInClass unless I1 = I2 = ratio·I3, P c = 0, P r ≠ 0 and γ ≠ 0, exactly."""
-    (i1, i2, i3), (n1, n2, n3) = top.inertia, top.moment
-    if i1 != i2 or i1 != ratio * i3:
-        differences = f"I1 - I2 = {shown(i1 - i2)}, I1 - {ratio} I3 = {shown(i1 - ratio * i3)}"
-        raise NotInClass(f"{name} needs I1 = I2 = {ratio} I3; {differences}.", "Rename the axes if need be.")
-    if n3 != 0 or n1 == n2 == 0:
-        raise NotInClass(
-            f"{name} needs P c = 0 and P r != 0, but P r = ({', '.join(map(shown, (n1, n2, n3)))}).",
-            "The centre of mass lies in the plane of the equal moments.",
-        )
-    if not any(start.gamma):
-        raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
 
 
 def decide(

@@ -10,10 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from heavytop.errors import NotInClass
+from heavytop.exact.conditions import SPHERICAL, TORQUE
 from heavytop.exact.lagrange import Lagrange, across
 from heavytop.exact.scales import exponent
-from heavytop.precision import shown
 from heavytop.top.heavy_top import Vector
 
 
@@ -25,16 +24,7 @@ class SphericalTop(Lagrange):
     """
 
     method = "closed form: spherical top, Weierstrass functions of n·gamma"
-
-    def __post_init__(self) -> None:
-        i1, i2, i3 = self.top.inertia
-        if i1 != i2 or i2 != i3:
-            raise NotInClass(
-                f"I1 - I2 = {shown(i1 - i2)}, I2 - I3 = {shown(i2 - i3)}, not both 0.",
-                "A spherical top has three equal moments.",
-            )
-        if not any(self.top.moment):
-            raise NotInClass("P r = 0: no weight acts.", "Without a torque the motion is Euler's.")
+    body = SPHERICAL, TORQUE
 
     @property
     def frame(self) -> tuple[Vector, Vector]:

@@ -5,8 +5,8 @@
     ω² = P (I γ × γ)·(r × γ) / |I γ × γ|²     where γ is not a principal axis; it must not be negative.
 
 On a principal axis that r lies on, every ω serves; on another one, none.  Turned about: P r = ω² I γ + κ γ gives
-every top that turns about γ at the rate ω.  Space turns about Ω in the body at the rate |Ω|.  Whether one is
-stable to first order :func:`staude_stability` says.
+every top that turns about γ at the rate ω; with a rotor of momentum k, P r = ω² I γ + ω k + κ γ.  Space turns about Ω
+in the body at the rate |Ω|.  Whether one is stable to first order :func:`staude_stability` says.
 Source: O. Staude, J. reine angew. Math. 113 (1894) 318.
 """
 
@@ -23,8 +23,9 @@ from flint import arb, fmpq_mat, fmpq_poly
 from heavytop.errors import InputError, NotInClass
 from heavytop.exact.balls import ball, rational, to_bits
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, rotate
+from heavytop.exact.conditions import equilibrium, require
 from heavytop.precision import shown
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot, vector
 
 
@@ -36,12 +37,7 @@ class Staude(WithAttitude):
     method = "closed form: permanent rotation"
 
     def __post_init__(self) -> None:
-        field = self.system.field(self.system.parameters(self.top, self.start), self.start.flat)
-        if any(field):
-            raise NotInClass(
-                f"Not a permanent rotation: (Omega', gamma') = ({', '.join(map(shown, field))}), not 0.",
-                "`staude_rotations` finds those of a top.",
-            )
+        require("A permanent rotation", (equilibrium(self.system),), self.top, self.start)
 
     def motion(self, time: Any) -> tuple[list[Any], Carry]:
         """See :class:`heavytop.exact.closed_form.ClosedForm`."""
@@ -57,8 +53,10 @@ class Staude(WithAttitude):
 def staude_rate_squared(top: HeavyTop, gamma: Vector) -> Fraction | None:
     """ω² of the permanent rotation Ω = ω γ about a rational direction, of any length; None where every ω serves.
 
-    Raises NotInClass for a direction off Staude's cone, for a principal axis that r is not on, and where ω² < 0.
+    Raises NotInClass for a direction off Staude's cone, for a principal axis that r is not on, where ω² < 0, and for a
+    top with a rotor, whose ω is a root of a quadratic equation with a linear term.
     """
+    _require_no_rotor(top)
     turning = cross(top.angular_momentum(gamma), gamma)
     torque = cross(top.moment, gamma)
     if not any(gamma):
@@ -97,6 +95,7 @@ def staude_directions(top: HeavyTop, height: int) -> Iterator[Vector]:
     γ1 = −D1 p q/(D2 q + D3 p).  ``height`` bounds |p| and q.  Where the cone is a pair of planes, or all of space,
     directions in the principal planes that belong to it come as well.
     """
+    _require_no_rotor(top)
     (i1, i2, i3), n = top.inertia, top.moment
     d1, d2, d3 = n[0] * (i2 - i3), n[1] * (i3 - i1), n[2] * (i1 - i2)
     seen = set()
@@ -141,10 +140,27 @@ def staude_rotations(top: HeavyTop, height: int = 12) -> list[State]:
     return found
 
 
-def staude_motion(inertia: Vector, gamma: Vector, rate: Fraction, along: Fraction = Fraction(0)) -> Staude:
-    """The permanent rotation Ω = ω γ of the top of weight 1 with r = ω² I γ + κ γ, κ = ``along``: all there are."""
+def staude_motion(
+    inertia: Vector, gamma: Vector, rate: Fraction, along: Fraction = Fraction(0), rotor: Vector | None = None
+) -> Staude:
+    """The permanent rotation Ω = ω γ of the top of weight 1 with r = ω² I γ + κ γ, κ = ``along``: all there are.
+
+    rotor: k of a heavy gyrostat, for which r = ω² I γ + ω k + κ γ.
+    """
+    start = State([rate * g for g in gamma], gamma)
     centre = [(rate**2 * i + along) * g for i, g in zip(inertia, gamma, strict=True)]
-    return Staude(HeavyTop(inertia, 1, centre), State([rate * g for g in gamma], gamma))
+    if rotor is None:
+        return Staude(HeavyTop(inertia, 1, centre), start)
+    carried = [n + rate * k for n, k in zip(centre, rotor, strict=True)]
+    return Staude(HeavyTop(inertia, 1, carried, rotor), start, HEAVY_GYROSTAT)
+
+
+def _require_no_rotor(top: HeavyTop) -> None:
+    if top.rotor is not None and any(top.rotor):
+        raise NotInClass(
+            f"The rotor k = ({', '.join(map(shown, top.rotor))}) is not in Staude's condition.",
+            "`staude_motion` takes a rotor.",
+        )
 
 
 def _primitive(direction: Vector) -> tuple[Fraction, ...]:
@@ -167,9 +183,10 @@ def _root(square: Fraction) -> Fraction | None:
 def staude_stability(motion: Staude) -> str:
     """``unstable``, ``spectrally stable`` or ``degenerate``, decided exactly from the linearized motion.
 
-    The characteristic polynomial of the Jacobian is x² (x⁴ + A x² + B): |γ|² and M·γ give the zeros, reversibility the
-    even powers.  All exponents are imaginary and simple where A, B and A² − 4B are positive; one has a positive real
-    part where any of them is negative; where one is 0 and none negative, first order does not decide.
+    The characteristic polynomial of the Jacobian is x² (x⁴ + A x² + B): |γ|² and M·γ give the zeros, the Hamiltonian
+    form on their levels the even powers.  All exponents are imaginary and simple where A, B and A² − 4B are positive;
+    one has a positive real part where any of them is negative; where one is 0 and none negative, first order does not
+    decide.
     """
     p = motion.system.parameters(motion.top, motion.start)
     exact = p.mapped(lambda value: rational(Fraction(value)))

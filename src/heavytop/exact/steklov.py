@@ -14,14 +14,16 @@ Source: V. A. Steklov, Trudy otd. fiz. nauk 10 (1899) 1; coefficients derived he
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from heavytop.errors import InputError, NotInClass
+from heavytop.errors import InputError
 from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import ClosedForm
+from heavytop.exact.conditions import GAMMA, ON_AXIS_1, Condition, differ
 from heavytop.exact.flint_context import current_precision, whole_evaluation
 from heavytop.exact.motion import kept
 from heavytop.exact.one_gap import Curve, OneGapMotion, in_units, value
@@ -35,7 +37,28 @@ from heavytop.top.heavy_top import HeavyTop, State
 _LEAST = 256
 _TERMS_A_BIT = 64
 """How long the Fourier series may be at a working precision: 2^14 terms at 256 bits."""
-_REMEDY = "`steklov_motion` builds a top with such a motion."
+
+
+def _moments(top: HeavyTop, _start: State) -> Sequence[Fraction]:
+    a, b, c = top.inertia
+    return a - b, a - c, b - c, a - 2 * b, a - 2 * c
+
+
+def _height(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
+    """E0 of Ω2² = b0 + b2 Ω1², for A = 1 in the units of :func:`_units`, and what Ω3² lacks then."""
+    rate, _ = _units(top, start)
+    p, q, r = (w / rate for w in start.omega)
+    b2, b0, c2, c0 = quadratics(Fraction(1), top.inertia[1] / top.inertia[0], top.inertia[2] / top.inertia[0])
+    height = (q * q - b2 * p * p) / b0
+    return height, rate**2 * (r * r - c2 * p * p - height * c0)
+
+
+def _gamma_off(top: HeavyTop, start: State) -> list[Fraction]:
+    rate, torque = _units(top, start)
+    p, q, r = (w / rate for w in start.omega)
+    heights = _curve(top, start).heights
+    wanted = [factor * value(part, p) for factor, part in zip((Fraction(1), q, r), heights, strict=True)]
+    return [g - w / torque for g, w in zip(start.gamma, wanted, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +70,16 @@ class Steklov(WithBearing, ClosedForm):
     """
 
     method = "closed form: Steklov, inversion of an elliptic integral"
+    body = *ON_AXIS_1, Condition("I1, I2, I3 different, I1 != 2 I2, 2 I3", "the differences", _moments, differ)
+    starts = (
+        GAMMA,
+        Condition("Omega3^2 = c0 + c2 Omega1^2", "the difference", lambda top, start: (_height(top, start)[1],)),
+        Condition("E0 != 0", "E0", lambda top, start: (_height(top, start)[0],), any),
+        Condition("gamma as it follows from Omega", "the difference", _gamma_off),
+    )
 
     def __post_init__(self) -> None:
-        (a, b, c), (n1, n2, n3) = self.top.inertia, self.top.moment
-        if n2 != 0 or n3 != 0 or n1 == 0:
-            raise NotInClass(
-                f"Steklov needs P b = P c = 0 and P r != 0; P r = ({', '.join(map(shown, (n1, n2, n3)))}).",
-                "Rename the axes if need be.",
-            )
-        if not any(self.start.gamma):
-            raise NotInClass("gamma = 0: no weight acts.", "Without a torque the motion is Euler's.")
-        if (a - b) * (a - c) * (b - c) * (a - 2 * b) * (a - 2 * c) == 0:
-            raise NotInClass(
-                "Steklov needs three different moments of inertia, I1 != 2 I2, I1 != 2 I3.", "Choose other moments."
-            )
-        _curve(self.top, self.start)
+        ClosedForm.__post_init__(self)
         _require_reach(self)
 
     def evaluate(self, time: Fraction) -> list[Any]:
@@ -113,22 +131,11 @@ def quadratics(a: Fraction, b: Fraction, c: Fraction) -> tuple[Fraction, Fractio
 
 
 def _curve(top: HeavyTop, start: State) -> Curve:
-    """The curve of a start with A = 1, in the units of :func:`_units`; raises NotInClass."""
-    rate, torque = _units(top, start)
+    """The curve of a start with A = 1, in the units of :func:`_units`."""
+    height, zero = _height(top, start)[0], Fraction(0)
     b, c = top.inertia[1] / top.inertia[0], top.inertia[2] / top.inertia[0]
-    p, q, r = (w / rate for w in start.omega)
     b2, b0, c2, c0 = quadratics(Fraction(1), b, c)
-    height = (q * q - b2 * p * p) / b0
-    off = rate**2 * (r * r - c2 * p * p - height * c0)
-    if off != 0:
-        raise NotInClass(f"Omega3^2 is off Steklov's c0 + c2 Omega1^2 by {shown(off)}.", _REMEDY)
-    zero = Fraction(0)
-    curve = Curve.of((Fraction(1), b, c), polynomial(b0 * height, zero, b2), polynomial(c0 * height, zero, c2))
-    wanted = [factor * value(part, p) for factor, part in zip((Fraction(1), q, r), curve.heights, strict=True)]
-    differences = [g - w / torque for g, w in zip(start.gamma, wanted, strict=True)]
-    if any(differences):
-        raise NotInClass(f"gamma is off Steklov's by ({', '.join(map(shown, differences))}).", _REMEDY)
-    return curve
+    return Curve.of((Fraction(1), b, c), polynomial(b0 * height, zero, b2), polynomial(c0 * height, zero, c2))
 
 
 def steklov_motion(

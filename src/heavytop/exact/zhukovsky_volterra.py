@@ -33,16 +33,16 @@ from typing import Any
 
 from flint import arb, arb_mat, fmpq_mat
 
-from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.errors import LevelNotDone
 from heavytop.exact.balls import ball, rational, to_bits
 from heavytop.exact.closed_form import ClosedForm, balls, instant, rotate
+from heavytop.exact.conditions import NO_TORQUE
 from heavytop.exact.flint_context import current_length
 from heavytop.exact.motion import initial_xi, kept, taylor
 from heavytop.exact.quartic import lift
 from heavytop.exact.scales import unit_of_time
 from heavytop.exact.second_kind import SecondKind, Winding, second_kind
 from heavytop.exact.weierstrass import Lattice, Point, from_invariants, imag, real
-from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import Vector, cross, dot
 
@@ -60,13 +60,10 @@ class ZhukovskyVolterra(ClosedForm):
 
     method = "closed form: Zhukovsky-Volterra, Weierstrass functions"
     system = HEAVY_GYROSTAT
+    body = (NO_TORQUE,)
 
     def __post_init__(self) -> None:
-        if any(self.top.moment):
-            raise NotInClass(
-                f"Zhukovsky and Volterra's gyrostat has no weight; P r = ({', '.join(map(shown, self.top.moment))}).",
-                "Give weight 0.",
-            )
+        ClosedForm.__post_init__(self)
         g2, g3 = self.invariants()
         if not self.permanent and g2**3 == 27 * g3**2:
             raise LevelNotDone(

@@ -127,15 +127,16 @@ def _names(task: Task, motions: Drawn) -> dict[str, object]:
 
 
 def _data(motions: Drawn) -> dict[str, object]:
-    parts: dict[str, list[Sequence[object]]] = {
-        "inertia": [p.parameters.inertia for p in motions.problems],
-        "moment": [p.parameters.moment for p in motions.problems],
-        "rotor": [(*p.parameters.rotors, 0, 0)[:3] for p in motions.problems],
-        "omega": [p.start.omega for p in motions.problems],
-        "gamma": [p.start.gamma for p in motions.problems],
+    p = motions.parameters
+    rotor = (*p.rotors, 0, 0)[:3]
+    parts = {"inertia": p.inertia, "moment": p.moment, "rotor": rotor, "omega": motions.start[:3]}
+    parts |= {"gamma": motions.start[3:]}
+    zeros = numpy.zeros(len(motions.problems))
+    return {
+        f"{name}{k + 1}": zeros if isinstance(column, int) else column.high[:, 0]
+        for name, columns in parts.items()
+        for k, column in enumerate(columns)
     }
-    arrays = {name: numpy.array(rows, float) for name, rows in parts.items()}
-    return {f"{name}{k + 1}": rows[:, k] for name, rows in arrays.items() for k in range(3)}
 
 
 def _line(row: Row) -> str:

@@ -45,6 +45,8 @@ class Eight:
         self.scratch = doubles(SCRATCH)
         self.moving = [pointer(array) for array in (self.words, self.clock, self.flags)]
         self.tables = [pointer(array) for array in (self.constants, self.quotients, self.scratch)]
+        self.behind, self.sampled = doubles(2 * LANES), doubles(12 * LANES)
+        self.sampling = [pointer(array) for array in (self.behind, self.sampled)]
         self.signs = [1] * LANES
         self._set(steps.ROOM, [ladder.room] * LANES)
         self._set(steps.REACH, [ladder.reach] * LANES)
@@ -67,6 +69,36 @@ class Eight:
         values |= {steps.UNITS: FIRST_UNITS, steps.UNITS + 1: FIRST_UNITS, steps.SLOPE: 0.0, steps.TRIES: 0.0}
         for vector, word in (values | {steps.LEFT: _NO_LIMIT if most is None else float(most)}).items():
             self.clock[LANES * vector + lane] = word
+
+    def put_all(self, words: Any, constants: Any, most: int) -> None:
+        """Eight motions at their beginning, forwards: their words (12, 8), and those of each constant (k, 3, 8)."""
+        self.words[:], self.constants[:] = words.reshape(-1), constants.reshape(-1)
+        self.flags[:], self.signs[:] = steps.FINE, [1] * LANES
+        values = {steps.TIME: 0.0, steps.TIME + 1: 0.0, steps.SIGN: 1.0, steps.LEFT: float(most)}
+        values |= {steps.UNITS: FIRST_UNITS, steps.UNITS + 1: FIRST_UNITS, steps.SLOPE: 0.0, steps.TRIES: 0.0}
+        for vector, value in values.items():
+            self._set(vector, value)
+
+    def aim_all(self, targets: Any) -> None:
+        """Where the lanes are to stop, |τ|, eight doubles."""
+        self._set(steps.TARGET, targets)
+        self._set(steps.TARGET + 1, 0.0)
+
+    def sample_all(self, targets: Any) -> Doubles:
+        """The states of eight motions forwards at doubles |τ| inside their next steps: (12, 8)."""
+        behind, found = self.behind, self.sampled
+        first, second = self.clock[:LANES], self.clock[LANES : 2 * LANES]
+        total = targets - first
+        part = total - targets
+        low = ((targets - (total - part)) - (first + part)) - second
+        behind[:LANES] = total + low
+        behind[LANES:] = low - (behind[:LANES] - total)
+        self.functions["sample"](self.tables[2], self.ladder.order, *self.sampling)
+        return found.reshape(12, LANES).copy()
+
+    def left_all(self) -> Doubles:
+        """The steps that each lane may still take."""
+        return self.clock[LANES * steps.LEFT : LANES * (steps.LEFT + 1)]
 
     def taken_out(self, lane: int) -> tuple[Doubles, Doubles]:
         """All that a motion needs to go on in another eight: its state, and its part of the clock."""

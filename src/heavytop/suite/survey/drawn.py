@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy
 
+from heavytop.integrate.pair_arrays import Pairs
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.precision import DOUBLE, Precision
 from heavytop.suite.cases import Case
-from heavytop.suite.sweeps import Random, Sweep
-from heavytop.top.equations import HEAVY_TOP, Parameters
+from heavytop.suite.sweeps import Lazy, Random, Sweep
+from heavytop.top.equations import HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.integrals import Integral, holding
 
@@ -57,10 +58,34 @@ def number_of(cases: Sequence[Case]) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """Rounded motions: exactly what an integrator of the format is given."""
+    """Rounded motions: exactly what an integrator of the format is given.
 
-    problems: list[Problem]
+    numbers: what enters the field, and the start, (motions, k + 6).
+    """
+
+    problems: Sequence[Problem]
     integrals: list[tuple[Integral, ...]]
+    numbers: Pairs
+
+    @property
+    def system(self) -> System:
+        """The same of all."""
+        return self.problems[0].system
+
+    @property
+    def parameters(self) -> Parameters:
+        """Each a column, (motions, 1)."""
+        columns = [self.numbers[:, k : k + 1] for k in range(self.numbers.high.shape[1] - 6)]
+        found = self.system.taken_in(columns)
+        nothing = Pairs.of(numpy.zeros((len(self.problems), 1)))
+        moment = found.moment or (nothing,) * 3
+        return found._replace(moment=moment, rotor=nothing if found.rotor is None else found.rotor)
+
+    @property
+    def start(self) -> list[Pairs]:
+        """The six components, (motions, 1) each."""
+        width = self.numbers.high.shape[1]
+        return [self.numbers[:, k : k + 1] for k in range(width - 6, width)]
 
     @property
     def classes(self) -> list[str]:
@@ -74,44 +99,53 @@ def drawn(chunk: Chunk, precision: Precision, seed: int = 0) -> Drawn:
     cases = chunk.sweep.cases()
     places = range(chunk.first, chunk.first + chunk.count)
     if isinstance(chunk.sweep, Random) and precision == DOUBLE and not seed:
-        numbers = numpy.array([chunk.sweep.integers(index) for index in places])
-        problems = list(map(_problem, *_rounded(numbers)))
-        further = _may_have_more(problems)
+        numbers = _rounded(numpy.array([chunk.sweep.integers(index) for index in places]))
+        further = _may_have_more(numbers)
         integrals = [_integrals(cases[index]) if more else _ALWAYS for index, more in zip(places, further, strict=True)]
-        return Drawn(problems, integrals)
+        return Drawn(
+            Lazy(chunk.count, lambda place: _problem(numbers[place])),
+            integrals,
+            Pairs.of(numbers),
+        )
     given = [cases[index] for index in places]
     if seed:
         given = [replace(case, top=scaled(case.top, factor(seed))) for case in given]
     problems = [Problem.of(case.top, case.start, precision, case.system) for case in given]
-    return Drawn(problems, [_integrals(case) for case in given])
+    return Drawn(problems, [_integrals(case) for case in given], _pairs(problems))
+
+
+def _pairs(problems: Sequence[Problem]) -> Pairs:
+    """Their numbers, which two doubles hold: of formats of 106 bits at most."""
+    rows = [[*each.system.entering(each.parameters), *each.start.flat] for each in problems]
+    high = numpy.array(rows, float)
+    low = [
+        [float(v - Fraction(h)) for v, h in zip(*pair, strict=True)] for pair in zip(rows, high.tolist(), strict=True)
+    ]
+    return Pairs(high, numpy.array(low))
 
 
 def _integrals(case: Case) -> tuple[Integral, ...]:
     return holding(case.top, case.start, case.system)
 
 
-def _rounded(numbers: Any) -> tuple[Any, Any]:
-    """Parameters and starts, (motions, 6) each, of the integers of :meth:`Random.integers`.
+def _rounded(numbers: Any) -> Any:
+    """I, n and the start, (motions, 12), of the integers of :meth:`Random.integers`.
 
     All of them are below 2^53, so that each quotient is the exact number rounded once.
     """
     thousandths, weight, centre = numbers[:, :3] / 1000.0, numbers[:, 3:4], numbers[:, 4:7]
     moment = (weight * centre) / 1e6
-    start = numpy.hstack([numbers[:, 7:10] / 1000.0, numbers[:, 10:13] / numbers[:, 13:14]])
-    return numpy.hstack([thousandths, moment]), start
+    return numpy.hstack([thousandths, moment, numbers[:, 7:10] / 1000.0, numbers[:, 10:13] / numbers[:, 13:14]])
 
 
-def _problem(parameters: Any, start: Any) -> Problem:
-    p, y = map(Fraction, parameters.tolist()), map(Fraction, start.tolist())
-    i1, i2, i3, n1, n2, n3 = p
-    w1, w2, w3, g1, g2, g3 = y
+def _problem(numbers: Any) -> Problem:
+    i1, i2, i3, n1, n2, n3, w1, w2, w3, g1, g2, g3 = map(Fraction, numbers.tolist())
     given = Parameters((i1, i2, i3), (n1, n2, n3), 0)
     return Problem(HEAVY_TOP, DOUBLE, given, State((w1, w2, w3), (g1, g2, g3)), None)
 
 
-def _may_have_more(problems: Sequence[Problem]) -> Any:
+def _may_have_more(p: Any) -> Any:
     """Where two moments of inertia are equal or a component of the centre is 0: else no further integral is known."""
-    p = numpy.array([[*each.parameters.inertia, *each.parameters.moment] for each in problems], float)
     equal = (p[:, 0] == p[:, 1]) | (p[:, 1] == p[:, 2]) | (p[:, 0] == p[:, 2])
     return (equal | (p[:, 3:6] == 0).any(axis=1)).tolist()
 

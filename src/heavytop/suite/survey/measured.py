@@ -18,19 +18,23 @@ import numpy
 
 from heavytop.errors import Contradiction, PeerFailed
 from heavytop.exact.balls import midpoint, radius
+from heavytop.integrate.lane_grid import states_on_a_grid
+from heavytop.integrate.pair_arrays import Pairs
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.integrate.words_ensemble import propagate_words_ensemble
-from heavytop.measure.integrator import Integrator
+from heavytop.integrate.words_grid import double_double_states
+from heavytop.measure.integrator import HEYOKA, Integrator
 from heavytop.measure.truth import Known, known_motion
-from heavytop.precision import DOUBLE_DOUBLE, Precision, exact, number
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number
 from heavytop.suite.survey.drawn import Drawn
-from heavytop.suite.survey.pairs import Pairs
-from heavytop.top.equations import HEAVY_GYROSTAT, Parameters
+from heavytop.top.equations import HEAVY_TOP
 
 DRIFTS = ("gamma_squared", "area", "energy", "further")
 """Integrals whose drift is a column; further: the largest drift of all others that the motion has."""
-_OTHER_TOLERANCE = Fraction(1, 2**96)
-"""Of the second run: of a lower order, with other steps."""
+_TOLERANCES = Fraction(1, 2**96), Fraction(1, 2**84)
+"""Of both runs in double; other orders and steps.  In extended: of double-double itself, and the first."""
+_MODERATE = 1e4
+"""Larger data, and times, are looked at motion by motion."""
 _STEP_LIMIT = 1_000_000
 _FLOOR = 1e-28
 _RADII = 10
@@ -46,24 +50,50 @@ def measured(
 
     Raises Contradiction where the computed reference is off the proven one, PeerFailed where every run failed.
     """
-    runs = _runs(integrator, drawn.problems, times, options)
-    states = _pairs([run[1] for run in runs], len(times))
-    truth, apart = _truth(drawn.problems, times)
-    outcomes = [run[0] for run in runs]
+    outcomes, states, steps = _runs(integrator, drawn, times, precision, options)
+    truth, apart = _truth(drawn, times, precision)
     with numpy.errstate(all="ignore"):
-        wrong = [o == Outcome.SUCCESS.value for o in outcomes] & ~numpy.isfinite(states.high).all(axis=(1, 2))
-        for place in numpy.flatnonzero(wrong).tolist():
-            outcomes[place] = Outcome.NON_FINITE.value
+        wrong = (outcomes == Outcome.SUCCESS.value) & ~numpy.isfinite(states.high).all(axis=(1, 2))
+        outcomes[wrong] = Outcome.NON_FINITE.value
         found = _errors(states, truth, times, precision)
         found |= _drifts(drawn, states)
     _require_agreement(drawn.problems[0], times, truth, float(apart[0]))
-    return {"outcome": outcomes, "steps": [run[2] for run in runs]} | found | {"reference_radius": apart}
+    return {"outcome": outcomes.tolist(), "steps": steps} | found | {"reference_radius": apart}
+
+
+def _usual(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> bool:
+    """Whether the motions can be computed as arrays: doubles, and times that are out of nobody's reach."""
+    if precision != DOUBLE or times[0] <= 0 or max(abs(drawn.numbers.high).max(), float(times[-1])) > _MODERATE:
+        return False
+    return bool(drawn.numbers.high[:, :3].min() > 1 / _MODERATE)
 
 
 def _runs(
+    integrator: Integrator, drawn: Drawn, times: Sequence[Fraction], precision: Precision, options: dict[str, Any]
+) -> tuple[Any, Pairs, Any]:
+    """Outcome, states and steps of each; one after the other where the integrator has no lanes."""
+    count = len(drawn.problems)
+    outcomes, steps = numpy.full(count, Outcome.SUCCESS.value, object), numpy.zeros(count, int)
+    states, good = _pairs([()] * count, len(times)), numpy.zeros(count, bool)
+    if integrator == Integrator(HEYOKA) and _usual(drawn, times, precision):
+        given = drawn.numbers.high[:, :-6], drawn.numbers.high[:, -6:]
+        found, steps, good = states_on_a_grid(drawn.system, *given, times, **options)
+        states = Pairs(found, numpy.zeros_like(found))
+    rest = numpy.flatnonzero(~good)
+    problems = [drawn.problems[place] for place in rest.tolist()]
+    if problems:
+        runs = _one_by_one(integrator, problems, times, options)
+        outcomes[rest] = [run[0] for run in runs]
+        again = _pairs([run[1] for run in runs], len(times))
+        states.high[rest], states.low[rest] = again.high, again.low
+        steps[rest] = [run[2] for run in runs]
+    return outcomes, states, steps
+
+
+def _one_by_one(
     integrator: Integrator, problems: Sequence[Problem], times: Sequence[Fraction], options: dict[str, Any]
 ) -> list[tuple[str, Sequence[Any], int]]:
-    """Outcome, states and steps of each; one after the other where the integrator has no lanes."""
+    """Outcome, states and steps of each, by the integrator's own ensembles where it has them."""
     if integrator.takes_many:
         many = integrator.propagate_many(problems, times, threads=1, **options)
         return [(run.outcome.value, run.states, run.steps) for run in many]
@@ -101,23 +131,33 @@ def _pairs(states: Sequence[Sequence[Any]], samples: int) -> Pairs:
     return Pairs(high, low)
 
 
-def _truth(problems: Sequence[Problem], times: Sequence[Fraction]) -> tuple[Pairs, Any]:
+def _truth(drawn: Drawn, times: Sequence[Fraction], precision: Precision) -> tuple[Pairs, Any]:
     """The reference, and the largest distance of the second run from it, absolute, a rounding of the format added, for
     short motions often agree in every bit.
     """
-    fine = [replace(each, precision=DOUBLE_DOUBLE) for each in problems]
-    targets = [number(time, DOUBLE_DOUBLE) for time in times]
-    found = [
-        _pairs([run.states for run in runs], len(times))
-        for runs in (
-            propagate_words_ensemble(fine, targets, threads=1, step_limit=_STEP_LIMIT, tolerance=tolerance)
-            for tolerance in (None, _OTHER_TOLERANCE)
-        )
-    ]
+    tolerances = _TOLERANCES if precision == DOUBLE else (None, _TOLERANCES[0])
+    found = [_reference(drawn, times, precision, tolerance) for tolerance in tolerances]
     with numpy.errstate(all="ignore"):
         apart = numpy.abs((found[0] - found[1]).high).max(axis=(1, 2))
         size = numpy.abs(found[0].high).max(axis=(1, 2))
         return found[0], apart + float(DOUBLE_DOUBLE.eps) * numpy.maximum(1.0, size)
+
+
+def _reference(drawn: Drawn, times: Sequence[Fraction], precision: Precision, tolerance: Fraction | None) -> Pairs:
+    """One run in double-double, of all motions."""
+    count = len(drawn.problems)
+    states, good = _pairs([()] * count, len(times)), numpy.zeros(count, bool)
+    if drawn.system is HEAVY_TOP and tolerance is not None and _usual(drawn, times, precision):
+        numbers = drawn.numbers.high
+        states, good = double_double_states(numbers[:, :6], numbers[:, 6:], times, tolerance, _STEP_LIMIT)
+    rest = numpy.flatnonzero(~good)
+    problems = [replace(drawn.problems[place], precision=DOUBLE_DOUBLE) for place in rest.tolist()]
+    if problems:
+        targets = [number(time, DOUBLE_DOUBLE) for time in times]
+        runs = propagate_words_ensemble(problems, targets, threads=1, step_limit=_STEP_LIMIT, tolerance=tolerance)
+        again = _pairs([run.states for run in runs], len(times))
+        states.high[rest], states.low[rest] = again.high, again.low
+    return states
 
 
 def _errors(states: Pairs, truth: Pairs, times: Sequence[Fraction], precision: Precision) -> Columns:
@@ -146,13 +186,13 @@ def _drifts(drawn: Drawn, states: Pairs) -> Columns:
     for place, integrals in enumerate(drawn.integrals):
         groups[tuple((i.name, _axes(i)) for i in integrals)].append(place)
     found = {f"drift_{name}": numpy.full(len(drawn.problems), math.nan) for name in DRIFTS}
+    parameters, start = drawn.parameters, drawn.start
     for places in groups.values():
-        problems = [drawn.problems[place] for place in places]
-        parameters = _parameters(problems)
-        now = [Pairs(states.high[places, :, k], states.low[places, :, k]) for k in range(6)]
-        before = [_column([problem.start.flat[k] for problem in problems]) for k in range(6)]
+        own = parameters.mapped(lambda column, places=places: column[places])  # type: ignore[misc]
+        now = [states[places, :, k] for k in range(6)]
+        before = [column[places] for column in start]
         for integral in drawn.integrals[places[0]]:
-            change = integral.value(parameters, now) - integral.value(parameters, before)
+            change = integral.value(own, now) - integral.value(own, before)
             size = numpy.abs(change.high).max(axis=1)
             name = f"drift_{integral.name}"
             if name in found:
@@ -164,25 +204,6 @@ def _drifts(drawn: Drawn, states: Pairs) -> Columns:
 
 def _axes(integral: Any) -> Any:
     return getattr(integral.value, "keywords", {}).get("axes")
-
-
-def _parameters(problems: Sequence[Problem]) -> Parameters:
-    """Those of the problems, each a column."""
-    system = problems[0].system
-    each = [problem.parameters for problem in problems]
-    inertia, moment = (tuple(_column([getattr(p, name)[k] for p in each]) for k in range(3)) for name in _VECTORS)
-    if system is HEAVY_GYROSTAT:
-        return Parameters(inertia, moment, tuple(_column([p.rotor[k] for p in each]) for k in range(3)))
-    return Parameters(inertia, moment, _column([p.rotor for p in each]))
-
-
-_VECTORS = ("inertia", "moment")
-
-
-def _column(values: Sequence[Fraction]) -> Pairs:
-    high = numpy.array([float(value) for value in values])
-    low = numpy.array([float(value - Fraction(first)) for value, first in zip(values, high.tolist(), strict=True)])
-    return Pairs(high[:, None], low[:, None])
 
 
 def _require_agreement(problem: Problem, times: Sequence[Fraction], truth: Pairs, apart: float) -> None:

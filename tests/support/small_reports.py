@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import report_helpers
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import SCHEMA, Report, Row
-from report_helpers import error
-from reports import replace
+from support import report_helpers
+from support.report_helpers import error
+from support.reports import replace
 
 __all__ = ["error", "report", "row"]
 

@@ -7,7 +7,7 @@ from decimal import Decimal
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import SCHEMA, Law, Metric, Report, Series
-from reports import Row, replace
+from support.reports import Row, replace
 
 HOSTILE = "<script>window.hacked = 1</script>\"'&$\\frac{a}$\n\x00]]>" + "x" * 10240
 TIMES = ["1", "10", "100", "1000"]

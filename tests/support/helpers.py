@@ -15,7 +15,7 @@ from heavytop.integrate.trajectory import Trajectory
 from heavytop.top.equations import HEAVY_GYROSTAT, System
 from heavytop.top.heavy_top import HeavyTop, State
 
-VECTORS = json.loads((Path(__file__).parent / "data" / "vectors.json").read_text("utf-8"))
+VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text("utf-8"))
 
 
 def fraction(random: Random, low: int = -30, high: int = 30) -> Fraction:

@@ -1,8 +1,8 @@
 """The ways in, word for word as the README has them, with the wheel in an environment that has nothing else.
 
-``python tests/from_a_wheel.py ENVIRONMENT`` (a folder made by venv, with ``constraints/run.txt`` installed): makes the
-wheel, installs it there and runs the three blocks in a folder of their own, which knows no checkout but the examples.
-Then the plan `gate` as it is, for the integrator that the second block installed.
+``python -m support.from_a_wheel ENVIRONMENT`` in tests/ (a folder made by venv, with ``constraints/run.txt`` in it):
+makes the wheel, installs it there and runs the three blocks in a folder of their own, which knows no checkout but the
+examples.  Then the plan `gate` as it is, for the integrator that the second block installed.
 A verdict on a trajectory must be there within two minutes, a gate of a program in C within two (from nothing: the
 program, its contract, a baseline, a mistake, the comparison), one of a package within ten, an audit within two.
 """
@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
-from documents import ROOT, Block, blocks, run_shell
+from support.documents import ROOT, Block, blocks, run_shell
 
 LIMITS = {
     "score motion.csv": 120,

@@ -27,19 +27,20 @@ class Pairs:
         """An array or a number that doubles hold."""
         if isinstance(value, Pairs):
             return value
-        return cls(numpy.asarray(value, float), numpy.zeros(1))
+        high = numpy.asarray(value, float)
+        return cls(high, numpy.zeros_like(high))
 
     def __add__(self, other: Any) -> Pairs:
         one = Pairs.of(other)
         total, off = _two_sum(self.high, one.high)
         low, rest = _two_sum(self.low, one.low)
         total, off = _quick(total, off + low)
-        return Pairs(*_quick(total, off + rest))
+        return type(self)(*_quick(total, off + rest))
 
     __radd__ = __add__
 
     def __neg__(self) -> Pairs:
-        return Pairs(-self.high, -self.low)
+        return type(self)(-self.high, -self.low)
 
     def __sub__(self, other: Any) -> Pairs:
         return self.__add__(-Pairs.of(other))
@@ -51,7 +52,7 @@ class Pairs:
     def __mul__(self, other: Any) -> Pairs:
         one = Pairs.of(other)
         product, off = _two_product(self.high, one.high)
-        return Pairs(*_quick(product, off + (self.high * one.low + self.low * one.high)))
+        return type(self)(*_quick(product, off + (self.high * one.low + self.low * one.high)))
 
     __rmul__ = __mul__
 
@@ -64,9 +65,28 @@ class Pairs:
         two = Pairs(*_quick(*_two_sum(first, second)))
         return two.__add__(third)
 
+    def __getitem__(self, where: Any) -> Pairs:
+        return type(self)(self.high[where], self.low[where])
+
     def __abs__(self) -> Pairs:
         sign = numpy.where(self.high < 0, -1.0, 1.0)
         return Pairs(sign * self.high, sign * self.low)
+
+
+class Numerators(Pairs):
+    """Pairs whose quotients have three words each, as constants of the machine code have: (3, ...).
+
+    The words are right to some 2^-150 where divisor and dividend are sums of few doubles.
+    """
+
+    __slots__ = ()
+
+    def __truediv__(self, other: Any) -> Any:
+        words, rest = [], self
+        for _ in range(3):
+            words.append(rest.high / other.high)
+            rest = rest.__sub__(other * words[-1])  # type: ignore[assignment]
+        return numpy.array(words)
 
 
 def _two_sum(a: Any, b: Any) -> tuple[Any, Any]:

@@ -15,7 +15,7 @@ from heavytop.errors import InputError
 from heavytop.precision import decimal_text, exact, log10
 from heavytop.records import Against
 from heavytop.report.policy import Policy
-from reports import compare, store
+from support.reports import compare, store
 
 Document = dict[str, Any]
 Edit = Callable[[Document, Random], bool]

@@ -22,7 +22,7 @@ import mpmath
 
 from heavytop.__main__ import main
 
-HERE = Path(__file__).resolve().parent.parent
+HERE = Path(__file__).resolve().parents[2]
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 

@@ -27,7 +27,7 @@ from heavytop.records import SCHEMA, Metric, Report, Row, Series
 from heavytop.report.policy import Policy
 from heavytop.report.verdicts import Verdict
 from heavytop.suite.rows import data_of
-from reports import compare, expand, history, measure, plan_of
+from support.reports import compare, expand, history, measure, plan_of
 
 NAME = "degraded:taylor"
 CASES = ("euler", "kovalevskaya", "lagrange")

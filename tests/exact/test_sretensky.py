@@ -1,0 +1,131 @@
+"""Sretensky's gyrostat in closed form: its separation by polynomials, random motions, levels, what is refused."""
+
+import random
+from fractions import Fraction
+
+import pytest
+from flint import fmpq_mpoly_ctx
+
+from heavytop.errors import LevelNotDone, NotInClass
+from heavytop.exact.axes import ALL, renamed_state, renamed_top
+from heavytop.exact.catalogue import find
+from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin, Sretensky
+from heavytop.exact.resting import Rest
+from heavytop.exact.validated import Validated
+from heavytop.top.equations import HEAVY_GYROSTAT
+from heavytop.top.heavy_top import HeavyTop, State
+from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
+
+F = Fraction
+
+
+def motion_from(moment, rotor, omega, gamma, i3=F(1)):
+    """The motion whose third component of Ω makes M·γ vanish where γ3 is not 0."""
+    w1, w2, *given = omega
+    third = given[0] if given else -4 * (w1 * gamma[0] + w2 * gamma[1]) / F(gamma[2]) - rotor / i3
+    top = HeavyTop((4 * i3, 4 * i3, i3), 1, (*moment, 0), (0, 0, rotor))
+    return Sretensky(top, State((w1, w2, third), gamma))
+
+
+def random_motion(seed):
+    """The centre anywhere in the plane, any rotor, |γ| not 1."""
+    rng = random.Random(seed)
+    gamma = rational(rng), rational(rng), positive(rng)
+    moment = positive(rng) * rng.choice((1, -1)), rational(rng)
+    return motion_from(moment, positive(rng), (rational(rng), rational(rng)), gamma, positive(rng))
+
+
+def test_the_separation_is_proven_by_polynomials():
+    """x = X(u), x² + y² = a²u² and y = u' (u − v) of the roots u, v of u² − ρu − 4s, from the field equations."""
+    context = fmpq_mpoly_ctx.get(["u", "p", "q", "r", "g1", "g2", "g3", "c", "k"], "degrevlex")
+    u, p, q, r, g1, g2, g3, c, k = context.gens()
+    rho, s = r + k, p * p + q * q
+    energy = 2 * s + r * r / 2 + c * g1 - k * k / 2
+    third = (r - k) * s - c * p * g3
+    area = 4 * p * g1 + 4 * q * g2 + rho * g3
+    separated = u * u - rho * u - 4 * s
+    x, y = c * (2 * p * g3 - g1 * u), c * (2 * q * g3 - g2 * u)
+    cubic = (u**3 - 2 * k * u * u - 2 * energy * u - 4 * third) / 2
+    assert divmod(cubic - x, separated)[1] == 0
+    square = x * x + y * y - c * c * (g1 * g1 + g2 * g2 + g3 * g3) * u * u
+    # modulo the area: c²γ3 (γ3 (4s + ρu − u²) − area u)
+    assert square == c * c * g3 * (-g3 * separated - area * u)
+    # I1 Ω1' = M2 Ω3 − M3 Ω2, I2 Ω2' = M3 Ω1 − M1 Ω3 + γ3 c, M3' = −c γ2
+    rate_of_s = (p * (4 * q * r - rho * q) + q * (rho * p - 4 * p * r + g3 * c)) / 2
+    # u' (2u − ρ) = ρ'u + 4s', and 2u − ρ = u − v
+    assert -c * g2 * u + 4 * rate_of_s == y
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_every_random_motion_solves_all_six_equations(seed):
+    motion = random_motion(seed)
+    assert_solves(motion, rational(random.Random(seed), size=30))
+    assert_narrow(motion, F(10**6))
+    enclosed = Validated(motion.top, motion.start, HEAVY_GYROSTAT).state(F(-2), 180)
+    assert all(a.overlaps(b) for a, b in zip(motion.state(F(-2), 180), enclosed, strict=True))
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_the_attitude_turns_with_the_body_at_any_time(seed):
+    assert_attitude(random_motion(seed), F(-(10**4)))
+
+
+@pytest.mark.parametrize("axes", ALL)
+def test_it_is_found_under_every_naming_of_the_axes(axes):
+    motion = random_motion(3)
+    found = find(renamed_top(motion.top, axes), renamed_state(motion.start, axes), HEAVY_GYROSTAT)
+    assert isinstance(getattr(found, "solution", found), Sretensky)
+    assert_solves(found, F(7, 3))
+
+
+def test_without_a_rotor_it_is_goryachev_and_chaplygins():
+    start = State(("3/4", "1/2", 0), (0, 0, 1))
+    plain = GoryachevChaplygin(HeavyTop((4, 4, 1), 1, (1, 0, 0)), start)
+    motion = motion_from((F(1), F(0)), 0, (F(3, 4), F(1, 2), 0), (0, 0, 1))
+    assert [str(one) for one in plain.state(F(7, 3), 170)] == [str(one) for one in motion.state(F(7, 3), 170)]
+
+
+@pytest.mark.parametrize(
+    ("rotor", "omega", "gamma"),
+    [
+        (1, ("3/4", "1/2"), (0, 0, 1)),
+        (F(-5, 2), (F(1, 3), 0), (0, 0, 1)),  # q = γ2 = 0: both at turning points
+        (-2, (0, F(1, 2), 0), (1, 0, 0)),
+        (2, (1, 0, 3), (0, 1, 0)),
+        (3, (0, F(3, 2)), (F(4, 5), 0, F(3, 5))),
+    ],
+)
+def test_turning_points_are_starts_like_any_other(rotor, omega, gamma):
+    motion = motion_from((F(1), F(0)), rotor, tuple(map(F, omega)), gamma)
+    assert_solves(motion, F(7, 3))
+    assert_solves(motion, F(-1000))
+
+
+@pytest.mark.parametrize("place", [F(1), F(-2, 3)])
+def test_a_variable_may_rest_at_a_double_root(place):
+    """u = e at rest: Ω1 = e (1 + γ1)/(2γ3), ρ = e − 4Ω1²/e, and λ from X'(e) = a."""
+    g1, g3 = F(-5, 13), F(12, 13)
+    p = place * (1 + g1) / (2 * g3)
+    rho = place - 4 * p * p / place
+    rotor = (1 + g1 + 2 * p * p + rho * rho / 2 - 3 * place**2 / 2) / (rho - 2 * place)
+    motion = motion_from((F(1), F(0)), rotor, (p, F(0), rho - rotor), (g1, 0, g3))
+    assert_solves(motion, F(-40))
+    assert_narrow(motion, F(10**6))
+    assert all(isinstance(form.line.variables[0 if place > 0 else 1], Rest) for form in motion.made.values())
+    assert_attitude(motion, F(7, 3))
+
+
+def test_the_pendulum_about_the_rotors_axis_is_left_to_the_enclosure():
+    """Ω1 = Ω2 = γ3 = 0: a separated variable rests at 0."""
+    with pytest.raises(LevelNotDone, match="rests at 0"):
+        motion_from((F(1), F(0)), 2, (F(0), F(0), F(1)), (F(3, 5), F(4, 5), 0))
+
+
+def test_what_is_outside_is_refused_with_the_test_that_failed():
+    start = State(("3/4", "1/2", -1), (0, 0, 1))
+    with pytest.raises(NotInClass, match="k1 = k2 = 0, but k1 = 0, k2 = 1"):
+        Sretensky(HeavyTop((4, 4, 1), 1, (1, 0, 0), (0, 1, 1)), start)
+    with pytest.raises(NotInClass, match="I1 - 4 I3 = -1"):
+        Sretensky(HeavyTop((3, 3, 1), 1, (1, 0, 0), (0, 0, 1)), start)
+    with pytest.raises(NotInClass, match="M·gamma = -1"):
+        Sretensky(HeavyTop((4, 4, 1), 1, (1, 0, 0), (0, 0, 0)), start)
