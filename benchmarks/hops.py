@@ -1,4 +1,4 @@
-"""How many files take part in one flow: a row of drift from TOML to the page, a propagation, a comparison.
+"""How many files take part in one flow: a row of drift, a propagation, a comparison, a Kovalevskaya reference.
 
 ``python benchmarks/hops.py`` prints, for each flow, the files of ``heavytop`` that execute a call in it, in the order
 of their first call, and how many of them are not the mathematics (`top/`, `words/`, `exact/`).  What runs while a
@@ -51,7 +51,14 @@ def compare(folder: Path) -> Callable[[], object]:
     return lambda: ht.compare(folder / "out", folder / "out")
 
 
-FLOWS = {flow.__name__: flow for flow in (drift, propagate, compare)}
+def reference(folder: Path) -> Callable[[], object]:
+    """A Kovalevskaya top to 40 digits."""
+    top = ht.HeavyTop((2, 2, 1), "1/2", ("6/5", "2/3", 0))
+    start = ht.State(("1/3", "4/5", "-7/10"), ("2/7", "3/7", "6/7"))
+    return lambda: ht.reference(top, start, [1, 2], 40)
+
+
+FLOWS = {flow.__name__: flow for flow in (drift, propagate, compare, reference)}
 
 
 def files(flow: Callable[[], object]) -> list[str]:

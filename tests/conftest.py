@@ -1,4 +1,4 @@
-"""Marks the tests of slow.txt as `slow`: whole files, or ``FILE::FUNCTION``, with a call of more than 0.1 s.
+"""Marks the tests of slow.txt as `slow`: whole files, or ``FILE::FUNCTION``, that take more than a second.
 
 And unloads the integrators that a test loaded from its own folder.
 """

@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -303,10 +304,24 @@ def test_an_interrupted_run_goes_on_where_it_was(tmp_path: Path, finished: Path)
     assert not rows.exists()
 
 
+def seconds_so_far(pid: int) -> float:
+    """Processor time of a process that runs."""
+    fields = Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def seconds_of_ended_children() -> float:
+    """Processor time of all of them."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 @pytest.mark.parametrize(
     ("after", "integrator"), [(0.5, "heyoka"), (1.0, "heyoka"), (2.0, "heyoka"), (6.0, "heyoka"), (2.0, "multiword")]
 )
-def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130(after: float, integrator: str) -> None:
+def test_ctrl_c_ends_a_propagation_within_two_seconds_of_processor_time_with_exit_130(
+    after: float, integrator: str
+) -> None:
     """While libraries load, while heyoka compiles, while it integrates."""
     process = subprocess.Popen(
         [*COMMAND, "propagate", *top_options(times="1e12", integrator=integrator)],
@@ -316,10 +331,10 @@ def test_ctrl_c_ends_a_propagation_within_two_seconds_with_exit_130(after: float
     )
     time.sleep(after)
     assert process.poll() is None
+    before = seconds_of_ended_children() + seconds_so_far(process.pid)
     process.send_signal(signal.SIGINT)
-    before = time.monotonic()
-    _, errors = process.communicate(timeout=30)
-    assert time.monotonic() - before < 20  # 0.3 s when nothing else runs
+    _, errors = process.communicate(timeout=120)
+    assert seconds_of_ended_children() - before < 2
     assert process.returncode == 130
     assert "Traceback" not in errors
 

@@ -59,7 +59,7 @@ class PeerFailed(HeavyTopError):
 
 
 class Unsupported(InputError):
-    """What an integrator declares that it cannot do: a system, a format, a direction.  No failure."""
+    """What an integrator declares that it cannot do: a system, a format, a direction, events.  No failure."""
 
 
 class OutOfTime(HeavyTopError):

@@ -10,16 +10,42 @@ import os
 import signal
 import subprocess
 from contextlib import suppress
-from multiprocessing import spawn
+from glob import glob
+from multiprocessing import current_process, spawn
 from multiprocessing.context import SpawnContext, SpawnProcess
+from pathlib import Path
 from threading import Lock, get_ident
 from typing import Any
+from uuid import uuid4
 
+MARK = "HEAVYTOP_GUARD"
+"""The variable of the environment by which a guard finds what left its process group."""
+_KILL_ALL = f"""read -r _
+for file in $(grep -ls "{MARK}=$1" /proc/[0-9]*/environ); do
+  process=${{file#/proc/}}
+  kill -KILL "${{process%/environ}}"
+done
+kill -KILL 0"""
+"""What the shell of a guard does once its input has ended."""
+_ROUNDS = 20
+"""How often what a process may just have started is looked for."""
 _starting = Lock()
 
 
 class _Child(SpawnProcess):
-    """A spawned process that is told nothing of the caller's script."""
+    """A spawned process that is told nothing of the caller's script.
+
+    A daemon of multiprocessing, such as the worker of Dask, may start one: it ends with its parent, however that ends.
+    """
+
+    def start(self) -> None:
+        config = current_process()._config  # type: ignore[attr-defined]
+        daemon = config.pop("daemon", None)
+        try:
+            super().start()
+        finally:
+            if daemon is not None:
+                config["daemon"] = daemon
 
     @staticmethod
     def _Popen(process_obj: Any) -> Any:  # noqa: N802 - the hook of multiprocessing
@@ -49,22 +75,40 @@ class ChildContext(SpawnContext):
     Process = _Child
 
 
+def new_mark() -> str:
+    """What no other process has in its environment."""
+    return uuid4().hex
+
+
+def lead_group(mark: str) -> None:
+    """In a new process: it leads a process group of its own, and what it starts is marked for a :class:`Guard`."""
+    os.setpgid(0, 0)
+    os.environ[MARK] = mark
+
+
 class Guard:
     """A small process that kills its process group once this process has ended, however that came about.
 
-    group: the process group that it joins; a new one where that is 0.
+    What is started with :attr:`environment` is killed too where it has left the group, as a program does that calls
+    ``setsid`` or becomes a daemon: what a process starts inherits its environment.  That takes a Linux /proc; elsewhere
+    the group alone is killed.
+
+    group: the process group that it joins; a new one where that is 0.  mark: of :func:`lead_group`; else a new one.
     """
 
-    def __init__(self, group: int = 0) -> None:
+    def __init__(self, group: int = 0, mark: str = "") -> None:
+        self._mark = mark or new_mark()
         reading, self._lifeline = os.pipe()
         try:
             # what it reads ends with this process, which alone holds the other end
             self._shell = subprocess.Popen(
-                ["/bin/sh", "-c", "read -r _; kill -KILL 0"],
+                ["/bin/sh", "-c", _KILL_ALL, "sh", self._mark],
                 stdin=reading,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 process_group=group,
+                # a guard inside what another guards is to do its work when that is killed
+                env={name: value for name, value in os.environ.items() if name != MARK},
             )
         except BaseException:
             os.close(self._lifeline)
@@ -73,10 +117,31 @@ class Guard:
             os.close(reading)
         self.group = group or self._shell.pid
 
+    @property
+    def environment(self) -> dict[str, str]:
+        """The variable that marks a process, and all that it starts, as this guard's."""
+        return {MARK: self._mark}
+
     def end(self) -> None:
-        """Kills every process of the group, the guard too."""
+        """Kills every process of the group, the guard too, and those that left it."""
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self.group, signal.SIGKILL)
+        for _ in range(_ROUNDS):
+            if not (left := _marked(self._mark)):
+                break
+            for process in left:
+                with suppress(ProcessLookupError, PermissionError):
+                    os.kill(process, signal.SIGKILL)
         self._shell.wait()
         with suppress(OSError):
             os.close(self._lifeline)
+
+
+def _marked(mark: str) -> list[int]:
+    """The processes whose environment has this mark; none where the system does not show environments."""
+    found, wanted = [], f"{MARK}={mark}".encode()
+    for file in glob("/proc/[0-9]*/environ"):
+        with suppress(OSError):  # it has ended, or is somebody else's; that of a zombie is empty
+            if wanted in Path(file).read_bytes():
+                found.append(int(file.split("/")[2]))
+    return found

@@ -273,6 +273,34 @@ class Worst(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     command: str
 
 
+class Histogram(msgspec.Struct, frozen=True, gc=False):
+    """How many values lie in bins of equal width in decades; first: log10 of the left edge of the first."""
+
+    first: float
+    width: float
+    counts: tuple[Count, ...]
+
+
+class CellMap(msgspec.Struct, frozen=True, gc=False):
+    """The median of the digits lost in each cell of two data, rows from below; None in a cell without a motion.
+
+    x, y: names of columns of the records; their edges are one more than the cells.
+    """
+
+    x: str
+    y: str
+    x_edges: tuple[float, ...]
+    y_edges: tuple[float, ...]
+    digits_lost: tuple[tuple[float | None, ...], ...]
+
+
+class Spread(msgspec.Struct, frozen=True, gc=False):
+    """How the quantities of a survey's motions are distributed, by the names of their columns, and over which data."""
+
+    histograms: dict[str, Histogram]
+    map: CellMap | None
+
+
 class Row(msgspec.Struct, gc=False):
     """One measurement, of one motion compared with one reference.
 
@@ -286,7 +314,8 @@ class Row(msgspec.Struct, gc=False):
     amplification: the largest factor by which the motion itself has amplified a change of its start up to the horizon,
     an estimate; null where no single motion is integrated.
     starts: how many starts stand behind the row; laws: how its series grow, by the name of the series.
-    worst: of a survey, first the worst.  chunk: Parquet bytes of a part of one; no report holds it.
+    worst: of a survey, first the worst; spread: its distributions.  chunk: Parquet bytes of a part of one; no report
+    holds it.
     """
 
     case: str
@@ -317,6 +346,7 @@ class Row(msgspec.Struct, gc=False):
     data: Data | None = None
     amplification: Annotated[float, msgspec.Meta(ge=1)] | None = None
     worst: tuple[Worst, ...] | msgspec.UnsetType = msgspec.UNSET
+    spread: Spread | msgspec.UnsetType = msgspec.UNSET
     chunk: bytes | msgspec.UnsetType = msgspec.UNSET
 
     @property

@@ -13,7 +13,7 @@ from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.catalogue import find
 from heavytop.exact.hess import Hess
 from heavytop.exact.hess_pendulum import HessPendulum
-from heavytop.exact.hess_transfer import MOST_SEGMENTS, Segment, System2, Transfer, plan
+from heavytop.exact.hess_transfer import MOST_SEGMENTS, RATIO, Segment, System2, Transfer, plan
 from heavytop.exact.scales import unit_of_time
 from heavytop.exact.validated import Validated
 from heavytop.measure.reference import reference
@@ -108,14 +108,33 @@ def test_pendulums_swing_turn_over_and_start_from_rest(omega, gamma, turning):
 def test_the_first_terms_left_out_lie_within_the_tail():
     with working_precision(200):
         system = System2(*map(ball, SYSTEM))
-        segment = Segment.of(system, 0.0, 0.4, system.bound(arb(0.05), 0.4))
+        segment = Segment.of(system, 0.0, 0.4, system.bound(arb(0.4) / RATIO, 0.4))
     with working_precision(600):
-        longer = Segment.of(system, 0.0, 0.4, system.bound(arb(0.05), 0.4))
+        longer = Segment.of(system, 0.0, 0.4, system.bound(arb(0.4) / RATIO, 0.4))
         for short, long in zip(segment.parts, longer.parts, strict=True):
-            for order, coefficient in enumerate(long.coeffs()):
-                assert abs(coefficient).upper() <= segment.growth.upper()
+            for order, coefficient in enumerate(long.coeffs()[: 2 * len(short)]):
+                assert abs(coefficient).upper() * RATIO**order <= segment.growth.upper()
                 if order < len(short):
                     assert short[order].overlaps(coefficient)
+
+
+def test_polynomials_of_bits_that_count_hold_those_of_all_bits():
+    """Both ends of a segment, in 200 bits against 900; where κr is large too."""
+    for system in (SYSTEM, (F(1, 3), F(1, 10**4), F(1, 2), F(1, 100), F(-1, 4)), (F(1), F(1), F(1), F(1), F(9))):
+        with working_precision(900):
+            fine = System2(*map(ball, system))
+        with working_precision(200):
+            for left, radius, bound in plan(System2(*map(ball, system)))[-2:]:
+                short = Segment.of(System2(*map(ball, system)), left, radius, bound)
+                with working_precision(900):
+                    long = Segment.of(fine, left, radius, bound)
+                for end in (left, left + 2 * radius / RATIO):
+                    given = short.at(arb(end)).entries()
+                    with working_precision(900):
+                        true = long.at(arb(end)).entries()
+                    for ours, wanted in zip(given, true, strict=True):
+                        assert ours.contains(wanted)
+                        assert ours.rad() < arb(2) ** -188 * short.growth**2
 
 
 def test_the_matrix_over_a_period_keeps_areas_and_undoes_itself():
@@ -246,7 +265,7 @@ def test_what_the_plan_of_the_linear_system_counts():
                 # no disc meets a cut, κr is within its limit, and κ is right on the circle
                 assert left * left + float(system.width()) ** 2 > radius * radius
                 assert radius * float(bound) <= 33
-                for entry in system.entries(arb(left) + radius / 8 + radius * acb(0, 1)):
+                for entry in system.entries(arb(left) + radius / RATIO + radius * acb(0, 1)):
                     assert abs(entry) <= bound
         with pytest.raises(OutOfReach, match="more than 96 segments"):
             plan(System2(arb(1), arb(2) ** -400, arb(1), arb(2) ** -200, arb(1) / 5))

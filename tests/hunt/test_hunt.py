@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import heavytop as ht
-from heavytop.integrate.peers.built_in import BUILT_IN, BuiltIn
+from heavytop.integrate.integrator import INTEGRATORS, Integrator
 from heavytop.kinds import KINDS
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import exact
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.hunt.draw import FAMILIES, MOST_TURNS, drawn, possible, turns
@@ -29,7 +29,8 @@ def numbers(found: dict[str, object]) -> list[Fraction]:
 @pytest.mark.parametrize("fault", ["branch", "rest"])
 def test_a_planted_fault_is_found_and_shrunk(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # in this process: one of its own takes seconds to begin
-    monkeypatch.setitem(BUILT_IN, f"planted:{fault}", BuiltIn(f"support.hunted_integrators:{fault}"))
+    planted = Integrator(f"planted:{fault}", f"support.hunted_integrators:{fault}")
+    monkeypatch.setitem(INTEGRATORS, planted.name, planted)
     hunt = ht.hunt(f"planted:{fault}", budget=128, horizon=2)
     assert hunt.found
     worst = hunt.found[0]
@@ -100,7 +101,7 @@ def test_error_and_amplification_are_those_of_the_scorer_and_the_variational_equ
     from heavytop.top.amplification import amplification
     from heavytop.top.equations import HEAVY_TOP
 
-    meter = Meter(Integrator("heyoka"), ht.DOUBLE, Fraction(10), None)
+    meter = Meter(ChosenIntegrator("heyoka"), ht.DOUBLE, Fraction(10), None)
     motions = [drawn(1, index, "any", Fraction(10)) for index in (0, 2, 4)]
     for found in meter.measure(motions):
         top, start = found.motion
@@ -139,7 +140,7 @@ def test_what_is_rounded_on_the_way_may_grow_by_more_than_what_is_rounded_at_the
     # a hunt of heyoka once found this motion, near the separatrix of a pendulum, and blamed heyoka
     top = ht.HeavyTop(("199/1000000000", "239/1000000000", "134337/1000000000000"), 56, ("7/10000000", 0, 0))
     start = ht.State(("1/50", 0, "-3/100"), (0, 0, 1))
-    meter = Meter(Integrator("heyoka"), ht.DOUBLE, Fraction(3), None)
+    meter = Meter(ChosenIntegrator("heyoka"), ht.DOUBLE, Fraction(3), None)
     (found,) = meter.measure([(top, start)])
     assert meter.sharper(found).amplification > 2 * found.amplification
     assert found.error < 100 * meter.sharper(found).explained(2.0**-52)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
+from time import perf_counter
 
 import pytest
 
@@ -287,12 +288,14 @@ def test_a_cheat_is_a_row_that_fails_with_what_was_observed_and_the_others_go_on
 
 
 def test_seconds_are_those_of_the_clock_here(package: Path) -> None:
+    began = perf_counter()
     found = dict(zip(TIMED, rows(package, *TIMED), strict=True))
+    passed = perf_counter() - began
     assert {name: row.reference.reason for name, row in found.items() if row.outcome != "success"} == {}
     for name, row in found.items():
         least = 0.2 if name in ("slow", "slow_compiling", "later") else 1e-4
-        assert least / 10 <= row.seconds["least"] <= row.seconds["run"] < 5, name
-        assert row.seconds["compile"] < 5, name
+        assert least / 10 <= row.seconds["least"] <= row.seconds["run"], name
+    assert sum(row.seconds["compile"] + row.seconds["run"] for row in found.values()) <= passed
 
 
 def test_whatever_is_done_to_the_arguments_and_whoever_it_says_it_is_the_row_is_its_own(package: Path) -> None:

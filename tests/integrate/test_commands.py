@@ -41,6 +41,7 @@ FAILURES = {
     "killed at the start": "was ended by SIGKILL before it said ready",
     "another greeting": "began with 'Welcome to my integrator' instead of ready NAME VERSION",
     "silent": "did not say done within 1 s",
+    "leaves its group": "did not say done within 1 s",
     "busy": "did not say done within 1 s",
     "no done": "did not say done within 1 s",
     "too slow": "did not say done within 1 s",
@@ -159,7 +160,7 @@ def test_a_right_program_keeps_the_contract_and_one_process_serves_it() -> None:
     assert len(found) == 16
 
 
-@pytest.mark.parametrize("fault", ["", "forks", "chatty errors", "counts none"])
+@pytest.mark.parametrize("fault", ["", "forks", "becomes a daemon", "chatty errors", "counts none"])
 def test_a_program_integrates_whatever_else_it_does(fault: str) -> None:
     run = peers.ready(program(fault), ("step", Fraction(1, 50)))(CASE.top, CASE.start, TIMES, DOUBLE)
     known = propagate(CASE.top, CASE.start, TIMES, DOUBLE)
@@ -338,19 +339,22 @@ def test_a_program_that_is_not_there_is_a_failure_of_its_rows(tmp_path: Path, li
         peers.ready(given)(CASE.top, CASE.start, TIMES, DOUBLE)
 
 
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
-def test_the_program_ends_with_this_process_however_that_ends(tmp_path: Path, end: int) -> None:
-    path = toml(tmp_path, table=TABLE.replace('"{program}"', '"{program}", "silent"'))
+@pytest.mark.parametrize(
+    ("end", "fault"), [(signal.SIGINT, "silent"), (signal.SIGKILL, "silent"), (signal.SIGKILL, "leaves its group")]
+)
+def test_the_program_ends_with_this_process_however_that_ends(tmp_path: Path, end: int, fault: str) -> None:
+    words = '", "'.join(["{program}", *fault.split()])
+    path = toml(tmp_path, table=TABLE.replace("{program}", words))
     data = ["--inertia", "3,2,1", "--weight", "1", "--centre", "0,0,1/2", "--omega", "1,0,1", "--gamma", "0,0,1"]
     line = [sys.executable, "-m", "heavytop", "propagate", *data, "--times", "1", "--integrator", str(path)]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as parent:
         wait = monotonic() + 60
-        while not processes("silent") and monotonic() < wait:
+        while not processes(fault) and monotonic() < wait:
             sleep(0.05)
         sleep(0.2)
         os.kill(parent.pid, end)
         parent.wait(30)
-    assert gone("silent")
+    assert gone(fault)
 
 
 def test_a_session_is_one_thread_s_alone() -> None:

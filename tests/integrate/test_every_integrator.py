@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+import inspect
+import json
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from fractions import Fraction
+from importlib.metadata import EntryPoint
 from typing import Any
 
 import numpy as np
 import pytest
 
-from heavytop.errors import InputError
+from heavytop.errors import InputError, PeerFailed
 from heavytop.exact.validated import Validated
-from heavytop.integrate import reach, registry
-from heavytop.integrate.broken import Integrator
-from heavytop.integrate.peers.built_in import BUILT_IN
+from heavytop.integrate import peers, reach, registry
+from heavytop.integrate.broken import FAULTS, Fault
+from heavytop.integrate.integrator import INTEGRATORS, load
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.precision import DOUBLE, exact, number
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, exact, number, real
 from heavytop.suite.cases import CASES, Case
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
+from support.in_process import heavytop
 
 F = Fraction
-NAMES = [*dict.fromkeys([*registry.INTEGRATORS, *BUILT_IN]), "planted fault"]
+NAMES = [*INTEGRATORS, "planted fault"]
 GENERIC, GYROSTAT_CASE = CASES["generic"], CASES["gyrostat"]
 FORWARDS_ONLY = {"mpmath:odefun"}
 HANGING = HeavyTop((3, 2, 1), 1, (0, 0, F(1, 2))), State((0, 0, 0), (0, 0, 1))
@@ -33,14 +38,53 @@ def call(name: str, top: HeavyTop, start: State, times: Sequence[Fraction], syst
     """One run in double, through the very call that everything else takes."""
     if name == "planted fault":
         seen: list[Any] = []
-        run = Integrator("none").propagate(
-            top, start, times, system=system, observer=lambda _, y: seen.append(y.copy())
-        )
+        run = Fault("none").propagate(top, start, times, system=system, observer=lambda _, y: seen.append(y.copy()))
         return Trajectory(**{f: getattr(run, f) for f in run.__dataclass_fields__} | {"states": np.array(seen)})
     options: dict[str, Any] = {"step": F(1, 64)} if name.startswith("splitting") else {}
     if name.startswith("scipy:Radau"):
         options = {"tolerance": F(1, 10**8)}
     return registry.propagator(name, options)(top, start, times, DOUBLE, system=system)
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_capabilities_are_those_of_the_functions(name: str) -> None:
+    """Options, the formats it takes, and what sets its error."""
+    each = INTEGRATORS[name]
+    if each.lacks:
+        return
+    taken = set(inspect.signature(peers.peer(name)).parameters)
+    assert each.control in taken
+    assert {"step": "tolerance", "tolerance": "step"}[each.control] not in taken
+    assert each.streams == ({"observer", "step_limit", "place", "mark"} <= taken)
+    assert each.attitude == ("xi" in taken)
+    assert bool(each.ensemble) == each.streams
+    for form in (DOUBLE, DOUBLE_DOUBLE, real(80)):
+        if {form.name, form.family} & set(each.formats or ()):
+            assert len(registry.propagator(name, {})(GENERIC.top, GENERIC.start, [F(0)], form).states) == 1
+        else:
+            with pytest.raises((InputError, PeerFailed)):
+                registry.propagator(name, {})(GENERIC.top, GENERIC.start, [F(0)], form)
+
+
+def test_an_integrator_added_as_the_manual_says_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An entry point, and a line of the table."""
+    entry = EntryPoint("mine:own", "heavytop.integrate.peers.splitting:order2", "heavytop.peers")
+    monkeypatch.setattr(peers, "entry_points", lambda group: [entry])
+    monkeypatch.setitem(INTEGRATORS, "new", replace(INTEGRATORS["splitting:2"], name="new"))
+    shown = heavytop("list", "--json")
+    assert shown.returncode == 0
+    listed = json.loads(shown.stdout)
+    assert (listed["integrators"]["mine:own"], listed["integrators"]["new"]) == ("installed", "installed")
+    assert listed["capabilities"]["new"]["control"] == "step"
+    assert set(listed["capabilities"]["mine:own"].values()) == {None, False}
+    assert list(listed["integrators"])[:2] == ["heyoka", "multiword"]
+
+
+def test_the_deliberately_faulty_ones_are_instances() -> None:
+    for fault in FAULTS.values():
+        assert fault.integrator.systems == ("heavy_top",)
+        assert not fault.integrator.ensemble
+        assert callable(load(fault.integrator.propagate))
 
 
 def bits(run: Trajectory) -> list[list[str]]:
@@ -154,7 +198,7 @@ def a_run_that_stops_early_says_so(name: str) -> None:
         return
     with pytest.raises(InputError, match=f"{name} has no nonsense"):
         registry.propagator(name, {"nonsense": 1})
-    if name not in registry.INTEGRATORS:
+    if not INTEGRATORS[name].streams:
         with pytest.raises(InputError, match=f"{name} has no step_limit"):
             registry.propagator(name, {"step_limit": 3})
         return

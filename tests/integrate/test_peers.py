@@ -12,7 +12,7 @@ import pytest
 
 from heavytop.errors import InputError
 from heavytop.integrate import peers
-from heavytop.integrate.peers.built_in import BUILT_IN
+from heavytop.integrate.integrator import INTEGRATORS
 from heavytop.integrate.peers.double import Solved, count, double_peer, rates
 from heavytop.integrate.peers.mpmath_taylor import odefun
 from heavytop.integrate.taylor import propagate
@@ -24,7 +24,7 @@ from support.helpers import run_peer
 
 TIMES = [Fraction(1, 3), Fraction(2), Fraction(5)]
 FINE = Fraction(1, 10**12)
-PEERS = [name for name in BUILT_IN if name not in ("heyoka", "mpmath:odefun")]
+PEERS = [name for name in INTEGRATORS if name not in ("heyoka", "mpmath:odefun")]
 
 
 def distance(one, other) -> Fraction:
@@ -189,14 +189,14 @@ DOCS = (Path(__file__).parents[2] / "docs" / "peers.md").read_text("utf-8")
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another package with the peer of the documentation, and with bad ones."""
     adapter = re.search(r"```python\n(.*?)```", DOCS, re.S)[1]
-    (tmp_path / "mine.py").write_text(adapter + "\nnot_callable = 3\n")
+    (tmp_path / "adapter_of_docs.py").write_text(adapter + "\nnot_callable = 3\n")
     (tmp_path / "broken.py").write_text("raise RuntimeError('no licence')")
     info = tmp_path / "mine-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(
-        "[heavytop.peers]\nmine:midpoint = mine:midpoint\nmine:broken = broken:x\nmine:absent = nowhere:x\n"
-        "mine:three = mine:not_callable\nheyoka = mine:midpoint\n"
+        "[heavytop.peers]\nmine:midpoint = adapter_of_docs:midpoint\nmine:broken = broken:x\nmine:absent = nowhere:x\n"
+        "mine:three = adapter_of_docs:not_callable\nheyoka = adapter_of_docs:midpoint\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()

@@ -8,11 +8,11 @@ import numpy
 import pytest
 
 from heavytop.errors import PeerFailed
-from heavytop.integrate import registry
 from heavytop.integrate.broken import FAULTS
+from heavytop.integrate.integrator import INTEGRATORS
 from heavytop.integrate.taylor import first_steps, propagate
 from heavytop.integrate.trajectory import Outcome
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.local_error import LocalError
 from heavytop.measure.single_calls import single_calls
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact
@@ -92,7 +92,7 @@ def test_an_equilibrium_has_no_steps() -> None:
 @pytest.mark.parametrize(("name", "order"), [("splitting:2", 2), ("splitting:8", 8)])
 def test_a_method_with_fixed_steps_shows_its_order_in_longer_ones(name, order) -> None:
     case = CASES["generic"]
-    run, calls = single_calls(Integrator(name), case.top, case.start, Fraction(4), DOUBLE, case.system)
+    run, calls = single_calls(ChosenIntegrator(name), case.top, case.start, Fraction(4), DOUBLE, case.system)
     found = examined(run, calls)
     assert found["observed_order"].value == str(order)
     assert all(call.length == Fraction(1 / 100) for _, call in calls)
@@ -101,7 +101,7 @@ def test_a_method_with_fixed_steps_shows_its_order_in_longer_ones(name, order) -
 
 def test_an_error_of_a_call_is_that_of_one_step_from_where_it_starts() -> None:
     case = CASES["euler"]
-    run, calls = single_calls(Integrator("splitting:2"), case.top, case.start, Fraction(1), DOUBLE, case.system)
+    run, calls = single_calls(ChosenIntegrator("splitting:2"), case.top, case.start, Fraction(1), DOUBLE, case.system)
     size, worst = Fraction(0), Fraction(0)
     for _, call in calls:
         begin = State(*(tuple(map(exact, call.start[i : i + 3])) for i in (0, 3)))
@@ -114,7 +114,7 @@ def test_an_error_of_a_call_is_that_of_one_step_from_where_it_starts() -> None:
 
 def test_an_integrator_with_a_tolerance_is_called_over_its_mean_step_and_shows_no_order() -> None:
     case = CASES["lagrange"]
-    run, calls = single_calls(Integrator("multiword"), case.top, case.start, Fraction(4), EXTENDED, case.system)
+    run, calls = single_calls(ChosenIntegrator("multiword"), case.top, case.start, Fraction(4), EXTENDED, case.system)
     found = examined(run, calls)
     assert float(calls[0][1].length) == pytest.approx(4 / run.steps)
     assert found.keys() == {"local_error_ulp_max", "local_error_ulp_rms"}
@@ -126,7 +126,7 @@ def test_an_integrator_with_a_tolerance_is_called_over_its_mean_step_and_shows_n
 )
 def test_a_count_of_steps_that_cannot_be_is_refused(name, times, monkeypatch) -> None:
     """Steps a thousand times too many make calls so short that each is right to an ulp."""
-    propagate, propagate_many = Integrator.propagate, Integrator.propagate_many
+    propagate, propagate_many = ChosenIntegrator.propagate, ChosenIntegrator.propagate_many
 
     def miscounted(self, *given, **options):
         run = propagate(self, *given, **options)
@@ -135,13 +135,13 @@ def test_a_count_of_steps_that_cannot_be_is_refused(name, times, monkeypatch) ->
     def all_miscounted(self, *given, **options):
         return [replace(run, steps=run.steps * times) for run in propagate_many(self, *given, **options)]
 
-    monkeypatch.setattr(Integrator, "propagate", miscounted)
-    if name in registry.INTEGRATORS:  # others call propagate for each
-        monkeypatch.setattr(Integrator, "propagate_many", all_miscounted)
+    monkeypatch.setattr(ChosenIntegrator, "propagate", miscounted)
+    if INTEGRATORS[name].ensemble:  # others call propagate for each
+        monkeypatch.setattr(ChosenIntegrator, "propagate_many", all_miscounted)
     case = CASES["lagrange"]
     said = "counts its steps wrongly" if times else "moved, and says that it took no step"
     with pytest.raises(PeerFailed, match=f"{name} {said}"):
-        single_calls(Integrator(name), case.top, case.start, Fraction(4), DOUBLE, case.system)
+        single_calls(ChosenIntegrator(name), case.top, case.start, Fraction(4), DOUBLE, case.system)
 
 
 def test_longer_steps_do_not_depend_on_the_unit_of_time() -> None:
@@ -151,7 +151,7 @@ def test_longer_steps_do_not_depend_on_the_unit_of_time() -> None:
     for scale in (Fraction(1), Fraction(10) ** 30, Fraction(3, 10**20)):
         top = HeavyTop(case.top.inertia, scale**2 * case.top.weight, case.top.centre)
         start = State([scale * omega for omega in case.start.omega], case.start.gamma)
-        integrator = Integrator("splitting:4", setting=("step", Fraction(1, 10) / scale))
+        integrator = ChosenIntegrator("splitting:4", setting=("step", Fraction(1, 10) / scale))
         _, calls = single_calls(integrator, top, start, 2 / scale, DOUBLE, case.system)
         asked.append([tuple(call.further) for _, call in calls])
     assert asked == [[(2, 4, 8, 16)] * 16] * 3

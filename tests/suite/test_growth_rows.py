@@ -17,7 +17,7 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.kinds import growth
 from heavytop.measure import computed_reference
 from heavytop.measure.ensemble_reference import reference
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE
 from heavytop.records import Report
 from heavytop.report.policy import Policy
@@ -266,7 +266,7 @@ def test_a_row_goes_on_behind_the_starts_that_are_done(tmp_path: Path, monkeypat
     def watched_too(self, problems, times, observer=None, finished=None, **options):
         return watched(problems, times, observer=observer, finished=finished, **options)
 
-    monkeypatch.setattr(Integrator, "propagate_many", watched_too)
+    monkeypatch.setattr(ChosenIntegrator, "propagate_many", watched_too)
     path = tmp_path / "row-0.partial"
     deaths = 0
     while True:
@@ -292,7 +292,7 @@ def _with_a_nan(_, problems, times, observer, finished, **options):
 
 def test_a_start_that_is_not_finite_is_kept_as_it_is(tmp_path: Path, monkeypatch) -> None:
     (task,) = tasks(tmp_path, '"euler"', 'precision = "double", horizon = "20", starts = 9, samples = 4')
-    monkeypatch.setattr(Integrator, "propagate_many", _with_a_nan)
+    monkeypatch.setattr(ChosenIntegrator, "propagate_many", _with_a_nan)
     saved = Saved(tmp_path / "row-0.partial", "this plan", every=0)
     one = measure(task, saved)
     again = measure(task, saved)

@@ -45,7 +45,7 @@ def sleeps(given):
     time.sleep(1000)
 
 def stuck(given):  # in one call of C that holds the interpreter
-    subprocess.Popen(["sleep", "987"])
+    subprocess.Popen(["sleep", "987"], start_new_session=True)
     re.match("(a+)+$", 60 * "a" + "b")
 
 forward = double_peer("forward", 2, solve, directions=["forward"], systems=["heavy_top"], precisions=["double"])

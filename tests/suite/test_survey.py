@@ -17,15 +17,21 @@ from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.pair_arrays import Pairs
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds import KINDS
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact
+from heavytop.records import SCHEMA, Row
+from heavytop.report.policy import Policy
+from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import read
+from heavytop.suite.rows import failed
 from heavytop.suite.survey import measured as records
 from heavytop.suite.survey.drawn import chunks, drawn
+from heavytop.suite.survey.gathered import gathered
 from heavytop.suite.sweeps import Grid, Random
 from support.in_process import heavytop
+from support.reports import compare
 
 TIMES = [Fraction(n) for n in (1, 2, 3)]
 SWEEP = """
@@ -53,7 +59,7 @@ def plan(folder: Path, count: int = 5, more: str = "") -> Path:
 def test_records_equal_the_scorers(family: str) -> None:
     sweep = Random(name="s", seed=7, count=4, family=family)  # type: ignore[arg-type]
     motions = drawn(chunks(sweep, sweep.cases(), 0), DOUBLE)
-    found = records.measured(motions, Integrator("heyoka"), TIMES, DOUBLE, {})
+    found = records.measured(motions, ChosenIntegrator("heyoka"), TIMES, DOUBLE, {})
     runs = propagate_ensemble(motions.problems, TIMES, threads=1)
     for place, (case, run) in enumerate(zip(sweep.cases(), runs, strict=True)):
         problem = Problem.of(case.top, case.start, DOUBLE)
@@ -112,7 +118,7 @@ def test_a_reference_that_is_off_is_a_contradiction(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(records, "_truth", off)
     with pytest.raises(Contradiction, match="off the proven one"):
-        records.measured(motions, Integrator("heyoka"), TIMES, DOUBLE, {})
+        records.measured(motions, ChosenIntegrator("heyoka"), TIMES, DOUBLE, {})
 
 
 def test_a_run_writes_a_row_and_a_record_a_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,6 +138,26 @@ def test_a_run_writes_a_row_and_a_record_a_motion(tmp_path: Path, monkeypatch: p
     again = heavytop(*worst[0]["command"].partition("|")[0].split()[1:])
     state = json.loads(again.stdout)
     assert state
+
+
+def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("heavytop.suite.survey.drawn.CHUNK", 2)
+    tasks = list(read(str(plan(tmp_path, 4)), KINDS)[2])
+    rows = [KINDS["survey"].measure(task, Saved()) for task in tasks]
+    lost = [failed(task, "heyoka gave up") for task in tasks]
+
+    def report(*parts: Row) -> ht.Report:
+        return ht.Report(SCHEMA, {"name": "many"}, {}, gathered(zip(tasks, parts, strict=True)))
+
+    whole, part, none = report(*rows), report(rows[0], lost[1]), report(*lost)
+    assert [row.metrics["motions_success"].value for each in (whole, part) for row in each.rows] == ["4", "2"]
+    for bad, first in ((part, 2), (none, 0)):
+        found = compare(whole, bad, Policy())
+        assert (found.verdict, found.exit_code, len(found.findings)) == ("worse", 1, 1)
+        assert f"heyoka gave up in many[{first}]" in found.findings[0].reason
+    assert compare(none, none, Policy()).verdict == "same"
 
 
 def test_a_resumed_run_leaves_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,7 +185,7 @@ def test_a_resumed_run_leaves_the_same_bytes(tmp_path: Path, monkeypatch: pytest
 def test_an_integrator_without_lanes_is_surveyed_too() -> None:
     sweep = Random(name="s", seed=7, count=2)
     motions = drawn(chunks(sweep, sweep.cases(), 0), DOUBLE)
-    found = records.measured(motions, Integrator("scipy:DOP853"), TIMES, DOUBLE, {})
+    found = records.measured(motions, ChosenIntegrator("scipy:DOP853"), TIMES, DOUBLE, {})
     assert found["outcome"] == ["success"] * 2
     assert all(found["error_max"] > 0)
 
@@ -198,3 +224,19 @@ def test_columns_and_folders_that_are_not_there_are_refused(tmp_path: Path) -> N
         ht.read_survey(tmp_path)
     with pytest.raises(InputError, match="no column"):
         ht.read_survey(tmp_path, columns=["nothing"])
+
+
+def test_the_page_draws_the_worst_motions_and_the_map_asked_for(tmp_path: Path) -> None:
+    file = plan(tmp_path, 45, 'map = ["omega3", "gamma3"]')
+    ht.run(file, tmp_path / "out", workers=1)
+    (row,) = ht.read_report(tmp_path / "out").rows
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Digits lost over omega3 and gamma3" in page
+    assert isinstance(row.worst, tuple)
+    assert all(f">{each.index}<" in page for each in row.worst)
+    assert sum(row.spread.histograms["error_max"].counts) == 45  # type: ignore[union-attr]
+
+
+def test_a_map_without_two_axes_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="two axes"):
+        read(str(plan(tmp_path, more='map = ["omega1"]')), KINDS)

@@ -23,8 +23,9 @@ from heavytop.measure.digits import digits_kept
 from heavytop.records import Row
 from heavytop.report.consistency import contradictions
 from heavytop.suite import workers
+from heavytop.suite.plan import read
 from heavytop.suite.task import Task
-from support.reports import expand, load, rows
+from support.reports import rows
 
 PLAN = """name = "tiny"
 [[measure]]
@@ -37,7 +38,7 @@ runs = [{ precision = "double", horizon = "5", samples = 5 }, { precision = "ext
 def tasks_of(folder: Path, text: str):
     file = folder / "tiny.toml"
     file.write_text(text)
-    return expand(load(str(file))[0])
+    return read(str(file), KINDS)[2]
 
 
 @pytest.fixture(scope="module")
@@ -240,6 +241,43 @@ def test_a_cluster_gives_the_same_rows_as_this_process_even_if_a_worker_is_kille
 ) -> None:
     assert measured(tasks, 1, cluster) == expected
     assert measured(tasks, 1, cluster, after_first=lambda: kill(worker_pids()[0])) == expected
+
+
+THIRD_PARTY = """
+import os, re, subprocess
+from heavytop.integrate.peers.double import Solved
+
+def good(given):
+    return Solved([given.start + 1e-9 for _ in given.times], given.times[-1], 10)
+
+def stuck(given):
+    subprocess.Popen(["sleep", "876"], start_new_session=True)
+    re.match("(a+)+$", 60 * "a" + "b")
+
+def dies(given):
+    os._exit(3)
+"""
+
+
+@dask
+def test_on_a_cluster_too_rows_of_others_end_and_their_workers_live(
+    tmp_path: Path, cluster: str, worker_pids, tasks
+) -> None:
+    (tmp_path / "mine.py").write_text(THIRD_PARTY)
+    names = [f"mine.py:{name}" for name in ("good", "stuck", "dies")]
+    tables = [
+        f'[[measure]]\nkind = "drift"\ncases = ["pendulum"]\nintegrator = "{name}"\n'
+        'runs = [{ precision = "double", horizon = "1", samples = 2 }]\n'
+        for name in names
+    ]
+    theirs = tasks_of(tmp_path, f'name = "theirs"\nintegrators = {names}\n'.replace("'", '"') + "".join(tables))
+    before = worker_pids()
+    found = dict(workers.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=12.0))
+    assert [found[index].outcome for index in range(4)] == ["success", "out_of_time", "failed", "success"]
+    assert found[1].against == "nothing: mine.py:stuck was stopped after 12 s in pendulum"
+    assert "mine.py:dies ended its process 3 times" in found[2].against
+    assert worker_pids() == before
+    assert not subprocess.run(["pgrep", "-f", "^sleep 876$"], capture_output=True, check=False).stdout
 
 
 @dask

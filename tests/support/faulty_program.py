@@ -36,6 +36,16 @@ def hang():
         time.sleep(60)
 
 
+def daemon():
+    """What is left of it has another session, and no parent."""
+    if os.fork() == 0:
+        os.setsid()
+        if os.fork() == 0:
+            hang()
+        os._exit(0)
+    os.wait()
+
+
 GREETINGS = {
     "silent at the start": hang,
     "dies at the start": lambda: sys.exit("no licence found"),
@@ -45,6 +55,7 @@ GREETINGS = {
 }
 INSTEAD = {  # of the answer to a request with times
     "silent": hang,
+    "leaves its group": lambda: (os.setsid(), hang()),
     "busy": lambda: next(i for i in iter(int, 1)),
     "crashes": lambda: os.kill(os.getpid(), signal.SIGSEGV),
     "leaves": lambda: sys.exit(0),
@@ -163,6 +174,8 @@ def main():
         if name == "heavytop-integrator":
             if fault == "forks" and os.fork() == 0:
                 hang()
+            if fault == "becomes a daemon":
+                daemon()
             if fault == "chatty errors":
                 print("x" * 200_000, file=sys.stderr, flush=True)
             GREETINGS.get(fault, lambda: out("ready faulty 1.2"))()

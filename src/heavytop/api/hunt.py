@@ -11,9 +11,10 @@ from typing import Any
 from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.errors import InputError, quoted
+from heavytop.integrate import peers
 from heavytop.integrate.peers.command import close_all
 from heavytop.integrate.peers.source import Source, named
-from heavytop.measure.integrator import Integrator, require
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE_DOUBLE, Precision, exact, physical, time_text, whole
 from heavytop.report.hunt_text import hunt_text
 from heavytop.suite.hunt.draw import FAMILIES, Family
@@ -104,10 +105,10 @@ def asked_for(
     seed: int,
 ) -> Asked:
     """The search, checked; raises InputError as :func:`hunt` does."""
-    require(which)
+    peers.require(which)
     other = None if against is None else named(against)
     if other is not None:
-        require(other)
+        peers.require(other)
     if not isinstance(family, str) or family not in FAMILIES:
         raise InputError(f"There is no family {quoted(family)}.", f"Use {', '.join(FAMILIES)}.")
     time = physical(exact(horizon), "horizon")
@@ -126,8 +127,8 @@ def asked_for(
     return Asked(one, form, time, families[family], two, beyond, number, seconds, _seed(seed))
 
 
-def _integrator(which: str | Source) -> Integrator:
-    return Integrator(which) if isinstance(which, str) else Integrator(which.name, source=which)
+def _integrator(which: str | Source) -> ChosenIntegrator:
+    return ChosenIntegrator(which) if isinstance(which, str) else ChosenIntegrator(which.name, source=which)
 
 
 def _seed(value: int) -> int:

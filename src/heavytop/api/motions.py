@@ -12,6 +12,7 @@ from heavytop.api.arguments import Number, Numbers
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
 from heavytop.integrate import registry
+from heavytop.integrate.integrator import described
 from heavytop.integrate.peers.source import named
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.measure.derivatives import which_derivatives
@@ -113,7 +114,7 @@ def propagate(
     wanted = arguments.flag(attitude, "attitude")
     which = named(integrator)
     if wanted is None:  # integrators of other packages carry Ω and γ alone
-        wanted = state.attitude is not None and which in registry.INTEGRATORS
+        wanted = state.attitude is not None and described(which).attitude
     beside = xi is None and wanted
     if xi is not None:
         options["xi"] = setup.own(arguments.attitude(xi, state, form))

@@ -21,8 +21,9 @@ def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None =
         lazy: a polars LazyFrame, which reads what is asked of it.
 
     Returns:
-        A pandas DataFrame, one row a motion: ``sweep``, ``index`` in it, ``class``, ``outcome``, ``digits_right``,
-        ``error_max``, ``steps``, ``drift_*``, the rounded top and start.  What could not be measured is missing.
+        A pandas DataFrame with one row a motion.  Its columns are ``sweep``, ``index`` in it, ``class``, ``outcome``,
+        ``digits_right``, ``error_max``, ``steps``, ``drift_*``, the rounded top and start.  What could not be measured
+        is missing.
 
     Raises:
         InputError: where there is no survey, for a column that is not there, and where pandas (of a lazy one, polars)

@@ -33,7 +33,7 @@ def list_(
         print_json(listed)
         return 0
     print("Cases (--case NAME shows the data)")
-    _lines({each["name"]: f"{each['system']:10} {each['about']}" for each in listed["cases"]}, indent=11)
+    _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["cases"]}, indent=15)
     print("Bodies (cases too: the standard tests of other programs)")
     _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["bodies"]}, indent=15)
     plans = f"{', '.join(listed['plans'])}, or a TOML file"
@@ -55,16 +55,18 @@ def _lines(notes: dict[str, str], indent: int = 0) -> None:
 
 
 def _everything() -> dict[str, Any]:
-    from heavytop.integrate import peers, registry
+    from heavytop.integrate import peers
     from heavytop.precision import FORMATS, available
     from heavytop.suite.cases import CASES, named_bodies
     from heavytop.suite.plan import BUILT_IN
     from heavytop.top.equations import SYSTEMS
 
     notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
-    said = {"heyoka": "every format but double-double", "multiword": "every format"}
-    own = {name: said.get(name, "installed") for name in registry.INTEGRATORS}
-    others = {name: "installed" if reason is None else reason for name, reason in peers.available().items()}
+    known, reasons = peers.known(), peers.available()
+    integrators = {
+        name: reasons[name] or (each.formats_text if each.streams else "") or "installed"
+        for name, each in sorted(known.items(), key=lambda item: not item[1].streams)
+    }
     return {
         "cases": [{"name": case.name, "system": case.system.name, "about": case.about} for case in CASES.values()],
         "bodies": [
@@ -76,8 +78,8 @@ def _everything() -> dict[str, Any]:
             "real:BITS" if name == "real" else name: notes[name] if reason is None else f"not available: {reason}"
             for name, reason in available().items()
         },
-        # heyoka stands among the peers too
-        "integrators": own | {name: note for name, note in others.items() if name not in own},
+        "integrators": integrators,
+        "capabilities": {name: each.capabilities() for name, each in known.items()},
     }
 
 

@@ -14,8 +14,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_poly, fmpz_poly
 
-from heavytop.errors import InputError, OutOfReach, quoted
-from heavytop.integrate import registry
+from heavytop.errors import OutOfReach, Unsupported, quoted
 from heavytop.integrate.engines import compiled as compile_heyoka
 from heavytop.integrate.engines import load
 from heavytop.integrate.reach import expected_steps
@@ -271,23 +270,21 @@ def _reader(rows: Sequence[tuple[Fraction, ...]], scaled: Scaled) -> Callable[[i
 
 
 _DENSE: dict[str, type[Dense]] = {
-    "heavytop.integrate.taylor:propagate": OfHeyoka,
-    "heavytop.integrate.words:propagate_words": OfWords,
+    "heyoka": OfHeyoka,
+    "multiword": OfWords,
 }
-"""By the function that propagates: those that hand over the polynomial of a step."""
+"""By name: those that hand over the polynomial of a step."""
 
 
 def dense(
     integrator: Any, problem: Problem, until: Fraction, tolerance: Fraction | None, step_limit: int | None
 ) -> Dense:
-    """A run of that integrator; raises InputError for one that hands over no polynomial of its steps."""
-    found = registry.INTEGRATORS.get(integrator) if isinstance(integrator, str) else None
-    made = _DENSE.get(found.propagate) if found else None
+    """A run of that integrator; raises Unsupported for one that hands over no polynomial of its steps."""
+    made = _DENSE.get(integrator) if isinstance(integrator, str) else None
     if made is None:
-        known = " and ".join(name for name, each in registry.INTEGRATORS.items() if each.propagate in _DENSE)
-        raise InputError(
+        raise Unsupported(
             f"The integrator {quoted(integrator)} hands over no polynomial of its steps.",
-            f"Events are located by {known}.",
+            f"Events are located by {' and '.join(_DENSE)}.",
         )
     end = exact(number(until, problem.precision))
     steps = expected_steps(problem, end)

@@ -124,6 +124,9 @@ TORQUE = Condition("P r != 0", "P r", lambda top, _: top.moment, any)
 NO_TORQUE = Condition("P r = 0", "P r", lambda top, _: top.moment)
 ON_AXIS_1 = Condition("P b = P c = 0", "P b, P c", lambda top, _: top.moment[1:]), TORQUE
 IN_PLANE_13 = Condition("P b = 0", "P b", lambda top, _: top.moment[1:2])
+MOMENTS_1_3 = Condition("I1 != I3", "I1 - I3", lambda top, _: (_differ(top, 0, 2),), any)
+OFF_AXES_13 = Condition("P a != 0, P c != 0", "P a, P c", lambda top, _: (top.moment[0], top.moment[2]), differ)
+SPIN_UPWARDS = Condition("Omega3 > 0", "Omega3", lambda _, start: start.omega[2:], positive)
 HESS = Condition("I1 (I2 - I3) a^2 = I3 (I1 - I2) c^2", "P^2 times the difference", _hess)
 HESS_TOP = IN_PLANE_13, TORQUE, HESS
 SYMMETRIC = (

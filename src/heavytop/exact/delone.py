@@ -38,7 +38,7 @@ from heavytop.errors import NotInClass
 from heavytop.exact.azimuth import Bearing, WithBearing
 from heavytop.exact.balls import ball, to_bits
 from heavytop.exact.closed_form import ClosedForm, WithAngles, balls, constant, instant, series_length, tanh_sech
-from heavytop.exact.conditions import XI, Condition, apart, plane_top, positive
+from heavytop.exact.conditions import SPIN_UPWARDS, XI, Condition, apart, plane_top
 from heavytop.exact.delone_attitude import DeloneAzimuth
 from heavytop.exact.flint_context import current_length
 from heavytop.exact.kovalevskaya_level import Level
@@ -140,7 +140,7 @@ class DeloneHomoclinic(WithAngles):
     system = HEAVY_TOP
     body = plane_top(2)
     starts = (
-        Condition("Omega3 > 0", "Omega3", lambda _, start: start.omega[2:], positive),
+        SPIN_UPWARDS,
         Condition(
             "the top and start of alpha = Omega3/2",
             "the difference",

@@ -32,7 +32,15 @@ from heavytop.exact.abel import Inversion
 from heavytop.exact.azimuth import Azimuth, Bearing, WithBearing
 from heavytop.exact.balls import Undecided, ball, midpoint, to_bits
 from heavytop.exact.closed_form import ClosedForm, sign
-from heavytop.exact.conditions import HESS, IN_PLANE_13, NOT_ACROSS_CENTRE, Condition, differ, positive
+from heavytop.exact.conditions import (
+    HESS,
+    IN_PLANE_13,
+    MOMENTS_1_3,
+    NOT_ACROSS_CENTRE,
+    OFF_AXES_13,
+    Condition,
+    positive,
+)
 from heavytop.exact.flint_context import current_length, whole_evaluation
 from heavytop.exact.gaps import Gap, Roots
 from heavytop.exact.motion import kept
@@ -269,8 +277,8 @@ class Dokshevich(_Moving, ClosedForm):
     method = "closed form: Dokshevich, inversion of an elliptic integral"
     body = (
         IN_PLANE_13,
-        Condition("P a != 0, P c != 0", "P a, P c", lambda top, _: (top.moment[0], top.moment[2]), differ),
-        Condition("I1 != I3", "I1 - I3", lambda top, _: (top.inertia[0] - top.inertia[2],), any),
+        OFF_AXES_13,
+        MOMENTS_1_3,
         HESS,
         Condition("S^2 = a^2 - ab + b^2 + 3 the square of a rational number", "S^2", _root_square, _has_root),
         Condition("C2 < 0", "-C2", lambda top, _: (-_constants(top).lead,), positive),

@@ -20,7 +20,7 @@ from flint import arb, arb_series
 from heavytop.errors import NotInClass
 from heavytop.exact.balls import FUNCTIONS, ball, to_bits
 from heavytop.exact.closed_form import WithAngles, instant, tanh_sech
-from heavytop.exact.conditions import Condition, apart, positive
+from heavytop.exact.conditions import SPIN_UPWARDS, Condition, apart, positive
 from heavytop.precision import shown
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
@@ -54,7 +54,7 @@ class ErshkovPartial(WithAngles):
         Condition("I1 > I3", "I1 - I3", lambda top, _: (top.inertia[0] - top.inertia[2],), positive),
     )
     starts = (
-        Condition("Omega3 > 0", "Omega3", lambda _, start: start.omega[2:], positive),
+        SPIN_UPWARDS,
         Condition(
             "the top and start of alpha = I3 Omega3/I1",
             "the difference",

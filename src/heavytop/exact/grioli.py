@@ -22,7 +22,7 @@ from typing import Any
 from heavytop.errors import InputError
 from heavytop.exact.balls import ball
 from heavytop.exact.closed_form import Carry, WithAttitude, balls, half_angle
-from heavytop.exact.conditions import IN_PLANE_13, TORQUE, Condition
+from heavytop.exact.conditions import IN_PLANE_13, MOMENTS_1_3, TORQUE, Condition
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
 
 
@@ -48,7 +48,7 @@ class Grioli(WithAttitude):
     body = (
         IN_PLANE_13,
         TORQUE,
-        Condition("I1 != I3", "I1 - I3", lambda top, _: (top.inertia[0] - top.inertia[2],), any),
+        MOMENTS_1_3,
         Condition("(I2 - I3) a^2 = (I1 - I2) c^2", "P^2 times the difference", _section),
     )
     starts = (

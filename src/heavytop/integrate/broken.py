@@ -16,6 +16,7 @@ import numpy
 from heavytop.errors import InputError
 from heavytop.integrate import taylor
 from heavytop.integrate.engines import compiled
+from heavytop.integrate.integrator import Integrator
 from heavytop.integrate.stepper import Stepper
 from heavytop.integrate.taylor import Observer
 from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
@@ -89,7 +90,7 @@ def _not_a_number(states: Sequence[Any]) -> list[Any]:
 
 
 @dataclass(frozen=True, slots=True)
-class Integrator:
+class Fault:
     """heyoka in double, and what is wrong with it.
 
     options: those of `engines.compiled` that differ.  top: what is integrated in the place of the one asked for.
@@ -106,6 +107,11 @@ class Integrator:
     stops: Fraction = Fraction(1)
     silent: bool = False
     detectable: bool = True
+
+    @property
+    def integrator(self) -> Integrator:
+        """As an integrator with its capabilities."""
+        return Integrator("heyoka", self.propagate, systems=(HEAVY_TOP.name,), control="", steps=self.first_steps)
 
     def propagate(
         self,
@@ -145,20 +151,20 @@ class Integrator:
 
 
 FAULTS = {
-    "sign": Integrator("P γ × r enters (1.1) with the other sign", top=_pulled_upwards),
-    "coefficient": Integrator("I1 is larger by 1e-10 of itself", top=_off_by_1e_10),
-    "tolerance": Integrator("tolerance 1e-9", options={"tolerance": Fraction(1, 10**9)}),
-    "order": Integrator("one order less, at heyoka's own step", stepping=_OneOrderLess),
-    "summation": Integrator(
+    "sign": Fault("P γ × r enters (1.1) with the other sign", top=_pulled_upwards),
+    "coefficient": Fault("I1 is larger by 1e-10 of itself", top=_off_by_1e_10),
+    "tolerance": Fault("tolerance 1e-9", options={"tolerance": Fraction(1, 10**9)}),
+    "order": Fault("one order less, at heyoka's own step", stepping=_OneOrderLess),
+    "summation": Fault(
         "compensated summation in a step the other way round: on, where the healthy run has it off",
         options={"high_accuracy": True},
         detectable=False,
     ),
-    "clock": Integrator("time summed in one double", stepping=_ClockInOneWord, detectable=False),
-    "axes": Integrator("axes 1 and 2 swapped in what is handed over", states=_swapped),
-    "frozen": Integrator("the state stands still from the middle on", states=_frozen),
-    "nan": Integrator("the last state is NaN", states=_not_a_number),
-    "stop": Integrator("stops early and says so", stops=Fraction(3, 4)),
-    "silent stop": Integrator("stops early and says nothing", stops=Fraction(3, 4), silent=True),
+    "clock": Fault("time summed in one double", stepping=_ClockInOneWord, detectable=False),
+    "axes": Fault("axes 1 and 2 swapped in what is handed over", states=_swapped),
+    "frozen": Fault("the state stands still from the middle on", states=_frozen),
+    "nan": Fault("the last state is NaN", states=_not_a_number),
+    "stop": Fault("stops early and says so", stops=Fraction(3, 4)),
+    "silent stop": Fault("stops early and says nothing", stops=Fraction(3, 4), silent=True),
 }
 """Each fault by name."""

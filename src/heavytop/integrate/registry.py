@@ -1,8 +1,7 @@
-"""The integrators that have a name, and what each is called with.  A new one is a line in :data:`INTEGRATORS`.
+"""Integrators by name or source, as callables that take the options asked for, and no others.
 
-The two functions of an integrator are called as :func:`heavytop.integrate.taylor.propagate` and
-:func:`heavytop.integrate.ensemble.propagate_ensemble`.  An option that one of them does not have is refused where it is
-asked for, so no integrator needs to take options that mean nothing to it.  Peers serve under their own names.
+An option that an integrator does not have is refused where it is asked for, so none needs to take options that mean
+nothing to it.  What each can do: :class:`heavytop.integrate.integrator.Integrator`.
 """
 
 from __future__ import annotations
@@ -11,12 +10,12 @@ import inspect
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from importlib.metadata import EntryPoint
 from types import FunctionType
-from typing import Any, NamedTuple
+from typing import Any
 
-from heavytop.errors import InputError, quoted
+from heavytop.errors import InputError
 from heavytop.integrate import peers
+from heavytop.integrate.integrator import described, loaded, name_of
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.source import Source
 from heavytop.integrate.reach import require_reach
@@ -24,21 +23,6 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, Precision, exact
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
-
-HERE = "heavytop.integrate"
-
-
-class Integrator(NamedTuple):
-    """Where the functions of an integrator are, as ``module:name``; ensemble: "" where it runs one motion at a time."""
-
-    propagate: str
-    ensemble: str = ""
-
-
-INTEGRATORS = {
-    "heyoka": Integrator(f"{HERE}.taylor:propagate", f"{HERE}.ensemble:propagate_ensemble"),
-    "multiword": Integrator(f"{HERE}.words:propagate_words", f"{HERE}.words_ensemble:propagate_words_ensemble"),
-}
 
 
 def propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
@@ -65,19 +49,21 @@ def propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., An
 
 
 def _unguarded(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
+    name = name_of(which)
     if isinstance(which, Command):
-        return _with(CommandIntegrator(which), which.name, options)
-    if not isinstance(which, str) or (which not in INTEGRATORS and which in peers.known()):
-        _with(peers.peer(which), peers.name_of(which), options)
-        return _with(peers.ready(which), peers.name_of(which), options)
-    return _with(_load(_find(which).propagate), which, options)
+        return _with(CommandIntegrator(which), name, options)
+    found = described(which)
+    if found.streams:
+        return _with(loaded(found.propagate), name, options)
+    _with(peers.peer(which), name, options)
+    return _with(peers.ready(which), name, options)
 
 
 def watched(
     which: str | Source, options: dict[str, Any], observer: Callable[[Fraction, Any], None]
 ) -> Callable[..., Any]:
     """The same as :func:`propagator`, with every state given to ``observer``: by a peer at the end of its run."""
-    if isinstance(which, str) and which in INTEGRATORS:
+    if described(which).streams:
         return propagator(which, {**options, "observer": observer})
     run = propagator(which, options)
 
@@ -95,12 +81,11 @@ def ensemble_propagator(which: str | Source, options: dict[str, Any]) -> Callabl
 
     Its calls raise OutOfReach as those of :func:`propagator`.
     """
-    one_at_a_time = not isinstance(which, str) or (which not in INTEGRATORS and which in peers.known())
-    place = "" if one_at_a_time else _find(peers.name_of(which)).ensemble
-    if not place:
-        name = peers.name_of(which)
+    found, name = described(which), name_of(which)
+    if not found.ensemble:
+        peers.require(which)
         raise InputError(f"The integrator {name} runs one motion at a time.", "Call propagate for each.")
-    run = _with(_load(place), peers.name_of(which), options)
+    run = _with(loaded(found.ensemble), name, options)
 
     def call(problems: Sequence[Problem], times: Sequence[Any], **more: Any) -> Any:
         for problem in problems if len(times) else ():
@@ -108,20 +93,6 @@ def ensemble_propagator(which: str | Source, options: dict[str, Any]) -> Callabl
         return run(problems, times, **more)
 
     return call
-
-
-def _find(name: str) -> Integrator:
-    found = INTEGRATORS.get(name) if isinstance(name, str) else None
-    if found is None:
-        known = ", ".join([*INTEGRATORS, *(peer for peer in peers.known() if peer not in INTEGRATORS)])
-        raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {known}.")
-    return found
-
-
-@lru_cache(maxsize=16)
-def _load(place: str) -> Callable[..., Any]:
-    found: Callable[..., Any] = EntryPoint("", place, "").load()
-    return found
 
 
 @lru_cache(maxsize=64)

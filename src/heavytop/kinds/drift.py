@@ -107,7 +107,7 @@ class Drift(Kind):
         """Of one run.  Raises Contradiction where two proofs of the known motion exclude each other, InputError for a
         place reached with other flags.
         """
-        if task.options.attitude and task.integrator.takes_many:
+        if task.options.attitude and task.integrator.supports_ensemble:
             return _with_attitude(task)
         case, precision = task.given, task.precision
         problem = Problem.of(case.top, case.start, precision, case.system)
@@ -124,7 +124,7 @@ class Drift(Kind):
                 saved.save({"run": place.content(precision), "measures": scorer.content()})
 
         going_on: dict[str, Any] = {}
-        if task.integrator.takes_many:
+        if task.integrator.supports_ensemble:
             going_on = {"place": None if before is None else Place.of(before["run"], precision), "mark": mark}
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **going_on)
         return _row(task, run, scorer)

@@ -152,7 +152,7 @@ class Growth(Kind):
         case, precision, run = task.given, task.precision, task.options
         members = ensemble_of(case, run.starts, run.seed)
         true = [Problem.of(*member, precision, case.system) for member in members]
-        turned = run.attitude and task.integrator.takes_many
+        turned = run.attitude and task.integrator.supports_ensemble
         posed = [_posed(problem, *member) if turned else problem for problem, member in zip(true, members, strict=True)]
         given = [_biased(problem, run.bias) for problem in posed]
         times = [exact(number(time, precision)) for time in task.times]

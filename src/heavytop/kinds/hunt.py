@@ -12,7 +12,7 @@ from rich.text import Text
 
 from heavytop.errors import InputError, quoted
 from heavytop.kinds.base import Kind
-from heavytop.measure.integrator import HEYOKA, Integrator
+from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact, parse, time_text
 from heavytop.records import Against, Metric, Quantity, Row, RowKey, Subject, by_name
@@ -107,7 +107,7 @@ def _asked(task: Task) -> Asked:
         task.precision,
         Fraction(exact(horizon)),
         family,
-        Integrator(against) if against else None,
+        ChosenIntegrator(against) if against else None,
         float(exact(limit)) if limit else None,
         budget,
         seed=seed + task.seed,

@@ -16,6 +16,7 @@ from heavytop.kinds.base import Kind
 from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse, time_text
 from heavytop.records import Against, Metric, Row, RowKey
+from heavytop.report.survey_charts import survey_charts
 from heavytop.report.text import title
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
@@ -24,7 +25,7 @@ from heavytop.suite.sampling import positive, uniform
 from heavytop.suite.survey.drawn import Chunk, Drawn, drawn
 from heavytop.suite.survey.gathered import of_motions
 from heavytop.suite.survey.measured import measured
-from heavytop.suite.survey.table import chunk_bytes
+from heavytop.suite.survey.table import DATA, chunk_bytes
 from heavytop.suite.task import Task, computed
 
 NAME = "survey"
@@ -33,7 +34,10 @@ _METHOD = "two runs of multiword in double-double, of different orders"
 
 
 class SurveyTable(Table, tag=NAME):
-    """cases: sweeps, as ``sweep:NAME``.  samples: uniform, to the horizon; precision: double or extended."""
+    """cases: sweeps, as ``sweep:NAME``.  samples: uniform, to the horizon; precision: double or extended.
+
+    map: two data by the names of their columns, over which digits lost are drawn; none for the first two that vary.
+    """
 
     cases: list[str]
     horizon: str
@@ -41,6 +45,7 @@ class SurveyTable(Table, tag=NAME):
     samples: int = 10
     integrator: str = HEYOKA
     tolerance: str = ""
+    map: list[str] = msgspec.field(default_factory=list)
     chunked: ClassVar[bool] = True
 
     def tasks(self, find: Find) -> list[Task]:
@@ -54,6 +59,10 @@ class SurveyTable(Table, tag=NAME):
         (horizon,) = positive([self.horizon], "horizon")
         if self.tolerance:
             positive([self.tolerance], "tolerance")
+        if self.map and (len(set(self.map)) != 2 or len(self.map) != 2 or not set(self.map) <= set(DATA)):
+            raise InputError(
+                f"A map over {quoted(', '.join(self.map))} has no two axes.", f"Use two of {', '.join(DATA)}."
+            )
         times, _ = uniform(horizon, self.samples)
         subject = computed(self.integrator, tolerance=self.tolerance)
         return [
@@ -63,6 +72,7 @@ class SurveyTable(Table, tag=NAME):
                 self.integrator,
                 case,
                 times,
+                options=tuple(self.map),
             )
             for case in map(find, self.cases)
         ]
@@ -74,6 +84,7 @@ class Survey(Kind):
     name = NAME
     table = SurveyTable
     gathers = True
+    sections = (survey_charts,)
     noise_factor = 5.0
     place = 33
 

@@ -181,7 +181,7 @@ class WorkPrecision(Kind):
         """Seconds, and a run to the end alone; of another package's integrator tried and checked."""
         end, how = task.times[-1:], _repeats(task)
         name = task.integrator.name
-        if task.integrator.of_another_package and sampled.outcome is Outcome.SUCCESS:
+        if not task.integrator.can.own and sampled.outcome is Outcome.SUCCESS:
             seconds, alone = tried(name, sampled.problem, integrate, sampled, error, how)
             counted = replace(alone, times=sampled.times, states=sampled.states)
             require_counts(name, counted, _setting(task.key.subject), error)

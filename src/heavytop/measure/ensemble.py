@@ -17,7 +17,7 @@ from heavytop.measure.attitude_error import ATTITUDE, POSITION
 from heavytop.measure.digits import RELATIVE
 from heavytop.measure.ensemble_reference import Reference
 from heavytop.measure.growth import Array, Ensemble, band, law, root_mean_square
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
 from heavytop.measure.scorer import Scorer, TimeText
 from heavytop.measure.solution_error import SOLUTION_ERROR
@@ -75,7 +75,7 @@ def complete(
     times: Sequence[Fraction],
     scorers: Sequence[Scorer],
     save: Callable[[], None],
-    integrator: Integrator,
+    integrator: ChosenIntegrator,
     options: Mapping[str, Any],
 ) -> None:
     """Compute those of the motions that are missing, all side by side; save after each.  options: the integrator's."""

@@ -8,11 +8,11 @@ from fractions import Fraction
 from typing import Any
 
 from heavytop.errors import InputError, PeerFailed, Unsupported
-from heavytop.integrate import peers, registry, taylor
+from heavytop.integrate import peers, registry
 from heavytop.integrate.broken import FAULTS
 from heavytop.integrate.ensemble import Finished
 from heavytop.integrate.ensemble import Observer as EnsembleObserver
-from heavytop.integrate.peers.built_in import BUILT_IN
+from heavytop.integrate.integrator import Integrator, described, load
 from heavytop.integrate.peers.contract import require_equal
 from heavytop.integrate.peers.source import Source
 from heavytop.integrate.taylor import Observer
@@ -26,14 +26,8 @@ _AGAIN_SECONDS = 1.0
 """A longer call of an integrator of another package is made once."""
 
 
-def require(which: str | Source) -> None:
-    """Raises InputError for an integrator that is unknown, or built in and not installed."""
-    if which not in registry.INTEGRATORS:
-        peers.require(which)
-
-
 @dataclass(frozen=True, slots=True)
-class Integrator:
+class ChosenIntegrator:
     """The integrator of that name, or a planted fault of :mod:`heavytop.integrate.broken` in the place of heyoka.
 
     setting: ("tolerance", 1e-9) or ("step", 1/50) of a third-party integrator; None for what it does by itself.
@@ -51,19 +45,14 @@ class Integrator:
         return self.source or self.name
 
     @property
-    def takes_many(self) -> bool:
+    def can(self) -> Integrator:
+        """What it can do."""
+        return FAULTS[self.fault].integrator if self.fault else described(self.which)
+
+    @property
+    def supports_ensemble(self) -> bool:
         """Whether many motions go side by side, which makes each cheap."""
-        return not self.fault and self.name in registry.INTEGRATORS
-
-    @property
-    def of_another_package(self) -> bool:
-        """Whether it is believed nothing that can be measured."""
-        return not self.fault and self.name not in registry.INTEGRATORS and self.name not in BUILT_IN
-
-    @property
-    def hands_over_steps(self) -> bool:
-        """Whether its single steps can be looked at, as heyoka's."""
-        return self.name == HEYOKA
+        return bool(self.can.ensemble)
 
     def propagate(
         self,
@@ -85,15 +74,16 @@ class Integrator:
         """
         if self.fault:
             watch = observer or (lambda time, state: None)
-            return FAULTS[self.fault].propagate(top, start, times, precision, system=system, observer=watch)
-        if self.name in registry.INTEGRATORS:
+            spoilt: Trajectory = load(self.can.propagate)(top, start, times, precision, system=system, observer=watch)
+            return spoilt
+        if self.can.streams:
             call = registry.propagator(self.name, {})
             run: Trajectory = call(top, start, times, precision, system=system, observer=observer, **going_on)
             return run
         try:
             peer = peers.ready(self.which, self.setting)
             run = peer(top, start, times, precision, system=system)
-            if again and self.of_another_package and run.seconds["run"] < _AGAIN_SECONDS:
+            if again and not self.can.own and run.seconds["run"] < _AGAIN_SECONDS:
                 require_equal(self.name, run, peer(top, start, times, precision, system=system))
         except Unsupported:
             raise
@@ -116,7 +106,7 @@ class Integrator:
         """The motions of ``problems``, as :func:`heavytop.integrate.ensemble.propagate_ensemble`; one after the other
         where the integrator takes no more.  Raises PeerFailed for an option that it does not have: its row fails alone.
         """
-        if self.takes_many:
+        if self.supports_ensemble:
             try:
                 many = registry.ensemble_propagator(self.name, options)
             except InputError as error:
@@ -140,9 +130,9 @@ class Integrator:
     def first_steps(
         self, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
     ) -> tuple[Trajectory, list[TaylorStep]]:
-        """As :func:`heavytop.integrate.taylor.first_steps`, where it :attr:`hands_over_steps`."""
-        steps = FAULTS[self.fault].first_steps if self.fault else taylor.first_steps
-        return steps(top, start, until, precision, system=system)
+        """As :func:`heavytop.integrate.taylor.first_steps`, where its steps are exposed."""
+        found: tuple[Trajectory, list[TaylorStep]] = load(self.can.steps)(top, start, until, precision, system=system)
+        return found
 
 
 def _given(problem: Problem) -> tuple[HeavyTop, State]:

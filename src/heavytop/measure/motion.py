@@ -13,6 +13,7 @@ from flint import arb
 from heavytop.exact.balls import FUNCTIONS, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate import registry
+from heavytop.integrate.integrator import described
 from heavytop.integrate.peers.source import Source
 from heavytop.integrate.reach import expected_steps
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -150,7 +151,7 @@ def compute(
     integrals = holding(setup.top, setup.start, system)
     watcher = _Watcher(problem, integrals, frozenset(wanted), reached or (lambda time: None), attitude, setup)
     samples = times if watcher.angles is None else watcher.angles.samples(times)
-    if reached is not None and integrator in registry.INTEGRATORS:
+    if reached is not None and described(integrator).streams:
         on_the_way = {exact(number(time, precision)) for time in _on_the_way(problem, times[-1])}
         samples = sorted({*samples, *(on_the_way - wanted.keys())}, key=abs)
     options = (options or {}) | ({} if xi is None else {"xi": xi})

@@ -10,10 +10,10 @@ from typing import Any
 from heavytop.errors import PeerFailed, Unsupported
 from heavytop.exact.balls import midpoint
 from heavytop.exact.validated import Validated
-from heavytop.integrate import peers, registry, taylor
+from heavytop.integrate import peers, taylor
 from heavytop.integrate.peers.command import NOT_COUNTED
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.local_error import Call
 from heavytop.measure.scalar import GUARD_BITS
 from heavytop.precision import Precision, decimal_text, exact, number
@@ -34,7 +34,7 @@ _MOST_STEPS = 64
 
 
 def single_calls(
-    integrator: Integrator, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
+    integrator: ChosenIntegrator, top: HeavyTop, start: State, until: Fraction, precision: Precision, system: System
 ) -> tuple[Trajectory, list[tuple[Fraction, Call]]]:
     """A run to ``until`` > 0, and 16 calls, each with the time at which it ends; none where a run failed.
 
@@ -47,7 +47,7 @@ def single_calls(
     sampled = integrator.propagate(top, start, times, precision, system)
     begins = [whole.problem.native(whole.problem.start.flat), *sampled.states]
     problems = [_from(whole.problem, state) for state in begins]
-    fixed = integrator.name not in registry.INTEGRATORS and peers.knob(integrator.which) == "step"
+    fixed = peers.knob(integrator.which) == "step"
     length = until / max(whole.steps, 1)
 
     def over(n: int) -> list[Trajectory]:
@@ -70,7 +70,7 @@ def single_calls(
     return whole, [(time + call.length, call) for time, call in zip((Fraction(0), *times), calls, strict=True)]
 
 
-def _require_count(integrator: Integrator, runs: Sequence[Trajectory], most: int) -> None:
+def _require_count(integrator: ChosenIntegrator, runs: Sequence[Trajectory], most: int) -> None:
     """Raises PeerFailed where a run moved in no step, or took more than ``most`` over one mean step.
 
     A mean step follows from the count of steps: one too many times too large would make every call look exact.
@@ -87,7 +87,7 @@ def _require_count(integrator: Integrator, runs: Sequence[Trajectory], most: int
             )
 
 
-def require_sum(integrator: Integrator, whole: Trajectory, step: Fraction) -> None:
+def require_sum(integrator: ChosenIntegrator, whole: Trajectory, step: Fraction) -> None:
     """Raises PeerFailed where an integrator ends further off than its steps, each a number, can have taken it.
 
     step: the largest error of a step over the mean step, which follows from its count of steps; one too large makes

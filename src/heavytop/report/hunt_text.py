@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from textwrap import fill
 from typing import Any
 
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import time_text
 from heavytop.suite.hunt.found import digits_lost, ratio
 from heavytop.suite.hunt.measured import Measured
@@ -98,7 +98,7 @@ def _found(hunted: Hunted, number: int, each: dict[str, Any], m: Measured, p: Pr
     ]
 
 
-def _beside(other: Integrator, p: Proof, eps: float) -> str:
+def _beside(other: ChosenIntegrator, p: Proof, eps: float) -> str:
     if p.other is None:
         return f"What {other.name} loses here is not known."
     if math.isinf(p.other):

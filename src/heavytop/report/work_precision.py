@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from heavytop.integrate.peers.built_in import BUILT_IN
+from heavytop.integrate.integrator import INTEGRATORS
 from heavytop.precision import parse
 from heavytop.records import UNMEASURED, Quantity, Row
 
@@ -165,7 +165,7 @@ def beside_ours(rows: Sequence[Row]) -> list[str]:
     found = {case: lines for case, lines in panels(rows).items() if any(line.integrator == OURS for line in lines)}
     names = {line.integrator for lines in found.values() for line in lines} - {OURS, CONSTANTS, LANES}
     said = []
-    for name in sorted(names if len(names) == 1 else names - BUILT_IN.keys()):
+    for name in sorted(names if len(names) == 1 else names - INTEGRATORS.keys()):
         cases: dict[str, dict[str, str]] = {}
         for case, lines in list(found.items())[:_MOST_CASES]:
             for line in lines:

@@ -15,7 +15,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import msgspec
 
@@ -24,11 +24,16 @@ from heavytop.errors import InputError
 from heavytop.records import Report, Row
 from heavytop.suite.files import line, replace, verified
 
+if TYPE_CHECKING:
+    from filelock import FileLock
+
 FILE = "rows.jsonl"
 OURS = re.compile(r"rows\.jsonl|row-\d+\.partial|\.lock|\..*\.partial")
 """Names of what a run leaves behind when it is killed."""
 EVERY = 10.0
 """Seconds between two places of a row in progress."""
+_WAIT = 0.2
+"""Seconds that a run waits for the lock: another may be removing its own just now."""
 _SYNC_EVERY = 1.0
 """Seconds of finished rows that a power cut may cost.  A kill costs none."""
 
@@ -185,9 +190,15 @@ class Checkpoint:
     def _leave(self) -> None:
         if hasattr(self, "_file"):
             self._file.close()
-        # the name goes while the lock is held; whoever waits for this file finds that it is no longer the one
-        (self.directory / ".lock").unlink(missing_ok=True)
-        self._lock.close()
+        name = self.directory / ".lock"
+        try:
+            # while the lock is held: whoever waits for this file finds that it is no longer the one
+            name.unlink(missing_ok=True)
+            self._lock.release()
+        except PermissionError:  # Windows: not while it is open, and not where another run has it open
+            self._lock.release()
+            with suppress(OSError):
+                name.unlink()
         with suppress(OSError):  # only an empty folder goes: nothing was finished, so nothing stays
             self.directory.rmdir()
 
@@ -215,24 +226,18 @@ def require_same(there: dict[str, str], here: dict[str, str], where: Path) -> No
         )
 
 
-def locked(directory: Path) -> BinaryIO:
-    """The lock file of a directory, held; raises InputError where another process holds it."""
-    import fcntl
+def locked(directory: Path) -> FileLock:
+    """The lock of a directory, held; raises InputError where another process holds it."""
+    from filelock import FileLock, Timeout
 
-    path = directory / ".lock"
+    # a process of several threads may end a run in another one than it began in
+    lock = FileLock(directory / ".lock", thread_local=False)
     while True:
         directory.mkdir(parents=True, exist_ok=True)
         try:
-            file = path.open("wb")
+            lock.acquire(timeout=_WAIT, poll_interval=_WAIT / 10)
         except FileNotFoundError:
             continue  # the run before removed its folder just now
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            file.close()
+        except Timeout:
             raise InputError(f"Another run writes to {directory}.", "Wait for it, or give another --out.") from None
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                return file
-        # locked, but the run before had removed the name: the next run would lock another file
-        file.close()
+        return lock

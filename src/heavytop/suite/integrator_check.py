@@ -31,8 +31,6 @@ from heavytop.top.heavy_top import HeavyTop, State
 
 _PATIENCE = 60
 """Seconds of one request, at most; a shorter timeout of the integrator's own counts."""
-_PATIENCE_HUGE = 10
-"""Seconds of the motion that is too fast to follow, where no program answers that it is."""
 _FAREWELL = 2.0
 _OFF = 0.05
 """An error beyond which a state is that of another motion, in units of its largest component, at |t| <= 10."""
@@ -73,7 +71,7 @@ def check(which: str | Source) -> list[Checked]:
 def _in_child(pool: ProcessPoolExecutor, which: str | Source) -> Iterator[Checked]:
     """Each part in the process of the pool; where one does not come back, what was found before it stands."""
     for place, (name, _) in enumerate(_Contract(which).parts()):
-        seconds = _PATIENCE_HUGE if name == _TOO_FAST else _PATIENCE
+        seconds = _PATIENCE_OF.get(name, _PATIENCE)
         ended = True
         try:
             found = pool.submit(_part, which, place).result(timeout=seconds)
@@ -101,6 +99,8 @@ _NOTHING_ELSE = Checked("rest of the contract", "note", "Nothing else was tried:
 _FIRST = 2
 """Parts that nothing works without."""
 _TOO_FAST = "huge"
+_PATIENCE_OF = {_TOO_FAST: 10}
+"""Seconds of single parts: the motion that is too fast to follow, where no program answers that it is."""
 
 
 class _Violated(Exception):

@@ -10,17 +10,18 @@ from __future__ import annotations
 import os
 import signal
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cache
 from time import monotonic
 from typing import Any
 
 from heavytop.errors import OutOfTime
-from heavytop.processes import ChildContext, Guard
-from heavytop.records import Row
+from heavytop.processes import ChildContext, Guard, lead_group, new_mark
+from heavytop.records import OUT_OF_TIME, Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Kind, Kinds
 from heavytop.suite.one_row import begin_worker, died, ended_its_process, measure
@@ -72,6 +73,13 @@ class RowLimits:
         """A row was stopped at its limit."""
         self._of(task).lost += 1
 
+    def took(self, task: Task, cost: float, row: Row, seconds: float) -> None:
+        """A row of any integrator ended, by itself or at its limit."""
+        if row.outcome == OUT_OF_TIME:
+            self.ran_out(task)
+        elif task.is_third_party:
+            self.finished(task, cost, seconds)
+
     def _of(self, task: Task) -> _Record:
         return self._records.setdefault(task.key.subject.name, _Record())
 
@@ -83,6 +91,7 @@ class _Worker:
         self._kinds = kinds
         self._pool: ProcessPoolExecutor | None = None
         self._guard: Guard | None = None
+        self._mark = ""
         self._hello: Future[int] | None = None
         self.index = -1
         self.row: Future[Row] | None = None
@@ -100,8 +109,9 @@ class _Worker:
         """Begins a task: its time runs from when the process is there."""
         self.index, self.limit, self.began = index, limit, monotonic()
         if self._pool is None:
+            self._mark = new_mark()
             self._pool = ProcessPoolExecutor(
-                1, mp_context=ChildContext(), initializer=_lead_group, initargs=tuple(self._kinds.values())
+                1, mp_context=ChildContext(), initializer=_begin, initargs=(self._mark, tuple(self._kinds.values()))
             )
             self._hello = self._pool.submit(os.getpid)
         try:
@@ -118,7 +128,7 @@ class _Worker:
         """Puts a guard into the group of a process that has just begun, and starts its clock."""
         if self._hello is not None and self._hello.done():
             with suppress(BrokenProcessPool, OSError):  # a process that is gone is noticed with its row
-                self._guard = Guard(self._hello.result())
+                self._guard = Guard(self._hello.result(), self._mark)
             self._hello, self.began = None, monotonic()
 
     def end(self) -> None:
@@ -136,9 +146,8 @@ class _Worker:
         self._pool = self._guard = self._hello = self.row = None
 
 
-def _lead_group(*kinds: Kind) -> None:
-    """In a new process: it leads a process group of its own."""
-    os.setpgid(0, 0)
+def _begin(mark: str, kinds: tuple[Kind, ...]) -> None:
+    lead_group(mark)
     begin_worker(*kinds)
 
 
@@ -153,12 +162,10 @@ def in_limited_processes(
 ) -> Iterator[tuple[int, Row]]:
     """(index of the task, its row) as they finish.
 
-    Rows of third-party integrators come first, the quick ones before the long ones, whose limits rest on them.  A task
-    whose process died is run again, three times in all; then it is a row that failed, or where the integrator is this
-    program's, a HeavyTopError.
+    A task whose process died is run again, three times in all; then it is a row that failed, or where the integrator is
+    this program's, a HeavyTopError.
     """
-    costs = {index: kinds[tasks[index].key.kind].cost(tasks[index]) for index in queue}
-    waiting = deque(sorted(queue, key=lambda i: (0, costs[i]) if tasks[i].is_third_party else (1, -costs[i])))
+    costs, waiting = in_order(tasks, kinds, queue)
     limits, deaths = RowLimits(row_timeout), Counter[int]()
     pool = [_Worker(kinds) for _ in range(max(workers, 1))]
     try:
@@ -192,6 +199,39 @@ def in_limited_processes(
     finally:
         for worker in pool:
             worker.end()
+
+
+def in_order(tasks: Sequence[Task], kinds: Kinds, queue: Iterable[int]) -> tuple[dict[int, float], deque[int]]:
+    """The cost of each task, and the tasks in the order in which they are to begin.
+
+    Those of third-party integrators come first, the quick ones before the long ones, whose limits rest on them.
+    """
+    costs = {index: kinds[tasks[index].key.kind].cost(tasks[index]) for index in queue}
+    first = {index: (0, costs[index]) if tasks[index].is_third_party else (1, -costs[index]) for index in costs}
+    return costs, deque(sorted(costs, key=first.__getitem__))
+
+
+@cache
+def _kept_worker() -> _Worker:
+    return _Worker({})
+
+
+def in_limited_process(kind: Kind, task: Task, limit: float) -> tuple[Row, float]:
+    """The row of a third-party integrator, measured in a child of this process within a limit, and its seconds.
+
+    The child is kept for the next row; it ends with this process.  For one thread at a time.
+    """
+    worker, limits = _kept_worker(), RowLimits(limit)
+    for _ in range(_MOST_DEATHS):
+        worker.submit(0, limit, kind, task, Saved())
+        try:
+            while (row := _ended(worker, task, 1.0, limits)) is None:
+                _wait([worker])
+                worker.greet()
+            return row, monotonic() - worker.began
+        except BrokenProcessPool:
+            worker.end()
+    return ended_its_process(task, _MOST_DEATHS), 0.0
 
 
 def _wait(pool: Sequence[_Worker]) -> None:

@@ -23,10 +23,10 @@ from heavytop.errors import InputError, quoted
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers import known as known_integrators
+from heavytop.integrate.peers import require as require_integrator
 from heavytop.integrate.peers.source import Source, command_of, commands_in, named, seconds_of
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.integrator import HEYOKA
-from heavytop.measure.integrator import require as require_integrator
 from heavytop.measure.rounding_noise import MOST_SEEDS
 from heavytop.precision import exact, number, require
 from heavytop.records import RowKey

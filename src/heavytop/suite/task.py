@@ -13,7 +13,7 @@ from heavytop.integrate.peers.source import Source
 from heavytop.integrate.reach import require_reach
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.computed_reference import seconds_a_step as words_seconds
-from heavytop.measure.integrator import HEYOKA, MULTIWORD, Integrator
+from heavytop.measure.integrator import HEYOKA, MULTIWORD, ChosenIntegrator
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.precision import Precision, exact, parse
 from heavytop.records import EXACT, RowKey, Subject
@@ -63,9 +63,9 @@ class Task:
         return self.key.precision != EXACT
 
     @property
-    def integrator(self) -> Integrator:
+    def integrator(self) -> ChosenIntegrator:
         """What computes the motion."""
-        return Integrator(self.key.subject.name, self.fault, source=self.source)
+        return ChosenIntegrator(self.key.subject.name, self.fault, source=self.source)
 
     @property
     def is_third_party(self) -> bool:

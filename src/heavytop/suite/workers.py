@@ -15,14 +15,15 @@ from functools import cache
 from importlib import metadata
 from operator import itemgetter
 from threading import Lock
-from typing import Any
+from time import monotonic
+from typing import Any, TypeVar
 
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.processes import ChildContext
 from heavytop.records import Row
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Kind, Kinds
-from heavytop.suite.limited import in_limited_processes
+from heavytop.suite.limited import RowLimits, in_limited_process, in_limited_processes, in_order
 from heavytop.suite.one_row import RESUME, begin_worker, died, ended_its_process, measure
 from heavytop.suite.task import Task
 
@@ -38,8 +39,9 @@ timings, and another package's integrator need not bear threads.  Ensembles brin
 _PACKAGES = ("heavytop", "heyoka", "numpy", "mpmath", "gmpy2", "python-flint", "msgspec")
 
 Versions = dict[str, str]
-Submit = Callable[[int], Future[Row]]
-UnderWay = dict[Future[Row], int]
+T = TypeVar("T")
+Timed = tuple[Row, float]
+"""A row, and the seconds that it took."""
 
 
 @cache
@@ -67,7 +69,7 @@ def rows(
     row_timeout: seconds of each row of a third-party integrator; None for limits by its other rows.
 
     Where a task has a third-party integrator, all tasks run in processes of their own, also with one worker
-    (:mod:`heavytop.suite.limited`); on a cluster it runs in the cluster's.
+    (:mod:`heavytop.suite.limited`); on a cluster that task alone does, in a child of the worker, under the same limit.
 
     A task whose worker died is run again, three times in all; a third-party integrator that it ran is then a row that
     failed.
@@ -77,7 +79,7 @@ def rows(
     queue, third_party = _longest_first(tasks, kinds, done)
     saved = saved or (lambda index: Saved())
     if scheduler is not None:
-        yield from _on_cluster(tasks, kinds, queue, scheduler, begun)
+        yield from _on_cluster(tasks, kinds, queue, scheduler, begun, row_timeout)
     elif third_party:
         yield from in_limited_processes(tasks, kinds, queue, workers, saved, begun, row_timeout)
     elif workers > 1:
@@ -108,7 +110,7 @@ def _in_processes(
     begun: Callable[[Task], None],
 ) -> Iterator[tuple[int, Row]]:
     deaths: Counter[int] = Counter()
-    under_way: UnderWay = {}
+    under_way: dict[Future[Row], int] = {}
 
     def submit(index: int) -> Future[Row]:
         return pool.submit(measure, kinds[tasks[index].key.kind], tasks[index], saved(index))
@@ -135,16 +137,25 @@ def _in_processes(
 
 
 def _on_cluster(
-    tasks: Sequence[Task], kinds: Kinds, queue: deque[int], scheduler: str, begun: Callable[[Task], None]
+    tasks: Sequence[Task],
+    kinds: Kinds,
+    queue: deque[int],
+    scheduler: str,
+    begun: Callable[[Task], None],
+    row_timeout: float | None,
 ) -> Iterator[tuple[int, Row]]:
+    costs, queue = in_order(tasks, kinds, queue)
+    limits = RowLimits(row_timeout)
     with _client(scheduler) as client:
         from distributed import KilledWorker
 
         pool = client.get_executor(pure=False)
         same = versions()
 
-        def submit(index: int) -> Future[Row]:
-            future: Future[Row] = pool.submit(_measure_as, same, kinds[tasks[index].key.kind], tasks[index])
+        def submit(index: int) -> Future[Timed]:
+            task = tasks[index]
+            limit = limits.seconds(task, costs[index]) if task.is_third_party else None
+            future: Future[Timed] = pool.submit(_measure_as, same, kinds[task.key.kind], task, limit)
             return future
 
         def at_once() -> int:
@@ -153,7 +164,7 @@ def _on_cluster(
         try:
             for index, future in _windowed(queue, {}, submit, at_once, lambda i: begun(tasks[i])):
                 try:
-                    row = future.result()
+                    row, seconds = future.result()
                 except KilledWorker as error:
                     if tasks[index].is_third_party:
                         yield index, ended_its_process(tasks[index], error.allowed_failures + 1)
@@ -165,14 +176,19 @@ def _on_cluster(
                     if "deserialization" in str(error):
                         raise InputError(f"The scheduler {scheduler} has no such heavytop.", _SAME) from None
                     raise
+                limits.took(tasks[index], costs[index], row, seconds)
                 yield index, row
         except (CancelledError, OSError):
             raise HeavyTopError(f"The scheduler {scheduler} was lost.", f"{RESUME}.") from None
 
 
 def _windowed(
-    queue: deque[int], under_way: UnderWay, submit: Submit, at_once: Callable[[], int], begun: Callable[[int], None]
-) -> Iterator[tuple[int, Future[Row]]]:
+    queue: deque[int],
+    under_way: dict[Future[T], int],
+    submit: Callable[[int], Future[T]],
+    at_once: Callable[[], int],
+    begun: Callable[[int], None],
+) -> Iterator[tuple[int, Future[T]]]:
     """Indices as they finish, with up to ``at_once()`` tasks under way; it is 0 where there are no workers.
 
     begun: called with the task that is under way for longest, whenever that changes.
@@ -196,14 +212,20 @@ def _windowed(
             del under_way[future]
 
 
-def _measure_as(expected: Versions, kind: Kind, task: Task) -> Row:
-    """The row of ``task``; raises InputError unless the versions here are those expected."""
+def _measure_as(expected: Versions, kind: Kind, task: Task, limit: float | None) -> Timed:
+    """The row of ``task`` and its seconds, within so many of them where there is a limit.
+
+    Raises InputError unless the versions here are those expected.
+    """
     here = versions()
     other = [f"{name} {here[name]} instead of {expected[name]}" for name in expected if here[name] != expected[name]]
     if other:
         raise InputError(f"A worker has {', '.join(other)}.", _SAME)
     with _one_task:
-        return measure(kind, task, Saved())
+        if limit is not None:
+            return in_limited_process(kind, task, limit)
+        began = monotonic()
+        return measure(kind, task, Saved()), monotonic() - began
 
 
 @contextmanager

@@ -18,13 +18,14 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from fractions import Fraction
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-from heavytop.errors import InputError, PeerFailed
+from heavytop.errors import InputError, PeerFailed, quoted
 from heavytop.former_names import INTEGRATORS as FORMER
-from heavytop.integrate.peers.built_in import BUILT_IN
+from heavytop.integrate.integrator import INTEGRATORS, Integrator, described, foreign, load
+from heavytop.integrate.integrator import name_of as name_of
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
 from heavytop.integrate.peers.source import PythonFile, Source
@@ -41,23 +42,18 @@ _PATIENCE = 60
 """Seconds that a third-party package has to say what it is set by."""
 
 
-def known() -> dict[str, EntryPoint]:
-    """Every peer by name, not yet imported: the built-in ones, then those of other packages, which replace none."""
-    found = {name: EntryPoint(name, built_in.place, GROUP) for name, built_in in BUILT_IN.items()}
+def known() -> dict[str, Integrator]:
+    """Every integrator by name, not yet imported: its own, then those of other packages, which replace none."""
+    found = dict(INTEGRATORS)
     for entry in entry_points(group=GROUP):
         if entry.name not in FORMER:
-            found.setdefault(entry.name, entry)
+            found.setdefault(entry.name, foreign(entry.name, entry.value))
     return found
-
-
-def name_of(which: str | Source) -> str:
-    """The name in rows of an integrator that is named or defined by its source."""
-    return which if isinstance(which, str) else which.name
 
 
 def is_third_party(name: str) -> bool:
     """Whether an integrator of that name is not one of this program's."""
-    return name not in BUILT_IN and name not in FORMER
+    return name not in INTEGRATORS and name not in FORMER
 
 
 def peer(which: str | Source) -> Peer:
@@ -67,12 +63,12 @@ def peer(which: str | Source) -> Peer:
     name = which
     entry = known().get(name)
     if entry is None:
-        raise InputError(f"Unknown integrator {name[:60]!r}.", f"Known: {', '.join(known())}.")
-    if name in BUILT_IN and (missing := BUILT_IN[name].lacks):
-        raise InputError(f"The integrator {name} needs {missing}, which is not installed.", _REMEDY)
+        raise InputError(f"Unknown integrator {quoted(name)}.", f"Known: {', '.join(known())}.")
+    if entry.lacks:
+        raise InputError(f"The integrator {name} needs {entry.lacks}, which is not installed.", _REMEDY)
     try:
         with quiet():
-            loaded: Any = entry.load()
+            found = load(entry.propagate)
     except ImportError as error:
         raise InputError(f"The integrator {name} is not available: {said(error)}.", _remedy(entry)) from error
     except KeyboardInterrupt:
@@ -80,9 +76,9 @@ def peer(which: str | Source) -> Peer:
     except BaseException as error:  # whatever another package's module does when it is imported
         why = f"{type(error).__name__}: {said(error)}"
         raise InputError(f"The integrator {name} is broken: {why}.", _remedy(entry)) from error
-    if not callable(loaded):
-        raise InputError(f"The integrator {name} is broken: {entry.value} is not callable.", _remedy(entry))
-    return loaded  # type: ignore[no-any-return]
+    if not callable(found):
+        raise InputError(f"The integrator {name} is broken: {entry.propagate} is not callable.", _remedy(entry))
+    return found  # type: ignore[no-any-return]
 
 
 def require(which: str | Source) -> None:
@@ -92,7 +88,7 @@ def require(which: str | Source) -> None:
     """
     if isinstance(which, PythonFile) and not Path(which.path).is_file():
         raise InputError(f"There is no file {which.path}.", "Give FILE.py:FUNCTION.")
-    if isinstance(which, str) and (which not in known() or which in BUILT_IN):
+    if isinstance(which, str) and (which not in known() or which in INTEGRATORS):
         peer(which)
 
 
@@ -103,7 +99,7 @@ def ready(which: str | Source, setting: tuple[str, Fraction] | None = None) -> P
     Raises InputError for an unknown integrator and for a setting that one of this program's does not have; PeerFailed
     where another package's cannot be used.
     """
-    name, own = name_of(which), which in BUILT_IN if isinstance(which, str) else False
+    name, own = name_of(which), described(which).own
     if isinstance(which, Command):
         return _program(which, setting)
     try:
@@ -150,6 +146,8 @@ def knob(which: str | Source) -> str:
     """What a peer is set by: "step", "tolerance", or "" for neither, as for one that cannot be used."""
     if isinstance(which, Command):
         return which.knob
+    if control := described(which).control:
+        return control
     for each in ("step", "tolerance"):
         try:
             ready(which, (each, Fraction(1, 100)))
@@ -161,7 +159,7 @@ def knob(which: str | Source) -> str:
 
 def knob_apart(which: str | Source) -> str:
     """:func:`knob`; a third-party one is looked at in a process of its own, which it may end, or never leave."""
-    if isinstance(which, Command) or (isinstance(which, str) and which in BUILT_IN):
+    if isinstance(which, Command) or described(which).own:
         return knob(which)
     with ProcessPoolExecutor(1, mp_context=ChildContext()) as pool:
         try:
@@ -180,9 +178,9 @@ def available() -> dict[str, str | None]:
     One of this program's is not imported: the packages that it needs are looked for.  One of another package is.
     """
     found: dict[str, str | None] = {}
-    for name in known():
+    for name, each in known().items():
         found[name] = None
-        if name not in BUILT_IN or BUILT_IN[name].lacks:
+        if not each.own or each.lacks:
             try:
                 peer(name)
             except InputError as error:
@@ -190,5 +188,5 @@ def available() -> dict[str, str | None]:
     return found
 
 
-def _remedy(entry: EntryPoint) -> str:
-    return _REMEDY if entry.name in BUILT_IN else f"It comes from {entry.value}: repair or remove that package."
+def _remedy(entry: Integrator) -> str:
+    return _REMEDY if entry.own else f"It comes from {entry.propagate}: repair or remove that package."

@@ -438,6 +438,7 @@ class Session:
                 cwd=command.folder or None,
                 bufsize=0,
                 process_group=self._guard.group,
+                env={**os.environ, **self._guard.environment},
             )
         except OSError as error:
             self._guard.end()

@@ -255,7 +255,7 @@ class Contained:
         self._require(within, f"the time {said(run.time_reached)} as reached")
         if not (done or self.own):
             last, following = abs(times[-1]) if times else 0, abs(asked[len(states)])
-            what = f"the time {said(run.time_reached)} as reached, and {len(states)} states"
+            what = f"{len(states)} of {len(asked)} states, and said that it reached t = {said(run.time_reached)}"
             self._require(last <= abs(reached) < following, what)
         named = type(run.integrator) is str and 0 < len(run.integrator) <= _MOST_SAID and run.integrator.isprintable()
         self._require(named, "no name of an integrator")

@@ -15,14 +15,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, quoted
 from heavytop.former_names import INTEGRATORS as FORMER
 from heavytop.former_names import current
-from heavytop.integrate.peers.built_in import BUILT_IN
+from heavytop.integrate.integrator import INTEGRATORS
+from heavytop.integrate.integrator import Source as Source
 from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import contained, quiet, said
 from heavytop.precision import exact, parse
@@ -34,19 +35,6 @@ _TOML = re.compile(r"(?s)(.+\.toml)(?::(.*))?")
 _SHOWN = "docs/commands.md shows every key."
 _FORMS = "A peer takes (top, start, times, precision, *, system, tolerance), a solver takes what is given alone."
 _MOST_SECONDS = 10**7
-
-
-class Source(Protocol):
-    """An integrator that is defined outside this program and every package."""
-
-    @property
-    def name(self) -> str:
-        """In rows and messages."""
-        ...
-
-    def load(self) -> Callable[..., Any]:
-        """The peer; raises InputError where there is none."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +223,7 @@ def command_of(table: Any, folder: Path, where: str) -> Command:
 def _require_possible(command: Command) -> None:
     if not re.fullmatch(_NAME, command.name):
         raise InputError(f"the name {quoted(command.name)} is not letters, digits and ._:+- alone.")
-    if command.name in BUILT_IN or command.name in FORMER:
+    if command.name in INTEGRATORS or command.name in FORMER:
         raise InputError(f"the name {command.name} is that of a built-in integrator.")
     if not command.command or not all(part and "\0" not in part for part in command.command[:1]):
         raise InputError("command is empty.")

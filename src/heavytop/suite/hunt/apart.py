@@ -16,9 +16,9 @@ from heavytop.errors import HeavyTopError, InputError, PeerFailed
 from heavytop.integrate import peers
 from heavytop.integrate.peers.command import Command, begin_row
 from heavytop.integrate.trajectory import Outcome
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import Precision
-from heavytop.processes import ChildContext, Guard
+from heavytop.processes import ChildContext, Guard, lead_group, new_mark
 from heavytop.records import FAILED, OUT_OF_TIME
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
@@ -36,10 +36,12 @@ class Run(NamedTuple):
     said: str = ""
 
 
-def follow(integrator: Integrator, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision) -> Run:
+def follow(
+    integrator: ChosenIntegrator, top: HeavyTop, start: State, times: Sequence[Fraction], precision: Precision
+) -> Run:
     """One motion by an integrator of any kind, contained; raises InputError for what it cannot do at all."""
     try:
-        if integrator.takes_many or isinstance(integrator.source, Command):
+        if integrator.supports_ensemble or isinstance(integrator.source, Command):
             run = integrator.propagate(top, start, times, precision, HEAVY_TOP, again=False)
         else:
             which: Any = integrator.which
@@ -64,7 +66,7 @@ class Apart:
     What the integrator started ends with its process.
     """
 
-    def __init__(self, integrator: Integrator, seconds: float = SECONDS) -> None:
+    def __init__(self, integrator: ChosenIntegrator, seconds: float = SECONDS) -> None:
         self._integrator, self._seconds = integrator, seconds
         self._pool: ProcessPoolExecutor | None = None
         self._guard: Guard | None = None
@@ -85,14 +87,15 @@ class Apart:
             return Run(FAILED, (), f"{self._integrator.name} ended its whole process")
 
     def _begin(self) -> None:
-        self._pool = ProcessPoolExecutor(1, mp_context=ChildContext(), initializer=_lead_group)
+        mark = new_mark()
+        self._pool = ProcessPoolExecutor(1, mp_context=ChildContext(), initializer=lead_group, initargs=(mark,))
         try:
             process = self._pool.submit(_hello, self._integrator).result(timeout=_BEGIN)
         except TimeoutError:
             self.end()
             raise PeerFailed(f"{self._integrator.name} cannot be loaded within {_BEGIN:.3g} s") from None
         with suppress(OSError):
-            self._guard = Guard(process)
+            self._guard = Guard(process, mark)
 
     def end(self) -> None:
         """Kill the process and whatever it started."""
@@ -109,11 +112,7 @@ class Apart:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _lead_group() -> None:
-    os.setpgid(0, 0)
-
-
-def _hello(integrator: Integrator) -> int:
+def _hello(integrator: ChosenIntegrator) -> int:
     """The number of the process; what the integrator imports is imported now, and not in the time of a motion."""
     begin_row()
     with suppress(HeavyTopError):

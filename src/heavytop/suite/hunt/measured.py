@@ -19,7 +19,7 @@ from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers.command import Command
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.integrate.words_ensemble import propagate_words_ensemble
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, number, real
 from heavytop.suite.hunt.apart import SECONDS, Apart, Run, follow
 from heavytop.suite.hunt.draw import Motion
@@ -62,7 +62,7 @@ class Meter:
     """Measures motions with one integrator, and with the one that it is compared with."""
 
     def __init__(
-        self, integrator: Integrator, precision: Precision, horizon: Fraction, against: Integrator | None
+        self, integrator: ChosenIntegrator, precision: Precision, horizon: Fraction, against: ChosenIntegrator | None
     ) -> None:
         self.integrator, self.precision, self.horizon, self.against = integrator, precision, horizon, against
         self.times = [exact(number(horizon * i / SAMPLES, precision)) for i in range(1, SAMPLES + 1)]
@@ -97,7 +97,7 @@ class Meter:
                 found.append(Measured(motion, outcome, error, grown, turns, other, run.said))
         return found
 
-    def run_of(self, integrator: Integrator, motion: Motion) -> Run:
+    def run_of(self, integrator: ChosenIntegrator, motion: Motion) -> Run:
         """One run of the integrator that is hunted, or of another."""
         if integrator == self.integrator and self._apart is not None:
             return self._apart.follow(*motion, self.times, self.precision)
@@ -119,9 +119,9 @@ class Meter:
         return replace(found, amplification=max(largest, found.amplification))
 
     def _runs(
-        self, integrator: Integrator, problems: Sequence[Problem], motions: Sequence[Motion], apart: Apart | None
+        self, integrator: ChosenIntegrator, problems: Sequence[Problem], motions: Sequence[Motion], apart: Apart | None
     ) -> list[Run]:
-        if integrator.takes_many:
+        if integrator.supports_ensemble:
             runs = integrator.propagate_many(problems, self.times, threads=1)
             return [Run(run.outcome.value, run.states) for run in runs]
         if apart is not None:

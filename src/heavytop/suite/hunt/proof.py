@@ -10,7 +10,7 @@ from flint import arb
 from heavytop.exact.balls import rational, working_precision
 from heavytop.exact.flint_context import whole_evaluation
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.measure.integrator import Integrator
+from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.measure.scalar import GUARD_BITS, largest, to_ball
 from heavytop.measure.truth import Truth, truth
 from heavytop.suite.hunt.apart import Run
@@ -34,7 +34,7 @@ class Proof:
     proven: bool
 
 
-def proof(meter: Meter, found: Measured, other: Integrator) -> Proof:
+def proof(meter: Meter, found: Measured, other: ChosenIntegrator) -> Proof:
     """The error of a found motion and of ``other`` on it, against the best that is known of it.
 
     Raises Contradiction where two proofs exclude each other.

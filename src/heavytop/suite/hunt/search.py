@@ -9,7 +9,7 @@ from fractions import Fraction
 from statistics import median, quantiles
 from time import process_time
 
-from heavytop.measure.integrator import HEYOKA, MULTIWORD, Integrator
+from heavytop.measure.integrator import HEYOKA, MULTIWORD, ChosenIntegrator
 from heavytop.precision import Precision
 from heavytop.records import OUT_OF_TIME
 from heavytop.suite.hunt.draw import Dice, Family, Motion, changed, drawn, is_plain, possible
@@ -44,11 +44,11 @@ class Asked:
     for two decades beyond what is explained.  first: motions that are measured before all others.
     """
 
-    integrator: Integrator
+    integrator: ChosenIntegrator
     precision: Precision
     horizon: Fraction
     family: Family = "any"
-    against: Integrator | None = None
+    against: ChosenIntegrator | None = None
     limit: float | None = None
     budget: int | None = None
     seconds: float | None = None
@@ -61,12 +61,12 @@ class Asked:
         return float(self.precision.eps) * math.pow(max(float(abs(self.horizon)), 1e-3), 1.5)
 
     @property
-    def other(self) -> Integrator:
+    def other(self) -> ChosenIntegrator:
         """What the errors are shown beside: heyoka, or multiword where heyoka is hunted or lacks the format."""
         if self.against is not None:
             return self.against
         own = self.integrator.name == HEYOKA or self.precision.name == "double-double"
-        return Integrator(MULTIWORD if own else HEYOKA)
+        return ChosenIntegrator(MULTIWORD if own else HEYOKA)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,12 +14,13 @@ import numpy
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import parse, time_text
-from heavytop.records import Metric, Quantity, Row, Worst, by_name
+from heavytop.records import CellMap, Metric, Quantity, Row, Spread, Worst, by_name
 from heavytop.suite.case_text import forms
 from heavytop.suite.cases import Case
 from heavytop.suite.rows import data_of
 from heavytop.suite.survey.drawn import Chunk
-from heavytop.suite.survey.table import DRIFT_COLUMNS, read_chunk
+from heavytop.suite.survey.spread import cell_map, histogram, two_of
+from heavytop.suite.survey.table import DATA, DRIFT_COLUMNS, read_chunk
 from heavytop.suite.task import Task
 
 MOST_WORST = 20
@@ -57,8 +58,10 @@ class Gathered:
         self._row, self._task = first, task
         self._values: dict[str, list[Any]] = {name: [] for name in _QUANTITIES}
         self._outcomes: dict[str, int] = {}
+        self._digits: list[Any] = []
         self._steps = 0
         self._worst: list[_Bad] = []
+        self._map: dict[str, list[Any]] = {name: [] for name in task.options}
 
     def take(self, row: Row) -> None:
         """One chunk."""
@@ -66,6 +69,10 @@ class Gathered:
         table = read_chunk(row.chunk)
         for name, values in self._values.items():
             values.append(table[name].drop_null().to_numpy())
+        if not self._outcomes and not self._map:
+            self._map = {name: [] for name in two_of({name: table[name].to_numpy() for name in DATA})}
+        for name, values in [*self._map.items(), ("", self._digits)]:
+            values.append(table[name or "digits_right"].to_numpy())
         outcomes = table["outcome"].cast("string").to_pylist()
         for outcome in outcomes:
             self._outcomes[outcome] = self._outcomes.get(outcome, 0) + 1
@@ -88,8 +95,10 @@ class Gathered:
         failed = motions - self._outcomes.get(Outcome.SUCCESS.value, 0)
         counts = {Quantity(COUNT, outcome): n for outcome, n in sorted(self._outcomes.items())}
         metrics = {q: Metric(str(n), math.log10(n), "value") for q, n in counts.items()}
-        for column, values in self._values.items():
-            metrics |= _quantiles(Quantity(*_QUANTITIES[column]), numpy.sort(numpy.concatenate(values)))
+        sorted_values = {column: numpy.sort(numpy.concatenate(values)) for column, values in self._values.items()}
+        for column, values in sorted_values.items():
+            metrics |= _quantiles(Quantity(*_QUANTITIES[column]), values)
+        histograms = {name: found for name, values in sorted_values.items() if (found := histogram(values))}
         return msgspec.structs.replace(
             self._row,
             case=name,
@@ -100,8 +109,17 @@ class Gathered:
             steps=self._steps,
             measured=f"{motions} motions of the sweep {name}, {failed} of which did not reach the horizon",
             data=None,
+            spread=Spread(histograms, self._cells()),
             worst=tuple(_worst(self._task, cases[each.index], each) for each in self._worst),
         )
+
+    def _cells(self) -> CellMap | None:
+        """The digits lost over two of the data."""
+        if len(self._map) < 2:
+            return None
+        lost = self._row.bits * math.log10(2) - numpy.concatenate(self._digits)
+        x, y = ((name, numpy.concatenate(values)) for name, values in self._map.items())
+        return cell_map(x, y, lost)
 
 
 def _quantiles(quantity: Quantity, values: Any) -> dict[Quantity, Metric]:
@@ -138,18 +156,36 @@ def _command(task: Task, case: Case, bad: _Bad) -> str:
 
 
 def gathered(rows: Iterator[tuple[Task, Row]]) -> list[Row]:
-    """One row for each sweep and integrator, in the order of the plan; a chunk that was not measured stays a row."""
-    sums: dict[Any, Gathered] = {}
-    others: list[Row] = []
+    """One row for each sweep and integrator, in the order of the plan.
+
+    A survey with a chunk that was not measured ends as the first such chunk does: what the others came to stays in it.
+    """
+    sums: dict[Any, Gathered | None] = {}
+    lost: dict[Any, Row] = {}
     for task, row in rows:
-        if not isinstance(row.chunk, bytes):
-            others.append(row)
-            continue
         assert isinstance(task.case, Chunk)
         assert task.case.sweep is not None
         key = msgspec.structs.replace(row.key, case=task.case.sweep.name)
-        sums.setdefault(key, Gathered(row, task)).take(row)
-    return [*(each.row() for each in sums.values()), *others]
+        found = sums.setdefault(key, None)
+        if not isinstance(row.chunk, bytes):
+            lost.setdefault(key, msgspec.structs.replace(row, case=key.case, key=key))
+            continue
+        if found is None:
+            found = sums[key] = Gathered(row, task)
+        found.take(row)
+    return [_survey(each, lost.get(key)) for key, each in sums.items()]
+
+
+def _survey(measured: Gathered | None, lost: Row | None) -> Row:
+    """The row of a survey: what its measured chunks came to, with the outcome of a lost one."""
+    if measured is None:
+        assert lost is not None
+        return lost
+    row = measured.row()
+    if lost is None:
+        return row
+    ended = {name: getattr(lost, name) for name in ("outcome", "time_reached", "finite", "reference", "against")}
+    return msgspec.structs.replace(row, **ended)
 
 
 def contents(rows: Iterator[Row]) -> Iterator[bytes]:

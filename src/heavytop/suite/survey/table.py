@@ -14,8 +14,8 @@ _TEXTS = ("sweep", "integrator", "precision", "horizon", "class", "outcome")
 _INTEGERS = ("index", "steps")
 _ERRORS = ("digits_right", "error_max", "error_time", "error_omega", "error_gamma", "error_scaled", "reference_radius")
 DRIFT_COLUMNS = ("drift_gamma_squared", "drift_area", "drift_energy", "drift_further")
-_DATA = tuple(f"{name}{i}" for name in ("inertia", "moment", "rotor", "omega", "gamma") for i in (1, 2, 3))
-COLUMNS = ("sweep", "index", *_TEXTS[1:], *_ERRORS, *DRIFT_COLUMNS, "steps", *_DATA)
+DATA = tuple(f"{name}{i}" for name in ("inertia", "moment", "rotor", "omega", "gamma") for i in (1, 2, 3))
+COLUMNS = ("sweep", "index", *_TEXTS[1:], *_ERRORS, *DRIFT_COLUMNS, "steps", *DATA)
 """In the order of the file.  inertia1 to gamma3 are the rounded top and start, moment that of the weight, P r."""
 
 
