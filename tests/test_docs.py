@@ -20,7 +20,7 @@ from heavytop.cli import app
 from heavytop.integrate.peers.source import commands_in
 from heavytop.kinds import KINDS
 from heavytop.report import policy
-from heavytop.report.brief import brief
+from heavytop.report.terminal import brief
 from heavytop.suite import plan
 from support import from_a_wheel, in_process
 from support.documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Annotated, Any, Literal, NamedTuple, SupportsFloat
 
 import msgspec
@@ -22,6 +23,8 @@ UNMEASURED = OUT_OF_REACH, CONTRADICTION, FAILED, UNSUPPORTED, OUT_OF_TIME
 failed: a third-party integrator raised an error, or gave back what is no trajectory.  unsupported: it declares that it
 cannot do what was asked, which is no failure.  out_of_time: it was stopped at the time limit of its row."""
 
+FINEST = "eps"
+"""In the place of a tolerance: the finest that an integrator offers."""
 EXACT = "exact"
 """The precision of a row in which no format is involved."""
 Direction = Literal["", "forward", "backward"]
@@ -58,7 +61,7 @@ class Quantity(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
         return Quantity(self.name, self.component, statistic, self.branch, self.domain)
 
 
-class Metric(msgspec.Struct, gc=False):
+class Metric(msgspec.Struct, frozen=True, gc=False):
     """One measured number.
 
     quantity: what it is; its text is the metric's key in the report.
@@ -83,26 +86,36 @@ class Metric(msgspec.Struct, gc=False):
             return math.inf if self.value == "never" else math.nan
 
     def __lt__(self, other: SupportsFloat) -> bool:
-        return float(self) < float(other)
+        """By the numbers, exactly: 1e-997 is less than 1e-996.  Metrics that are equal are neither less nor greater."""
+        return self != other and self._number < _number_of(other)
 
     def __le__(self, other: SupportsFloat) -> bool:
-        return float(self) <= float(other)
+        return self == other or self._number <= _number_of(other)
 
     def __gt__(self, other: SupportsFloat) -> bool:
-        return float(self) > float(other)
+        return self != other and self._number > _number_of(other)
 
     def __ge__(self, other: SupportsFloat) -> bool:
-        return float(self) >= float(other)
+        return self == other or self._number >= _number_of(other)
+
+    @property
+    def _number(self) -> Fraction | float:
+        try:
+            return Fraction(self.bound if self.bound is not None else self.value)
+        except ValueError:
+            return float(self)
+
+
+def _number_of(other: SupportsFloat) -> Fraction | float:
+    return other._number if isinstance(other, Metric) else float(other)
 
 
 def by_name(found: Mapping[Quantity, Metric]) -> dict[str, Metric]:
     """Metrics under their keys, each with its quantity."""
-    for quantity, metric in found.items():
-        metric.quantity = quantity
-    return {quantity.text: metric for quantity, metric in found.items()}
+    return {q.text: msgspec.structs.replace(metric, quantity=q) for q, metric in found.items()}
 
 
-class Series(msgspec.Struct, gc=False):
+class Series(msgspec.Struct, frozen=True, gc=False):
     """A measured quantity over time.  values: decimal text or the words of :class:`Metric`, one for each time."""
 
     times: list[str]
@@ -113,7 +126,7 @@ class Series(msgspec.Struct, gc=False):
 Growth = Literal["bounded", "t^0.5", "t", "t^1.5", "t^2", "exponential", "unresolved"]
 
 
-class Law(msgspec.Struct, gc=False):
+class Law(msgspec.Struct, frozen=True, gc=False):
     """How a quantity grows with |t|: a fit to its RMS over an ensemble of starts.
 
     growth: the class; exponent of |t| (or rate of e^(rate |t|) where exponential) with its 95 % bootstrap interval over
@@ -169,6 +182,13 @@ class Subject(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     def setting(self) -> str:
         """``tolerance=1e-9`` or ``step=1/50``; "" where neither is asked for."""
         return f"tolerance={self.tolerance}" if self.tolerance else f"step={self.step}" if self.step else ""
+
+    @property
+    def asked(self) -> str:
+        """The same in words: ``tolerance 1e-9``, ``step 1/50``, or ``finest``."""
+        if FINEST in (self.tolerance, self.step):
+            return "finest"
+        return f"tolerance {self.tolerance}" if self.tolerance else f"step {self.step}" if self.step else ""
 
 
 class RowKey(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
@@ -301,7 +321,7 @@ class Spread(msgspec.Struct, frozen=True, gc=False):
     map: CellMap | None
 
 
-class Row(msgspec.Struct, gc=False):
+class Row(msgspec.Struct, frozen=True, gc=False):
     """One measurement, of one motion compared with one reference.
 
     key: what is measured, of what, how, over which time; case, system, integrator, precision, horizon and measure are

@@ -435,4 +435,5 @@ def test_a_report_counts_the_digits_that_are_right(tmp_path: Path, monkeypatch: 
         "digits_right.energy1 printed t=2": "5",
         "as_expected": "1",
     }
-    assert KINDS["audit"].brief([row]) == ["Library of 1 claims: 1 refuted; every verdict as expected."]
+    headline, *_ = KINDS["audit"].document([row])
+    assert headline.text == "Library of 1 claims: 1 refuted; every verdict as expected."

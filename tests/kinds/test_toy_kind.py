@@ -10,12 +10,14 @@ from rich.console import Console
 
 from heavytop.kinds import KINDS, Kind
 from heavytop.measure.scalar import of_fraction
-from heavytop.records import SCHEMA, Against, Quantity, Report, Row, RowKey, Subject, by_name
+from heavytop.records import SCHEMA, Against, Beside, Quantity, Report, Row, RowKey, Subject, by_name
 from heavytop.report.compare import compare
+from heavytop.report.document import Block, Chart, Headline, Value
+from heavytop.report.document import Table as Cells
 from heavytop.report.html import report_page
 from heavytop.report.policy import Policy
 from heavytop.report.section import Section, Sources
-from heavytop.report.text import summary, table, title
+from heavytop.report.terminal import summary
 from heavytop.suite.checkpoint import Checkpoint, Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.plan import expand, load
@@ -43,7 +45,7 @@ class ToyTable(Table, tag="toy"):
         return [
             Task(
                 RowKey("toy", case.name, case.system.name, Subject("given", f"times {factor}")),
-                case.name,
+                "",
                 f"times {factor}",
                 case,
                 options=int(factor),
@@ -64,7 +66,6 @@ class Toy(Kind):
     name = "toy"
     table = ToyTable
     needed = (WEIGHT.text,)
-    sections = (drawn,)
     spoilt = 1
 
     def cost(self, task: Task) -> float:
@@ -74,8 +75,10 @@ class Toy(Kind):
         weight = of_fraction(task.given.top.weight * task.options * self.spoilt)
         return exact_row(task, "given: a toy", Against("equations", "a balance"), by_name({WEIGHT: weight}))
 
-    def summary(self, rows: Sequence[Row]) -> list:
-        return [title("Toys"), table(["case", "weight"], [[row.case, row.metrics[WEIGHT.text].value] for row in rows])]
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        yield Headline(f"{len(rows)} toys are weighed.")
+        yield Cells("Toys", ["case", "weight"], [[row.case, Value(row.metrics[WEIGHT.text])] for row in rows])
+        yield Chart(drawn)
 
 
 KINDS_WITH_TOY = {**KINDS, "toy": Toy()}
@@ -123,6 +126,7 @@ def test_its_rows_have_their_lines_and_their_section(tmp_path: Path) -> None:
     made = report(measured(tmp_path))
     with console.capture() as capture:
         console.print(summary(made, KINDS_WITH_TOY))
+    assert "4 toys are weighed." in capture.get()
     assert "Toys" in capture.get()
     assert "4.5" in capture.get()
     page = report_page(made, KINDS_WITH_TOY)

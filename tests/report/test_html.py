@@ -11,10 +11,12 @@ import pytest
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.measure.digits import RELATIVE
-from heavytop.records import SCHEMA, Law, Metric, Report, Series
+from heavytop.records import SCHEMA, Law, Metric, Report, Row, Series
 from heavytop.report import plots
 from heavytop.report.answers import digits_headline, laws_headline
+from heavytop.report.document import Card, Headline, In, Word
 from heavytop.report.html import MOST_ROWS
+from heavytop.report.kind import document
 from heavytop.report.policy import Policy
 from heavytop.report.section import MOST_PLOTS, Section, points
 from heavytop.report.svg import apart, decades, finish, new_axes
@@ -130,16 +132,16 @@ def test_the_headline_says_what_the_audit_found(tmp_path: Path, verdict: str, wo
     report = full_report()
     report.rows[:5] = claim_rows(verdict)
     rows = [row for row in report.rows if row.measure == "audit"]
-    (card,) = KINDS["audit"].cards(rows)
-    assert card.lines[1].word == verdict
-    assert card.lines[1].text.endswith(", refuted (1.2)" if verdict == "refuted" else "equations proven")
-    assert words in KINDS["audit"].headline(rows)[1]
+    headline, *_, card = KINDS["audit"].document(rows)
+    assert headline.word == card.lines[1].word == Word(verdict)
+    assert card.lines[1].text.endswith(", 1 refuted: (1.2)" if verdict == "refuted" else "equations proven")
+    assert words in headline.text
     html.write_report(report, tmp_path / "page.html")
     assert words in Page(tmp_path / "page.html").text
 
 
 def test_no_claim_no_verdict_on_one() -> None:
-    assert KINDS["audit"].headline([]) is None
+    assert list(KINDS["audit"].document([])) == []
     page = html.report_page(Report("", {}, {}, [row()]))
     assert '<h2 id="verdict-heading">heyoka has 10.0 of 16 digits left at T = 1000 (euler in double).</h2>' in page
     assert "claim" not in page[page.index("<main") : page.index("</main")]
@@ -147,11 +149,11 @@ def test_no_claim_no_verdict_on_one() -> None:
 
 def test_how_wrong_and_from_when_on(pages: dict[str, Page]) -> None:
     rows = [row for row in full_report().rows if row.measure == "claim_model"]
-    (card,) = KINDS["claim_model"].cards(rows)
+    (card,) = (block for block in KINDS["claim_model"].document(rows) if isinstance(block, Card))
     assert card.title == "c-2, smooth branch: wrong from"
     assert card.lines[0].text == "|t| = 0.24"
     assert card.lines[1].text.endswith("up to |t| = 8 is 0.25.")
-    assert card.rows == [("0.1", "0.0025", "0.05"), ("1", "0.17", "0.34")]
+    assert card.table.rows == [("0.1", "0.0025", "0.05"), ("1", "0.17", "0.34")]
     assert "|t| = 0.24" in pages["report"].text
 
 
@@ -341,14 +343,15 @@ def test_the_digits_of_an_integrator_stand_beside_those_of_heyoka() -> None:
     mine = row(integrator="mine:rk", metrics={RELATIVE.text: error("1e-4")})
     alone = row(case="far", horizon="9000", integrator="mine:rk", metrics={RELATIVE.text: error("1e-2")})
     said = "mine:rk has 4.0 of 16 digits left at T = 1000 (euler in double), heyoka 10.0."
-    assert digits_headline([row(), mine, alone]) == ("", said)
-    assert digits_headline([row(horizon="10"), row()]) == (
-        "",
+    assert digits_headline([row(), mine, alone]) == Headline(said)
+    assert digits_headline([row(horizon="10"), row()]) == Headline(
         "heyoka has 10.0 of 16 digits left at T = 1000 (euler in double).",
     )
     only = {"solution_error_omega_max": error("1e-5"), "solution_error_gamma_max": error("1e-3")}
-    (_, least) = digits_headline([row(metrics=only)])
-    assert least == "heyoka has at least 3.0 of 16 digits left at T = 1000 (euler in double)."
+    assert (
+        digits_headline([row(metrics=only)]).text
+        == "heyoka has at least 3.0 of 16 digits left at T = 1000 (euler in double)."
+    )
     assert digits_headline([row(outcome="time_limit")]) is None
 
 
@@ -358,10 +361,12 @@ def test_whether_planted_faults_are_told_opens_the_page_of_growth(law: str, told
     faulty = row(measure="growth", starts=32, laws={"solution_error_along": Law(law, 32, 1.0, 0.9, 1.1)})
     subject = replace(faulty.key.subject, bias="1e-12")
     faulty = replace(faulty, key=replace(faulty.key, subject=subject))
-    _, found = laws_headline([healthy, faulty])
-    assert found == f"Errors along the flow grow like t^1.5; {told} of 1 planted faults show another law."
+    assert (
+        laws_headline([healthy, faulty]).text
+        == f"Errors along the flow grow like t^1.5; {told} of 1 planted faults show another law."
+    )
     mine = replace(faulty, key=replace(healthy.key, subject=replace(healthy.key.subject, name="mine:rk")))
-    assert laws_headline([healthy, mine]) == ("", f"Errors of mine:rk along the flow grow like {law}.")
+    assert laws_headline([healthy, mine]) == Headline(f"Errors of mine:rk along the flow grow like {law}.")
 
 
 def test_regular_and_unstable_motions_stand_side_by_side_at_the_head_of_the_page_of_growth() -> None:
@@ -371,8 +376,11 @@ def test_regular_and_unstable_motions_stand_side_by_side_at_the_head_of_the_page
         ([unstable, unstable, regular], "like t^1.5 (1 of 3 ensembles) or exponentially (2)."),
         ([unstable, regular, regular, regular], "like t^1.5 (3 of 4 ensembles)."),
     ):
-        (_, found) = laws_headline(rows)
-        assert found == f"Errors along the flow grow {said}"
+        assert laws_headline(rows).text == f"Errors along the flow grow {said}"
+
+
+def headline_of(kind: str, rows: list[Row]) -> str:
+    return next(block.text for block in KINDS[kind].document(rows) if isinstance(block, Headline))
 
 
 ALONE = {
@@ -392,10 +400,11 @@ def default() -> Report:
 @pytest.mark.parametrize("kind", ALONE)
 def test_rows_of_one_kind_alone_open_their_page_with_their_answer(default: Report, kind: str) -> None:
     rows = [each for each in default.rows if each.key.kind == kind]
-    assert KINDS[kind].headline(rows) == ("", ALONE[kind])
+    assert headline_of(kind, rows) == ALONE[kind]
     page = re.sub("<span.*?>|</span>", "", html.report_page(Report("", {}, {}, rows)))
     assert f"{ALONE[kind]}</h2>" in page
-    assert KINDS[kind].headline([replace(each, metrics={}, outcome="failed") for each in rows]) is None
+    none = [replace(each, metrics={}, outcome="failed") for each in rows]
+    assert document(Report("", {}, {}, none), KINDS, In.PAGE) == {}
 
 
 def test_kinds_that_are_mixed_answer_in_order_and_what_a_card_says_is_said_once(default: Report) -> None:
@@ -415,7 +424,7 @@ def test_homoclinic_motions_of_others_stand_beside_those_of_heyoka(default: Repo
     late = replace(
         theirs[0], metrics={"break_away_time": replace(theirs[0].metrics["break_away_time"], value="never", log10=None)}
     )
-    (_, found) = KINDS["homoclinic"].headline([*ours, late])
+    found = headline_of("homoclinic", [*ours, late])
     horizon = float(ours[0].horizon)
     assert (
         found
@@ -444,7 +453,7 @@ def test_work_without_heyoka_opens_with_the_least_error() -> None:
         for size in ("1e-3", "2e-6")
     ]
     rows = [replace(each, seconds={"least": 0.25}) for each in rows]
-    assert KINDS["work_precision"].headline(rows) == ("", "The least error is 2e-6: mine:rk on euler, in 250 ms.")
+    assert headline_of("work_precision", rows) == "The least error is 2e-6: mine:rk on euler, in 250 ms."
 
 
 def test_one_chart_a_case_and_quantity_has_all_variants_with_their_laws() -> None:

@@ -151,9 +151,7 @@ def test_two_tops_of_one_name_in_two_plans_are_two(tmp_path: Path) -> None:
     def ran(centre: str, omega: str) -> Row:
         (tmp_path / "plan.toml").write_text(PLAN.format(centre=centre, omega=omega))
         (task,) = expand(load(str(tmp_path / "plan.toml"))[0])
-        found = measure(task)
-        found.data = data_of(task.case)
-        return found
+        return msgspec.structs.replace(measure(task), data=data_of(task.case))
 
     mine = ran("1/2", "9/10")
     assert judged(mine, ran("0.5", "0.90"))[0] == "same"

@@ -54,7 +54,7 @@ def candidate() -> Report:
     rows[0] = replace(rows[0], laws={"drift_energy": Law("t", 64, 1.0, 0.9, 1.1)})
     rows[0].metrics["drift_energy_max"] = error("1e-10")
     rows[1].metrics["solution_error_across_max"] = error("1e-14")
-    rows[2].outcome, rows[2].time_reached = "step_limit", "7.5"
+    rows[2] = replace(rows[2], outcome="step_limit", time_reached="7.5")
     made = report(*rows, row(case="added"))
     made.environment = {"packages": {"heyoka": "8"}, "llvm": "23.0"}
     made.plan = {"name": "test", "seed": "1"}
@@ -74,7 +74,8 @@ def on_paper(renderable: object) -> str:
 
 def shown() -> Report:
     made = baseline()
-    made.rows[0].series = {"drift_energy": Series(["1", "10"], ["1e-14", "1e-13"])}
+    drift = {"drift_energy": Series(["1", "10"], ["1e-14", "1e-13"])}
+    made.rows[0] = replace(made.rows[0], series=drift)
     steps = {
         "local_error_ulp_max": error("0.65"),
         "local_error_ulp_rms": error("0.28"),

@@ -17,7 +17,7 @@ from heavytop.precision import DOUBLE
 from heavytop.records import Report, Row
 from heavytop.report.history_page import history_page
 from heavytop.report.policy import Policy
-from heavytop.report.score_page import score_page, score_report
+from heavytop.report.score_page import score_report
 from heavytop.suite.cases import CASES
 from heavytop.suite.given import of_arrays
 from heavytop.suite.score import Assessment, assess
@@ -106,7 +106,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     read |= {"smoke": smoke(read["default"]), "gate": gate(read["default"], read["growth"], read["peers"])}
     for name in BUILT_IN:
         html.write_report(read[name], folder / f"{name}.html")
-    (folder / "score.html").write_text(score_page(score_report(scored(), {"commit": "0" * 40})), "utf-8")
+    (folder / "score.html").write_text(html.report_page(score_report(scored(), {"commit": "0" * 40})), "utf-8")
     names = ["a", "b", "c"]
     older = replace(candidate, rows=candidate.rows[:6])
     tracks = history([baseline, candidate, older], Policy())

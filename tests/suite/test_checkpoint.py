@@ -94,9 +94,7 @@ def tasks(tmp_path_factory: pytest.TempPathFactory):
 @pytest.mark.parametrize("index", range(6))
 def test_a_row_taken_up_anywhere_ends_with_the_same_bytes(tasks, index: int) -> None:
     def measured(notes: Notes) -> bytes:
-        found = measure(tasks[index], notes)
-        found.seconds = {}
-        return msgspec.json.encode(found)
+        return msgspec.json.encode(msgspec.structs.replace(measure(tasks[index], notes), seconds={}))
 
     every = len(tasks[index].times) // 2
     whole = Notes(None, every)
@@ -224,8 +222,7 @@ def test_a_forged_place_with_its_checksum_is_measured_from_the_beginning(tmp_pat
 
 def measured_again(task, saved: Saved) -> bytes:
     found = one_row.measure(KINDS[task.key.kind], task, saved)
-    found.seconds = {}
-    return msgspec.json.encode(found)
+    return msgspec.json.encode(msgspec.structs.replace(found, seconds={}))
 
 
 def test_a_forged_row_with_its_checksum_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
@@ -425,3 +422,19 @@ def test_sigterm_ends_a_run_with_exit_143_and_it_goes_on(quick: Path) -> None:
     again = resumed(quick, out)
     assert again.returncode == 0
     assert "was finished already" in again.stdout
+
+
+def test_each_row_of_a_finished_run_is_read_from_the_disk_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "plan.toml").write_text(
+        'name = "tiny"\n[[measure]]\nkind = "homoclinic"\ncases = ["delone"]\nprecisions = ["double", "extended"]\n'
+        'samples = 2\n[[measure]]\nkind = "audit"\nclaims = ["ershkov-partial"]\nsystems = ["heavy_top"]\n'
+    )
+    read: list[int] = []
+    rows = Checkpoint.rows
+    monkeypatch.setattr(Checkpoint, "rows", lambda self, indices: (read.extend(indices), rows(self, indices))[1])
+    monkeypatch.setattr("heavytop.report.html.write_report", lambda report, path, kinds: path.touch())
+    run = prepare(str(tmp_path / "plan.toml"), tmp_path / "out", workers=1)
+    assert run.measure().good
+    assert read == list(range(len(run.tasks)))
+    laws = [each for each in store.read(tmp_path / "out").rows if each.key.kind == "break_away_law"]
+    assert [law.precision for law in laws] == ["double,extended", "double,extended"]

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from support.reports import expand, load, rows
@@ -37,8 +38,6 @@ def test_a_worker_of_four_threads_gives_the_rows_of_one_process(tmp_path: Path, 
 
     def measured(scheduler: str | None) -> list:
         found = dict(rows(tasks, 1, scheduler))
-        for row in found.values():
-            row.seconds = {}
-        return [found[index] for index in range(len(tasks))]
+        return [msgspec.structs.replace(found[index], seconds={}) for index in range(len(tasks))]
 
     assert measured(address) == measured(None)

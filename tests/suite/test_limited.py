@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from time import monotonic, sleep
 
+import msgspec
 import pytest
 
 import heavytop as ht
@@ -143,8 +144,8 @@ def test_what_an_integrator_declares_that_it_cannot_do_is_no_failure(tmp_path: P
     assert all_good(lacking.rows)
     assert lacking.verdict == "complete"
     lost, gained = (ht.Report("heavytop-report/2", {}, {}, each.rows) for each in (lacking, able))
-    lost.rows[0].key = gained.rows[0].key  # the same row in two versions
-    lost.rows[0].precision = gained.rows[0].precision
+    there = gained.rows[0]  # the same row in two versions
+    lost.rows[0] = msgspec.structs.replace(lost.rows[0], key=there.key, precision=there.precision)
     for baseline, candidate, verdict, code in (
         (lost, lost, "same", 0),
         (gained, lost, "worse", 1),

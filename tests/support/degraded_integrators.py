@@ -140,8 +140,7 @@ def report_of(method: Method, case: str, samples: int = SAMPLES) -> Report:
     runs = [{"precision": "double", "horizon": str(HORIZON), "samples": samples}]
     plan = plan_of({"name": "p", "measure": [{"kind": "drift", "cases": [case], "integrator": NAME, "runs": runs}]})
     (task,) = expand(plan)
-    row = measure(task)
-    row.data = data_of(task.case)
+    row = msgspec.structs.replace(measure(task), data=data_of(task.case))
     return Report(SCHEMA, {"name": "p"}, {}, [row])
 
 

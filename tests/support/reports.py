@@ -18,6 +18,7 @@ from heavytop.report import history as _history
 from heavytop.report import html as _html
 from heavytop.report import overview as _overview
 from heavytop.report import store as _store
+from heavytop.report import terminal as _terminal
 from heavytop.report import text as _text
 from heavytop.report.kind import kind_of
 from heavytop.suite import plan as _plan
@@ -28,7 +29,7 @@ from heavytop.suite.task import Task
 
 compare = partial(_compare.compare, kinds=KINDS)
 history = partial(_history.history, kinds=KINDS)
-summary = partial(_text.summary, kinds=KINDS)
+summary = partial(_terminal.summary, kinds=KINDS)
 failed = partial(_text.failed, kinds=KINDS)
 all_good = partial(_overview.all_good, kinds=KINDS)
 report_page = partial(_html.report_page, kinds=KINDS)

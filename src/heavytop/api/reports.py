@@ -23,8 +23,8 @@ from heavytop.report import store
 from heavytop.report.comparison_text import headline, metric_name, values
 from heavytop.report.names import row_name
 from heavytop.report.parquet import COLUMNS, lines
-from heavytop.report.printable import printable
-from heavytop.report.text import drifts, failed, short
+from heavytop.report.printable import printable, short
+from heavytop.report.text import drifts, failed
 
 if TYPE_CHECKING:
     import pandas
@@ -119,7 +119,7 @@ def run(
         str(arguments.path(plan, "plan")),
         None if out is None else arguments.path(out, "out"),
         resume=bool(arguments.flag(resume, "resume")),
-        workers=arguments.count(workers, "workers"),
+        workers=workers,
         scheduler=None if scheduler is None else arguments.text(scheduler, "scheduler"),
         seed=whole(seed, "seed"),
         integrator=_integrator(integrator),

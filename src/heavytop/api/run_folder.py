@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
@@ -13,19 +13,19 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from heavytop.api import arguments
 from heavytop.errors import InputError
 from heavytop.integrate.peers import name_of
 from heavytop.integrate.peers.command import Command, greeting
 from heavytop.integrate.peers.source import named, seconds_of
 from heavytop.kinds import KINDS
-from heavytop.precision import whole
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report import html, overview, parquet, store
-from heavytop.report.brief import brief
 from heavytop.report.checks import check_rows
 from heavytop.report.environment import environment
 from heavytop.report.names import row_name
 from heavytop.report.printable import printable
+from heavytop.report.terminal import brief
 from heavytop.suite import checkpoint
 from heavytop.suite.checkpoint import Checkpoint, identity_of
 from heavytop.suite.plan import read, warnings
@@ -113,19 +113,24 @@ class Run:
                 raise InputError(f"{rows.path} holds the row {name}, which is not row {index} of this plan.", _ANOTHER)
             check_rows(rows.path, [row], KINDS)
 
-    def _reported(self, rows: Checkpoint, laws: Sequence[Row]) -> Callable[[], Iterator[Row]]:
-        """A stream of the report's rows at each call; surveys become a row each, and their file is written."""
+    def _reported(self, rows: Checkpoint, laws: Sequence[Row]) -> Callable[[], Iterable[Row]]:
+        """The report's rows at each call, read from the disk once unless they are too many; surveys become a row
+        each, and their file is written.
+        """
         indices = range(len(self.tasks))
-        parts = [i for i, row in zip(indices, rows.rows(indices), strict=True) if KINDS[row.key.kind].gathers]
-        if not parts:
-            return lambda: chain(rows.rows(indices), laws)
-        survey.write(self.directory / survey.FILE, contents(rows.rows(parts)))
-        found = gathered(zip(map(self.tasks.__getitem__, parts), rows.rows(parts), strict=True))
+        parts = [i for i in indices if KINDS[self.tasks[i].key.kind].gathers]
+        found: Sequence[Row] = []
+        if parts:
+            survey.write(self.directory / survey.FILE, contents(rows.rows(parts)))
+            found = gathered(zip(map(self.tasks.__getitem__, parts), rows.rows(parts), strict=True))
         others = sorted(set(indices).difference(parts))
-        return lambda: chain(rows.rows(others), found, laws)
+        if len(self.tasks) > MOST_ON_A_PAGE:
+            return lambda: chain(rows.rows(others), found, laws)
+        held = [*rows.rows(others), *found, *laws]
+        return lambda: held
 
-    def _write(self, report: Report, rows: Callable[[], Iterator[Row]]) -> Ended:
-        """Write all that a finished run leaves.  rows: a new stream of all rows at each call."""
+    def _write(self, report: Report, rows: Callable[[], Iterable[Row]]) -> Ended:
+        """Write all that a finished run leaves.  rows: all rows at each call."""
         if self.parquet:
             parquet.write(self.directory / parquet.FILE, rows(), report.plan)
         store.write(report, self.directory, rows())
@@ -157,8 +162,7 @@ def prepare(
     loaded, digest, tasks = read(plan, KINDS, seed, which)
     of_plan = None if loaded.row_timeout == "" else loaded.row_timeout
     timeout = of_plan if row_timeout is None else row_timeout
-    if workers is not None and whole(workers, "--workers") < 1:
-        raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
+    workers = arguments.count(workers, "workers")
     if workers is not None and scheduler is not None:
         raise InputError("--workers are processes here, --scheduler has its own.", "Give one of them.")
     if resume and out is None:

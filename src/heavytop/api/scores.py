@@ -20,7 +20,7 @@ from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.precision import Precision
 from heavytop.records import Metric, Row
 from heavytop.report.diagnosis_text import diagnosis_text
-from heavytop.report.text import short
+from heavytop.report.printable import short
 from heavytop.suite.given import of_arrays
 from heavytop.suite.score import Assessment, Peer, assess, passed, required
 from heavytop.top.bodies import Body

@@ -141,9 +141,9 @@ def show(
     The page is one self-contained file; --parquet writes the rows as a table instead.
     """
     from heavytop.kinds import KINDS
-    from heavytop.report import overview, store, text
+    from heavytop.report import overview, store
     from heavytop.report import parquet as tables
-    from heavytop.report.brief import brief
+    from heavytop.report.terminal import brief, summary
     from heavytop.suite.files import whole
 
     if parquet is not None:
@@ -161,7 +161,7 @@ def show(
             hint = "Every row is in report.json; --parquet FILE writes all as a table."
             show_on_terminal(overview.worst(streamed, streamed.rows, hint))
         else:
-            show_on_terminal(text.summary(store.read(report, KINDS), KINDS))
+            show_on_terminal(summary(store.read(report, KINDS), KINDS))
         return 0
     found = store.read(report, KINDS)
     with ExitStack() as stack:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import log10
 from typing import Literal
-
-from rich.console import RenderableType
-from rich.text import Text
 
 from heavytop.claims.audit import PAPER, paper_claim
 from heavytop.claims.entry import library
@@ -16,11 +13,9 @@ from heavytop.claims.verdicts import audited, own_system
 from heavytop.errors import InputError
 from heavytop.kinds.base import Kind
 from heavytop.measure.scalar import UNRESOLVED
-from heavytop.records import Against, Metric, Quantity, Row, RowKey, Subject, by_name
-from heavytop.report.brief import wrapped
-from heavytop.report.printable import printable
-from heavytop.report.section import Card, Line, clip
-from heavytop.report.text import title
+from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.document import Block, Card, Headline, In, Note, Word
+from heavytop.report.section import clip
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import exact_row
@@ -52,7 +47,7 @@ class AuditTable(Table, tag=NAME):
                 keys += [RowKey(NAME, claim, system, Subject("claimed", claim)) for system in self.systems]
             else:
                 keys += [RowKey(NAME, name, own_system(name), Subject("claimed", name)) for name in _entries(claim)]
-        return [Task(key, key.case, NAME) for key in keys]
+        return [Task(key, "", NAME) for key in keys]
 
 
 def _entries(claim: str) -> list[str]:
@@ -89,71 +84,55 @@ class Audit(Kind):
         against = Against("equations", f"the equations of {task.key.system}")
         return exact_row(task, f"claimed: {claim.source}", against, by_name(metrics))
 
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """A line for each claim and system."""
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """Whether the claims are motions of the heavy top, and how many of each system's equations are proven; how many
+        claims of the library hold, and whether that is what is expected.
+        """
         paper, entries = _parted(rows)
-        parts: list[RenderableType] = []
-        if entries:
-            parts += [title("Verdicts on the library of claims (heavytop claims)"), *map(Text, _of_library(entries))]
+        if any(row.system == HEAVY_TOP.name for row in paper):
+            yield _of_paper(paper)
+        elif entries:
+            yield _of_verdicts(entries)
+        for sentence in _of_library(entries):
+            yield Note(sentence, shown=In.SHORT)
+            yield Card("Library of claims (heavytop claims)", [Note(sentence)], shown=In.FULL | In.PAGE)
+        for verdict, about in dict.fromkeys((_verdict(row)[0], row.system) for row in paper):
+            found = [row.case for row in paper if (_verdict(row)[0], row.system) == (verdict, about)]
+            said = f"Ershkov's claims {', '.join(found)}: {verdict} for {_SYSTEMS.get(about, about)}."
+            yield Note(said, shown=In.SHORT)
         if paper:
-            parts.append(title("Verdict on the paper's solution, equation by equation (heavytop audit)"))
-        for row in paper:
+            lines = [line for claim in sorted({row.case for row in paper}) for line in _equations(claim, paper)]
+            yield Card("Equation by equation (heavytop audit)", lines, shown=In.FULL | In.PAGE)
+
+
+def _of_paper(rows: Sequence[Row]) -> Headline:
+    """Whether the claims are motions of the heavy top."""
+    verdicts = {_verdict(row)[0] for row in rows if row.system == HEAVY_TOP.name}
+    others = [row.system for row in rows if row.system != HEAVY_TOP.name and _verdict(row)[0] == "holds"]
+    solved = " and ".join(_SYSTEMS.get(name, name) for name in dict.fromkeys(others))
+    instead = f" It solves {solved} instead." if others else ""
+    if verdicts == {"refuted"}:
+        return Headline(f"The claimed solution is not a motion of the heavy top.{instead}", Word("refuted"))
+    if "refuted" in verdicts:
+        return Headline(f"Some of the claimed solutions are not motions of the heavy top.{instead}", Word("refuted"))
+    if verdicts == {"holds"}:
+        return Headline("Every equation of the claim is proven for the heavy top.", Word("holds"))
+    return Headline("No equation of the claim is refuted, but not all are proven.", Word("undecided"))
+
+
+def _equations(claim: str, rows: Sequence[Row]) -> Iterator[Note]:
+    """The verdict on one claim of the paper, and for each system how many of its equations are proven and refuted."""
+    yield Note(clip(claim), style="soft")
+    for row in rows:
+        if row.case == claim:
             verdict, refuted, held = _verdict(row)
             smooth = " on the smooth branch" if row.system == GYROSTAT.name else ""
-            line = Text(printable(f"  {row.case} as a motion of {row.system}: "))
-            line.append(verdict, style={"refuted": "bold red", "holds": "bold green"}.get(verdict, "bold yellow"))
-            line.append(f"{smooth} ({held} of {len(row.metrics)} equations proven, {len(refuted)} refuted")
-            smooth_ones = sorted({f"{q.name}.{q.component}" for q in refuted if q.branch == _SMOOTH})
-            line.append(f"; refuted on the smooth branch: {', '.join(smooth_ones)})" if smooth_ones else ")")
-            parts.append(line)
-        return parts
-
-    def brief(self, rows: Sequence[Row]) -> list[str]:
-        """The verdict on each claim for each system."""
-        rows, entries = _parted(rows)
-        found: dict[tuple[str, str], list[str]] = {}
-        for row in rows:
-            found.setdefault((_verdict(row)[0], row.system), []).append(row.case)
-        said = (
-            f"{', '.join(claims)}: {verdict} for {_SYSTEMS.get(system, system)}."
-            for (verdict, system), claims in found.items()
-        )
-        of_paper = [line for sentence in said for line in wrapped(f"Ershkov's claims {sentence}")]
-        return of_paper + [line for sentence in _of_library(entries) for line in wrapped(sentence)]
-
-    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """Whether the claims are motions of the heavy top."""
-        rows, entries = _parted(rows)
-        verdicts = {_verdict(row)[0] for row in rows if row.system == HEAVY_TOP.name}
-        if not verdicts:
-            return _of_verdicts(entries) if entries else None
-        others = [row.system for row in rows if row.system != HEAVY_TOP.name and _verdict(row)[0] == "holds"]
-        solved = " and ".join(_SYSTEMS.get(name, name) for name in dict.fromkeys(others))
-        instead = f" It solves {solved} instead." if others else ""
-        if verdicts == {"refuted"}:
-            return "refuted", f"The claimed solution is not a motion of the heavy top.{instead}"
-        if "refuted" in verdicts:
-            return "refuted", f"Some of the claimed solutions are not motions of the heavy top.{instead}"
-        if verdicts == {"holds"}:
-            return "holds", "Every equation of the claim is proven for the heavy top."
-        return "undecided", "No equation of the claim is refuted, but not all are proven."
-
-    def cards(self, rows: Sequence[Row]) -> list[Card]:
-        """The equations that are proven and refuted, of each claim and system."""
-        rows, entries = _parted(rows)
-        lines = [Line(sentence) for sentence in _of_library(entries)]
-        for claim in sorted({row.case for row in rows}):
-            lines.append(Line(clip(claim), "soft"))
-            for row in rows:
-                if row.case == claim:
-                    verdict, refuted, held = _verdict(row)
-                    smooth = [q for q in refuted if q.branch == _SMOOTH] or refuted
-                    text = f"for {clip(_SYSTEMS.get(row.system, row.system), 40)}: "
-                    text += f"{held} of {len(row.metrics)} equations proven"
-                    if smooth:
-                        text += ", refuted " + clip(", ".join(dict.fromkeys(q.name for q in smooth)), 120)
-                    lines.append(Line(text, "", verdict))
-        return [Card("Equation by equation", lines)] if lines else []
+            said = f"for {clip(_SYSTEMS.get(row.system, row.system), 40)}{smooth}: "
+            said += f"{held} of {len(row.metrics)} equations proven"
+            if refuted:
+                names = dict.fromkeys(q.name for q in [q for q in refuted if q.branch == _SMOOTH] or refuted)
+                said += f", {len(refuted)} refuted: {clip(', '.join(names), 120)}"
+            yield Note(said, Word(verdict))
 
 
 def _of_entry(task: Task) -> Row:
@@ -199,10 +178,11 @@ def _of_library(rows: Sequence[Row]) -> list[str]:
     return [f"Library of {len(rows)} claims: {', '.join(said)}; {expected}."]
 
 
-def _of_verdicts(rows: Sequence[Row]) -> tuple[str, str]:
+def _of_verdicts(rows: Sequence[Row]) -> Headline:
     wrong = any(row.metrics[EXPECTED.text].value == "0" for row in rows)
     undecided = any(row.metrics[EXPECTED.text].value == UNRESOLVED for row in rows)
-    return ("refuted" if wrong else "undecided" if undecided else "holds"), " ".join(_of_library(rows))
+    word = "refuted" if wrong else "undecided" if undecided else "holds"
+    return Headline(" ".join(_of_library(rows)), Word(word))
 
 
 def _value(holds: bool | None) -> Metric:

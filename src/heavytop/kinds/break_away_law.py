@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 
 import numpy
-from rich.console import RenderableType
+from msgspec.structs import replace
 
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
@@ -15,11 +15,13 @@ from heavytop.kinds.base import Kind
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
-from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.consistency import CLOSE
+from heavytop.report.document import Block, Cell, Chart, Headline, Table, Value
+from heavytop.report.printable import short
 from heavytop.report.section import DASHED, Key, Section, Sources, clip, draw, left_out, logarithm
 from heavytop.report.svg import COLOURS, MARKERS, finish, new_axes, spoken
-from heavytop.report.text import both, short, table, title
+from heavytop.report.text import both
 from heavytop.suite.cases import CASES
 
 NAME = "break_away_law"
@@ -88,8 +90,7 @@ def _law_row(members: Sequence[Row], slope: Fraction, expected: Fraction, noise:
 
 
 def _with_band(metric: Metric, relative: float) -> Metric:
-    metric.band = round(math.log10(1 + abs(relative)), 4)
-    return metric
+    return replace(metric, band=round(math.log10(1 + abs(relative)), 4))
 
 
 _Place = tuple[str, Direction, str]
@@ -174,7 +175,6 @@ class BreakAwayLaw(Kind):
     name = NAME
     needed = (SLOPE.text, EXPECTED.text, OFF_BY.text)
     noise_factor = 8.0
-    sections = (escape_times,)
     place = 70
 
     def carries_band(self, metric: Metric) -> bool:
@@ -187,7 +187,7 @@ class BreakAwayLaw(Kind):
 
     def contradictions(self, row: Row) -> Iterator[str]:
         """The three numbers say the same."""
-        found = [row.metrics[each.text].value for each in (SLOPE, EXPECTED, OFF_BY) if each.text in row.metrics]
+        found = [metric.value for metric in _numbers(row)]
         if len(found) < 3:
             return
         try:
@@ -197,33 +197,25 @@ class BreakAwayLaw(Kind):
         if expected == 0 or abs(abs(slope / expected - 1) - off) > CLOSE / 100:
             yield f"{OFF_BY.text}: {found[2]}, where the slope is {found[0]} and {found[1]} is expected"
 
-    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """What a bit of the format buys, and how far that is from the law."""
-        found = [row for row in rows if row.metrics]
-        if not found:
-            return None
-        slopes, off = ([float(row.metrics[each.text]) for row in found] for each in (SLOPE, OFF_BY))
-        low, high = f"{min(slopes):.2g}", f"{max(slopes):.2g}"
-        buys = low if low == high else f"{low} to {high}"
-        return (
-            "",
-            f"A bit of the format buys {buys} time units before the escape: ln 2 / rate within {100 * max(off):.2g} %.",
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """What a bit of the format buys, and how far that is from the law; a line a case."""
+        slopes, off = ([float(row.metrics[each.text]) for row in rows if row.metrics] for each in (SLOPE, OFF_BY))
+        if slopes:
+            low, high = f"{min(slopes):.2g}", f"{max(slopes):.2g}"
+            buys = f"A bit of the format buys {low if low == high else f'{low} to {high}'} time units before the escape"
+            yield Headline(f"{buys}: ln 2 / rate within {100 * max(off):.2g} %.")
+        yield Table(
+            "Escape time gained per bit of the format",
+            ("case", "measured", "ln 2 / rate", "off by"),
+            both((row, _cells(*found)) for row in rows if (found := _numbers(row))),
         )
+        yield Chart(escape_times)
 
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """A line a case."""
-        lines = [
-            (
-                row,
-                [
-                    short(row.metrics[SLOPE.text].value),
-                    short(row.metrics[EXPECTED.text].value),
-                    f"{float(exact(row.metrics[OFF_BY.text].value)):.1%}",
-                ],
-            )
-            for row in rows
-        ]
-        return [
-            title("Escape time gained per bit of the format"),
-            table(["case", "measured", "ln 2 / rate", "off by"], both(lines)),
-        ]
+
+def _numbers(row: Row) -> list[Metric]:
+    """The slope, the expected one and by how much it is off."""
+    return [row.metrics[each.text] for each in (SLOPE, EXPECTED, OFF_BY) if each.text in row.metrics]
+
+
+def _cells(slope: Metric, expected: Metric, off_by: Metric) -> list[Cell]:
+    return [Value(slope), Value(expected), f"{float(off_by):.1%}"]

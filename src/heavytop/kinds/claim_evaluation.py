@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from fractions import Fraction
 
-from rich.console import RenderableType
-from rich.text import Text
+from msgspec.structs import replace
 
 from heavytop.exact.balls import working_precision
 from heavytop.kinds.base import Kind
@@ -16,9 +15,12 @@ from heavytop.kinds.claim_tasks import CLAIM, EVALUATION_ERROR, claim_of, claime
 from heavytop.measure import claim_error as errors_of
 from heavytop.measure.scalar import largest, metric, of_fraction, text
 from heavytop.precision import parse, time_text
-from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
+from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
 from heavytop.report.consistency import CLOSE, sizes
-from heavytop.report.text import both, largest_over, short, table, title
+from heavytop.report.document import Block, Cell, Chart, Headline, Value
+from heavytop.report.document import Table as Cells
+from heavytop.report.printable import short
+from heavytop.report.text import both, largest_over
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import exact_row, time_metric
@@ -54,7 +56,7 @@ class ClaimEvaluationTable(Table, tag=NAME):
                     for form in ("printed", "stable"):
                         subject = Subject("claimed", "(4.2)-(4.6)", form=form)
                         key = RowKey(NAME, case.name, GYROSTAT.name, subject, precision.name, direction, end)
-                        tasks.append(Task(key, f"{case.name}/{direction}", f"formula:{form}", case, signs, signs))
+                        tasks.append(Task(key, f"/{direction}", f"formula:{form}", case, signs, signs))
         return tasks
 
 
@@ -72,7 +74,6 @@ class ClaimEvaluation(Kind):
         for quantity in (Quantity(EVALUATION_ERROR, each, _WORST), Quantity(_COUNT, each, _SINCE))
     )
     may_overflow = True
-    sections = (claim_error,)
     place = 90
 
     def cost(self, task: Task) -> float:
@@ -102,9 +103,9 @@ class ClaimEvaluation(Kind):
         measured = f"{CLAIM}, {form} form, evaluated in {precision.name}; times of the series are k t"
         against = Against("proven", "the same form exactly evaluated from the same rounded data")
         row = exact_row(task, measured, against, by_name(metrics), precision.bits, series)
-        row.horizon = row.time_reached = task.key.horizon
-        row.finite = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
-        return row
+        end = task.key.horizon
+        whole = all(m.value == "0" for quantity, m in metrics.items() if quantity.statistic == _LOST)
+        return replace(row, horizon=end, time_reached=end, finite=whole)
 
     def contradictions(self, row: Row) -> Iterator[str]:
         """A series holds every sample: those that are not finite are counted, and the last begin somewhere."""
@@ -121,38 +122,29 @@ class ClaimEvaluation(Kind):
             if worst is not None and worst.log10 is not None and found and abs(max(found) - worst.log10) > CLOSE:
                 yield f"{Quantity(EVALUATION_ERROR, component, _WORST).text}: not the largest of its series"
 
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """The largest errors of each form in each format, and from when on its values are not finite."""
-        lines = [
-            (
-                row,
-                [
-                    row.precision,
-                    row.key.subject.form,
-                    *(short(row.metrics[Quantity(EVALUATION_ERROR, q, _WORST).text].value) for q in _SUMMED_UP),
-                    *(short(row.metrics[Quantity(_COUNT, q, _SINCE).text].value) for q in ("psi", "omega")),
-                ],
-            )
-            for row in rows
-        ]
-        columns = ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω from |t|"]
-        return [
-            title(
-                "Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated"
-            ),
-            Text(f"  Errors are the {largest_over(rows)}."),
-            table(columns, both(lines)),
-        ]
-
-    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """How far off each form is in the narrowest format, and from when on it is not finite."""
-        bits = min((row.bits for row in rows), default=0)
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """How far off each form is in the narrowest format, and until when it is finite; a line a form and format."""
+        bits = min(row.bits for row in rows)
         forms: dict[str, list[Row]] = {}
         for row in rows:
             if row.bits == bits and row.metrics:
                 forms.setdefault(row.key.subject.form, []).append(row)
         said = "; ".join(f"the {form} form {_said(members)}" for form, members in sorted(forms.items()))
-        return ("", f"In {next(iter(forms.values()))[0].precision} {said}.") if said else None
+        if said:
+            yield Headline(f"In {next(iter(forms.values()))[0].precision} {said}.")
+        yield Cells(
+            "Formulas in floating point: as printed, and in the stable form, each against itself exactly evaluated",
+            ["case", "format", "form", "Ω error", "θ error", "ψ error", "ψ NaN/inf from |t|", "Ω from |t|"],
+            both((row, _cells(row)) for row in rows),
+            [f"Errors are the {largest_over(rows)}."],
+        )
+        yield Chart(claim_error)
+
+
+def _cells(row: Row) -> list[Cell]:
+    errors = (row.metric(EVALUATION_ERROR, each, _WORST) for each in _SUMMED_UP)
+    times = (row.metric(_COUNT, each, _SINCE) for each in ("psi", "omega"))
+    return [row.precision, row.key.subject.form, *map(Value, errors), *map(Value, times)]
 
 
 def _said(rows: Sequence[Row]) -> str:

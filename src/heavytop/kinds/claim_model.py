@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from fractions import Fraction
 from functools import partial
 
 from flint import arb
-from rich.console import RenderableType
-from rich.text import Text
 
 from heavytop.claims.ershkov import Branch, PartialCase
 from heavytop.errors import OutOfReach
@@ -25,11 +23,12 @@ from heavytop.measure.parting import CLAIM_XI, parting, true_solution
 from heavytop.measure.scalar import largest, metric, text
 from heavytop.measure.truth import certified
 from heavytop.precision import exact, time_text
-from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
-from heavytop.report.brief import wrapped
-from heavytop.report.printable import printable
-from heavytop.report.section import Card, Line, clip
-from heavytop.report.text import both, short, table, title
+from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
+from heavytop.report.document import Block, Card, Cell, Chart, Headline, In, Note, Value
+from heavytop.report.document import Table as Cells
+from heavytop.report.printable import short
+from heavytop.report.section import clip
+from heavytop.report.text import both
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import exact_row, time_metric
@@ -67,7 +66,7 @@ class ClaimModelTable(Table, tag=NAME):
                     subject = Subject("claimed", "(4.2)-(4.6)", branch=branch)
                     end = time_text(signs[1][-1])
                     key = RowKey(NAME, case.name, HEAVY_TOP.name, subject, direction=direction, horizon=end)
-                    tasks.append(Task(key, f"{case.name}/{direction}", f"claim:{branch}", case, *signs))
+                    tasks.append(Task(key, f"/{direction}", f"claim:{branch}", case, *signs))
         return tasks
 
 
@@ -80,7 +79,6 @@ class ClaimModel(Kind):
     name = NAME
     table = ClaimModelTable
     needed = (PARTS.text,)
-    sections = (claim_error,)
     place = 20
 
     def cost(self, task: Task) -> float:
@@ -106,66 +104,58 @@ class ClaimModel(Kind):
         measured = f"{CLAIM}, {branch} branch, exactly evaluated"
         return exact_row(task, measured, against, by_name(metrics), errors_of.MODEL_BITS, series)
 
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """The errors at a few times, and when claim and truth part."""
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """When the claim is off by 1 %; a line a case and branch; how wrong it is, forward in time, and in full on the
+        smooth branch where there are several.
+        """
+        parted = [row for row in rows if PARTS.text in row.metrics]
+        if parted:
+            yield _headline(parted)
+        forward = [row for row in parted if row.key.direction != "backward"]
+        yield from _parting_times(forward)
         times = [time for time in _SHOWN if any(_at(row, "omega", time) for row in rows)]
         heads = (*(f"Ω at |t|={t}" for t in times), *(f"γ at |t|={t}" for t in times[:2]))
-        lines = [
-            (
-                row,
-                [
-                    row.key.subject.branch,
-                    *(short(_at(row, "omega", t) or "-") for t in times),
-                    *(short(_at(row, "gamma", t) or "-") for t in times[:2]),
-                    short(row.metrics[PARTS.text].value),
-                ],
-            )
-            for row in rows
-        ]
+        yield Cells(
+            "Claim compared with the true motion: (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0",
+            ["case", "branch", *heads, "Ω off 1 % of α at |t|"],
+            both((row, _cells(row, times)) for row in rows),
+            [
+                "Error of Ω, largest component; the same for γ. Exactly evaluated: no rounding is in these numbers.",
+                "Off 1 %: the first |t| at which the largest component of |ΔΩ| is 1 % of α, proven, not a sample.",
+            ],
+        )
         truths = {row.key.case: row.against for row in rows}
-        return [
-            title(
-                "Claim against truth: the paper's (4.2)-(4.6) as a motion of the heavy top, from its own data at t = 0"
-            ),
-            Text(
-                "  Error of Ω, largest component; the same for γ. Exactly evaluated: no rounding is in these numbers."
-            ),
-            Text("  Off 1 %: the first |t| at which the largest component of |ΔΩ| is 1 % of α, proven, not a sample."),
-            table(["case", "branch", *heads, "Ω off 1 % of α at |t|"], both(lines)),
-            *(Text(printable(f"  {case}: truth is {text}"), style="dim") for case, text in truths.items()),
-        ]
-
-    def brief(self, rows: Sequence[Row]) -> list[str]:
-        """When each claim is off by 1 %."""
-        found: dict[str, dict[str, str]] = {}
-        for row in rows:
-            if PARTS.text in row.metrics and row.key.direction != "backward":
-                found.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
-        said = ((case, ", ".join(f"{t} ({branch})" for branch, t in times.items())) for case, times in found.items())
-        return [line for case, t in said for line in wrapped(f"{case}: Ω off by 1 % of α = Ω3(0)/2 at |t| = {t}")]
-
-    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """The first time at which a claimed Ω is off by 1 %."""
-        found = [(row.metrics[PARTS.text], row) for row in rows if PARTS.text in row.metrics]
-        parted = [(time.log10, row) for time, row in found if time.log10 is not None]
-        if parted:
-            _, row = min(parted, key=lambda each: each[0])
-            at = f"|t| = {short(row.metrics[PARTS.text].value)}"
-            return (
-                "",
-                f"The claimed Ω is off by 1 % of α from {at} on ({clip(row.case, 40)}, {row.key.subject.branch}).",
-            )
-        if not found:
-            return None
-        horizon = short(max((row.horizon.removeprefix("-") for _, row in found), key=exact))
-        return "", f"The claimed Ω stays within 1 % of α of the true motion up to |t| = {horizon}."
-
-    def cards(self, rows: Sequence[Row]) -> list[Card]:
-        """How wrong the claim is, forward in time, and in full on the smooth branch, where there are several."""
-        forward = [row for row in rows if row.key.direction != "backward" and PARTS.text in row.metrics]
+        yield from (Note(f"{case}: true motion: {text}", style="soft") for case, text in truths.items())
         smooth = {row.case for row in forward if row.key.subject.branch == "smooth"}
-        shown = (row for row in forward if row.case not in smooth or row.key.subject.branch == "smooth")
-        return [_card(row, [each for each in forward if each.case == row.case and each is not row]) for row in shown]
+        for row in forward:
+            if row.case not in smooth or row.key.subject.branch == "smooth":
+                yield _card(row, [each for each in forward if each.case == row.case and each is not row])
+        yield Chart(claim_error)
+
+
+def _headline(rows: Sequence[Row]) -> Headline:
+    """The first time at which a claimed Ω is off by 1 %."""
+    parted = [(time, row) for row in rows if (time := row.metrics[PARTS.text].log10) is not None]
+    if parted:
+        _, row = min(parted, key=lambda each: each[0])
+        at, where = f"|t| = {short(row.metrics[PARTS.text].value)}", f"{clip(row.case, 40)}, {row.key.subject.branch}"
+        return Headline(f"The claimed Ω is off by 1 % of α from {at} on ({where}).")
+    horizon = short(max((row.horizon.removeprefix("-") for row in rows), key=exact))
+    return Headline(f"The claimed Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")
+
+
+def _parting_times(rows: Sequence[Row]) -> Iterator[Note]:
+    found: dict[str, dict[str, str]] = {}
+    for row in rows:
+        found.setdefault(row.key.case, {})[row.key.subject.branch] = short(row.metrics[PARTS.text].value, 2)
+    for case, times in found.items():
+        said = ", ".join(f"{t} ({branch})" for branch, t in times.items())
+        yield Note(f"{case}: Ω off by 1 % of α = Ω3(0)/2 at |t| = {said}", shown=In.SHORT)
+
+
+def _cells(row: Row, times: Sequence[str]) -> list[Cell]:
+    omega, gamma = ([short(_at(row, part, t) or "-") for t in times] for part in ("omega", "gamma"))
+    return [row.key.subject.branch, *omega, *gamma[:2], Value(row.metrics.get(PARTS.text))]
 
 
 def true_motion(claim: PartialCase, times: Sequence[Fraction]) -> tuple[errors_of.Truth, Against]:
@@ -211,30 +201,23 @@ def _at(row: Row, component: str, time: str) -> str | None:
 
 
 def _card(row: Row, others: Iterable[Row]) -> Card:
-    """The branch of a row in full, and when its other branches part from the truth."""
+    """The branch of a row in full, and when its other branches part from the true motion."""
     horizon, parts_at = short(row.horizon.removeprefix("-")), short(row.metrics[PARTS.text].value)
     found = row.metric(MODEL_ERROR, "omega", "max")
     over = f"over {row.samples} samples" if row.samples else "over the samples"
     if parts_at == "never":
-        lines = [Line(f"Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")]
+        lines = [Note(f"Ω stays within 1 % of α of the true motion up to |t| = {horizon}.")]
     else:
-        lines = [
-            Line(f"|t| = {parts_at}", "big"),
-            Line(
-                "The first time at which the largest component of |ΔΩ| from the true motion is 1 % of α, proven. "
-                f"The largest error {over} up to |t| = {horizon} is {short(found.value) if found else 'missing'}."
-            ),
-        ]
+        said = "The first time at which the largest component of |ΔΩ| from the true motion is 1 % of α, proven. "
+        largest_error = short(found.value) if found else "missing"
+        said += f"The largest error {over} up to |t| = {horizon} is {largest_error}."
+        lines = [Note(f"|t| = {parts_at}", style="big"), Note(said)]
     for other in others:
         at = short(other.metrics[PARTS.text].value)
         when = f"not up to |t| = {horizon}" if at == "never" else f"from |t| = {at}"
-        lines.append(Line(f"On the {clip(other.key.subject.branch, 20)} branch: {when}."))
+        lines.append(Note(f"On the {clip(other.key.subject.branch, 20)} branch: {when}."))
     omega, gamma = (_values(row, component) for component in ("omega", "gamma"))
-    return Card(
-        f"{clip(row.key.case)}, {clip(row.key.subject.branch, 20)} branch: wrong from",
-        lines,
-        "Error of Ω (1/time unit) and of γ (|γ| = 1)",
-        ("|t|", "|ΔΩ|", "|Δγ|"),
-        [(t, short(omega[t]), short(gamma.get(t, "missing"))) for t in _SHOWN if t in omega],
-        f"Truth: {row.against}",
-    )
+    cells = [(t, short(omega[t]), short(gamma.get(t, "missing"))) for t in _SHOWN if t in omega]
+    title = f"{clip(row.key.case)}, {clip(row.key.subject.branch, 20)} branch: wrong from"
+    table = Cells("Error of Ω (1/time unit) and of γ (|γ| = 1)", ("|t|", "|ΔΩ|", "|Δγ|"), cells)
+    return Card(title, lines, table, f"True motion: {row.against}")

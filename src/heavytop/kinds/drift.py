@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import msgspec
-from rich.console import RenderableType
-from rich.text import Text
 
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.trajectory import Place, Problem, Trajectory
@@ -20,13 +18,12 @@ from heavytop.measure.reruns import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact, number, parse, time_text
-from heavytop.records import NOISE, NOT_MEASURED, Metric, Row, RowKey
-from heavytop.report.answers import digits_headline
-from heavytop.report.brief import digits_lines
+from heavytop.records import NOISE, NOT_MEASURED, Beside, Metric, Row, RowKey
+from heavytop.report.answers import digits_columns, digits_headline, motions
 from heavytop.report.digits_chart import digits
+from heavytop.report.document import Block, Chart
 from heavytop.report.plots import growth
-from heavytop.report.text import DIGITS, largest_over, motions, title
-from heavytop.report.text import NOISE as ABOUT_NOISE
+from heavytop.report.text import DIGITS, NOISE_BAND, largest_over
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import computed_row
@@ -75,7 +72,7 @@ class DriftTable(Table, tag=NAME):
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, precision, horizon=horizon),
-                case.name,
+                "",
                 self.integrator,
                 case,
                 *times,
@@ -92,7 +89,6 @@ class Drift(Kind):
     name = NAME
     table = DriftTable
     noise_factor = 5.0
-    sections = (digits, growth)
     place = 30
 
     def noise_is_reruns(self, metric: Metric) -> bool:
@@ -129,25 +125,21 @@ class Drift(Kind):
         run = task.integrator.propagate(case.top, case.start, task.times, precision, case.system, scorer, **going_on)
         return _row(task, run, scorer)
 
-    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """Digits left at the longest horizon, or of an integrator of others beside heyoka's."""
-        return digits_headline(rows)
-
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """A line a row."""
-        return [
-            title(
-                "Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals"
-            ),
-            Text(f"  Both absolute, {largest_over(rows)}: a first integral that is kept proves no motion right."),
-            Text(f"  {DIGITS}"),
-            Text(f"  {ABOUT_NOISE}"),
-            motions(rows),
-        ]
-
-    def brief(self, rows: Sequence[Row]) -> list[str]:
-        """Digits right, a line a motion."""
-        return digits_lines(rows, "Digits right, to |t|")
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """Digits left at the longest horizon; digits right, a line a motion; everything, a line a row."""
+        if (found := digits_headline(rows)) is not None:
+            yield found
+        yield from digits_columns(rows)
+        yield motions(
+            "Long runs: distance from the true motion (along the flow, across it) and drift of the first integrals",
+            rows,
+            [
+                f"Both absolute, {largest_over(rows)}: a conserved integral does not prove the trajectory correct.",
+                DIGITS,
+                NOISE_BAND,
+            ],
+        )
+        yield from (Chart(digits), Chart(growth))
 
 
 def _row(task: Task, run: Trajectory, scorer: Scorer) -> Row:

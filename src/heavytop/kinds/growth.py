@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from time import perf_counter
 from typing import Any
 
 import msgspec
-from rich.console import RenderableType
-from rich.text import Text
 
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome, Problem
@@ -24,13 +22,15 @@ from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.measure.scorer import Scorer
 from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
-from heavytop.records import Law, Metric, Quantity, Row, RowKey, by_name
+from heavytop.records import Beside, Law, Metric, Quantity, Row, RowKey, by_name
 from heavytop.report.answers import laws_headline
 from heavytop.report.digits_chart import digits
-from heavytop.report.law_lines import law_lines
+from heavytop.report.document import Block, Cell, Chart
+from heavytop.report.document import Table as Cells
+from heavytop.report.law_lines import laws_in_short
 from heavytop.report.names import computed_by
 from heavytop.report.plots import growth as over_time
-from heavytop.report.text import short, table, title
+from heavytop.report.printable import short
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
@@ -114,7 +114,7 @@ def _task(case: Case, run: Run, integrator: str) -> Task:
     asked = {"tolerance": run.tolerance or "", "high_accuracy": run.high_accuracy, "bias": run.bias or ""}
     subject = computed(integrator, seed=run.seed, **asked)
     key = RowKey(NAME, case.name, case.system.name, subject, precision.name, horizon=time_text(horizon))
-    return Task(key, case.name, f"{integrator} {subject.variant}".rstrip(), case, times, times, run)
+    return Task(key, "", f"{integrator} {subject.variant}".rstrip(), case, times, times, run)
 
 
 class _Done(msgspec.Struct):
@@ -129,7 +129,6 @@ class Growth(Kind):
     name = NAME
     table = GrowthTable
     noise_factor = 6.0
-    sections = (digits, over_time)
     place = 50
 
     def carries_band(self, metric: Metric) -> bool:
@@ -176,40 +175,34 @@ class Growth(Kind):
         rounding = max(input_rounding(*member, p) for member, p in zip(members, true, strict=True))
         return _row(task, [start for _, start in members], motions, scorers, compared, seconds, rounding)
 
-    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """The laws, and whether the planted faults are told from them."""
-        return laws_headline(rows)
-
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """A line for each law."""
-        lines = [
-            [
-                f"{row.case}{computed_by(row)} {row.key.subject.variant}".rstrip(),
-                row.precision,
-                _label(law),
-                f"{law.starts} of {row.starts}" if law.starts < row.starts else str(law.starts),
-                law.growth,
-                _exponent(law),
-                short(law.detects or "-", 2),
-                short(law.lost_at or "-", 2),
-            ]
-            for row in rows
-            for law in row.laws.values()
-        ]
-        columns = ["case", "format", "quantity", "starts", "grows like", "exponent or rate [95 %]", "detects"]
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """The laws, whether the planted faults are told from them; the laws in short; a line for each law."""
+        if (found := laws_headline(rows)) is not None:
+            yield found
+        yield from laws_in_short(rows)
         chaotic = any(law.growth == "exponential" for row in rows for law in row.laws.values())
-        return [
-            title(
-                "Growth laws: root mean square over the starts, drift of the first integrals and distance from truth"
-            ),
-            Text("  Detects: the smallest relative fault a step that these starts tell from rounding noise."),
-            *([Text("  Rate: the median over the starts of their finite-time rates.")] if chaotic else []),
-            table([*columns, "lost at |t|"], lines),
-        ]
+        notes = ["Detects: the smallest relative fault per step that these starts distinguish from rounding noise."]
+        if chaotic:
+            notes.append("Rate: the median over the starts of their finite-time rates.")
+        columns = ["case", "format", "quantity", "starts", "grows like", "exponent or rate [95 %]", "detects"]
+        columns.append("lost at |t|")
+        title = "Growth laws: root mean square over the starts, drift of the first integrals and distance from truth"
+        cells = [_cells(row, law) for row in rows for law in row.laws.values()]
+        yield Cells(title, columns, cells, notes)
+        yield from (Chart(digits), Chart(over_time))
 
-    def brief(self, rows: Sequence[Row]) -> list[str]:
-        """The laws, a line for those of one kind."""
-        return law_lines(rows)
+
+def _cells(row: Row, law: Law) -> list[Cell]:
+    return [
+        f"{row.case}{computed_by(row)} {row.key.subject.variant}".rstrip(),
+        row.precision,
+        _label(law),
+        f"{law.starts} of {row.starts}" if law.starts < row.starts else str(law.starts),
+        law.growth,
+        _exponent(law),
+        short(law.detects or "-", 2),
+        short(law.lost_at or "-", 2),
+    ]
 
 
 def _posed(problem: Problem, top: HeavyTop, start: State) -> Problem:

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import lru_cache
 
-from rich.console import RenderableType
-from rich.text import Text
+from msgspec.structs import replace
 
 from heavytop.errors import OutOfReach
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
@@ -24,10 +23,13 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.measure.truth import Truth, certified
 from heavytop.precision import DOUBLE, exact, parse, time_text
-from heavytop.records import Against, Direction, Metric, Quantity, Row, RowKey, by_name
-from heavytop.report.brief import named, wrapped
+from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, by_name
+from heavytop.report.answers import in_columns
+from heavytop.report.document import Block, Cell, Chart, Headline, In, Note, Value
+from heavytop.report.document import Table as Cells
+from heavytop.report.printable import short
 from heavytop.report.section import clip
-from heavytop.report.text import NOISE, both, drifts, short, table, title, with_noise
+from heavytop.report.text import NOISE_BAND, both, drifts
 from heavytop.report.verdicts import size
 from heavytop.suite.cases import Case
 from heavytop.suite.checkpoint import Saved
@@ -70,8 +72,7 @@ class HomoclinicTable(Table, tag=NAME):
                     subject = computed(self.integrator)
                     name, horizon = precision.name, time_text(signs[-1])
                     key = RowKey(NAME, case.name, case.system.name, subject, name, direction, horizon)
-                    title = f"{case.name}/{direction}"
-                    tasks.append(Task(key, title, self.integrator, case, signs, signed(keep, direction)))
+                    tasks.append(Task(key, f"/{direction}", self.integrator, case, signs, signed(keep, direction)))
         return tasks
 
 
@@ -87,7 +88,6 @@ class Homoclinic(Kind):
     noise_factor = 8.0
     largest_amplification = 10 * math.exp(WINDOW)
     concludes = True
-    sections = (claim_error, escape_times)
     place = 60
 
     def carries_band(self, metric: Metric) -> bool:
@@ -138,52 +138,42 @@ class Homoclinic(Kind):
         if away is not None and away.log10 is not None and abs(exact(away.value)) > abs(exact(row.horizon)):
             yield f"{ESCAPE.text}: {away.value} is beyond the horizon {row.horizon}"
 
-    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """Until when the narrowest and the widest format stay; of integrators of others where there are any."""
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """Until when they stay; the escape times, and what these do not show; a line for each case and format."""
         known = [row for row in rows if row.outcome == Outcome.SUCCESS.value and ESCAPE.text in row.metrics]
-        theirs = [row for row in known if row.key.subject.name != HEYOKA]
-        if not known:
-            return None
-        name, cases = (theirs or known)[0].key.subject.name, dict.fromkeys(row.key.case for row in theirs or known)
-        on = "a homoclinic motion" if len(cases) > 1 else clip(next(iter(cases)), 40)
-        said = f"{clip(name, 40)} stays on {on} up to |t| = {_stays(row for row in known if _by(row, name))}"
-        ours = [row for row in known if theirs and _by(row, HEYOKA) and row.key.case in cases]
-        return "", f"{said}{f'; {HEYOKA} to {_stays(ours)}' if ours else ''}."
+        if known:
+            yield _headline(known)
+        shown = [row for row in rows if row.key.direction != "backward" and ESCAPE.text in row.metrics]
+        title = "Escape from a homoclinic motion at |t|"
+        yield from in_columns(title, lambda row: short(row.metrics[ESCAPE.text].value), shown)
+        yield from (Note(said, shown=In.SHORT) for said in _hidden(shown))
+        yield Cells(
+            "Integrators on a homoclinic motion, against its closed form",
+            ["case", "format", "Ω error", "γ error", "drift", "escape |t|", "outcome"],
+            both((row, _cells(row)) for row in rows),
+            [
+                "Errors of Ω and γ: the largest over the samples with rate·|t| <= 10; drift: the largest of a first "
+                "integral, of all samples; escape: Ω wrong by 1e-3 α, where all significant digits are lost.",
+                NOISE_BAND,
+            ],
+        )
+        yield from (Chart(claim_error), Chart(escape_times))
 
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """A line for each case and format."""
-        lines = []
-        for row in rows:
-            error, *others = _errors(row).values()
-            escape = with_noise(row.metrics[ESCAPE.text])
-            cells = [row.precision, with_noise(error), *map(_value, others), escape, row.outcome]
-            lines.append((row, cells))
-        return [
-            title("Integrators on a homoclinic motion, against its closed form"),
-            Text(
-                "  Errors of Ω and γ: the largest over the samples with rate·|t| <= 10; drift: the largest of a first"
-            ),
-            Text("  integral, of all samples; escape: Ω wrong by 1e-3 α, where all significant digits are lost."),
-            Text(f"  {NOISE}"),
-            table(["case", "format", "Ω error", "γ error", "drift", "escape |t|", "outcome"], both(lines)),
-        ]
 
-    def brief(self, rows: Sequence[Row]) -> list[str]:
-        """The escape times of each case, a format after the other, or an integrator where all are in one format."""
-        found: dict[str, dict[str, str]] = {}
-        names = named(rows)
-        rows = [row for row in rows if row.key.direction != "backward" and ESCAPE.text in row.metrics]
-        one_format = len({row.precision for row in rows}) == 1
-        for row in rows:
-            time = short(row.metrics[ESCAPE.text].value)
-            case, column = (row.key.case, row.key.subject.name) if one_format else (names(row), row.precision)
-            found.setdefault(case, {})[column] = time
-        columns = list(dict.fromkeys(name for times in found.values() for name in times))
-        lines = [f"  {case}: {', '.join(times.get(name, '-') for name in columns)}" for case, times in found.items()]
-        if not lines:
-            return []
-        said = [f"Escape from a homoclinic motion at |t|, {', '.join(columns)}:", *lines, *_hidden(rows)]
-        return [part for line in said for part in wrapped(line, "    " if line.startswith(" ") else "  ")]
+def _headline(known: Sequence[Row]) -> Headline:
+    """Until when the narrowest and the widest format stay; of third-party integrators where there are any."""
+    theirs = [row for row in known if row.key.subject.name != HEYOKA]
+    name, cases = (theirs or known)[0].key.subject.name, dict.fromkeys(row.key.case for row in theirs or known)
+    on = "a homoclinic motion" if len(cases) > 1 else clip(next(iter(cases)), 40)
+    said = f"{clip(name, 40)} stays on {on} up to |t| = {_stays(row for row in known if _by(row, name))}"
+    ours = [row for row in known if theirs and _by(row, HEYOKA) and row.key.case in cases]
+    return Headline(f"{said}{f'; {HEYOKA} to {_stays(ours)}' if ours else ''}.")
+
+
+def _cells(row: Row) -> list[Cell]:
+    error, *others = _errors(row).values()
+    escape = Value(row.metrics.get(ESCAPE.text), noise=True)
+    return [row.precision, Value(error, noise=True), *map(Value, others), escape, row.outcome]
 
 
 def _errors(row: Row) -> dict[str, Metric | None]:
@@ -193,10 +183,6 @@ def _errors(row: Row) -> dict[str, Metric | None]:
     drift = max((metric for _, metric in drifts(row)), key=size, default=None)
     found = {f"error of {symbol}": row.metric(name, part, "max") for part, symbol in (("omega", "Ω"), ("gamma", "γ"))}
     return found | {"drift": drift}
-
-
-def _value(metric: Metric | None) -> str:
-    return "-" if metric is None else short(metric.value)
 
 
 def _hidden(rows: Iterable[Row]) -> Iterator[str]:
@@ -210,7 +196,7 @@ def _hidden(rows: Iterable[Row]) -> Iterator[str]:
         worse = [(size(mine) - size(known), what, mine, known) for (what, mine), known in pairs if mine and known]
         lost, what, mine, known = max(worse, key=lambda each: each[0], default=(0.0, "", None, None))
         if lost > _WORSE:
-            yield f"  {row.key.case}: the {what} of {row.key.subject.name} is {_value(mine)}, heyoka's {_value(known)}."
+            yield f"{row.key.case}: the {what} of {row.key.subject.name} is {Value(mine)}, heyoka's {Value(known)}."
 
 
 def _stayed(row: Row) -> float:
@@ -271,7 +257,8 @@ def _with_bands(task: Task, run: Trajectory, metrics: dict[str, Metric]) -> dict
     escapes = [abs(each) for each in escaped if each is not None]
     own = metrics[ESCAPE.text]
     if own.log10 is not None and len(escapes) == len(escaped):
-        own.band = escape_band(exact(own.value), escapes, case.rate, task.precision.bits)
+        band = escape_band(exact(own.value), escapes, case.rate, task.precision.bits)
+        metrics = metrics | {ESCAPE.text: replace(own, band=band)}
     return metrics
 
 

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
-
-from rich.console import RenderableType
-from rich.text import Text
 
 from heavytop.errors import InputError, quoted
 from heavytop.kinds.base import Kind
 from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact, parse, time_text
-from heavytop.records import Against, Metric, Quantity, Row, RowKey, Subject, by_name
-from heavytop.report.text import title
+from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.report.document import Block, Card, In, Note
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.hunt.draw import Family
 from heavytop.suite.hunt.found import command_of, keep, kept
@@ -61,7 +58,7 @@ class HuntTable(Table, tag=NAME):
         name = f"{self.family}-{self.seed}"
         key = RowKey(NAME, name, "heavy_top", computed(self.integrator), parse(self.precision).name)
         options = time_text(horizon), self.budget, self.family, self.against, self.limit, self.seed, self.found
-        return [Task(key, name, self.integrator, options=options)]
+        return [Task(key, "", self.integrator, options=options)]
 
 
 class Hunt(Kind):
@@ -91,13 +88,10 @@ class Hunt(Kind):
             task, _measured(hunted), Against("equations", _law(hunted)), _metrics(hunted), asked.precision.bits
         )
 
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """A line a row."""
-        return [title("Searches for the motion that breaks an integrator"), *(Text(f"  {_line(row)}") for row in rows)]
-
-    def brief(self, rows: Sequence[Row]) -> list[str]:
-        """A line a row."""
-        return ["Searches for the worst motion", *(f"  {_line(row)}" for row in rows)] if rows else []
+        lines = [Note(_line(row)) for row in rows]
+        yield Card("Searches for the motion that breaks an integrator", lines, shown=In.SHORT | In.FULL | In.PAGE)
 
 
 def _asked(task: Task) -> Asked:

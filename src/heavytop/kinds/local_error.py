@@ -6,8 +6,6 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 import msgspec
-from rich.console import RenderableType
-from rich.text import Text
 
 from heavytop.errors import OutOfReach
 from heavytop.integrate.trajectory import Outcome, TaylorStep
@@ -16,11 +14,12 @@ from heavytop.measure import local_error
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.single_calls import require_sum, single_calls
 from heavytop.precision import parse, time_text
-from heavytop.records import Against, Row, RowKey
-from heavytop.report.brief import wrapped
-from heavytop.report.names import computed_by, with_source
-from heavytop.report.section import Section, Sources, clip
-from heavytop.report.text import short, table, title
+from heavytop.records import Against, Beside, Row, RowKey
+from heavytop.report.document import Block, Cell, Headline, In, Note, Value
+from heavytop.report.document import Table as Cells
+from heavytop.report.names import computed_by
+from heavytop.report.printable import short
+from heavytop.report.section import clip
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import computed_row
@@ -32,6 +31,7 @@ _AGAINST = Against("proven", "known: validated enclosure of each step from where
 
 
 _LARGEST = local_error.LOCAL_ERROR.over("max").text
+_UNITS = "Error in eps of the format times the largest component of the state; the order as the steps show it."
 
 
 class LocalErrorTable(Table, tag=NAME):
@@ -49,7 +49,7 @@ class LocalErrorTable(Table, tag=NAME):
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, parse(precision).name, horizon=horizon),
-                case.name,
+                "",
                 self.integrator,
                 case,
                 times,
@@ -59,43 +59,12 @@ class LocalErrorTable(Table, tag=NAME):
         ]
 
 
-_TITLE = "Single steps, each against the proven motion from where it starts"
-_UNITS = "Error in eps of the format times the largest component of the state; the order as the steps show it."
-_COLUMNS = ["case", "format", "steps", "largest", "rms", "order seen", "declared", "outcome"]
-
-
-def _lines(rows: Sequence[Row]) -> list[list[str]]:
-    quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)
-    return [
-        [
-            clip(row.case + computed_by(row)),
-            row.precision,
-            str(row.samples if row.key.subject.name != HEYOKA else row.steps),
-            *(short(row.metrics[q.text].value) if q.text in row.metrics else "-" for q in quantities),
-            str(row.order) if row.order else "-",
-            row.outcome,
-        ]
-        for row in rows
-    ]
-
-
-def single_steps(sources: Sources, first: Iterable[str] = ()) -> Section | None:
-    """The errors of the steps, a line a row."""
-    lines = [
-        [with_source(clip(case), source), *map(clip, cells)]
-        for source, report in sources
-        for case, *cells in _lines(report.rows)
-    ]
-    return Section("steps", "Single steps", [_UNITS], columns=_COLUMNS, rows=lines, place=60) if lines else None
-
-
 class LocalError(Kind):
     """Errors of steps in units of eps times the largest component of the state."""
 
     name = NAME
     table = LocalErrorTable
     samples_are_steps = True
-    sections = (single_steps,)
     place = 80
 
     def cost(self, task: Task) -> float:
@@ -122,20 +91,29 @@ class LocalError(Kind):
         row = computed_row(task, run, error.metrics(), {}, _AGAINST)
         return msgspec.structs.replace(row, samples=error.running.count)
 
-    def brief(self, rows: Sequence[Row]) -> list[str]:
-        """The largest error of a step and the order, a sentence a motion and format; of integrators of others alone
-        where there are any.
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """The largest error of a step and the order, a sentence a motion and format; of third-party integrators alone
+        where there are any; then a line a row.
         """
-        return [line for row in _told(rows) for line in wrapped(_said(row))]
+        told = _told(rows)
+        if told:
+            yield Headline(_said(max(told, key=lambda row: row.metrics[_LARGEST])))
+        yield from (Note(_said(row), shown=In.SHORT) for row in told)
+        columns = "case", "format", "steps", "largest", "rms", "order seen", "declared", "outcome"
+        title = "Single steps, each against the proven motion from where it starts"
+        yield Cells(title, columns, [_cells(row) for row in rows], [_UNITS], shown=In.FULL | In.PAGE)
 
-    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """The largest error of a step; of integrators of others where there are any."""
-        found = _told(rows)
-        return ("", _said(max(found, key=lambda row: row.metrics[_LARGEST]))) if found else None
 
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """A line a row."""
-        return [title(_TITLE), Text(f"  {_UNITS}"), table(_COLUMNS, _lines(rows))]
+def _cells(row: Row) -> list[Cell]:
+    quantities = (local_error.LOCAL_ERROR.over("max"), local_error.LOCAL_ERROR.over("rms"), local_error.ORDER)
+    return [
+        clip(row.case + computed_by(row)),
+        row.precision,
+        str(row.samples if row.key.subject.name != HEYOKA else row.steps),
+        *(Value(row.metrics.get(quantity.text)) for quantity in quantities),
+        str(row.order) if row.order else "-",
+        row.outcome,
+    ]
 
 
 def _told(rows: Sequence[Row]) -> list[Row]:

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import ClassVar
 
 import msgspec
 import numpy
-from rich.console import RenderableType
-from rich.text import Text
 
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kinds.base import Kind
 from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse, time_text
-from heavytop.records import Against, Metric, Row, RowKey
+from heavytop.records import Against, Beside, Metric, Row, RowKey
+from heavytop.report.document import Block, Card, Chart, In, Note
 from heavytop.report.survey_charts import survey_charts
-from heavytop.report.text import title
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import exact_row
@@ -68,7 +66,7 @@ class SurveyTable(Table, tag=NAME):
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, precision.name, horizon=time_text(horizon)),
-                case.name,
+                "",
                 self.integrator,
                 case,
                 times,
@@ -84,7 +82,6 @@ class Survey(Kind):
     name = NAME
     table = SurveyTable
     gathers = True
-    sections = (survey_charts,)
     noise_factor = 5.0
     place = 33
 
@@ -111,16 +108,11 @@ class Survey(Kind):
         everything = found | _names(task, motions) | _data(motions)
         return msgspec.structs.replace(row, bits=precision.bits, chunk=chunk_bytes(everything))
 
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
         """A line a row."""
-        return [
-            title("Surveys: a record for each motion in survey.parquet"),
-            *(Text(f"  {_line(row)}") for row in rows),
-        ]
-
-    def brief(self, rows: Sequence[Row]) -> list[str]:
-        """A line a row."""
-        return ["Surveys", *(f"  {_line(row)}" for row in rows)] if rows else []
+        lines = [Note(_line(row)) for row in rows]
+        yield Card("Surveys: a record for each motion in survey.parquet", lines, shown=In.SHORT | In.FULL | In.PAGE)
+        yield Chart(survey_charts)
 
 
 def _names(task: Task, motions: Drawn) -> dict[str, object]:

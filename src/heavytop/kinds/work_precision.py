@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
 import msgspec
-from rich.console import RenderableType
-from rich.text import Text
 
 from heavytop.errors import InputError
 from heavytop.exact.balls import midpoint, radius
@@ -26,20 +24,19 @@ from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.measure.timed_calls import TOO_LONG, Repeats, require_counts, timed, tried
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text, usable_tolerance
-from heavytop.records import Metric, Quantity, Row, RowKey, Subject, by_name
+from heavytop.records import FINEST, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
 from heavytop.report.answers import fastest
-from heavytop.report.brief import wrapped
 from heavytop.report.consistency import CLOSE, bound, ended, size_of, sizes
+from heavytop.report.document import Block, Chart, In, Note
+from heavytop.report.document import Table as Cells
 from heavytop.report.method_growth import method_growth
-from heavytop.report.printable import printable
-from heavytop.report.text import table, title
 from heavytop.report.work_plots import work_precision
-from heavytop.report.work_precision import CONSTANTS, ERRORS, LANES, OURS, beside_ours, leads, panels
+from heavytop.report.work_precision import CONSTANTS, ERRORS, LANES, OURS, Line, beside_ours, leads, panels
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.kind import Find, Table
 from heavytop.suite.rows import computed_row
 from heavytop.suite.sampling import positive, uniform
-from heavytop.suite.task import FINEST, Task, computed
+from heavytop.suite.task import Task, computed
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import State
 
@@ -100,7 +97,7 @@ class WorkPrecisionTable(Table, tag=NAME):
         return [
             Task(
                 RowKey(NAME, case.name, case.system.name, subject, precision, horizon=end),
-                f"{case.name}/T={self.horizon}",
+                f"/T={self.horizon}",
                 f"{subject.name} {subject.setting}",
                 case,
                 *times,
@@ -134,7 +131,6 @@ class WorkPrecision(Kind):
     name = NAME
     table = WorkPrecisionTable
     may_give_up = "work against precision"
-    sections = (work_precision, method_growth)
     place = 40
 
     def assumed_band(self, subject: Subject) -> float:
@@ -215,30 +211,34 @@ class WorkPrecision(Kind):
         if len(ends) == len(both) and abs(max(ends) - last.log10) > CLOSE:
             yield "error_final: not the last value of its series"
 
-    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """Who is fastest at 1e-10 and by how much."""
-        return fastest(rows)
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """Who is fastest at 1e-10 and by how much; a table a case; how heyoka compares, a sentence a case.  In short an
+        integrator beside heyoka, setting by setting, where there is one.
+        """
+        if (found := fastest(rows)) is not None:
+            yield found
+        for place, (case, lines) in enumerate(panels(rows).items()):
+            yield _table("" if place else _TITLE, case, lines)
+        yield from (Note(lead.text) for lead in leads(rows))
+        shorter = [Note(f"{lead.case}: {lead.short}.", shown=In.SHORT) for lead in leads(rows) if lead.short]
+        yield from beside_ours(rows) or shorter
+        yield from (Chart(work_precision), Chart(method_growth))
 
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """A table a case, then how heyoka compares."""
-        parts: list[RenderableType] = [title("Work against precision: seconds that an error takes, whole horizon")]
-        for case, lines in panels(rows).items():
-            cells = []
-            for line in lines:
-                best = line.best
-                found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", f"{best.seconds:.2g} s"]
-                at = (line.seconds_at(log10) for log10 in (-6.0, -10.0, -14.0))
-                found += ["-" if seconds is None else f"{seconds:.2g} s" for seconds in at]
-                cells.append([line.label, *found, str(len(line.failures) or "")])
-            columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "gave up"]
-            parts += [table(columns, cells), Text()]
-        return parts + [Text(printable(f"  {lead.text}"), style="bold") for lead in leads(rows)]
 
-    def brief(self, rows: Sequence[Row]) -> list[str]:
-        """An integrator beside heyoka, rung by rung; else how heyoka compares, a sentence a case."""
-        if beside := beside_ours(rows):
-            return beside
-        return [line for lead in leads(rows) if lead.short for line in wrapped(f"{lead.case}: {lead.short}.")]
+_TITLE = "Work against precision: seconds that an error takes, whole horizon"
+
+
+def _table(title: str, case: str, lines: Sequence[Line]) -> Cells:
+    """Seconds that an error takes, a line an integrator."""
+    cells = []
+    for line in lines:
+        best = line.best
+        found = ["-", "-"] if best is None else [f"{10**best.log10:.1e}", f"{best.seconds:.2g} s"]
+        at = (line.seconds_at(log10) for log10 in (-6.0, -10.0, -14.0))
+        found += ["-" if seconds is None else f"{seconds:.2g} s" for seconds in at]
+        cells.append([line.label, *found, str(len(line.failures) or "")])
+    columns = [case, "least error", "takes", "1e-6 takes", "1e-10 takes", "1e-14 takes", "aborted"]
+    return Cells(title, columns, cells)
 
 
 def _missing() -> Metric:

@@ -114,13 +114,11 @@ def _early_and_last(
     known = solution.state(early, bits)
     enclosed = enclosure.state(early, bits)
     _require_overlap(solution, early, known, enclosed)
-    before = [midpoint(value) for value in solution.state(time - while_last, bits + 64)]
-    last = enclosure_of(solution, State(before[:3], before[3:])).state(while_last, bits + 16)
+    earlier = [midpoint(value) for value in solution.state(time - while_last, bits + 64)]
+    last = enclosure_of(solution, State(earlier[:3], earlier[3:])).state(while_last, bits + 16)
     agreed = min(agreed_digits(known, enclosed), agreed_digits(values, last), _integral_digits(solution, values, bits))
-    source = f"validated integration from 0 to {shown(early)} and from t - {shown(while_last)} to t".replace(
-        "- -", "+ "
-    )
-    source += "; first integrals at t"
+    before = f"t {'-' if time > 0 else '+'} {shown(abs(while_last))}"
+    source = f"validated integration from 0 to {shown(early)} and from {before} to t; first integrals at t"
     try:
         other = solution.second_state(time, bits) if hasattr(solution, "second_state") else None
     except OutOfReach:

@@ -28,9 +28,14 @@ def relative_error(errors: Sequence[arb], truth: Sequence[arb]) -> arb:
 class Measured(Protocol):
     """A row, as far as its digits are concerned."""
 
-    bits: int
-    metrics: dict[str, Metric]
-    reference: Against
+    @property
+    def bits(self) -> int: ...
+
+    @property
+    def metrics(self) -> dict[str, Metric]: ...
+
+    @property
+    def reference(self) -> Against: ...
 
 
 def digits_kept(row: Measured) -> float | None:

@@ -205,8 +205,7 @@ def _add(
     for part, values in (("max", kept.max(axis=1)), ("final", kept[:, -1])):
         resolved = len(kept) > 0 and not (part == "final" and numpy.isnan(rms[-1]))
         found.metrics[quantity.over(part)] = _metric(values, resolved)
-    found.laws[name] = law(ensemble)
-    found.laws[name].quantity = quantity
+    found.laws[name] = msgspec.structs.replace(law(ensemble), quantity=quantity)
 
 
 def _text(value: float, measured: bool) -> str:
@@ -222,5 +221,4 @@ def _metric(values: Array, resolved: bool) -> Metric:
     if not resolved:
         return Metric(UNRESOLVED, None, bound=decimal_text(Fraction(value), 3))
     metric = of_fraction(Fraction(value), words=decimal_text(Fraction(value), _DIGITS))
-    metric.band = band(values)
-    return metric
+    return msgspec.structs.replace(metric, band=band(values))

@@ -7,12 +7,11 @@ from collections.abc import Iterator
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.report.brief import wrapped
 from heavytop.report.compare import Comparison, Finding
 from heavytop.report.findings import line
 from heavytop.report.names import row_name
-from heavytop.report.printable import printable
-from heavytop.report.text import short, table
+from heavytop.report.printable import printable, short
+from heavytop.report.text import table, wrapped
 from heavytop.report.verdicts import Verdict
 
 _MOST = 200

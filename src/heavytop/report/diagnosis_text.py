@@ -5,17 +5,20 @@ from __future__ import annotations
 from heavytop.measure.diagnosis import AS_AT_START, VARIES, Diagnosis
 from heavytop.measure.suspects import FLOOR
 from heavytop.report.convention_text import is_convention, sentence
-from heavytop.report.text import short
+from heavytop.report.printable import short
 
+_MEANINGS = {
+    "gamma_down": ("γ points down", ": with −γ they fit"),
+    "omega_reversed": ("Ω has the other sign", ": with −Ω they fit"),
+    "both_reversed": ("Ω and γ both have the other sign", ": with −Ω and −γ they fit"),
+    "omega_in_degrees": ("Ω is in degrees per time unit", ", not in radians"),
+    "omega_in_turns": ("Ω is in turns per time unit", ", not in radians"),
+    "omega_in_rpm": ("Ω is in turns per 60 time units", " (rpm where times are in s), not in radians"),
+}
+"""What the columns mean in these states, and what that comes to."""
 _SENTENCES = {
-    "gamma_down": "γ points down in these states: with −γ they fit",
-    "omega_reversed": "Ω has the other sign in these states: with −Ω they fit",
-    "both_reversed": "Ω and γ both have the other sign in these states: with −Ω and −γ they fit",
     "momentum": "The first three columns are the angular momentum M = (I1Ω1, I2Ω2, I3Ω3), not Ω",
     "momentum_gamma_down": "The first three columns are the angular momentum M, not Ω, and γ points down",
-    "omega_in_degrees": "Ω is in degrees per time unit in these states, not in radians",
-    "omega_in_turns": "Ω is in turns per time unit in these states, not in radians",
-    "omega_in_rpm": "Ω is in turns per 60 time units in these states (rpm where times are in s), not in radians",
     "columns_swapped": "γ stands before Ω in these states",
     "weight_sign": "The states fit a top whose weight P has the other sign, as where γ points down in start and states",
     "rotor_sign": "The states fit a rotor of −k: the momentum of the rotor has the other sign",
@@ -67,6 +70,8 @@ def _size(value: float) -> str:
 
 def _said(found: Diagnosis, system: str) -> str:
     numbers = found.numbers
+    if found.kind in _MEANINGS:
+        return " in these states".join(_MEANINGS[found.kind])
     if found.kind in _SENTENCES:
         return _SENTENCES[found.kind]
     named = ", ".join(f"{name} = {value}" for name, value in numbers.items())
@@ -132,7 +137,8 @@ def _signed(shift: str) -> str:
 def _columns(numbers: dict[str, str]) -> str:
     parts = []
     if "meaning" in numbers:
-        parts.append(_SENTENCES[numbers["meaning"]].partition(":")[0].replace(" in these states", ""))
+        meaning = numbers["meaning"]
+        parts.append(_MEANINGS[meaning][0] if meaning in _MEANINGS else _SENTENCES[meaning])
     if "order" in numbers:
         parts.append("γ stands before Ω")
     if "axes" in numbers:

@@ -10,9 +10,9 @@ from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
 from heavytop.measure.integrator import HEYOKA
 from heavytop.records import Row
 from heavytop.report.names import variant, with_source
+from heavytop.report.printable import short
 from heavytop.report.section import DASHED, Key, Section, Sources, clip, left_out, logarithm
 from heavytop.report.svg import COLOURS, MARKERS, End, decades, finish, new_axes, room, spoken
-from heavytop.report.text import short
 
 MOST_LANES, MOST_LISTED = 40, 160
 _GREY = 5

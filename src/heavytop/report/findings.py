@@ -18,9 +18,9 @@ from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.measure.local_error import ORDER
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.records import FAILED, UNMEASURED, UNSUPPORTED, Identity, Law, Metric, Quantity, Row, Series
+from heavytop.report.printable import short
 from heavytop.report.row_comparison import Finding
 from heavytop.report.section import clip
-from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
 from heavytop.report.work_precision import ERRORS
 
@@ -106,11 +106,16 @@ class Change(NamedTuple):
 
     def about(self, finding: Finding) -> Quantity | None:
         """The quantity that a metric or series is about, without its statistic; None for laws, seconds, whole rows."""
+        found = self.measured(finding)
+        return found and found.over("")
+
+    def measured(self, finding: Finding) -> Quantity | None:
+        """The same with its statistic."""
         for row in (self.old, self.new):
-            if row is not None:
-                measured = row.metrics.get(finding.metric) or row.series.get(finding.metric.removeprefix("series "))
-                if measured is not None and measured.quantity is not None:
-                    return measured.quantity.over("")
+            if row is not None and finding.of in ("", "series"):
+                found = (row.series if finding.of else row.metrics).get(finding.name)
+                if found is not None and found.quantity is not None:
+                    return found.quantity
         return None
 
 
@@ -216,7 +221,7 @@ def line(change: Change) -> str:
     if digits is not None and abs(digits[0] - digits[1]) >= _DIGITS_MOVED and (digits[1] > digits[0]) is better:
         return f"digits right {digits_text(digits[0])} → {digits_text(digits[1])}{more}"
     said = f"{clip(worst.metric, 40)} {short(worst.baseline or '-')} → {short(worst.candidate or '-')}"
-    if worst.metric.startswith("series "):
+    if worst.of == "series":
         said = clip(worst.metric, 40)
     return said + (f", {worst.reason}" if worst.reason else "") + more
 
@@ -226,17 +231,16 @@ def folded(change: Change) -> Iterator[tuple[str, list[Finding]]]:
     together: dict[tuple[Verdict, str], list[Finding]] = {}
     for finding in change.findings:
         quantity = change.about(finding)
-        name = quantity.text if quantity else finding.metric.removeprefix("series ")
+        name = quantity.text if quantity else finding.name if finding.of == "series" else finding.metric
         together.setdefault((finding.verdict, name), []).append(finding)
     for (_, name), findings in together.items():
         yield name or "whole row", findings
 
 
-def statistics(name: str, findings: Sequence[Finding]) -> str:
+def statistics(change: Change, name: str, findings: Sequence[Finding]) -> str:
     """Which statistics of a quantity changed: ``drift_energy: max, rms, series``."""
-    parts = [
-        "series" if each.metric == f"series {name}" else each.metric.removeprefix(name).strip("_") for each in findings
-    ]
+    measured = ((each, change.measured(each)) for each in findings)
+    parts = ("series" if each.of == "series" else found.statistic if found else "" for each, found in measured)
     said = ", ".join(part for part in parts if part)
     return f"{name}: {said}" if said else name
 
@@ -266,10 +270,13 @@ def _digits(row: Row | None) -> float | None:
 def _where(row: Identity, at: bool = True) -> str:
     """``lagrange at T = 100 (mine:rk4, step 1/100, double)``."""
     key = row.key
-    asked = key.subject.setting.replace("=", " ")
-    inside = ", ".join(part for part in (clip(key.subject.name, 40), asked, row.precision) if part)
+    inside = ", ".join(part for part in (clip(key.subject.name, 40), key.subject.asked, row.precision) if part)
     end = f" at T = {short(key.horizon.removeprefix('-'))}" if at and key.horizon not in ("", "0") else ""
-    return f"{clip(row.case.split('/T=')[0], 40)}{end} ({inside})"
+    return f"{_case(row)}{end} ({inside})"
+
+
+def _case(row: Identity) -> str:
+    return clip(f"{row.key.case}/{row.key.direction}" if row.key.direction else row.key.case, 40)
 
 
 def _on(rows: Sequence[Identity]) -> str:
@@ -308,7 +315,7 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
     for row in (change.identity for change in changes.rows):
         changed.setdefault((row.case, row.key.subject.name, row.precision), set()).add(row)
     for key, rows in changed.items():
-        case, name, precision = key
+        _, name, precision = key
         for coarse, fine in pairwise(sorted(changes.points.get(key, []))):
             spans = [b - a for a, b in zip(coarse.steps, fine.steps, strict=True)]
             if min(spans) > 0:
@@ -316,7 +323,7 @@ def _orders_of_settings(changes: Changes) -> Iterator[tuple[str, float, Sentence
                 before, after = (fall / span for fall, span in zip(falls, spans, strict=True))
                 if abs(after - before) >= _ORDER_MOVED:
                     steps = " to ".join(f"{10 ** each.steps[0]:.0f}" for each in (coarse, fine))
-                    where = f"{clip(case.split('/T=')[0], 40)} from {steps} steps ({clip(name, 40)}, {precision})"
+                    where = f"{_case(next(iter(rows)))} from {steps} steps ({clip(name, 40)}, {precision})"
                     said = f"Order observed {max(before, 0):.1f} → {max(after, 0):.1f} on {where}."
                     yield name, after - before, Sentence(said, frozenset(rows))
 
@@ -420,14 +427,13 @@ def _laws_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Sent
     found: dict[tuple[str, str, str], list[Change]] = {}
     for change in rows:
         for finding in change.findings:
-            name = finding.metric.removeprefix("growth ")
-            laws = [None if row is None else row.laws.get(name) for row in (change.old, change.new)]
-            if finding.metric != name and finding.verdict in verdicts and None not in laws:
+            laws = [None if row is None else row.laws.get(finding.name) for row in (change.old, change.new)]
+            if finding.of == "growth" and finding.verdict in verdicts and None not in laws:
                 old, new = (law for law in laws if law is not None)
                 said = _law_moved(old, new, finding.reason)
-                found.setdefault((change.identity.key.subject.name, _quantity(old.quantity, name), said), []).append(
-                    change
-                )
+                found.setdefault(
+                    (change.identity.key.subject.name, _quantity(old.quantity, finding.name), said), []
+                ).append(change)
     for (_, what, said), changes in found.items():
         also = f" and {_count(len(changes) - 1, 'other row')}" if len(changes) > 1 else ""
         text = f"The {what} {said} on {_where(changes[0].identity, at=False)}{also}."
@@ -458,14 +464,14 @@ def _others_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
         for _, findings in folded(change):
             worst, quantity = findings[0], change.about(findings[0])
             if worst.verdict in verdicts and not _told_elsewhere(change, worst, quantity):
-                name = quantity.name if quantity else worst.metric.removeprefix("series ")
+                name = quantity.name if quantity else worst.name
                 size = change.decades(worst) or 0.0
                 found.setdefault((change.identity.key.subject.name, name), []).append((abs(size), change, worst))
     for cases in sorted(found.values(), key=lambda cases: -max(size for size, _, _ in cases)):
         _, change, finding = max(cases, key=lambda case: case[0])
         what = _quantity(change.about(finding), finding.metric)
         values = f" {short(finding.baseline or '-')} → {short(finding.candidate or '-')}"
-        if finding.metric.startswith("series "):
+        if finding.of == "series":
             values = " at its samples"
         why = f", {finding.reason}" if finding.reason and change.decades(finding) is None else ""
         together = frozenset(c.identity for _, c, _ in cases)
@@ -475,11 +481,11 @@ def _others_moved(rows: Sequence[Change], verdicts: set[Verdict]) -> Iterator[Se
 
 def _told_elsewhere(change: Change, finding: Finding, quantity: Quantity | None) -> bool:
     """Whether other sentences say it: whole rows, laws, orders, and what the digits right sum up."""
-    if not finding.metric or finding.metric.startswith("growth ") or finding.metric == ORDER.text:
+    if not finding.metric or finding.of == "growth" or finding.metric == ORDER.text:
         return True
     if change.digits is None or abs(change.lost) < _DIGITS_MOVED:
         return False
-    return finding.metric.startswith("series ") or (quantity is not None and quantity.name in _DIGITS)
+    return finding.of == "series" or (quantity is not None and quantity.name in _DIGITS)
 
 
 def _by_integrator(changes: Sequence[Change]) -> Iterator[list[Change]]:

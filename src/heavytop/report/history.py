@@ -15,9 +15,9 @@ from heavytop.report.kind import Kinds
 from heavytop.report.laws import law_text
 from heavytop.report.names import row_name
 from heavytop.report.policy import Policy
-from heavytop.report.printable import printable
+from heavytop.report.printable import printable, short
 from heavytop.report.store import AnyReport
-from heavytop.report.text import short, table
+from heavytop.report.text import table
 from heavytop.report.verdicts import Verdict
 
 MARK = {

@@ -7,11 +7,10 @@ from pathlib import PurePath
 
 from heavytop.report.history import MARK, Track
 from heavytop.report.names import row_name
-from heavytop.report.printable import printable
+from heavytop.report.printable import printable, short
 from heavytop.report.section import Key, Section, clip, draw, logarithm, numbered, scientific
 from heavytop.report.store import AnyReport
 from heavytop.report.svg import COLOURS, End, Picture, decades, finish, new_axes, quiet_style, room, spoken
-from heavytop.report.text import short
 from heavytop.report.verdicts import Verdict
 
 MOST_PICTURES, MOST_CURVES = 120, 6

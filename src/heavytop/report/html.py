@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Container, Iterable, Mapping, Sequence
-from itertools import chain, islice
+from collections.abc import Container, Iterable, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,14 @@ from msgspec.structs import replace as replace_struct
 from heavytop.measure.digits import RELATIVE, digits_kept
 from heavytop.records import UNMEASURED, UNSUPPORTED, Report, Row
 from heavytop.report.compare import Comparison, Finding
+from heavytop.report.document import Card, Chart, Document, Headline, In, Make, Note, Table, cell_text
 from heavytop.report.findings import Change, folded, line, statistics
-from heavytop.report.kind import Kinds, MakeSection, kind_of
-from heavytop.report.names import row_name
+from heavytop.report.kind import Kinds, document, headlines, kind_of
+from heavytop.report.names import row_name, with_source
+from heavytop.report.printable import short
 from heavytop.report.section import Section, Sources, clip
 from heavytop.report.svg import quiet_style
-from heavytop.report.text import failed, short, unsupported
+from heavytop.report.text import failed, unsupported
 from heavytop.report.work_precision import ERRORS
 from heavytop.suite.files import replace
 from heavytop.suite.plan import BUILT_IN
@@ -39,22 +41,18 @@ def write_report(report: Report, path: Path, kinds: Kinds) -> None:
 
 def report_page(report: Report, kinds: Kinds) -> str:
     """The page of ``report``; the same report gives the same bytes."""
-    first = report.rows[0] if report.rows else None
-    if first and all(row.key.kind == first.key.kind for row in report.rows):
-        own = kind_of(first, kinds).page(report)
-        if own is not None:
-            return own
     rows, left_out = detailed(report.rows)
     failures = [row for row in report.rows if failed(row, kinds)]
-    of_kind = {name: [row for row in report.rows if row.key.kind == name] for name in kinds}
-    cards = {name: kind.cards(of_kind[name]) for name, kind in kinds.items()}
+    found = document(report, kinds, In.PAGE)
+    blocks = [block for blocks in found.values() for block in blocks]
     not_finite = [row for row in report.rows if row.outcome == "success" and not row.finite]
     return render(
         "report.html.j2",
         report=report,
-        headlines=_headlines(of_kind, cards, kinds)
-        or [("", f"{len(report.rows)} measurements, {len(failures)} of which failed.")],
-        cards=list(chain.from_iterable(cards.values())),
+        headlines=_headlines(found, kinds)
+        or [Headline(f"{len(report.rows)} measurements, {len(failures)} of which failed.")],
+        notes=[block for block in blocks if isinstance(block, Note)],
+        cards=[block for block in blocks if isinstance(block, Card)],
         failures=failures[:MOST_FAILURES],
         failed=len(failures),
         not_supported=unsupported(report.rows),
@@ -66,16 +64,16 @@ def report_page(report: Report, kinds: Kinds) -> str:
         groups=_by_kind(rows),
         left_out=left_out,
         environment=report.environment,
-        commands=commands(report),
+        commands=[] if report.beside else commands(report),
         dirty=str(report.environment.get("commit")).endswith("-dirty"),
     )
 
 
-def _headlines(of_kind: Mapping[str, Sequence[Row]], cards: Mapping[str, Any], kinds: Kinds) -> list[tuple[str, str]]:
+def _headlines(found: Document, kinds: Kinds) -> list[Headline]:
     """The answer of each kind; one that has cards is heard once, so in a sentence where it opens the page alone."""
-    order = sorted(kinds, key=lambda name: kinds[name].place)
-    said = [(name, found) for name in order if (found := kinds[name].headline(of_kind[name]))]
-    return [found for number, (name, found) in enumerate(said) if not number or not cards[name]]
+    said = headlines(found, kinds)
+    with_cards = [blocks for blocks in found.values() if any(isinstance(block, Card) for block in blocks)]
+    return [each for number, each in enumerate(said) if not number or not any(each in blocks for blocks in with_cards)]
 
 
 def _gave_up(row: Row, kinds: Kinds) -> bool:
@@ -101,14 +99,19 @@ def comparison_page(baseline: Report, candidate: Report, comparison: Comparison,
 
 
 def sections(sources: Sources, kinds: Kinds, first: Iterable[str] = ()) -> list[Section]:
-    """The parts of the page that have pictures, each from the rows of the kinds that ask for it."""
-    asked: dict[MakeSection, set[str]] = {}
-    for name, kind in kinds.items():
-        for make in kind.sections:
-            asked.setdefault(make, set()).add(name)
+    """The parts of the page that have pictures, each from the rows of the kinds that ask for it, and the tables."""
+    asked: dict[Make, set[str]] = {}
+    tables: dict[str, Section] = {}
+    for source, report in sources:
+        for name, blocks in document(report, kinds, In.PAGE).items():
+            for block in blocks:
+                if isinstance(block, Chart):
+                    asked.setdefault(block.make, set()).add(name)
+                elif isinstance(block, Table):
+                    _add(tables, block, source)
     with quiet_style():
         made = [make(_only(sources, names), first) for make, names in asked.items()]
-    found = sorted((section for section in made if section), key=lambda section: section.place)
+    found = [*sorted((section for section in made if section), key=lambda section: section.place), *tables.values()]
     for section in found:
         section.drop_empty_columns()
     return found
@@ -120,6 +123,13 @@ def _only(sources: Sources, names: Container[str]) -> Sources:
         (source, replace_struct(report, rows=[row for row in report.rows if row.key.kind in names]))
         for source, report in sources
     ]
+
+
+def _add(tables: dict[str, Section], table: Table, source: str) -> None:
+    """Take the rows of a table of a report into the section of that title."""
+    new = Section(f"table-{len(tables)}", table.title, list(table.notes), columns=list(table.columns))
+    rows = ([clip(cell_text(cell), 120) for cell in row] for row in table.rows)
+    tables.setdefault(table.title, new).rows += [[with_source(name, source), *cells] for name, *cells in rows]
 
 
 def detailed(rows: Sequence[Row]) -> tuple[list[Row], int]:
@@ -167,7 +177,7 @@ def metric_cells(row: Row) -> list[list[str]]:
 
 def quantities(changed: Change) -> list[tuple[str, Finding]]:
     """Each quantity of a row that changed with the statistics of it that did, and the worst finding about it."""
-    return [(statistics(name, found), found[0]) for name, found in folded(changed)]
+    return [(statistics(changed, name, found), found[0]) for name, found in folded(changed)]
 
 
 def commands(report: Report) -> list[str]:
@@ -204,6 +214,7 @@ def render(template: str, **context: Any) -> str:
     )
     environment.filters |= {
         "clip": clip,
+        "said": cell_text,
         "unbroken": unbroken,
         "short": short,
         "row_name": row_name,

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
-from rich.console import RenderableType
-
-from heavytop.records import Metric, Quantity, Report, Row, Subject
-from heavytop.report.section import Card, Section, Sources
-
-MakeSection = Callable[[Sources, Iterable[str]], Section | None]
-"""A part of the page from the rows of the kinds that ask for it, and the cases to draw first; None for no picture."""
+from heavytop.records import UNMEASURED, Beside, Metric, Quantity, Report, Row, Subject
+from heavytop.report.document import Block, Document, Headline, In
 
 
 class Kind(Protocol):
@@ -24,8 +19,7 @@ class Kind(Protocol):
     samples_are_steps: so these may be fewer as the steps may.
     may_give_up: what its runs are called, where that one does not reach its horizon is what the rows are there to show.
     may_overflow: the same of values that are not finite.
-    sections: of the page.
-    place: the answers of a page stand in the order of their places.
+    place: the headlines stand in the order of their places.
     """
 
     name: str
@@ -35,7 +29,6 @@ class Kind(Protocol):
     samples_are_steps: bool = False
     may_give_up: str = ""
     may_overflow: bool = False
-    sections: tuple[MakeSection, ...] = ()
     place: int = 0
 
     def carries_band(self, metric: Metric) -> bool:
@@ -70,28 +63,9 @@ class Kind(Protocol):
         """What contradicts something else in a row of this kind that succeeded, as ``FIELD: REASON``."""
         return iter(())
 
-    def summary(self, rows: Sequence[Row]) -> list[RenderableType]:
-        """Its part of the summary for a terminal, from rows that were measured."""
-        return []
-
-    def brief(self, rows: Sequence[Row]) -> list[str]:
-        """The same in a few lines of 80 columns, for the end of a run."""
-        return []
-
-    def headline(self, rows: Sequence[Row]) -> tuple[str, str] | None:
-        """A word (refuted, holds, undecided; or "") and the answer of its rows in a sentence; None for no answer.
-
-        That of the first place opens the page.
-        """
-        return None
-
-    def page(self, report: Report) -> str | None:
-        """The page of a report that holds rows of this kind alone; None for the usual one."""
-        return None
-
-    def cards(self, rows: Sequence[Row]) -> list[Card]:
-        """What stands under that sentence."""
-        return []
+    def document(self, rows: Sequence[Row], beside: Beside | None = None) -> Iterable[Block]:
+        """What its measured rows, one at least, come to.  beside: what `score` wrote beside its row."""
+        return ()
 
 
 class Unknown(Kind):
@@ -107,3 +81,22 @@ _UNKNOWN = Unknown()
 def kind_of(row: Row, kinds: Kinds) -> Kind:
     """The kind of a row."""
     return kinds.get(row.key.kind, _UNKNOWN)
+
+
+def document(report: Report, kinds: Kinds, shown: In) -> dict[str, list[Block]]:
+    """What each kind that has measured rows says there; the kinds that are not known say nothing."""
+    measured: dict[str, list[Row]] = {}
+    for row in report.rows:
+        if row.outcome not in UNMEASURED:
+            measured.setdefault(row.key.kind, []).append(row)
+    return {
+        name: [block for block in kind.document(measured[name], report.beside) if block.shown & shown]
+        for name, kind in kinds.items()
+        if name in measured
+    }
+
+
+def headlines(found: Document, kinds: Kinds) -> list[Headline]:
+    """Those of a document, in the order of the places of their kinds."""
+    order = sorted(found, key=lambda name: kinds[name].place)
+    return [block for name in order for block in found[name] if isinstance(block, Headline)]

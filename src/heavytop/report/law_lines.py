@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from textwrap import wrap
 
 from heavytop.measure.drift import DRIFT
 from heavytop.measure.integrator import HEYOKA, MULTIWORD
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.records import Quantity, Row, Series
-from heavytop.report.brief import wrapped
+from heavytop.report.document import Block, In, Note, Table
+from heavytop.report.printable import short
 from heavytop.report.section import points
-from heavytop.report.text import short
 from heavytop.report.verdicts import size
 
 _OWN = (HEYOKA, MULTIWORD)
@@ -25,12 +24,14 @@ _MEANS = {
 """Laws of the error along the flow."""
 _WIDTHS = {"integrals": 16, "along": 12, "across": 12}
 """What is summed up, and the characters there are for it."""
+_COLUMNS = "", "integrals", "error along", "across"
 _FAR = 2.0
 """Decades."""
 
 
-def law_lines(rows: Sequence[Row]) -> list[str]:
-    """The laws, those of all first integrals as one; formats and motions with the same laws together.
+def laws_in_short(rows: Sequence[Row]) -> list[Block]:
+    """The laws, those of all first integrals as one; formats and motions with the same laws together.  Then what those
+    of third-party integrators mean.
 
     Those of a variant, such as a planted fault, stand together for all motions.
     """
@@ -42,23 +43,16 @@ def law_lines(rows: Sequence[Row]) -> list[str]:
         name = "" if row.key.subject.name == HEYOKA else row.key.subject.name
         what = (name, row.key.subject.variant, row.key.case, _growths(united[_united(row)]))
         formats.setdefault(what, []).append(row.precision)
-    if not formats:
-        return []
     cases: dict[tuple[str, ...], list[str]] = {}
     for (name, variant, case, growths), precisions in formats.items():
         runs = " ".join(part for part in (name, ", ".join(precisions), variant) if part)
         cases.setdefault((runs, *growths), []).append(case)
-    printed = [_columns("Grows like", "integrals", "error along", "across")]
-    for (runs, *said), motions in cases.items():
-        names = f"  {runs}: {', '.join(motions)}"
-        first = wrap(names, 35)[0]
-        # beside the laws there is little room for names, and below them the whole line
-        rest = names.removeprefix(first).strip()
-        printed += [_columns(first, *said), *(wrapped(f"    {rest}", "    ") if rest else [])]
+    cells = [[f"{runs}: {', '.join(motions)}", *said] for (runs, *said), motions in cases.items()]
+    found: list[Block] = [Table("Grows like", _COLUMNS, cells, words=len(_COLUMNS), shown=In.SHORT)]
     others = [row for row in rows if row.key.subject.name not in _OWN]
     ours = {(row.key.case, row.precision): row for row in rows if row.key.subject.name == HEYOKA}
-    said = [_meaning(row) + _larger(row, ours.get((row.key.case, row.precision), row)) for row in others]
-    return printed + [line for sentence in said for line in wrapped(sentence)]
+    said = (_meaning(row) + _larger(row, ours.get((row.key.case, row.precision), row)) for row in others)
+    return [*found, *(Note(sentence, shown=In.SHORT) for sentence in said)]
 
 
 def _united(row: Row) -> tuple[str, ...]:
@@ -114,8 +108,3 @@ def _either(growths: Iterable[str], width: int) -> str:
     """The laws of several quantities: by name where there is room."""
     found = list(growths)
     return " or ".join(found) or "-" if len(" or ".join(found)) <= width else f"{len(found)} laws"
-
-
-def _columns(name: str, integrals: str, along: str, across: str) -> str:
-    columns = zip((integrals, along, across), _WIDTHS.values(), strict=True)
-    return f"{name:37}{' '.join(f'{said:{width}}' for said, width in columns)}".rstrip()

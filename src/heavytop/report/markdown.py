@@ -53,7 +53,7 @@ def _metrics(result: Comparison) -> list[str]:
     head += ["| verdict | row | quantity | baseline | candidate | why |", "|---|---|---|---:|---:|---|"]
     found = ((change, *quantity) for change in result.rows[:_MOST] for quantity in folded(change))
     cells = (
-        (c.verdict.value, row_name(c.identity), statistics(name, group), *values(group[0]), group[0].reason)
+        (c.verdict.value, row_name(c.identity), statistics(c, name, group), *values(group[0]), group[0].reason)
         for c, name, group in found
     )
     lines = ["| " + " | ".join(map(_cell, each)) + " |" for each in cells]

@@ -12,9 +12,9 @@ from typing import Any
 
 from heavytop.measure.growth import BENT, CLASSES, FEWEST_SAMPLES, NEAR
 from heavytop.records import Row, Series
+from heavytop.report.printable import short
 from heavytop.report.section import DASHED, TIME, Key, Keys, Section, Sources, clip, draw, points, scientific
 from heavytop.report.svg import COLOURS, End, decades, finish, new_axes, spoken
-from heavytop.report.text import short
 
 METHODS = ("heyoka", "cyrk:DOP853", "splitting:4")
 QUANTITIES = (

@@ -10,8 +10,7 @@ from heavytop.measure.motion import Motion
 from heavytop.measure.reference import Reference
 from heavytop.report.derivative_text import derivative_lines
 from heavytop.report.motion_table import MotionTable
-from heavytop.report.printable import printable
-from heavytop.report.text import short
+from heavytop.report.printable import printable, short
 
 
 def motion_text(motion: Motion, table: MotionTable) -> RenderableType:

@@ -11,9 +11,10 @@ from rich.text import Text
 
 from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.records import Metric, Row
+from heavytop.report.document import Cell, Value
 from heavytop.report.kind import Kinds
 from heavytop.report.store import AnyReport
-from heavytop.report.text import failed, head, table, title, with_noise
+from heavytop.report.text import failed, head, table, title
 
 MOST_LISTED = 5000
 """More rows than these nobody reads: `show` sums them up too."""
@@ -48,10 +49,10 @@ def worst(report: AnyReport, rows: Iterable[Row], hint: str) -> RenderableType:
             Text(),
             title(f"{' in '.join(filter(None, group))}: {outcomes}; the largest errors over their samples"),
         ]
-        lines = [
+        lines: list[list[Cell]] = [
             [
                 name,
-                with_noise(metric),
+                Value(metric, noise=True),
                 case,
                 ", ".join(f"{n} {word}" for word, n in words.get((*group, name), {}).items()),
             ]

@@ -10,6 +10,7 @@ from heavytop.measure.drift import DRIFT
 from heavytop.measure.solution_error import SOLUTION_ERROR
 from heavytop.records import Law, Metric, Quantity, Row, Series
 from heavytop.report.names import variant
+from heavytop.report.printable import short
 from heavytop.report.section import (
     DASHED,
     MOST_PLOTS,
@@ -26,7 +27,6 @@ from heavytop.report.section import (
     scientific,
 )
 from heavytop.report.svg import COLOURS, End, decades, finish, new_axes, room, spoken
-from heavytop.report.text import short
 
 _GREY = 5
 _FITTED = Key("fitted law", _GREY, "", "6 3")

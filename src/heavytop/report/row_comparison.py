@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 
@@ -33,16 +33,27 @@ _ANOTHER: Judged = (Verdict.INCOMPARABLE, "it says that it is another quantity")
 class Finding(msgspec.Struct, frozen=True, gc=False):
     """One metric of one row: verdict, the two values as text, and why.
 
-    metric: "" for a whole row, ``growth NAME`` for the law of a series, ``seconds NAME`` for a timing.
+    name: of the metric, "" for a whole row.  of: "" for a metric, series, growth for the law of one, seconds for a
+    timing.
     """
 
     row: Identity
-    metric: str
+    name: str
     verdict: Verdict
     baseline: str | None
     candidate: str | None
     reason: str = ""
-    timing: bool = False
+    of: Literal["", "series", "growth", "seconds"] = ""
+
+    @property
+    def metric(self) -> str:
+        """What policies and other programs call it: ``drift_energy_max``, ``growth drift_energy``."""
+        return f"{self.of} {self.name}".lstrip()
+
+    @property
+    def timing(self) -> bool:
+        """Whether it is about seconds."""
+        return self.of == "seconds"
 
     def to_json(self) -> dict[str, Any]:
         """The row of `compare --json`."""
@@ -211,8 +222,7 @@ class RowComparison:
 
     def _laws(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
         for name in dict.fromkeys((*old.laws, *new.laws)):
-            metric = f"growth {name}"
-            limits = self.lookup.metric(rules, metric)
+            limits = self.lookup.metric(rules, f"growth {name}")
             if limits.ignore:
                 continue
             a, b = old.laws.get(name), new.laws.get(name)
@@ -226,18 +236,18 @@ class RowComparison:
                 if judged[0] is Verdict.SAME and a.quantity != b.quantity:
                     judged = _ANOTHER
             before, after = (None if law is None else law_text(law) for law in (a, b))
-            yield Finding(key, metric, judged[0], before, after, judged[1])
+            yield Finding(key, name, judged[0], before, after, judged[1], "growth")
 
     def _series(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
         """What changed in a series: that of a candidate which is the same is not a finding."""
         for name, series in old.series.items():
-            metric = f"series {name}"
-            limits = self.lookup.metric(rules, metric)
+            limits = self.lookup.metric(rules, f"series {name}")
             match = new.series.get(name)
             if limits.ignore or match == series:
                 continue
             if match is None:
-                yield Finding(key, metric, Verdict.MISSING, f"{len(series.values)} samples", None, "it is missing")
+                before = f"{len(series.values)} samples"
+                yield Finding(key, name, Verdict.MISSING, before, None, "it is missing", "series")
                 continue
             exactly = any(metric.kind == "value" for metric in _of_series(name, old, "max", "final"))
             allowed = limits.value if exactly else max(limits.loss, self._noise(name, old, limits))
@@ -247,8 +257,8 @@ class RowComparison:
             if judged[0] is Verdict.SAME and series.quantity != match.quantity:
                 judged = _ANOTHER
             if judged[0] is not Verdict.SAME:
-                before, after = (f"{len(each.values)} samples" for each in (series, match))
-                yield Finding(key, metric, judged[0], before, after, judged[1])
+                found = [f"{len(each.values)} samples" for each in (series, match)]
+                yield Finding(key, name, judged[0], found[0], found[1], judged[1], "series")
 
     def _row(self, key: Identity, old: Row, new: Row) -> Iterator[Finding]:
         """What makes numbers of a row incomparable beside the numbers themselves."""
@@ -282,7 +292,7 @@ class RowComparison:
             if not self.lookup.metric(rules, f"seconds {name}").ignore:
                 verdict, why = judge_seconds(old.seconds[name], new.seconds[name], self.policy.timings)
                 before, after = (f"{row.seconds[name]:.3g} s" for row in (old, new))
-                yield Finding(key, f"seconds {name}", verdict, before, after, why, timing=True)
+                yield Finding(key, name, verdict, before, after, why, "seconds")
 
     def _repeated(self, key: Identity, rules: tuple[int, ...], old: Row, new: Row) -> Iterator[Finding]:
         """The seconds of runs that were repeated for a comparison; all count as one metric in a rule for ``run``."""
@@ -290,7 +300,7 @@ class RowComparison:
         if not limits.ignore:
             for name, judged in judge_repeated(old.seconds, new.seconds, self.policy.timings.ratio, limits.noise):
                 before, after = (f"{row.seconds[name]:.3g} s" if name in row.seconds else None for row in (old, new))
-                yield Finding(key, f"seconds {name}", judged[0], before, after, judged[1], timing=True)
+                yield Finding(key, name, judged[0], before, after, judged[1], "seconds")
 
     def _incomparable(self, old: Row, new: Row) -> str:
         """Why two rows cannot be compared; empty where they can."""

@@ -1,18 +1,21 @@
-"""The page of one scored motion: digits right, digits lost over time along and across the flow, the same in numbers."""
+"""What a report says of one scored motion: digits right, digits lost over time along and across the flow."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from typing import Any
 
-from heavytop.records import SCHEMA, Beside, Report, Row
-from heavytop.report.html import render
+from heavytop.measure.solution_error import SOLUTION_ERROR
+from heavytop.records import SCHEMA, Beside, Quantity, Report, Row
+from heavytop.report.document import Block, Card, Chart, Headline, In, Note, Table
+from heavytop.report.printable import short
 from heavytop.report.score_text import answer, sizes, told
-from heavytop.report.section import TIME, Key, Section, draw, logarithm, scientific
-from heavytop.report.svg import MARKERS, decades, finish, new_axes, quiet_style, spoken
-from heavytop.report.text import short
+from heavytop.report.section import TIME, Key, Section, Sources, draw, logarithm, scientific
+from heavytop.report.svg import MARKERS, decades, finish, new_axes, spoken
 from heavytop.suite.score import Assessment
 
+_SIZES = "", "largest", "rms", "final"
 _MOST = 50
 """Sentences beside the answer."""
 _PARTS = {"along": "along the flow (phase)", "across": "across the flow"}
@@ -24,29 +27,31 @@ def score_report(found: Assessment, environment: dict[str, Any], sha256: str = "
     return Report(SCHEMA, {"name": "score", "sha256": sha256}, environment, [found.row], beside)
 
 
-def score_page(report: Report) -> str | None:
-    """One self-contained page of a report with one scored motion; the same report gives the same bytes.
-
-    None for a report of anything else.
-    """
-    if report.beside is None or len(report.rows) != 1:
-        return None
-    (row,) = report.rows
-    with quiet_style():
-        section = digits_lost(row)
-    return render(
-        "score.html.j2",
-        row=row,
-        answer=answer(row, report.beside.peer),
-        told=report.beside.remarks[:_MOST],
-        section=section,
-        sizes=sizes(row),
-        environment=report.environment,
+def one_motion(row: Row, beside: Beside) -> Iterator[Block]:
+    """How good a scored motion is, what explains its error, how its digits are lost, and the same in numbers."""
+    first, *others = answer(row, beside.peer)
+    yield Headline(first)
+    compared = f"Compared with {row.against}."
+    yield from (Note(said, shown=In.FULL | In.PAGE) for said in (*others, *([] if beside.remarks else [compared])))
+    if beside.remarks:
+        remarks = [Note(said) for said in beside.remarks[:_MOST]]
+        yield Card("What explains it", remarks, note=compared, shown=In.FULL | In.PAGE)
+    yield Chart(digits_lost)
+    units = (
+        "Errors of Ω and along and across the flow in 1/time unit, of γ in units of |γ| = 1; drift of each first "
+        "integral in its own units."
     )
+    yield Table("Errors and drift", _SIZES, sizes(row), [units], shown=In.FULL | In.PAGE)
 
 
-def digits_lost(row: Row) -> Section | None:
-    """Digits that the format has and the state has not, over |t|; None without a reference or a sample away from 0."""
+def digits_lost(sources: Sources, first: Iterable[str] = ()) -> Section | None:
+    """Digits that the format has and the state has not, over |t|; None for several motions, without a reference, and
+    without a sample away from 0.
+    """
+    rows = [row for _, report in sources for row in report.rows]
+    if len(rows) != 1:
+        return None
+    (row,) = rows
     section = Section(
         "lost",
         "Digits lost over time",
@@ -79,7 +84,7 @@ def digits_lost(row: Row) -> Section | None:
 
 def _lost(row: Row, part: str, epsilon: float) -> list[tuple[float, float]]:
     """log10 |t| and digits lost at each sample of the series that has both."""
-    series = row.series.get(f"solution_error_{part}")
+    series = row.series.get(Quantity(SOLUTION_ERROR, part).text)
     if series is None:
         return []
     pairs = [(logarithm(t), logarithm(v)) for t, v in zip(series.times, series.values, strict=True)]
@@ -87,11 +92,14 @@ def _lost(row: Row, part: str, epsilon: float) -> list[tuple[float, float]]:
 
 
 def _table(row: Row, epsilon: float) -> list[list[str]]:
-    first = row.series["solution_error_along"]
-    columns = [row.series[f"solution_error_{part}"].values for part in _PARTS]
+    """The digits lost at each time."""
+    series = [row.series[Quantity(SOLUTION_ERROR, part).text] for part in _PARTS]
 
     def lost(value: str) -> str:
         size = logarithm(value)
         return "0.0" if value == "0" else value if size is None else f"{max(size - epsilon, 0.0):.1f}"
 
-    return [[short(time), *map(lost, values)] for time, *values in zip(first.times, *columns, strict=True)]
+    return [
+        [short(time), *map(lost, values)]
+        for time, *values in zip(series[0].times, *(each.values for each in series), strict=True)
+    ]

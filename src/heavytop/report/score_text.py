@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-import textwrap
-from collections.abc import Iterator
 from dataclasses import asdict
 from fractions import Fraction
 from typing import Any
 
 import msgspec
-from rich.console import Console, ConsoleOptions, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.text import Text
 
 from heavytop.measure.digits import digits_kept, digits_of, digits_right, digits_text
-from heavytop.records import Peer, Row
+from heavytop.measure.drift import DRIFT
+from heavytop.measure.solution_error import SOLUTION_ERROR
+from heavytop.records import Peer, Quantity, Row
 from heavytop.report.diagnosis_text import diagnosis_text
-from heavytop.report.text import short, table
+from heavytop.report.document import Cell, Value
+from heavytop.report.printable import short
+from heavytop.report.text import table, wrapped
 from heavytop.suite.score import Assessment, direction, passed
 
-WIDTH = 80
 _PARTS = {"omega": "Ω", "gamma": "γ", "along": "along the flow", "across": "across the flow"}
 _OBSERVED = {
     "attitude_error": "attitude (rad)",
@@ -98,16 +99,17 @@ def to_json(found: Assessment) -> dict[str, Any]:
     return row | answers | more
 
 
-def sizes(row: Row) -> list[list[str]]:
+def sizes(row: Row) -> list[list[Cell]]:
     """Label, largest, root mean square and final value of each error and of the drift of each first integral."""
     until = f" before t = {short(row.reference.until)}" if row.reference.until else ""
-    names = {f"solution_error_{key}": f"error{until}, {label}" for key, label in _PARTS.items()}
-    names |= {key: f"error{until}, {label}" for key, label in _OBSERVED.items()}
-    names |= {name[:-4]: f"drift, {name[6:-4]}" for name in row.metrics if name[:6] == "drift_" and name[-4:] == "_max"}
+    names = {Quantity(SOLUTION_ERROR, part): f"error{until}, {label}" for part, label in _PARTS.items()}
+    names |= {Quantity(name): f"error{until}, {label}" for name, label in _OBSERVED.items()}
+    found = [metric.quantity for metric in row.metrics.values() if metric.quantity]
+    names |= {Quantity(DRIFT, q.component): f"drift, {q.component}" for q in found if q.name == DRIFT}
     return [
-        [label, *(short(row.metrics[f"{name}_{part}"].value) for part in ("max", "rms", "final"))]
-        for name, label in names.items()
-        if f"{name}_max" in row.metrics
+        [label, *(Value(row.metrics.get(each.over(part).text)) for part in ("max", "rms", "final"))]
+        for each, label in names.items()
+        if each.over("max").text in row.metrics
     ]
 
 
@@ -116,7 +118,7 @@ def score_text(found: Assessment) -> RenderableType:
     row = found.row
     numbers = table(["", f"largest over {row.samples} samples", "rms", "final"], sizes(row))
     about = f"{row.case}: {row.integrator}, {row.system} in {row.precision} ({row.bits} bits)"
-    parts: list[RenderableType] = [_Sentence(line) for line in answer(row, found.peer)]
+    parts: list[RenderableType] = [Text(line) for said in answer(row, found.peer) for line in wrapped(said, "")]
     parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Compared with {row.against}.")]
     explained = told(found)
     if explained:
@@ -124,16 +126,5 @@ def score_text(found: Assessment) -> RenderableType:
     return Group(*parts)
 
 
-class _Sentence:
-    """A sentence that is broken behind a semicolon where the console is too narrow for it."""
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
-        fits = len(self.text) <= options.max_width
-        yield Text(self.text if fits else self.text.replace("; ", ";\n"))
-
-
 def _wrapped(text: str) -> list[Text]:
-    return [Text(line) for line in textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False)]
+    return [Text(line) for line in wrapped(text, "")]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from heavytop.errors import InputError
 from heavytop.precision import exact, log10
@@ -40,30 +40,8 @@ class Key:
     line: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A line of a card.  style: "", "soft", "big" or "note"; word: a verdict before it."""
-
-    text: str
-    style: str = ""
-    word: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Card:
-    """What a kind of measurement has to say under the headline: lines, a small table, a note below."""
-
-    title: str
-    lines: list[Line]
-    caption: str = ""
-    columns: tuple[str, ...] = ()
-    rows: list[tuple[str, ...]] = field(default_factory=list)
-    note: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """Cells under their columns; the first of each row names it."""
+class Answers(NamedTuple):
+    """What the pictures of a section come to: cells under their columns; the first of each row names it."""
 
     caption: str
     columns: Sequence[str]
@@ -80,7 +58,7 @@ class Section:
     id: str
     title: str
     text: list[str]
-    answers: Table | None = None
+    answers: Answers | None = None
     pictures: list[Picture] = field(default_factory=list)
     legend: dict[str, Key] = field(default_factory=dict)
     columns: list[str] = field(default_factory=list)

@@ -12,9 +12,9 @@ from heavytop.errors import HeavyTopError
 from heavytop.integrate.taylor import propagate
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import CellMap, Row, Spread, Worst
+from heavytop.report.printable import short
 from heavytop.report.section import Keys, Section, Sources, clip, draw, left_out
 from heavytop.report.svg import COLOURS, Picture, decades, finish, new_axes, spoken
-from heavytop.report.text import short
 from heavytop.top.equations import system
 from heavytop.top.heavy_top import HeavyTop, State
 

@@ -1,53 +1,24 @@
-"""A report in words and tables, for people.  Works on records alone; returns what rich can print."""
+"""Words and tables of a report for a terminal: what rich can print."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
-from fractions import Fraction
 from textwrap import wrap
 from typing import Any
 
 from rich.cells import cell_len
-from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.errors import InputError
-from heavytop.measure.digits import digits_kept, digits_text
 from heavytop.measure.drift import DRIFT
-from heavytop.measure.solution_error import SOLUTION_ERROR
-from heavytop.precision import decimal_text, exact
-from heavytop.records import FAILED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Report, Row
+from heavytop.records import FAILED, OUT_OF_TIME, UNMEASURED, UNSUPPORTED, Metric, Row
+from heavytop.report.document import Cell, Word, cell_text
 from heavytop.report.kind import Kinds, kind_of
 from heavytop.report.names import computed_by
 from heavytop.report.printable import printable
 from heavytop.report.store import AnyReport
-
-
-def short(value: str, digits: int = 3) -> str:
-    """A metric's text with few digits; words stay as they are."""
-    try:
-        number = exact(value)
-    except InputError:
-        return value
-    if number == 0:
-        return "0"
-    if Fraction(1, 1000) <= abs(number) < 10**5:
-        return f"{float(number):.{digits + 2}g}"
-    text = f"{Decimal(decimal_text(number, digits)):.{digits - 1}E}"
-    mantissa, _, exponent = text.partition("E")
-    if exact(text) == number:  # a time such as 10^6 has no more digits
-        mantissa = mantissa.rstrip("0").removesuffix(".")
-    return f"{mantissa}e{int(exponent)}"
-
-
-def with_noise(metric: Metric | None, digits: int = 3) -> str:
-    """The value of a metric and, where it was measured, the half-width of its rounding noise in decades."""
-    if metric is None:
-        return "-"
-    return short(metric.value, digits) + (f" ± {metric.band:.2f}" if metric.band else "")
 
 
 def largest_over(rows: Iterable[Row]) -> str:
@@ -59,28 +30,7 @@ def largest_over(rows: Iterable[Row]) -> str:
 
 
 DIGITS = "Digits right: −log10 of the largest |error|/max(1, |true value|) of a component of Ω or γ."
-NOISE = "± is the rounding noise in decades: half the interval that holds 95 % of it."
-
-
-def summary(report: Report, kinds: Kinds) -> RenderableType:
-    """What every kind of measurement says of its rows, then what did not reach its horizon."""
-    measured: dict[str, list[Row]] = {}
-    for row in report.rows:
-        if row.outcome not in UNMEASURED:
-            measured.setdefault(row.key.kind, []).append(row)
-    parts: list[RenderableType] = [head(report, len(report.rows))]
-    for name, kind in kinds.items():
-        if rows := measured.pop(name, None):
-            parts += [Text(), *kind.summary(rows)]
-    for name, rows in measured.items():
-        said = f"Measure {name or 'without a name'}: {len(rows)} rows, which the page lists (--html FILE)"
-        parts += [Text(), Text(printable(said))]
-    if said := unsupported(report.rows):
-        parts += [Text(), Text(printable(said))]
-    if failures := [row for row in report.rows if failed(row, kinds)]:
-        parts += [Text(), Text("Runs that did not reach their horizon", style="bold red")]
-        parts += [Text(printable(failure(row))) for row in failures]
-    return Group(*parts)
+NOISE_BAND = "± is the rounding noise in decades: half the interval that holds 95 % of it."
 
 
 def failed(row: Row, kinds: Kinds) -> bool:
@@ -117,6 +67,10 @@ def head(report: AnyReport, rows: int) -> Text:
     return Text(printable(f"Plan {report.plan.get('name', '?')}: {rows} measurements ({versions})"))
 
 
+WORD_STYLES = {"refuted": "bold red", "holds": "bold green"}
+"""Of verdicts; others are yellow."""
+
+
 def title(text: str) -> Text:
     """The first line of a section."""
     return Text(text, style="bold")
@@ -128,101 +82,81 @@ class Lines:
     each row: its first cell, and then every other one behind the name of its column.  No word is broken.
 
     words: how many first columns are words; the others are numbers.  left: the last column is words too.
+    head: stands above the first column.
     """
 
     columns: Sequence[str]
-    rows: Sequence[Sequence[Text]]
+    rows: Sequence[Sequence[Cell | Text]]
     words: int = 1
     left: bool = False
+    head: str = ""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """A table, or blocks."""
-        cells = [[Text(column) for column in self.columns], *self.rows]
-        widths = [max(cell_len(word) for row in cells for word in [*row[i].plain.split(" "), ""]) for i in self._all]
-        if sum(widths) + 2 * len(widths) > options.max_width:
-            yield from self._blocks(options.max_width)
+        first, *others = map(printable, self.columns)
+        columns = [printable(self.head) or first, *others]
+        rows = [[_styled(cell) for cell in row] for row in self.rows]
+        cells = [columns, *([cell.plain for cell in row] for row in rows)]
+        widths = [
+            max(cell_len(word) for row in cells for word in [*row[i].split(" "), ""]) for i in range(len(columns))
+        ]
+        wides = [max(cell_len(row[index]) for row in cells) for index in range(len(columns))]
+        edge = not self.head
+        room = options.max_width - sum(wide + 2 for wide in wides[1:]) - 2 * edge
+        if sum(widths) + 2 * len(widths) > options.max_width or (self.head and room < widths[0]):
+            yield from ([Text(self.head)] if self.head else [])
+            yield from _blocks(columns, rows, options.max_width)
             return
-        made = Table(box=None, pad_edge=True, header_style="dim")
-        for index, (column, width) in enumerate(zip(self.columns, widths, strict=True)):
-            wide = max(row[index].cell_len for row in cells)
-            made.add_column(
-                Text(column),
-                justify="left" if self._is_words(index) else "right",
-                no_wrap=wide == width,
-                min_width=width,
-            )
-        for row in self.rows:
+        if widths[0] + 2 <= room < wides[0]:
+            for row in rows:  # what is broken is indented
+                row[0] = Text("\n".join(wrapped(row[0].plain, "  ", "", room)), style=row[0].style)
+        made = Table(box=None, pad_edge=edge, header_style="dim")
+        for index, (column, width, wide) in enumerate(zip(columns, widths, wides, strict=True)):
+            words = index < self.words or (self.left and index == len(columns) - 1)
+            made.add_column(Text(column), justify="left" if words else "right", no_wrap=wide == width, min_width=width)
+        for row in rows:
             made.add_row(*row)
         yield made
 
-    @property
-    def _all(self) -> range:
-        return range(len(self.columns))
 
-    def _is_words(self, index: int) -> bool:
-        return index < self.words or (self.left and index == len(self.columns) - 1)
+def _styled(cell: Cell | Text) -> Text:
+    if isinstance(cell, Text):
+        return cell
+    style = WORD_STYLES.get(cell.text, "bold yellow") if isinstance(cell, Word) else ""
+    return Text(printable(cell_text(cell)), style=style)
 
-    def _blocks(self, width: int) -> Iterator[Text]:
-        for first, *rest in self.rows:
-            yield first
-            pairs = zip(self.columns[1:], rest, strict=True)
-            said = ";  ".join(f"{column} {cell.plain}".strip() for column, cell in pairs if cell.plain.strip())
-            yield from map(Text, wrap(said, width - 4, initial_indent="    ", subsequent_indent="    ", **_WHOLE_WORDS))
+
+def _blocks(columns: Sequence[str], rows: Iterable[Sequence[Text]], width: int) -> Iterator[Text]:
+    for first, *rest in rows:
+        yield first
+        pairs = zip(columns[1:], rest, strict=True)
+        said = ";  ".join(f"{column} {cell.plain}".strip() for column, cell in pairs if cell.plain.strip())
+        yield from map(Text, wrapped(said, "    ", "    ", width - 4))
+
+
+def wrapped(text: str, indent: str = "  ", first: str = "", width: int = 80) -> list[str]:
+    """A sentence in lines of so many columns, all but the first indented; no word is broken."""
+    return wrap(text, width, initial_indent=first, subsequent_indent=indent, **_WHOLE_WORDS)
 
 
 _WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False}
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[str | Text]], words: int = 1, left: bool = False) -> Lines:
+def table(columns: Sequence[str], rows: Iterable[Sequence[Cell | Text]], words: int = 1, left: bool = False) -> Lines:
     """A table without lines; its first ``words`` columns are words, the others are numbers; ``left``: not the last."""
-    cells = [[cell if isinstance(cell, Text) else Text(printable(cell)) for cell in row] for row in rows]
-    return Lines([printable(column) for column in columns], cells, words, left)
+    return Lines(columns, list(rows), words, left)
 
 
-def both(lines: Iterable[tuple[Row, Sequence[str]]]) -> list[list[str]]:
+def both(lines: Iterable[tuple[Row, Sequence[Cell]]]) -> list[list[Cell]]:
     """The cells of each row behind its case; what is the same forward and backward once, and then without direction."""
-    found: dict[tuple[str, ...], list[Row]] = {}
+    found: dict[tuple[str, ...], tuple[list[Row], Sequence[Cell]]] = {}
     for row, cells in lines:
-        found.setdefault((row.key.case, computed_by(row), *cells), []).append(row)
-    return [[(case if len(rows) > 1 else rows[0].case) + name, *cells] for (case, name, *cells), rows in found.items()]
-
-
-def motions(rows: Sequence[Row]) -> Lines:
-    """Digits right, distance from the true motion and drift of every integral, a line a row."""
-    lines = []
-    for row in rows:
-        cells = "  ".join(f"{name} {with_noise(metric, 2)}" for name, metric in drifts(row))
-        errors = (row.metric(SOLUTION_ERROR, part, "max") for part in ("along", "across"))
-        error, across = ("no reference" if each is None else with_noise(each, 2) for each in errors)
-        kept = digits_kept(row)
-        digits = "-" if kept is None else digits_text(kept)
-        if row.reference.until:
-            digits += f" from {row.reference.until}"
-        lines.append(
-            [
-                row.case + computed_by(row),
-                row.precision,
-                row.horizon,
-                str(row.steps),
-                row.outcome,
-                digits,
-                error,
-                across,
-                cells,
-            ]
-        )
-    columns = [
-        "case",
-        "format",
-        "T",
-        "steps",
-        "outcome",
-        "digits right",
-        "error along",
-        "across",
-        "drift of each integral",
+        same = row.key.case, computed_by(row), *map(cell_text, cells)
+        found.setdefault(same, ([], cells))[0].append(row)
+    return [
+        [(rows[0].key.case if len(rows) > 1 else rows[0].case) + computed_by(rows[0]), *cells]
+        for rows, cells in found.values()
     ]
-    return table(columns, lines, left=True)
 
 
 def drifts(row: Row) -> list[tuple[str, Metric]]:

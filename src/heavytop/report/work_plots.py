@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Sequence
 
 from heavytop.records import Row
-from heavytop.report.section import Keys, Section, Sources, Table, clip, draw, left_out, scientific
+from heavytop.report.printable import short
+from heavytop.report.section import Answers, Keys, Section, Sources, clip, draw, left_out, scientific
 from heavytop.report.svg import COLOURS, End, Picture, decades, finish, new_axes, room, spoken
-from heavytop.report.text import short
 from heavytop.report.work_precision import ERRORS, Lead, Line, leads, panels, seconds_text
 
 MOST_CASES = 12
@@ -42,7 +42,7 @@ def work_precision(sources: Sources, first: Iterable[str] = ()) -> Section | Non
             "took: it has no error. heyoka:constants has the numbers of the top compiled into its code; heyoka with "
             "general code, and the others, are given them when they run.",
         ],
-        answers=Table("Seconds that heyoka and the best of the others take for an error", _LEADS, found)
+        answers=Answers("Seconds that heyoka and the best of the others take for an error", _LEADS, found)
         if found
         else None,
         columns=[

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from heavytop.integrate.integrator import INTEGRATORS
 from heavytop.precision import parse
 from heavytop.records import UNMEASURED, Quantity, Row
+from heavytop.report.document import In, Table
 
-_MOST_CASES, _COLUMNS = 2, 80
+_MOST_CASES = 2
 OURS, CONSTANTS, LANES = "heyoka", "heyoka:constants", "heyoka:lanes"
 """heyoka; with the numbers of the top compiled into its code; eight motions at once.  Others compare with these."""
 ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final")
@@ -19,7 +20,7 @@ ERRORS = Quantity("error", statistic="max"), Quantity("error", statistic="final"
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One rung that reached the end: log10 of its error, its seconds, its tolerance or step.
+    """One rung that reached the end: log10 of its error, its seconds, its tolerance or step in words.
 
     seconds: of its fastest run.  Other work on the machine only ever adds, and adds more to longer runs: medians on a
     busy machine would flatter whoever is quick.
@@ -146,25 +147,25 @@ def panels(rows: Sequence[Row]) -> dict[str, list[Line]]:
     for row in rows:
         if row.outcome in UNMEASURED:
             continue
-        name, setting = row.key.subject.name, row.key.subject.setting
+        name = row.key.subject.name
         line = found.setdefault(row.case, {}).setdefault((name, row.precision), Line(name, row.precision))
         seconds = row.seconds.get("least", math.nan)
         error = row.metrics.get(ERRORS[0].text)
         if row.outcome != "success":
             line.failures.append(seconds)
         elif error is not None and error.log10 is not None and seconds > 0:
-            line.points.append(Point(error.log10, seconds, setting))
+            line.points.append(Point(error.log10, seconds, row.key.subject.asked))
             line.compile = max(line.compile, row.seconds.get("compile", 0.0))
     return {case: list(lines.values()) for case, lines in found.items()}
 
 
-def beside_ours(rows: Sequence[Row]) -> list[str]:
-    """The integrator that is measured beside heyoka alone, or comes from another package: a table of lines of 80
-    columns, a line a rung, of its error, its seconds and what heyoka takes for that error; two cases at most.
+def beside_ours(rows: Sequence[Row]) -> list[Table]:
+    """The integrator that is measured beside heyoka alone, or comes from another package: a column a case, two at most,
+    a line a point of the curve, of its error, its seconds and what heyoka takes for that error.
     """
     found = {case: lines for case, lines in panels(rows).items() if any(line.integrator == OURS for line in lines)}
     names = {line.integrator for lines in found.values() for line in lines} - {OURS, CONSTANTS, LANES}
-    said = []
+    tables = []
     for name in sorted(names if len(names) == 1 else names - INTEGRATORS.keys()):
         cases: dict[str, dict[str, str]] = {}
         for case, lines in list(found.items())[:_MOST_CASES]:
@@ -173,24 +174,16 @@ def beside_ours(rows: Sequence[Row]) -> list[str]:
                     ours = [each for each in lines if each.integrator == OURS and each.precision == line.precision]
                     cells = {_rung(line, point): _cell(point, ours) for point in line.points}
                     cases[case] = cases.get(case, {}) | cells
-        if any(cases.values()):
-            said += [f"{name}: largest error in its time (heyoka's time for that error)", *_table(cases)]
-    return said
-
-
-def _table(cases: dict[str, dict[str, str]]) -> list[str]:
-    """A column a case, a line a rung; each case by itself where they are wider than a terminal."""
-    rungs = dict.fromkeys(rung for cells in cases.values() for rung in cells)
-    rows = [["", *cases], *([rung, *(cells.get(rung, "-") for cells in cases.values())] for rung in rungs)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    if len(cases) > 1 and sum(widths) + 2 * len(widths) > _COLUMNS:
-        return [line for case, cells in cases.items() for line in _table({case: cells})]
-    return ["".join(f"  {cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+        rungs = dict.fromkeys(rung for cells in cases.values() for rung in cells)
+        lines_of = [[rung, *(cells.get(rung, "-") for cells in cases.values())] for rung in rungs]
+        note = f"{name}: largest error in its time (heyoka's time for that error)"
+        if lines_of:
+            tables.append(Table("", ["", *cases], lines_of, [note], shown=In.SHORT))
+    return tables
 
 
 def _rung(line: Line, point: Point) -> str:
-    setting = point.setting.replace("=", " ").replace("tolerance eps", "finest")
-    return setting if line.precision == "double" else f"{line.precision} {setting}"
+    return point.setting if line.precision == "double" else f"{line.precision} {point.setting}"
 
 
 def _cell(point: Point, ours: Sequence[Line]) -> str:

@@ -8,6 +8,8 @@ import signal
 from multiprocessing import parent_process
 from threading import Thread
 
+import msgspec
+
 from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach, PeerFailed, Unsupported
 from heavytop.integrate.peers.command import begin_row
 from heavytop.integrate.trajectory import OtherFlags
@@ -25,9 +27,7 @@ def measure(kind: Kind, task: Task, saved: Saved) -> Row:
     begin_row()
     try:
         task.require_reach()
-        row = _taken_up(kind, task, saved)
-        row.data = data_of(task.case)
-        return row
+        return msgspec.structs.replace(_taken_up(kind, task, saved), data=data_of(task.case))
     except PeerFailed as error:
         return failed(task, error.cause)
     except Unsupported as error:

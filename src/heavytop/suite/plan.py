@@ -29,12 +29,12 @@ from heavytop.integrate.trajectory import Problem
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import MOST_SEEDS
 from heavytop.precision import exact, number, require
-from heavytop.records import RowKey
+from heavytop.records import FINEST, RowKey
 from heavytop.suite.cases import CASES, Case, case, named_bodies, require_possible
 from heavytop.suite.files import read_whole
 from heavytop.suite.kind import Kinds, Table
 from heavytop.suite.sweeps import Lazy, Sweep
-from heavytop.suite.task import FINEST, Task
+from heavytop.suite.task import Task
 from heavytop.top.bodies import Body
 from heavytop.top.equations import system_of
 from heavytop.top.given_motion import motion_of
@@ -251,7 +251,7 @@ def expand(plan: Plan, seed: int = 0, defined: Mapping[str, Source] | None = Non
                 other = "" if seen[work] == task.label else f", also as {seen[work]}"
                 raise InputError(f"The plan {plan.name} measures {task.label} twice{other}.", "Name each once.")
             if task.label in seen.values():  # one case at several horizons
-                templates[place] = replace(task, title=f"{task.title}/T={task.key.horizon}")
+                templates[place] = replace(task, suffix=f"{task.suffix}/T={task.key.horizon}")
             seen[work] = templates[place].label
             _require_fit(task)
     if not seen:

@@ -36,12 +36,17 @@ def run(
         progress(tasks[index])
     at_once = min(workers, len(tasks))
     done, saved = checkpoint.offsets, checkpoint.saved
+    to_conclude: dict[int, Row] = {}
     for index, row in rows(tasks, kinds, at_once, scheduler, done, saved, begun, row_timeout):
         checkpoint.add(index, row)
+        if kinds[row.key.kind].concludes:
+            to_conclude[index] = row
         progress(tasks[index])
     concluded: list[Row] = []
     for kind in kinds.values():
         if kind.concludes:
             indices = [index for index, task in enumerate(tasks) if task.key.kind == kind.name]
-            concluded += kind.conclude(list(checkpoint.rows(indices)))
+            missing = [index for index in indices if index not in to_conclude]  # measured before it was resumed
+            to_conclude |= zip(missing, checkpoint.rows(missing), strict=True)
+            concluded += kind.conclude([to_conclude[index] for index in indices]) if indices else []
     return concluded

@@ -157,7 +157,7 @@ def _row(
     case = Case(given.name, "given", given.system, given.top, given.start)
     subject = Subject("given", given.integrator)
     key = RowKey("score", given.name, given.system.name, subject, precision.name, horizon=time_text(times[-1]))
-    task = Task(key, given.name, given.integrator, case, tuple(times), tuple(keep))
+    task = Task(key, "", given.integrator, case, tuple(times), tuple(keep))
     row = computed_row(task, run, scorer.metrics(), scorer.series(time_text), scorer.against)
     said = {"measured": f"given: {given.integrator}", "order": None, "time_reached": time_text(run.time_reached)}
     return msgspec.structs.replace(row, **said, data=data_of(case))

@@ -16,18 +16,16 @@ from heavytop.measure.computed_reference import seconds_a_step as words_seconds
 from heavytop.measure.integrator import HEYOKA, MULTIWORD, ChosenIntegrator
 from heavytop.measure.rounding_noise import factor, scaled
 from heavytop.precision import Precision, exact, parse
-from heavytop.records import EXACT, RowKey, Subject
+from heavytop.records import EXACT, FINEST, RowKey, Subject
 from heavytop.suite.cases import Case
-
-FINEST = "eps"
-"""In the place of a tolerance: the finest that an integrator offers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
     """One measurement, and the row it will fill.
 
-    key: of the row.  title, subject: what the row calls its case and what is measured.
+    key: of the row.  suffix: behind the case in what the row calls it: a direction, a horizon.  subject: what is
+    measured.
     case: None where no motion is measured.
     times: exact, of the sign of the direction; keep: those that go into the series.
     options: what else the kind of measurement needs to know, and it alone.
@@ -37,7 +35,7 @@ class Task:
     """
 
     key: RowKey
-    title: str
+    suffix: str
     subject: str
     case: Case | None = None
     times: tuple[Fraction, ...] = ()
@@ -50,7 +48,12 @@ class Task:
     def of(self, case: Case) -> Task:
         """The same measurement of another case of the same system."""
         key = msgspec.structs.replace(self.key, case=case.name, system=case.system.name)
-        return replace(self, key=key, title=self.title.replace(self.key.case, case.name, 1), case=case)
+        return replace(self, key=key, case=case)
+
+    @property
+    def title(self) -> str:
+        """What the row calls its case."""
+        return self.key.case + self.suffix
 
     @property
     def precision(self) -> Precision:

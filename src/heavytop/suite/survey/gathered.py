@@ -132,7 +132,8 @@ def _quantiles(quantity: Quantity, values: Any) -> dict[Quantity, Metric]:
         half = _NORMAL * math.sqrt(n * p * (1 - p))
         low, high = max(0, math.floor(rank - half)), min(n - 1, math.ceil(rank + half))
         if p < 1 and values[low] > 0:
-            metric.band = round(min(100.0, (math.log10(values[high]) - math.log10(values[low])) / 2), 4)
+            width = math.log10(values[high]) - math.log10(values[low])
+            metric = msgspec.structs.replace(metric, band=round(min(100.0, width / 2), 4))
         found[quantity.over(name)] = metric
     return found
 
