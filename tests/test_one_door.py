@@ -2,14 +2,19 @@
 
 import json
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
 import heavytop as ht
+from heavytop.api.integrators import check_integrator, new_integrator
 from heavytop.cli import app
 from heavytop.errors import HeavyTopError
+from heavytop.suite.cases import case
+from heavytop.suite.score import required
+from heavytop.suite.trajectory_file import read
 
 DATA = {
     "inertia": "3,2,1",
@@ -181,3 +186,81 @@ def test_events_are_the_same_or_the_same_error(function: str) -> None:
     else:
         (found,) = printed["events"]
         assert found["times"] == [{"value": ball.value, "radius": ball.radius} for ball in known.times]
+
+
+COMMANDS: Mapping[str, tuple[list[str], Callable[[], Any]]] = {
+    "audit of nothing known": (["audit", "nobody"], lambda: ht.audit("nobody")),
+    "audit of no file": (["audit", "nowhere.toml"], lambda: ht.audit("nowhere.toml")),
+    "audit of no system": (
+        ["audit", "ershkov-partial", "--system", "kite"],
+        lambda: ht.audit("ershkov-partial", system="kite"),
+    ),
+    "audit of no branch": (
+        ["audit", "ershkov-partial", "--branch", "third"],
+        lambda: ht.audit("ershkov-partial", branch="third"),
+    ),
+    "claims of no tag": (["claims", "--tag", "nothing"], lambda: ht.claim_library("nothing")),
+    "compare of no report": (["compare", "nowhere", "nowhere"], lambda: ht.compare("nowhere", "nowhere")),
+    "compare with a floor below 0": (
+        ["compare", "nowhere", "nowhere", "--floor", "-1"],
+        lambda: ht.compare("nowhere", "nowhere", floor="-1"),
+    ),
+    "compare with no number of bits": (
+        ["compare", "nowhere", "nowhere", "--loss", "x"],
+        lambda: ht.compare("nowhere", "nowhere", loss="x"),
+    ),
+    "compare by no policy": (
+        ["compare", "nowhere", "nowhere", "--policy", "none.toml"],
+        lambda: ht.compare("nowhere", "nowhere", policy="none.toml"),
+    ),
+    "show of no report": (["show", "nowhere"], lambda: ht.read_report("nowhere")),
+    "export of no report": (["export", "nowhere", "--to", "csv"], lambda: ht.read_report("nowhere")),
+    "history of no report": (["history", "nowhere", "nowhere"], lambda: ht.read_report("nowhere")),
+    "figures of no report": (["figures", "--out", "new", "--report", "nowhere"], lambda: ht.read_report("nowhere")),
+    "run of no plan": (["run", "--plan", "nobody"], lambda: ht.run("nobody")),
+    "run of no file": (["run", "--plan", "nowhere.toml"], lambda: ht.run("nowhere.toml")),
+    "run without workers": (["run", "--plan", "smoke", "--workers", "0"], lambda: ht.run("smoke", workers=0)),
+    "run of a seed too large": (["run", "--plan", "smoke", "--seed", "2000"], lambda: ht.run("smoke", seed=2000)),
+    "run beside nobody": (
+        ["run", "--plan", "smoke", "--integrator", "nobody"],
+        lambda: ht.run("smoke", integrator="nobody"),
+    ),
+    "run in no time": (
+        ["run", "--plan", "smoke", "--row-timeout", "0"],
+        lambda: ht.run("smoke", row_timeout="0"),
+    ),
+    "selftest without workers": (["selftest", "--workers", "0"], lambda: ht.run("smoke", workers=0)),
+    "hunt of nobody": (["hunt", "--integrator", "nobody"], lambda: ht.hunt("nobody")),
+    "hunt for no time": (["hunt", "--horizon", "0"], lambda: ht.hunt(horizon="0")),
+    "hunt in no family": (["hunt", "--family", "kites"], lambda: ht.hunt(family="kites")),
+    "hunt beyond 0": (["hunt", "--limit", "0"], lambda: ht.hunt(limit="0")),
+    "hunt on no budget": (["hunt", "--budget", "x"], lambda: ht.hunt(budget="x")),
+    "hunt against itself": (["hunt", "--against", "heyoka"], lambda: ht.hunt(against="heyoka")),
+    "hunt in no format": (["hunt", "--precision", "triple"], lambda: ht.hunt(precision="triple")),
+    "check of nobody": (["check-integrator", "nobody"], lambda: check_integrator("nobody")),
+    "check of no file": (["check-integrator", "nowhere.toml"], lambda: check_integrator("nowhere.toml")),
+    "new in no language": (
+        ["new", "new", "--language", "latin"],
+        lambda: new_integrator(Path("new"), "latin"),
+    ),
+    "list of no case": (["list", "--case", "nobody"], lambda: case("nobody")),
+    "score to no digits": (["score", "nowhere.csv", "--require", "-1"], lambda: required("-1")),
+    "score of no file": (["score", "nowhere.csv"], lambda: read(Path("nowhere.csv"), None, False)),
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_bad_input_of_every_other_command_is_the_same_error(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words, call = COMMANDS[name]
+    said = outcome(lambda: CliRunner().invoke(app, words, catch_exceptions=False, standalone_mode=False))
+    assert isinstance(said, tuple)
+    assert said == outcome(call)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_command_is_in_a_table() -> None:
+    tried = {words[0] for words, _ in COMMANDS.values()} | {"propagate", "reference"}
+    assert {command.name for command in app.registered_commands} == tried

@@ -261,3 +261,25 @@ def test_angles_of_many_turns_are_known_at_once(angle: str, place: int) -> None:
         gamma = (-mpmath.sin(b), mpmath.cos(b) * mpmath.sin(c), mpmath.cos(b) * mpmath.cos(c))
         for value, ball in zip(gamma, known.states[0][3:], strict=True):
             assert abs(value - mpmath.mpf(ball.value)) <= mpmath.mpf(ball.radius)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "about", "diagonal"),
+    [
+        (("1/2", "1/2", "1/2"), "pivot", "-1/2, 1/2, -1/2"),
+        (("1/2", "1/2", "1/2"), "centre of mass", None),
+        (("3/2", "1/2", "3/2"), "pivot", None),
+        ((1, "1/1000", 1), "pivot", "0, 1/1000, 0"),
+        ((1, 1e-30, 1), "pivot", None),  # a rod along its axis, rounded
+        ((1, 1, 2, "1/2", 0, 0), "pivot", "0, 1, 1"),
+        ((1, 3, 1), "centre of mass", "1, 3, 1"),
+    ],
+)
+def test_a_tensor_that_is_none_about_the_centre_of_mass_is_a_warning(inertia, about, diagonal) -> None:
+    found = ht.Body(1, 1, (0, 1, 0), inertia, about).warnings()
+    if diagonal is None:
+        assert found == []
+        return
+    (text,) = found
+    assert f"about the centre of mass, diagonal {diagonal}, is not that of a rigid body" in text
+    assert ('give about = "centre of mass"' in text) == (about == "pivot")

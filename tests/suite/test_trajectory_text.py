@@ -12,6 +12,7 @@ from heavytop.integrate.taylor import propagate
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text
 from heavytop.suite.cases import CASES
 from heavytop.suite.trajectory_file import read
+from heavytop.suite.trajectory_table import Table, unread
 from heavytop.written_numbers import format_of, number
 
 CASE = CASES["lagrange"]
@@ -139,3 +140,11 @@ def test_digits_beyond_those_of_a_format_do_not_make_it_wider(form, more: int) -
 
     values = [round_to(Fraction(k, 7), form.bits) for k in range(1, 40)]
     assert format_of(decimal_text(value, form.digits + more) for value in values) == form
+
+
+def test_xi_and_radii_that_heavytop_writes_itself_are_not_spoken_of() -> None:
+    states = ["t", "omega1", "omega2", "omega3", "gamma1", "gamma2", "gamma3"]
+    own = ["xi1", "xi2", "xi3", "omega1_radius", "gamma3_radius", "xi2_radius"]
+    names = [*states, *own]
+    assert Table("\n".join([",".join(names), ",".join("0" * len(names)), ",".join("1" * len(names))]), []).notes == []
+    assert unread([*own, "energy", "energies_radius"], names) == ["columns that are not read: energy, energies_radius"]

@@ -25,7 +25,7 @@ from heavytop.words.scaled import Scaled
 from heavytop.words.vector import DOUBLE, POINTER, function
 from support.words_helpers import LEVELS, problem
 
-HERE = str(Path(__file__).parent)
+PATH = os.pathsep.join(map(str, Path(__file__).parents[:2]))
 FINEST, COARSE = Fraction(1, 2**105), Fraction(1, 10**16)
 LADDER = Ladder.of(FINEST)
 PLAIN = Processor("x86-64")
@@ -116,7 +116,7 @@ def test_the_bits_are_those_without_fused_multiply_add_in_hardware() -> None:
         "run = t.Floating(t.problem(), t.Ladder.of(t.COARSE), True, processor=t.PLAIN); "
         "run.advance(t.Fraction(30), 10**6); print(*run.place())"
     )
-    environment = os.environ | {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F", "PYTHONPATH": HERE}
+    environment = os.environ | {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F", "PYTHONPATH": PATH}
     masked = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
     *_, place, _ = bits_on(None, False, COARSE)
     assert masked.stdout.split() == list(place)

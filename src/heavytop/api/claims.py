@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from heavytop.api import arguments
-from heavytop.claims.audit import PAPER, only_branch
+from heavytop.claims.audit import PAPER, only_branch, require_branch
 from heavytop.claims.audit import audit as audit_named
 from heavytop.claims.entry import Entry, library, require_tag
 from heavytop.claims.judge import Audit as Audit
@@ -34,9 +34,11 @@ def audit(claim: str | os.PathLike[str], system: System | str | None = None, *, 
         InputError: for an unknown claim, system or branch, for a file that is no claim, and for one whose audit takes
             too long.
     """
+    if branch is not None:
+        require_branch(arguments.text(branch, "branch"))
     name = claim if isinstance(claim, str) and claim in PAPER else str(arguments.path(claim, "claim"))
     found = audit_named(name, None if system is None else arguments.system(system).name)
-    return found if branch is None else only_branch(found, arguments.text(branch, "branch"))
+    return found if branch is None else only_branch(found, branch)
 
 
 @dataclass(frozen=True, slots=True, repr=False)

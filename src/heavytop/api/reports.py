@@ -119,7 +119,7 @@ def run(
         str(arguments.path(plan, "plan")),
         None if out is None else arguments.path(out, "out"),
         resume=bool(arguments.flag(resume, "resume")),
-        workers=arguments.count(workers, "workers"),
+        workers=workers,
         scheduler=None if scheduler is None else arguments.text(scheduler, "scheduler"),
         seed=whole(seed, "seed"),
         integrator=_integrator(integrator),

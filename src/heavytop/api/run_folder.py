@@ -13,12 +13,12 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from heavytop.api import arguments
 from heavytop.errors import InputError
 from heavytop.integrate.peers import name_of
 from heavytop.integrate.peers.command import Command, greeting
 from heavytop.integrate.peers.source import named, seconds_of
 from heavytop.kinds import KINDS
-from heavytop.precision import whole
 from heavytop.records import SCHEMA, Report, Row
 from heavytop.report import html, overview, parquet, store
 from heavytop.report.checks import check_rows
@@ -162,8 +162,7 @@ def prepare(
     loaded, digest, tasks = read(plan, KINDS, seed, which)
     of_plan = None if loaded.row_timeout == "" else loaded.row_timeout
     timeout = of_plan if row_timeout is None else row_timeout
-    if workers is not None and whole(workers, "--workers") < 1:
-        raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
+    workers = arguments.count(workers, "workers")
     if workers is not None and scheduler is not None:
         raise InputError("--workers are processes here, --scheduler has its own.", "Give one of them.")
     if resume and out is None:

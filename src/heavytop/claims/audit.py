@@ -102,10 +102,15 @@ def would_decide(claim: Auditable, about: System, rows: Sequence[Row], seconds: 
     return tuple(found)
 
 
-def only_branch(report: Audit, branch: str) -> Audit:
-    """The same report with the rows of one branch, and its verdict on them; raises InputError for any other name."""
+def require_branch(branch: str) -> None:
+    """Raises InputError for what is no branch."""
     if branch not in ("smooth", "printed"):
         raise InputError(f"Unknown branch {branch[:40]!r}.", "Use smooth or printed.")
+
+
+def only_branch(report: Audit, branch: str) -> Audit:
+    """The same report with the rows of one branch, and its verdict on them; raises InputError where there are none."""
+    require_branch(branch)
     rows = tuple(row for row in report.rows if row.branch == branch)
     if not rows:
         raise InputError(f"{report.claim} says nothing on the {branch} branch.", "Leave out --branch.")

@@ -32,12 +32,14 @@ def audit(
     Exit 0 if all equations hold, 1 if one is refuted, 3 if none is refuted but one is undecided.  Takes 5 to 20
     seconds.  With --library: 0 if every verdict is the expected one, 1 if one is not, 3 if one is undecided.
     """
-    from heavytop.claims.audit import PAPER, only_branch
+    from heavytop.claims.audit import PAPER, only_branch, require_branch
     from heavytop.claims.audit import audit as audit_named
     from heavytop.claims.guard import SECONDS
 
     if library or not claim:
         return _library(claim, system, branch, json) if library else _no_claim()
+    if branch is not None:
+        require_branch(branch)
     if claim in PAPER:
         with followed(f"audit of {claim}", "equations", _AUDIT_SECONDS) as progress:
             report = audit_named(claim, system, progress)

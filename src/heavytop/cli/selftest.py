@@ -9,7 +9,6 @@ import typer
 
 from heavytop.cli.app import Json, command, print_json, show_on_terminal
 from heavytop.cli.progress import Progress
-from heavytop.errors import InputError
 
 
 @command
@@ -21,13 +20,12 @@ def selftest(
 
     Exit 1 if a fault they should see slips through.  Takes two minutes on two cores.
     """
+    from heavytop.api import arguments
     from heavytop.api import selftest as detectors
     from heavytop.kinds import KINDS
 
-    if workers is not None and workers < 1:
-        raise InputError(f"--workers {workers} cannot run anything.", "Give 1 or more.")
+    at_once = arguments.count(workers, "workers") or os.cpu_count() or 1
     tasks = detectors.tasks()
-    at_once = workers or os.cpu_count() or 1
     with Progress(tasks, KINDS, at_once) as advance:
         trials = detectors.trials(tasks, at_once, advance)
     if json:

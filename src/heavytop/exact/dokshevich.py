@@ -22,7 +22,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import isqrt
 from typing import Any
 
 from flint import acb, arb, arb_series
@@ -49,6 +48,7 @@ from heavytop.exact.separated import decide
 from heavytop.precision import exact, round_to, shown
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, dot, vector
+from heavytop.top.vectors import rational_root
 
 _TERMS = 1 << 14
 _REMEDY = "`dokshevich_motion` builds a top with such a motion."
@@ -217,13 +217,6 @@ def _numbers(top: HeavyTop) -> tuple[Fraction, Fraction, Fraction, Fraction, Fra
     return square, abs(skew), along / abs(skew), 1 / (i2 * abs(skew)), Fraction(sign(skew))
 
 
-def _rational_root(square: Fraction) -> Fraction | None:
-    if square < 0:
-        return None
-    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
-    return root if root * root == square else None
-
-
 def _root_square(top: HeavyTop, _start: State) -> tuple[Fraction]:
     """S²."""
     _, _, a, b, _ = _numbers(top)
@@ -231,13 +224,13 @@ def _root_square(top: HeavyTop, _start: State) -> tuple[Fraction]:
 
 
 def _has_root(values: Sequence[Fraction]) -> bool:
-    return _rational_root(values[0]) is not None
+    return rational_root(values[0]) is not None
 
 
 def _constants(top: HeavyTop) -> _Constants:
     """Of a top with rational S."""
     _, _, a, b, _ = _numbers(top)
-    return _Constants(a, b, _rational_root(_root_square(top, State((0, 0, 0), (0, 0, 0)))[0]))
+    return _Constants(a, b, rational_root(_root_square(top, State((0, 0, 0), (0, 0, 0)))[0]))
 
 
 def _components(top: HeavyTop, start: State) -> tuple[Fraction, Fraction, Fraction]:

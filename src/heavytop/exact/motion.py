@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import wraps
-from math import factorial, isqrt
+from math import factorial
 from typing import Any, TypeVar
 
 from flint import arb, fmpq_series
@@ -18,6 +18,7 @@ from heavytop.exact.second_kind import Winding
 from heavytop.top.angles import perpendicular
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import Vector, dot
+from heavytop.top.vectors import rational_root
 
 Made = TypeVar("Made")
 
@@ -82,8 +83,8 @@ def initial_xi(gamma: Vector) -> list[arb]:
         raise InputError(
             "gamma is the zero vector: no attitude stands on it.", "Give the direction that points vertically up."
         )
-    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
-    if root * root == square:
+    root = rational_root(square)
+    if root is not None:
         return [ball(x) for x in perpendicular((gamma[0] / root, gamma[1] / root, gamma[2] / root))]
     size: Any = ball(square).sqrt()
     return list(perpendicular((ball(gamma[0]) / size, ball(gamma[1]) / size, ball(gamma[2]) / size)))  # type: ignore[arg-type]

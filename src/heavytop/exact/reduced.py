@@ -15,6 +15,7 @@ from typing import Any, Self
 from flint import arb, arb_series, fmpq_poly
 
 from heavytop.exact.balls import ball, rational
+from heavytop.exact.scales import exponent
 from heavytop.top.heavy_top import HeavyTop, State
 
 
@@ -97,13 +98,9 @@ def polynomial(*coefficients: Fraction) -> fmpq_poly:
 
 def _power_of_two(value: Fraction) -> Fraction:
     """A power of two of about the size of ``value`` ≥ 0; 1 for 0."""
-    return Fraction(2) ** _bits(value) if value else Fraction(1)
+    return Fraction(2) ** exponent(value) if value else Fraction(1)
 
 
 def _root_of_two(value: Fraction) -> Fraction:
     """A power of two of about the size of √value; 0 for 0."""
-    return Fraction(2) ** (_bits(value) // 2) if value else Fraction(0)
-
-
-def _bits(value: Fraction) -> int:
-    return value.numerator.bit_length() - value.denominator.bit_length()
+    return Fraction(2) ** (exponent(value) // 2) if value else Fraction(0)

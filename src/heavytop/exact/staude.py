@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from math import gcd, isqrt
+from math import gcd
 from typing import Any
 
 from flint import arb, fmpq_mat, fmpq_poly
@@ -27,6 +27,7 @@ from heavytop.exact.conditions import equilibrium, require
 from heavytop.precision import shown
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot, vector
+from heavytop.top.vectors import rational_root
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +127,7 @@ def staude_rotations(top: HeavyTop, height: int = 12) -> list[State]:
     """
     found = []
     for direction in staude_directions(top, height):
-        length = _root(dot(direction, direction))
+        length = rational_root(dot(direction, direction))
         if length is None:
             continue
         gamma = vector((g / length for g in direction), "gamma")
@@ -134,7 +135,7 @@ def staude_rotations(top: HeavyTop, height: int = 12) -> list[State]:
             square = staude_rate_squared(top, gamma)
         except NotInClass:
             continue
-        rate = _root(square) if square else None
+        rate = rational_root(square) if square else None
         if rate is not None:
             found += [State([turn * g for g in gamma], gamma) for turn in (rate, -rate)]
     return found
@@ -170,14 +171,6 @@ def _primitive(direction: Vector) -> tuple[Fraction, ...]:
         scale = scale * component.denominator // gcd(scale, component.denominator)
     whole = [int(component * scale) for component in direction]
     return tuple(Fraction(component, gcd(*whole)) for component in whole)
-
-
-def _root(square: Fraction) -> Fraction | None:
-    """The rational square root, or None."""
-    if square < 0:
-        return None
-    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
-    return root if root * root == square else None
 
 
 def staude_stability(motion: Staude) -> str:

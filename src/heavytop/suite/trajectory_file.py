@@ -110,8 +110,7 @@ def _table(text: str) -> tuple[dict[str, Any], list[str]]:
     if table.header is not None:
         times = [row[table.header.time or 0] for row in table.cells]
         more: dict[str, Any] = {"times": times, "header": table.header, "cells": table.cells, "lines": table.lines}
-        notes = [f"columns that are not read: {', '.join(name[:20] for name in table.header.others[:6])}"]
-        return table.keys | more, table.notes + (notes if table.header.others else [])
+        return table.keys | more, table.notes
     columns = {"times": [row[0] for row in table.rows], "states": [row[1:] for row in table.rows]}
     return table.keys | columns, table.notes
 

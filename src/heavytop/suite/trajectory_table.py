@@ -73,6 +73,7 @@ class Table:
             found = observed_columns.header(header)
             if found.time is not None and observed_columns.is_more_than_states(found):
                 self.header, self.width = found, len(header)
+                self.notes += unread(found.others, header)
                 self.cells = _split(body, self.lines, separator, len(header))
                 return
         places = self._places(header, len(first))
@@ -109,10 +110,16 @@ class Table:
         missing = [name for name in COLUMNS if name not in found]
         if missing:
             raise _no_header(missing)
-        more = [name for place, name in enumerate(header) if place not in found.values()]
-        if more:
-            self.notes.append(f"columns that are not read: {', '.join(name[:20] for name in more[:6])}")
+        self.notes += unread([name for place, name in enumerate(header) if place not in found.values()], header)
         return [found[name] for name in COLUMNS]
+
+
+def unread(names: Sequence[str], header: Sequence[str]) -> list[str]:
+    """What is said of columns that are not read; nothing of ξ and radii, which heavytop writes itself."""
+    columns = {name.strip() for name in header}
+    own = {"xi1", "xi2", "xi3"} | {f"{name}_radius" for name in columns}
+    more = [name for name in names if name.strip() not in own]
+    return [f"columns that are not read: {', '.join(name[:20] for name in more[:6])}"] if more else []
 
 
 def _no_header(missing: list[str]) -> InputError:

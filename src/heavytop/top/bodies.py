@@ -17,6 +17,8 @@ from heavytop.top.vectors import Vector, cross, dot, ordered, vector
 Tensor = tuple[Vector, Vector, Vector]
 PIVOT, CENTRE = "pivot", "centre of mass"
 _ROUNDED_BITS = 256
+_ROUNDED_DATA = Fraction(1, 2**40)
+"""A plate or a rod in rounded numbers is one."""
 _SHAPES = "Give 3 numbers (a diagonal tensor), 6 (I11, I22, I33, I12, I13, I23) or 9 (row by row)."
 
 
@@ -109,7 +111,7 @@ class Body:
 
     def warnings(self) -> list[str]:
         """What no rigid body can have, though the equations do not mind."""
-        return self.top.warnings()
+        return self.top.warnings() or _warnings_about_centre(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,6 +189,20 @@ def _at_pivot(tensor: Tensor, mass: Fraction, centre: Vector, about: str) -> Ten
         return x, y, z
 
     return row(0), row(1), row(2)
+
+
+def _warnings_about_centre(body: Body) -> list[str]:
+    """Whether ∫ x xᵀ dm = ½ tr J − J about the centre of mass can be that of a body: no principal minor is negative."""
+    central = _at_pivot(body.tensor, -body.mass, body.centre, CENTRE)
+    half = sum(central[i][i] + _ROUNDED_DATA * body.tensor[i][i] for i in range(3)) / 2
+    second = [[(half if i == j else 0) - central[i][j] for j in range(3)] for i in range(3)]
+    pairs = (second[i][i] * second[j][j] - second[i][j] ** 2 for i, j in ((0, 1), (0, 2), (1, 2)))
+    whole = dot(vector(second[0], "row"), cross(vector(second[1], "row"), vector(second[2], "row")))
+    if min(second[0][0], second[1][1], second[2][2], *pairs, whole) >= 0:
+        return []
+    moments = ", ".join(shown(central[i][i]) for i in range(3))
+    meant = "" if body.about == CENTRE else f' If it was meant about it, give about = "{CENTRE}".'
+    return [f"The inertia tensor about the centre of mass, diagonal {moments}, is not that of a rigid body.{meant}"]
 
 
 def _require_positive(tensor: Tensor) -> None:

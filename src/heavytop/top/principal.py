@@ -18,7 +18,7 @@ from heavytop.errors import InputError
 from heavytop.precision import round_to
 from heavytop.top.angles import perpendicular
 from heavytop.top.attitude import Rows, multiplied, rotation_of, transposed
-from heavytop.top.vectors import Vector, cross, dot
+from heavytop.top.vectors import Vector, cross, dot, rational_root
 
 IDENTITY: tuple[Vector, Vector, Vector] = tuple(tuple(Fraction(i == j) for j in range(3)) for i in range(3))  # type: ignore[assignment]
 _GUARD_BITS = 64
@@ -136,7 +136,7 @@ def _unit_vectors(tensor: Rows, moments: Vector) -> list[Vector] | None:
     for moment in single:
         rows = _less(tensor, moment)
         v = max((cross(rows[i], rows[j]) for i, j in ((0, 1), (1, 2), (2, 0))), key=lambda v: dot(v, v))
-        length = _rational_root(dot(v, v))
+        length = rational_root(dot(v, v))
         if length is None:
             return None
         found.append((v[0] / length, v[1] / length, v[2] / length))
@@ -144,11 +144,6 @@ def _unit_vectors(tensor: Rows, moments: Vector) -> list[Vector] | None:
         across = perpendicular(found[0])
         found += [across, cross(found[0], across)]
     return found
-
-
-def _rational_root(square: Fraction) -> Fraction | None:
-    top, bottom = isqrt(square.numerator), isqrt(square.denominator)
-    return Fraction(top, bottom) if Fraction(top * top, bottom * bottom) == square else None
 
 
 def _near(tensor: Rows, bits: int) -> tuple[Vector, Vector, Vector]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Set
 from fractions import Fraction
 from itertools import islice
+from math import isqrt
 from typing import Any
 
 from heavytop.errors import HeavyTopError, InputError, quoted
@@ -53,3 +54,11 @@ def dot(a: Any, b: Any) -> Any:
 def cross(a: Any, b: Any) -> tuple[Any, Any, Any]:
     """a × b over any ring."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def rational_root(square: Fraction) -> Fraction | None:
+    """The root of the square of a rational number; None for any other number."""
+    if square < 0:
+        return None
+    root = Fraction(isqrt(square.numerator), isqrt(square.denominator))
+    return root if root * root == square else None

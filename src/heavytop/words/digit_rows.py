@@ -60,6 +60,24 @@ class DigitRows(Rows):
             for lane in range(LANES)
         ]
 
+    def stored(self, n: Any, vector: int) -> list[Any]:
+        code, grid, count = self.code, self.grid, digits_of(self.grid)
+        row = code.integer(self.size(grid, self.vectors, 1).row)
+        at = code.address(self.rows, code.builder.mul(n, row))
+        found = [code.zero] * grid.words
+        for j in range(count):
+            exponent = _HEAD - BITS * (j + 1)
+            digit = code.load(at, LANES * (_BEFORE + count * (1 + vector) + j))
+            value = code.multiply(digit, code.constant(2.0**exponent))
+            k = min(max(0, -(exponent // grid.bits) - 1), grid.words - 1)  # the first word whose unit is no larger
+            if k:  # what is large beside that unit goes to the word before
+                big = code.constant(grid.centre(k - 1))
+                high = code.subtract(code.add(value, big), big)
+                found[k - 1] = code.add(found[k - 1], high)
+                value = code.subtract(value, high)
+            found[k] = code.add(found[k], value)
+        return found
+
     def begin(self, y: list[Any], wide: Any) -> Any:
         return self.keep(0, y, self.code.integer(0), wide)[2]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy
 
 from heavytop.words import grid as steps
 from heavytop.words.digits import digits, exact
+from heavytop.words.grid_samples import most_of, sample_row
 from heavytop.words.grid_series import most_orders, rows_of, size_of
 from heavytop.words.kernels import Grid
 from heavytop.words.lanes import series_rates
@@ -147,9 +149,31 @@ class Fixed(Run):
         return [constants, self.inverses, rows, self.sums, self.places, self.seen]
 
     def sample(self, time: Fraction) -> tuple[Fraction, ...] | None:
-        behind = time - Fraction(float(self.clock[steps.BEGAN]))
-        found = self._moved(self._before(), behind, _HALVED_SAMPLES)
-        return None if found is None else self._exact(found)
+        length = self.time - self._began
+        if not length:  # no step stands
+            return None
+        at = doubles(self.grid.words)
+        at[:] = digits((time - self._began) / length, self.grid)
+        found = doubles(sample_row(self.grid, self.vectors))
+        self._samples(at, found, 0, 1)
+        return self.exact_state(found, time)
+
+    @property
+    def _began(self) -> Fraction:
+        return Fraction(float(self.clock[steps.BEGAN]))
+
+    def _samples(self, at: Doubles, found: Doubles, first: int, last: int) -> None:
+        order = int(self.counts[steps.ORDERS])
+        self.machine.functions["samples"](pointer(self.rows), order, pointer(at), first, last, pointer(found))
+
+    def exact_state(self, words: Doubles, time: Fraction) -> tuple[Fraction, ...] | None:
+        """The state out of a row of samples, at ``time`` in the last step."""
+        if not words[-8:].max() <= most_of(self.grid):
+            moved = self._moved(self._before(), time - self._began, _HALVED_SAMPLES)
+            return None if moved is None else self._exact(moved)
+        size, parts = 8 * self.grid.words, range(self.vectors)
+        lanes = [[exact(words[size * v + lane : size * (v + 1) : 8]) for lane in range(6)] for v in parts]
+        return state_of_left(lanes)
 
     def _moved(self, words: Doubles, span: Fraction, halvings: int) -> Doubles | None:
         """The words after a time ``span``: one series; where a sum leaves its range, two of half the length."""
@@ -170,13 +194,8 @@ class Fixed(Run):
         return words
 
     def coefficients(self, n: int) -> tuple[Fraction, ...]:
-        # L holds Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2
-        found: list[Fraction] = []
-        for vector in range(self.vectors):
-            left = rows_of(self.grid).left(self.rows, self.grid, self.vectors, n, vector)
-            middle = left[5] / 2
-            found += [*(left[2], left[0], left[1])[: 3 * (1 - vector)], left[4] - middle, middle, left[3] - middle]
-        return tuple(found)
+        left = rows_of(self.grid).left
+        return state_of_left([left(self.rows, self.grid, self.vectors, n, v) for v in range(self.vectors)])
 
     def place(self) -> tuple[str, ...]:
         length = Fraction(float(self.clock[steps.TIME])) - Fraction(float(self.clock[steps.BEGAN]))
@@ -190,6 +209,15 @@ class Fixed(Run):
         self.clock[steps.TIME] = words[0]
         self.words[:] = words[1:]
         self.steps = steps_before
+
+
+def state_of_left(lanes: Sequence[Any]) -> tuple[Any, ...]:
+    """Components out of L of each vector: Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, or the last three with ξ for γ."""
+    found: list[Any] = []
+    for vector, left in enumerate(lanes):
+        middle = left[5] / 2
+        found += [*(left[2], left[0], left[1])[: 3 * (1 - vector)], left[4] - middle, middle, left[3] - middle]
+    return tuple(found)
 
 
 def _not_before(target: Fraction) -> float:

@@ -13,6 +13,7 @@ from typing import Any
 from llvmlite import ir
 
 from heavytop.top.equations import System
+from heavytop.words.grid_samples import write_samples
 from heavytop.words.grid_series import Series
 from heavytop.words.kernels import Grid
 from heavytop.words.machine import DOUBLES, INTEGERS, Machine, Processor, compiled
@@ -29,7 +30,7 @@ _MANY_ORDERS, _FEW_ORDERS = 0.53, 0.34
 
 
 def build(grid: Grid, system: System, attitude: bool, processor: Processor | None = None) -> Machine:
-    """``advance`` and ``series`` for this system.
+    """``advance``, ``series`` and ``samples`` for this system.
 
     advance(state, constants, inverses, rows, sums, places, seen, result, clock, counts, steps): at most so many steps,
     until the time covers the target; gives their number.  Behind the result lies the state before the last step.
@@ -38,6 +39,7 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
     series = Series(module, grid, system, 2 if attitude else 1, (processor or Processor.here()).wide)
     made = series.write()
     _Advance(module, grid, series.vectors, made).write()
+    write_samples(module, grid, series.vectors)
     pointers = [DOUBLES] * 5 + [INTEGERS, DOUBLES]
     integer = ctypes.c_int64
     return compiled(
@@ -45,6 +47,7 @@ def build(grid: Grid, system: System, attitude: bool, processor: Processor | Non
         {
             "series": (integer, [*pointers, ctypes.c_double, integer, DOUBLES]),
             "advance": (integer, [*pointers, DOUBLES, DOUBLES, INTEGERS, integer]),
+            "samples": (None, [DOUBLES, integer, DOUBLES, integer, integer, DOUBLES]),
         },
         processor,
     )

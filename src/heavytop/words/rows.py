@@ -58,6 +58,10 @@ class Rows(ABC):
         """The eight lanes of L of an order, out of the rows."""
 
     @abstractmethod
+    def stored(self, n: Any, vector: int) -> list[Any]:
+        """L of an order as K words, not carried."""
+
+    @abstractmethod
     def begin(self, y: list[Any], wide: Any) -> Any:
         """Store y_0; gives the largest word over its limit."""
 

@@ -37,6 +37,12 @@ class WordRows(Rows):
         block = rows[start : start + 8 * grid.words]
         return [exact(block[lane::8]) for lane in range(8)]
 
+    def stored(self, n: Any, vector: int) -> list[Any]:
+        code, words = self.code, self.grid.words
+        row = code.integer(self.size(self.grid, self.vectors, 1).row)
+        at = code.address(self.rows, code.builder.mul(n, row))
+        return [code.load(at, 8 * (words * (1 + vector) + k)) for k in range(words)]
+
     def begin(self, y: list[Any], wide: Any) -> Any:
         code = self.code
         self._put(0, y)
