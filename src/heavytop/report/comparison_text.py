@@ -30,7 +30,8 @@ def comparison(result: Comparison, full: bool = False) -> RenderableType:
         parts += [Text(), *(_metrics(result) if full else _rows(result))]
     if result.environment:
         parts += [Text(), Text("Environments differ:", style="bold")]
-        parts += [Text(printable(f"  {name}: {old} -> {new}")) for name, old, new in result.environment]
+        changes = (printable(f"{name}: {old} -> {new}") for name, old, new in result.environment)
+        parts += [Text(each) for change in changes for each in wrapped(change, "    ", "  ")]
     return Group(*parts)
 
 

@@ -54,7 +54,7 @@ def unsupported(rows: Iterable[Row]) -> str:
 def failure(row: Row) -> str:
     """A run that did not reach its horizon, and why."""
     if row.outcome in (FAILED, OUT_OF_TIME):
-        return f"  {row.reference.reason} in {row.precision}"
+        return f"  {row.key.kind}: {row.reference.reason} in {row.precision}"
     if row.outcome in UNMEASURED:
         return f"  {row.key.kind} of {row.case}, {row.integrator} in {row.precision}: {row.outcome}, {row.against}"
     return f"  {row.case} in {row.precision}: {row.outcome} at t = {row.time_reached} of {row.horizon}"
