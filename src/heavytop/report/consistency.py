@@ -11,17 +11,20 @@ from contextlib import suppress
 
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
+from heavytop.measure.growth import NEAR, Interval, bent, nearest_class
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.precision import exact, log10, parse
-from heavytop.records import Metric, Quantity, Row, Series
+from heavytop.records import Law, Metric, Quantity, Row, Series
 from heavytop.report.kind import Kind
-from heavytop.report.laws import inconsistent
 from heavytop.report.motion_data import impossible
 
 CLOSE = 1e-5
 """Decades: how far two logarithms of the same number may be apart, for numbers have six digits at least."""
 _SUCCESS = Outcome.SUCCESS.value
 _NO_NUMBER = ("nan", "missing")
+
+_HALF_WAY = 0.25 - NEAR
+"""Half of an interval that holds one class and no other, wherever it is: what is known of an exponent without one."""
 
 
 def contradictions(row: Row, kind: Kind) -> Iterator[str]:
@@ -137,3 +140,40 @@ def bound(metric: Metric) -> float:
     if metric.value == UNRESOLVED and metric.bound:
         return _floor(log10(exact(metric.bound))) + 0.01
     return -1e9 if metric.value == "0" else 1e9
+
+
+def law_text(law: Law) -> str:
+    """A growth law in a few words."""
+    if law.exponent is None:
+        return law.growth
+    span = "" if law.low is None or law.high is None else f" [{law.low:.3g}, {law.high:.3g}]"
+    return f"{law.growth}, exponent {law.exponent:.3g}{span}"
+
+
+def inconsistent(law: Law) -> str:
+    """Why a law contradicts itself: class, exponent, intervals and span; empty where it does not."""
+    if (law.low is None) != (law.high is None) or (law.exponent is None and law.low is not None):
+        return "half an interval, or one without its exponent"
+    if law.first is not None and law.last is not None and exact(law.first) > exact(law.last):
+        return f"a span from {law.first} to {law.last}"
+    if law.exponent is None:
+        return "" if law.bend is None else "a bend without an exponent"
+    low, high = interval_of(law)
+    bend = law.bend or (0.0, 0.0)
+    if not all(map(math.isfinite, (law.exponent, low, high, *bend))):
+        return "an exponent or an interval that is not finite"
+    if not low <= law.exponent <= high or bend[0] > bend[1]:
+        return f"an interval from {low:g} to {high:g} without its exponent {law.exponent:g}, or a bend that ends first"
+    said = f"{law.growth} with the exponent {law.exponent:g} in [{low:g}, {high:g}]"
+    if law.growth == "exponential":
+        return "" if law.exponent > 0 and law.bend is None else said
+    if law.low is None:
+        low, high = low - _HALF_WAY, high + _HALF_WAY
+    expected = "unresolved" if bent(bend) else nearest_class(law.exponent, low, high)
+    return "" if law.growth == expected else said
+
+
+def interval_of(law: Law) -> Interval:
+    """That of the exponent; where it has none, the exponent alone."""
+    assert law.exponent is not None
+    return (law.exponent, law.exponent) if law.low is None or law.high is None else (law.low, law.high)

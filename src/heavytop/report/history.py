@@ -11,8 +11,8 @@ from rich.text import Text
 
 from heavytop.records import Identity
 from heavytop.report.compare import compare
+from heavytop.report.consistency import law_text
 from heavytop.report.kind import Kinds
-from heavytop.report.laws import law_text
 from heavytop.report.names import row_name
 from heavytop.report.policy import Policy
 from heavytop.report.printable import printable, short

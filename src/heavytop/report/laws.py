@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-from heavytop.measure.growth import BENT, CLASSES, NEAR, Interval, bent, nearest_class
+from heavytop.measure.growth import BENT, CLASSES, Interval
 from heavytop.precision import exact, log10
 from heavytop.records import Law
+from heavytop.report.consistency import inconsistent, interval_of
 from heavytop.report.verdicts import SAME, Judged, Verdict
 
 _GROWTH = (*CLASSES, "exponential")
-_HALF_WAY = 0.25 - NEAR
-"""Half of an interval that holds one class and no other, wherever it is: what is known of an exponent without one."""
 _WIDER = 5.0
 """The interval of a rerun may be wider by that factor: of 1,400 pairs of ensembles of 16 starts, none is by 4.2."""
 _SPAN = 2.0
@@ -27,37 +26,6 @@ _BENDS_APART = 0.5
 """The same of bends, each the difference of two exponents over half of the span."""
 _LOST_AT = 0.3
 """Decades by which the time of the last digit may come earlier, beyond what the noise of the error itself makes it."""
-
-
-def law_text(law: Law) -> str:
-    """A growth law in a few words."""
-    if law.exponent is None:
-        return law.growth
-    span = "" if law.low is None or law.high is None else f" [{law.low:.3g}, {law.high:.3g}]"
-    return f"{law.growth}, exponent {law.exponent:.3g}{span}"
-
-
-def inconsistent(law: Law) -> str:
-    """Why a law contradicts itself: class, exponent, intervals and span; empty where it does not."""
-    if (law.low is None) != (law.high is None) or (law.exponent is None and law.low is not None):
-        return "half an interval, or one without its exponent"
-    if law.first is not None and law.last is not None and exact(law.first) > exact(law.last):
-        return f"a span from {law.first} to {law.last}"
-    if law.exponent is None:
-        return "" if law.bend is None else "a bend without an exponent"
-    low, high = _interval(law)
-    bend = law.bend or (0.0, 0.0)
-    if not all(map(math.isfinite, (law.exponent, low, high, *bend))):
-        return "an exponent or an interval that is not finite"
-    if not low <= law.exponent <= high or bend[0] > bend[1]:
-        return f"an interval from {low:g} to {high:g} without its exponent {law.exponent:g}, or a bend that ends first"
-    said = f"{law.growth} with the exponent {law.exponent:g} in [{low:g}, {high:g}]"
-    if law.growth == "exponential":
-        return "" if law.exponent > 0 and law.bend is None else said
-    if law.low is None:
-        low, high = low - _HALF_WAY, high + _HALF_WAY
-    expected = "unresolved" if bent(bend) else nearest_class(law.exponent, low, high)
-    return "" if law.growth == expected else said
 
 
 def judge_law(old: Law, new: Law, noise: float = 0.0, rerun: bool = False) -> Judged:
@@ -100,8 +68,8 @@ def _exponents(old: Law, new: Law, rerun: bool) -> Judged:
         known = old.exponent is not None or new.exponent is not None
         return (Verdict.INCOMPARABLE, "an exponent in one report only") if known else SAME
     if old.low is not None and new.low is not None:
-        return _apart("exponent", _interval(old), _interval(new), new.exponent, rerun, _APART)
-    (low, high), (new_low, new_high) = _interval(old), _interval(new)
+        return _apart("exponent", interval_of(old), interval_of(new), new.exponent, rerun, _APART)
+    (low, high), (new_low, new_high) = interval_of(old), interval_of(new)
     if new_low > high or new_high < low:
         return Verdict.INCOMPARABLE, "another exponent, and no interval to tell noise from it"
     return SAME
@@ -132,12 +100,6 @@ def _apart(what: str, old: Interval, new: Interval, middle: float, rerun: bool, 
     if own > _WIDER * width:
         return Verdict.WORSE, f"noise: the interval of the {what} is {own:.2g} wide, not {width:.2g}"
     return SAME
-
-
-def _interval(law: Law) -> Interval:
-    """That of the exponent; where it has none, the exponent alone."""
-    assert law.exponent is not None
-    return (law.exponent, law.exponent) if law.low is None or law.high is None else (law.low, law.high)
 
 
 def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:

@@ -12,9 +12,9 @@ from heavytop.measure.rounding_noise import least
 from heavytop.precision import exact
 from heavytop.records import NOISE, NOT_MEASURED, UNSUPPORTED, Identity, Metric, Quantity, Row
 from heavytop.report.against import weaker
-from heavytop.report.consistency import contradictions
+from heavytop.report.consistency import contradictions, law_text
 from heavytop.report.kind import Kinds, kind_of
-from heavytop.report.laws import judge_law, law_text
+from heavytop.report.laws import judge_law
 from heavytop.report.motion_data import other_data
 from heavytop.report.noise import allowed_loss, irreproducible, noisier, of_starts, reaches_further, seldom_apart
 from heavytop.report.outcomes import SUCCESS, judge_outcomes
