@@ -135,33 +135,26 @@ def show(
     html: Annotated[Path | None, typer.Option(help="Write the report as a page to that file instead.")] = None,
     parquet: Annotated[Path | None, typer.Option(help="Write its rows to that file instead.")] = None,
     full: Annotated[bool, typer.Option("--full", help="Print every row and law.")] = False,
+    markdown: Annotated[Path | None, typer.Option(help="Write what --full prints to that file instead.")] = None,
+    json: Json = False,
 ) -> int:
     """Print the summary of a report, or write its page.
 
     The page is one self-contained file; --parquet writes the rows as a table instead.
     """
     from heavytop.kinds import KINDS
-    from heavytop.report import overview, store
     from heavytop.report import parquet as tables
-    from heavytop.report.terminal import brief, summary
+    from heavytop.report import store
     from heavytop.suite.files import whole
 
     if parquet is not None:
         tables.check_name(parquet)
-        if html is not None and html.resolve() == parquet.resolve():
-            raise InputError(f"{html} is named twice.", "Give each file a name of its own.")
-    if html is None and parquet is None:
-        if not full:
-            found = store.read(report, KINDS)
-            print(brief(found, found.rows, KINDS))
-            print(f"\nEvery row: heavytop show {report} --full")
-            return 0
-        streamed = store.read_brief(report, KINDS)
-        if len(streamed.rows) > overview.MOST_LISTED:
-            hint = "Every row is in report.json; --parquet FILE writes all as a table."
-            show_on_terminal(overview.worst(streamed, streamed.rows, hint))
-        else:
-            show_on_terminal(summary(store.read(report, KINDS), KINDS))
+    files = [path for path in (parquet, html, markdown) if path is not None]
+    for place, path in enumerate(files):
+        if path.resolve() in [other.resolve() for other in files[:place]]:
+            raise InputError(f"{path} is named twice.", "Give each file a name of its own.")
+    if not files:
+        _print(report, full, json)
         return 0
     found = store.read(report, KINDS)
     with ExitStack() as stack:
@@ -171,11 +164,38 @@ def show(
 
             page = report_page(found, KINDS).encode()
             stack.enter_context(whole(html)).write(page)
+        if markdown is not None:
+            from heavytop.report.document_formats import to_markdown
+
+            stack.enter_context(whole(markdown)).write(to_markdown(found, KINDS).encode())
         if parquet is not None:
             tables.write(parquet, found.rows, found.plan)
-    for path in filter(None, (parquet, html)):
+    for path in files:
         print(path)
     return 0
+
+
+def _print(report: Path, full: bool, json: bool) -> None:
+    """The summary of a report, in short, in full, or as JSON."""
+    from heavytop.kinds import KINDS
+    from heavytop.report import overview, store
+    from heavytop.report.document_formats import to_json
+    from heavytop.report.terminal import brief, summary
+
+    if json:
+        print_json(to_json(store.read(report, KINDS), KINDS))
+        return
+    if not full:
+        found = store.read(report, KINDS)
+        print(brief(found, found.rows, KINDS))
+        print(f"\nEvery row: heavytop show {report} --full")
+        return
+    streamed = store.read_brief(report, KINDS)
+    if len(streamed.rows) > overview.MOST_LISTED:
+        hint = "Every row is in report.json; --parquet FILE writes all as a table."
+        show_on_terminal(overview.worst(streamed, streamed.rows, hint))
+    else:
+        show_on_terminal(summary(store.read(report, KINDS), KINDS))
 
 
 @command

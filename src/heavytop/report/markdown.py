@@ -23,16 +23,16 @@ def comparison_markdown(result: Comparison, page: Path | None = None) -> str:
 
     Where that is too long for a comment, quantities and then rows are left out; the findings never are.
     """
-    head = ["### heavytop: " + headline(result), "", *(f"- {_text(sentence)}" for sentence in result.sentences), ""]
+    head = ["### heavytop: " + headline(result), "", *(f"- {escaped(sentence)}" for sentence in result.sentences), ""]
     rows, metrics = (_rows(result), _metrics(result)) if result.rows else ([], [])
     end = []
     if result.environment:
         end += ["<details><summary>Environments differ</summary>", "", "| | baseline | candidate |", "|---|---|---|"]
-        end += ["| " + " | ".join(map(_cell, difference)) + " |" for difference in result.environment[:_MOST]]
+        end += ["| " + " | ".join(map(escaped_cell, difference)) + " |" for difference in result.environment[:_MOST]]
         end += ["", "</details>", ""]
     if page is not None:
         # no link: a comment does not lie beside the file
-        end += [f"Both on the same axes: {_cell(page.name)}.", ""]
+        end += [f"Both on the same axes: {escaped_cell(page.name)}.", ""]
     texts = ("\n".join(lines) for lines in ([*head, *rows, *metrics, *end], [*head, *rows, *end], head))
     return next((text for text in texts if len(text) <= _COMMENT), "\n".join(head))
 
@@ -42,7 +42,7 @@ def _rows(result: Comparison) -> list[str]:
     lines = [
         "| verdict | row | what changed |",
         "|---|---|---|",
-        *("| " + " | ".join(map(_cell, c)) + " |" for c in cells),
+        *("| " + " | ".join(map(escaped_cell, c)) + " |" for c in cells),
     ]
     return [*lines, *(["", f"and {len(result.rows) - _MOST} more."] if len(result.rows) > _MOST else []), ""]
 
@@ -56,17 +56,17 @@ def _metrics(result: Comparison) -> list[str]:
         (c.verdict.value, row_name(c.identity), statistics(c, name, group), *values(group[0]), group[0].reason)
         for c, name, group in found
     )
-    lines = ["| " + " | ".join(map(_cell, each)) + " |" for each in cells]
+    lines = ["| " + " | ".join(map(escaped_cell, each)) + " |" for each in cells]
     more = ["", f"and {len(lines) - _MOST_METRICS} more."] if len(lines) > _MOST_METRICS else []
     return [*head, *lines[:_MOST_METRICS], *more, "", "</details>", ""]
 
 
-def _cell(text: str) -> str:
+def escaped_cell(text: str) -> str:
     """Text in a cell of a table, cut where it is long."""
     text = " ".join(printable(text).split())
-    return _text(text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…")
+    return escaped(text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…")
 
 
-def _text(text: str) -> str:
+def escaped(text: str) -> str:
     """Text that Markdown takes as it is, without line breaks."""
     return re.sub(r"([\\`*_{}\[\]<>|#~@&])", r"\\\1", " ".join(printable(text).split()))
