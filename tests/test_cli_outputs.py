@@ -208,3 +208,15 @@ def test_the_command_itself_prints_latex_and_names_itself(tmp_path: Path) -> Non
     assert done.stdout.startswith("% command: heavytop reference --inertia 2,2,1 ")
     assert "# command: heavytop reference --inertia 2,2,1 " in (tmp_path / "a.csv").read_text()
     assert done.stderr.endswith("heavytop: wrote a.csv\n")
+
+
+@pytest.mark.parametrize("command", ["propagate", "reference"])
+def test_files_of_a_case_name_it(command: str, tmp_path: Path) -> None:
+    files = tmp_path / "a.csv", tmp_path / "a.tex"
+    made = in_process.heavytop(
+        command, "--case", "kovalevskaya", "--times", "1", "--csv", str(files[0]), "--latex", str(files[1])
+    )
+    assert made.returncode == 0
+    assert "\n# name: kovalevskaya\n" in files[0].read_text("utf-8")
+    assert "\\caption{name kovalevskaya; " in files[1].read_text("utf-8")
+    assert read(files[0]).name == "kovalevskaya"

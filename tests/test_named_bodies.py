@@ -85,3 +85,12 @@ def test_a_named_body_says_its_source_and_its_toml_is_the_same_body(name: str) -
     assert (body.centre, body.rotor) == (case.body.centre, case.body.rotor)
     assert body.tensor == case.body.tensor
     assert (start.omega, start.gamma) == (case.given_start.omega, case.given_start.gamma)
+
+
+def test_data_of_a_named_body_are_decimals_where_these_end() -> None:
+    from heavytop.suite.case_text import case_data, forms
+
+    body = named_bodies()["bruels-cardona-arnold"]
+    data = case_data(body)
+    assert (data["gravity"], data["inertia"][4], data["omega"][2]) == ("9.81", "0.46875", "-4.61538")
+    assert "gravity='9.81'" in forms(body)["python"]

@@ -10,11 +10,11 @@ import pytest
 
 from heavytop.display import Lines, Table
 from heavytop.errors import InputError
-from heavytop.integrate import stepper
+from heavytop.integrate import stepper, words
 from heavytop.integrate.taylor import first_steps, propagate
 from heavytop.integrate.trajectory import Outcome, Trajectory
 from heavytop.integrate.words import propagate_words
-from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, parse
 from heavytop.suite.cases import CASES
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import RoundedTimes, check_times
@@ -201,3 +201,16 @@ def test_many_samples_by_heyoka_have_the_bits_of_an_observed_run(last: int) -> N
     assert np.array_equal(exact_times.states, np.array(states))
     assert np.array_equal(found.states, exact_times.states)
     assert (found.steps, found.outcome) == (one_by_one.steps, one_by_one.outcome)
+
+
+@pytest.mark.parametrize("name", ["extended", "double-double", "real:70"])
+def test_states_out_of_two_words_have_the_bits_of_exact_numbers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    precision, times = parse(name), [-time for time in irregular(60, 9, 4)]
+    asked = {"xi": (Fraction(1), Fraction(0), Fraction(0))}
+    start = State(CASE.start.omega, (0, 0, 1))
+    found = [propagate_words(CASE.top, start, times, precision, **asked)]
+    monkeypatch.setattr(words, "sums_of_two", lambda *_: None)
+    found.append(propagate_words(CASE.top, start, times, precision, **asked))
+    quick, exactly = ([[exact(value) for value in state] for state in run.states] for run in found)
+    assert quick == exactly
+    assert len(quick) == len(times)

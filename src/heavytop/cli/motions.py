@@ -143,7 +143,7 @@ def propagate(
     def table() -> MotionTable:
         from heavytop.report.motion_table import of_motion as table_of
 
-        return table_of(motion, *made_by())
+        return table_of(motion, *made_by()).of_case(case)
 
     def text(shown: MotionTable) -> RenderableType:
         from heavytop.report.motion_text import motion_text
@@ -225,7 +225,7 @@ def reference(
     def table() -> MotionTable:
         from heavytop.report.motion_table import of_reference
 
-        return of_reference(found, wanted, *made_by())
+        return of_reference(found, wanted, *made_by()).of_case(case)
 
     def text(shown: MotionTable) -> RenderableType:
         from heavytop.report.motion_text import reference_text

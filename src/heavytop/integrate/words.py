@@ -16,7 +16,7 @@ from heavytop.precision import DOUBLE, Precision, exact, number, numbers, requir
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import RoundedTimes, check_times
-from heavytop.words.floating import Floating
+from heavytop.words.floating import PLACES, Floating
 from heavytop.words.run import Run, Status
 from heavytop.words.scaled import Scaled
 
@@ -100,10 +100,8 @@ def follow(
         outcome = pace.reach(target)
         if outcome is not Outcome.SUCCESS:
             break
-        sample = pace.sample(target)
-        state = None if sample is None else native_state(sample, problem.precision)
-        if state is None:
-            outcome = Outcome.CAPACITY if sample is None else Outcome.NON_FINITE
+        outcome, state = pace.native(target, problem.precision)
+        if outcome is not Outcome.SUCCESS:
             break
         done += 1
         kept_times.append(target)
@@ -243,7 +241,7 @@ class _Pace:
             return outcome, numpy.concatenate([[start], states])
         status, words = self.run.sampled(numpy.abs(numpy.array(targets, dtype=float)) * float(self.scaled.rate))
         width = len(self.scaled.sizes)
-        places = [*range(6), *range(19, 22)][:width]
+        places = list(PLACES[:width])
         total = words[:, places] + words[:, [place + 8 for place in places]]
         states = (total + 0.0) * numpy.array([float(size) for size in self.scaled.sizes])
         sizes = abs(total)
@@ -254,6 +252,24 @@ class _Pace:
                 return Outcome.NON_FINITE, states[:row]
             states[row] = state
         return OUTCOMES[status], states
+
+    def native(self, target: Fraction, precision: Precision) -> tuple[Outcome, Any]:
+        """The state at ``target``, inside the last step, rounded; None where it cannot be given."""
+        import numpy
+
+        if isinstance(self.run, Floating) and not self.scaled.rest and target != 0:
+            words = self.run.words_at(abs(target) * self.scaled.rate).tolist()
+            pairs = (
+                (words[at], words[at + 8], power) for at, power in zip(PLACES, self.scaled.exponents, strict=False)
+            )
+            state = sums_of_two(pairs, precision)
+            if state is not None:
+                return Outcome.SUCCESS, numpy.array(state)
+        sample = self.sample(target)
+        if sample is None:
+            return Outcome.CAPACITY, None
+        rounded = native_state(sample, precision)
+        return Outcome.NON_FINITE if rounded is None else Outcome.SUCCESS, rounded
 
     def sample(self, target: Fraction) -> tuple[Fraction, ...] | None:
         """The state at ``target``, inside the last step; None where the numbers outgrow their words there."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
@@ -53,6 +53,10 @@ class MotionTable:
     columns: tuple[Column, ...]
     times: tuple[str, ...]
     values: tuple[tuple[tuple[str, str | None], ...], ...]
+
+    def of_case(self, name: str | None) -> MotionTable:
+        """The same, whose facts say the case that the motion is; None for data that are none's."""
+        return self if name is None else replace(self, facts=(*self.facts[:2], ("name", name), *self.facts[2:]))
 
     def csv(self) -> str:
         """A header of comments, the names of the columns, a line a time; radii in the last columns.
@@ -218,7 +222,7 @@ def _one_line(text: str) -> str:
 def _caption(facts: dict[str, str]) -> str:
     """What a reader of the table alone must know."""
     made = ("digits", "method") if "digits" in facts else ("precision", "integrator")
-    known = [(key, facts[key]) for key in (*_DATA, *made) if key in facts]
+    known = [(key, facts[key]) for key in ("name", *_DATA, *made) if key in facts]
     said = "; ".join(f"{_escaped(_one_line(key))} {_breakable(text)}" for key, text in known)
     return f"{said}. heavytop {_escaped(facts['version'])}."
 

@@ -118,7 +118,7 @@ def score_text(found: Assessment) -> RenderableType:
     row = found.row
     numbers = table(["", f"largest over {row.samples} samples", "rms", "final"], sizes(row))
     about = f"{row.case}: {row.integrator}, {row.system} in {row.precision} ({row.bits} bits)"
-    parts: list[RenderableType] = [Text(line) for said in answer(row, found.peer) for line in wrapped(said, "")]
+    parts: list[RenderableType] = [Text(line) for line in answer(row, found.peer)]
     parts += [Text(), numbers, Text(), *_wrapped(about), *_wrapped(f"Compared with {row.against}.")]
     explained = told(found)
     if explained:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from decimal import Decimal
 from typing import Any
 
 from heavytop.measure.setup import motion_texts
@@ -11,6 +13,7 @@ from heavytop.suite.trajectory_table import COLUMNS
 from heavytop.top.heavy_top import data_texts
 
 _TIMES = ("1", "5", "10")
+_PLACES = 18
 _DIGITS = 40
 """Of a start whose attitude is irrational."""
 
@@ -20,7 +23,22 @@ def case_data(case: Case) -> dict[str, Any]:
     head = {"name": case.name, "system": case.system.name}
     if case.body is None or case.given_start is None:
         return head | data_texts(case.top, case.start)
-    return head | motion_texts(case.body, case.given_start, _DIGITS)
+    texts = motion_texts(case.body, case.given_start, _DIGITS)
+    return head | {
+        key: _in_decimals(value) if isinstance(value, str) else [_in_decimals(each) for each in value]
+        for key, value in texts.items()
+    }
+
+
+def _in_decimals(text: str) -> str:
+    """A text whose quotients are decimals where they end: the data of other programs are."""
+
+    def decimal(found: re.Match[str]) -> str:
+        below = int(found[2])
+        places = next((n for n in range(_PLACES) if 10**n % below == 0), None)
+        return found[0] if places is None else f"{Decimal(int(found[1]) * 10**places // below).scaleb(-places):f}"
+
+    return re.sub(r"(?<![\w/.])(-?\d+)/(\d+)(?![\w/.])", decimal, text)
 
 
 def forms(case: Case) -> dict[str, str]:
@@ -30,7 +48,7 @@ def forms(case: Case) -> dict[str, str]:
     if case.body is None:
         return {"command": _command(data)} | texts | {"python": _python(data)}
     command = f"heavytop propagate --case {case.name} --times {','.join(_TIMES)} --show quaternion,position"
-    return {"command": command} | texts | {"python": _python_of_body(case)}
+    return {"command": command} | texts | {"python": _in_decimals(_python_of_body(case))}
 
 
 def _follows(data: dict[str, Any]) -> bool:

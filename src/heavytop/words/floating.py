@@ -31,6 +31,8 @@ _USUAL_UNITS = -34.0
 _NEVER = -1000.0
 LARGEST_TIME = Fraction(2) ** 1000
 _STEPS_AT_ONCE = 1024
+PLACES = (*range(6), *range(19, 22))
+"""Where the first words of Ω, γ and ξ stand; the second are 8 behind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +113,8 @@ class Floating(Run):
         self.clock[dd.DEPTH] = ladder.depth
         self.table = _table(problem, ladder.order, self.layout)
         self.scratch = doubles((ladder.order + 5) * self.layout.row)
+        self.at, self.found = doubles(1), doubles(16 * self.layout.vectors)
+        self.sampling = [pointer(array) for array in (self.scratch, self.at, self.found)]
 
     @property
     def order(self) -> int:
@@ -135,16 +139,15 @@ class Floating(Run):
         return Status(int(self.counts[dd.STATUS]))
 
     def sample(self, time: Fraction) -> tuple[Fraction, ...]:
-        return self.exact_state(self._sample(time))
+        return self.exact_state(self.words_at(time))
 
-    def _sample(self, time: Fraction) -> Doubles:
-        """The words of the state at ``time``."""
-        found, at = doubles(16 * self.layout.vectors), doubles(1)
+    def words_at(self, time: Fraction) -> Doubles:
+        """The words of the state at ``time``, inside the last step."""
         behind = time - self._time(dd.BEGAN)
-        at[0], low = split(behind if self.forwards else -behind)
-        samples = self.machine.functions["samples"]
-        samples(pointer(self.scratch), self.order, pointer(at), 0, 1, 0.0, -low, 1.0, pointer(found))
-        return found
+        self.at[0], low = split(behind if self.forwards else -behind)
+        series, at, found = self.sampling
+        self.machine.functions["samples"](series, self.order, at, 0, 1, 0.0, -low, 1.0, found)
+        return self.found.copy()
 
     def exact_state(self, words: Doubles) -> tuple[Fraction, ...]:
         """A state out of its words."""
@@ -167,7 +170,7 @@ class Floating(Run):
                     samples(arrays[-1], self.order, ends[0], done, covered, began, low, sign, ends[1])
                 else:
                     for place in range(done, covered):
-                        found[row * place : row * (place + 1)] = self._sample(Fraction(float(given[place])))
+                        found[row * place : row * (place + 1)] = self.words_at(Fraction(float(given[place])))
                 done = covered
                 continue
             self.clock[dd.TARGET], self.clock[dd.TARGET_LOW] = given[done], 0.0
@@ -227,8 +230,7 @@ def _state_words(state: tuple[Fraction, ...], layout: Layout) -> Doubles:
 
 
 def _exact_state(words: Doubles, size: int) -> tuple[Fraction, ...]:
-    places = [*range(6), *range(19, 22)][:size]
-    return tuple(Fraction(words[place]) + Fraction(words[place + 8]) for place in places)
+    return tuple(Fraction(words[place]) + Fraction(words[place + 8]) for place in PLACES[:size])
 
 
 def _table(problem: Scaled, order: int, layout: Layout) -> Doubles:
