@@ -17,8 +17,8 @@ from time import perf_counter
 import numpy
 
 import heavytop as ht
-from heavytop.integrate.engines import compiled
-from heavytop.integrate.taylor import states_at
+from heavytop.integrate.heyoka.engines import compiled
+from heavytop.integrate.heyoka.motions import states_at
 from heavytop.precision import DOUBLE
 from heavytop.top.equations import HEAVY_TOP
 

@@ -16,12 +16,12 @@ from statistics import median
 from time import perf_counter, process_time
 
 from heavytop.api.integrators import new_integrator
+from heavytop.cases import CASES
 from heavytop.integrate.peers.command import Command, CommandIntegrator, Request, Session
 from heavytop.integrate.peers.source import commands_in
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, exact, number
-from heavytop.suite.cases import CASES
-from heavytop.suite.starts import ensemble_of
+from heavytop.suite.case_text import ensemble_of
 
 REQUESTS, STARTS = 10_000, 64
 STEP = exact(number(Fraction(1, 100), DOUBLE))

@@ -6,7 +6,7 @@ Run: python -m pytest benchmarks/bench_compile.py --benchmark-enable
 import heyoka
 import pytest
 
-from heavytop.integrate import engines
+from heavytop.integrate.heyoka import engines
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 

@@ -12,15 +12,14 @@ from time import perf_counter, process_time
 import numpy
 import pytest
 
-from heavytop.integrate.engines import arrays, compiled
+from heavytop.cases import CASES
 from heavytop.integrate.ensemble import propagate_ensemble
+from heavytop.integrate.heyoka.engines import arrays, compiled
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.measure.drift import Drift
+from heavytop.measure.scorer import Drift
 from heavytop.precision import DOUBLE
-from heavytop.suite.cases import CASES
-from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.equations import HEAVY_TOP, holding
 from heavytop.top.heavy_top import State
-from heavytop.top.integrals import holding
 
 TOP, START = CASES["kovalevskaya"].top, CASES["kovalevskaya"].start
 

@@ -6,10 +6,10 @@ import mpmath
 import pytest
 from flint import acb
 
-from heavytop.exact.balls import radius, radius_text, working_precision
-from heavytop.exact.gyrostat import Gyrostat
-from heavytop.exact.lagrange import Lagrange
-from heavytop.exact.weierstrass import exact_lattice, thetas
+from heavytop.exact.cases.gyrostat import Gyrostat
+from heavytop.exact.cases.lagrange import Lagrange
+from heavytop.exact.elliptic.weierstrass import exact_lattice, thetas
+from heavytop.exact.flint.balls import radius, radius_text, working_precision
 from heavytop.top.heavy_top import HeavyTop, State
 
 START = State((Fraction(1, 3), 1, 2), (Fraction(3, 5), 0, Fraction(4, 5)))

@@ -33,14 +33,14 @@ from flint import acb, arb
 from mpmath import mp
 from mpmath.libmp import BACKEND
 
-from heavytop.exact import euler, gyrostat, lagrange, pendulum
-from heavytop.exact.balls import midpoint, radius, radius_text, working_precision
-from heavytop.exact.euler import Euler
-from heavytop.exact.gyrostat import Gyrostat
-from heavytop.exact.lagrange import Lagrange
-from heavytop.exact.pendulum import Pendulum
+from heavytop.cases import CASES
+from heavytop.exact.cases import euler, gyrostat, lagrange, pendulum
+from heavytop.exact.cases.euler import Euler
+from heavytop.exact.cases.gyrostat import Gyrostat
+from heavytop.exact.cases.lagrange import Lagrange
+from heavytop.exact.cases.pendulum import Pendulum
+from heavytop.exact.flint.balls import midpoint, radius, radius_text, working_precision
 from heavytop.measure.certify import bits_of
-from heavytop.suite.cases import CASES
 from heavytop.top.heavy_top import HeavyTop, State
 
 F = Fraction
@@ -169,7 +169,7 @@ class OnEuler:
 
 
 class Wave:
-    """Functions of the second kind with one winding, as in exact/second_kind.py."""
+    """Functions of the second kind with one winding, as in exact/elliptic/weierstrass.py."""
 
     def __init__(self, companions):
         wave = companions.wave

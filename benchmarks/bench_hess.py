@@ -12,8 +12,8 @@ from fractions import Fraction
 from math import ceil, log2
 from time import process_time
 
-from heavytop.exact.hess import Hess
-from heavytop.suite.cases import CASES
+from heavytop.cases import CASES
+from heavytop.exact.cases.hess import Hess
 
 
 def main() -> None:

@@ -7,17 +7,16 @@ from fractions import Fraction
 
 import pytest
 
-from heavytop.exact.balls import radius, radius_text
-from heavytop.exact.delone import DeloneHomoclinic
-from heavytop.integrate.taylor import propagate
+from heavytop.cases import CASES
+from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.flint.balls import radius, radius_text
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.drift import Drift
-from heavytop.measure.solution_error import SolutionError
+from heavytop.measure.scorer import Drift, SolutionError
 from heavytop.measure.truth import Truth
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
 from heavytop.records import Against
-from heavytop.suite.cases import CASES
-from heavytop.top.integrals import holding
+from heavytop.top.equations import holding
 
 FORMATS = [DOUBLE, EXTENDED, QUAD, real(237)]
 

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.integrate import peers
 from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE, exact
-from heavytop.report.store import read
-from heavytop.suite.cases import CASES
+from heavytop.store.store import read
 
 REPORT = Path(__file__).parents[1] / "results" / "peers"
 OURS, THEIRS = ("heyoka", "heyoka:constants"), ("cyrk:DOP853", "cyrk:Vern8")

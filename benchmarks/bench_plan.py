@@ -13,7 +13,7 @@ from time import process_time
 from typing import Any
 
 from heavytop.kinds import KINDS
-from heavytop.suite import one_row
+from heavytop.suite import rows
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import read
 
@@ -97,7 +97,7 @@ def main() -> None:
         if only not in task.label:
             continue
         before = clock.spent.copy()
-        row = one_row.measure(KINDS[task.key.kind], task, Saved())
+        row = rows.measure(KINDS[task.key.kind], task, Saved())
         clock.switch()
         spent = clock.spent - before
         kinds.setdefault(task.key.kind, Counter()).update(spent)

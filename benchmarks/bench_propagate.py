@@ -11,15 +11,14 @@ import heyoka
 import numpy
 import pytest
 
-from heavytop.integrate.engines import compiled, expressions
-from heavytop.integrate.taylor import propagate
+from heavytop.cases import CASES
+from heavytop.integrate.heyoka.engines import compiled, expressions
+from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Problem
-from heavytop.integrate.words import propagate_words
-from heavytop.measure.drift import Drift
+from heavytop.measure.scorer import Drift
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
-from heavytop.suite.cases import CASES
-from heavytop.top.equations import HEAVY_TOP, VARIABLES, Parameters
-from heavytop.top.integrals import holding
+from heavytop.top.equations import HEAVY_TOP, VARIABLES, Parameters, holding
 
 TOP, START = CASES["kovalevskaya"].top, CASES["kovalevskaya"].start
 

@@ -8,8 +8,8 @@ from math import log10
 
 import pytest
 
-from heavytop.exact.balls import relative_bits
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import relative_bits
 from heavytop.top.heavy_top import HeavyTop, State
 
 GENERIC = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))

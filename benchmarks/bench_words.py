@@ -14,12 +14,12 @@ from time import perf_counter, thread_time
 
 import pytest
 
-from heavytop.integrate.engines import compiled, load
 from heavytop.integrate.ensemble import propagate_ensemble
+from heavytop.integrate.heyoka.engines import compiled, load
+from heavytop.integrate.multiword.engines import choose
+from heavytop.integrate.multiword.lanes import propagate_words_ensemble
+from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Problem
-from heavytop.integrate.words import propagate_words
-from heavytop.integrate.words_engines import choose
-from heavytop.integrate.words_ensemble import propagate_words_ensemble
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, exact, number, real
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
@@ -72,7 +72,7 @@ def _steps_ahead(engine, end) -> int:
 
 def error(problem: Problem, tolerance: Fraction | None, span: Fraction) -> tuple[float, float]:
     """The largest error at ``span`` by words and by heyoka, each as it is handed over."""
-    from heavytop.integrate.taylor import propagate
+    from heavytop.integrate.heyoka.motions import propagate
 
     wide = propagate_words(problem.top, problem.start, [span], real(problem.precision.bits + 150)).states[0]
     found = []

@@ -20,7 +20,7 @@ import numpy as np
 
 from heavytop.errors import InputError
 from heavytop.suite.score import Assessment, assess
-from heavytop.suite.trajectory_file import read
+from heavytop.trajectories.files import read
 
 REAL = np.longdouble
 SEQUENCES = ("XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ")

@@ -18,11 +18,11 @@ from random import Random
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+from heavytop.cases import CASES, Case
 from heavytop.errors import HeavyTopError
-from heavytop.exact.balls import working_precision
+from heavytop.exact.flint.balls import working_precision
 from heavytop.measure.rounding_noise import FACTORS
-from heavytop.suite.cases import CASES, Case
-from heavytop.suite.starts import ensemble_of, one_motion
+from heavytop.suite.case_text import ensemble_of, one_motion
 from support.derivative_laws import BITS, difference, holds, known, largest_radius, laws, of
 
 

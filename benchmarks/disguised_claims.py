@@ -21,9 +21,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.from_file import claim_from_table
-from heavytop.claims.guard import SECONDS
+from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.claims.audit.guard import SECONDS
 from heavytop.errors import HeavyTopError
 from heavytop.top.equations import system
 

@@ -22,22 +22,15 @@ from typing import Any
 from flint import arb
 
 from heavytop.errors import HeavyTopError
-from heavytop.exact.algebraic import AlgebraicMotion
-from heavytop.exact.balls import ball, working_precision
-from heavytop.exact.chaplygin import chaplygin_motion
-from heavytop.exact.dokshevich import AlgebraicDokshevich, dokshevich_motion
-from heavytop.exact.goryachev import goryachev_motion
-from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin, Sretensky
-from heavytop.exact.hess import Hess
-from heavytop.exact.hess_pendulum import HessPendulum
-from heavytop.exact.kovalevskaya import Kovalevskaya
-from heavytop.exact.kovalevskaya_abel import AbelMotion
-from heavytop.exact.kovalevskaya_level import Level
-from heavytop.exact.kovalevskaya_theta import ThetaMotion
-from heavytop.exact.kowalewski import kowalewski_motion
-from heavytop.exact.one_gap import gaps
-from heavytop.exact.steklov import steklov_motion
-from heavytop.exact.validated import Validated
+from heavytop.exact.cases.algebraic_starts import AlgebraicMotion, chaplygin_motion, goryachev_motion, kowalewski_motion
+from heavytop.exact.cases.dokshevich import AlgebraicDokshevich, dokshevich_motion
+from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin, Sretensky
+from heavytop.exact.cases.hess import Hess, HessPendulum
+from heavytop.exact.cases.kovalevskaya import AbelMotion, Kovalevskaya
+from heavytop.exact.cases.kovalevskaya_theta import Level, ThetaMotion
+from heavytop.exact.cases.one_interval import gaps, steklov_motion
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
 

@@ -17,14 +17,14 @@ from itertools import permutations
 
 import msgspec
 
+from heavytop.compare.compare import compare
+from heavytop.compare.noise import Policy
+from heavytop.compare.verdicts import Verdict
+from heavytop.document.names import row_name
 from heavytop.kinds import KINDS, work_precision
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
 from heavytop.precision import decimal_text, exact
 from heavytop.records import SCHEMA, Report, Series
-from heavytop.report.compare import compare
-from heavytop.report.names import row_name
-from heavytop.report.policy import Policy
-from heavytop.report.verdicts import Verdict
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import Plan, expand, load
 

@@ -20,7 +20,7 @@ def child(cache: str, forced: bool, checked: bool) -> None:
     import heyoka
 
     from heavytop import DOUBLE, HeavyTop, State, propagate
-    from heavytop.integrate import engines
+    from heavytop.integrate.heyoka import engines
 
     heyoka.llvm_state.set_diskcache_path(cache)
     if forced:

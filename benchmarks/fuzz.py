@@ -39,11 +39,11 @@ import mpmath
 import numpy as np
 
 import heavytop as ht
-from heavytop.claims import guard
+from heavytop.claims.audit import guard
 from heavytop.cli import run_command_line
 from heavytop.errors import HeavyTopError
-from heavytop.integrate import reach
-from heavytop.suite.files import line
+from heavytop.files import line
+from heavytop.integrate import integrator
 
 SECONDS = 20
 CODES = {0, 1, 2, 3}
@@ -418,7 +418,7 @@ def tried(call: Callable[[], object]) -> str:
 
 def main(count: int = 10_000, seed: int = 1, first: int = 0) -> int:
     guard.in_time.__defaults__ = (SECONDS / 2,)
-    reach.MOST_STEPS = 10**5
+    integrator.MOST_STEPS = 10**5
     found: Counter[str] = Counter()
     kinds: Counter[str] = Counter()
     began, longest = perf_counter(), 0.0

@@ -13,9 +13,9 @@ from random import Random
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import heavytop as ht
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import Validated
 from heavytop.precision import exact
-from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import perpendicular
 from integrate.test_heavy_gyrostat import _exactly, _fraction, independent
 from support.helpers import fraction, positive, unit_vector, vector
 

@@ -18,11 +18,11 @@ def child(count: int) -> None:
 
     import heavytop.suite.run
     from heavytop.api.run_folder import Run
+    from heavytop.cases import CASES
     from heavytop.kinds import KINDS
     from heavytop.records import RowKey
-    from heavytop.suite.cases import CASES
     from heavytop.suite.checkpoint import Saved
-    from heavytop.suite.task import Task, computed
+    from heavytop.suite.rows import Task, computed
 
     times = tuple(range(1, 11))
     names = [f"euler-{index}" for index in range(count)]

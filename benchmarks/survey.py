@@ -15,8 +15,8 @@ from time import process_time
 import heavytop as ht
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.precision import DOUBLE
-from heavytop.suite.survey.drawn import chunks, drawn
-from heavytop.suite.survey.table import FILE
+from heavytop.suite.survey.gathered import FILE
+from heavytop.suite.survey.measured import chunks, drawn
 from heavytop.suite.sweeps import Random
 
 PLAN = """name = "many"

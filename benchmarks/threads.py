@@ -21,13 +21,13 @@ from typing import Any
 
 from flint import ctx
 
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.drift import Drift
 from heavytop.measure.reference import reference
+from heavytop.measure.scorer import Drift
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
+from heavytop.top.equations import holding
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.integrals import holding
 
 F = Fraction
 FORMATS = (DOUBLE, EXTENDED, QUAD, real(100), real(237))

@@ -12,13 +12,13 @@ import argparse
 from fractions import Fraction
 from random import Random
 
-from heavytop.exact.balls import midpoint
+from heavytop.cases import CASES
+from heavytop.exact.flint.balls import midpoint
+from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Outcome
-from heavytop.integrate.words import propagate_words
 from heavytop.measure.truth import closed_form
 from heavytop.precision import Precision, exact, parse
-from heavytop.suite.cases import CASES
-from heavytop.suite.starts import Member, ensemble_of
+from heavytop.suite.case_text import Member, ensemble_of
 from heavytop.top.heavy_top import State
 
 SAMPLES, FASTEST = 64, 10

@@ -15,17 +15,17 @@ from functools import partial
 
 import numpy
 
-from heavytop.exact.balls import midpoint
+from heavytop.cases import CASES
+from heavytop.exact.flint.balls import midpoint
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.growth import Ensemble, law
 from heavytop.measure.truth import closed_form
+from heavytop.multiword.fixed_point.arithmetic import grid_of
+from heavytop.multiword.fixed_point.fixed_point_run import Fixed
+from heavytop.multiword.problem import Scaled
 from heavytop.precision import real
-from heavytop.suite.cases import CASES
-from heavytop.suite.starts import ensemble_of
+from heavytop.suite.case_text import ensemble_of
 from heavytop.top.equations import Parameters
-from heavytop.words.digits import grid_of
-from heavytop.words.fixed import Fixed
-from heavytop.words.scaled import Scaled
 
 SAMPLES, START_BITS, TRUE_BITS = 16, 53, 200
 NAMES = ("energy", "area", "abs. square of γ", "along the flow")

@@ -15,18 +15,16 @@ from fractions import Fraction
 from random import Random
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.balls import midpoint, radius
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import midpoint, radius
+from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.integrate.words import propagate_words
+from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
+from heavytop.multiword.fixed_point.fixed_point_run import Fixed
+from heavytop.multiword.problem import Scaled, Status
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, exact, real
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.words.digits import grid_of
-from heavytop.words.fixed import Fixed
-from heavytop.words.kernels import Grid
-from heavytop.words.run import Status
-from heavytop.words.scaled import Scaled
 
 SPAN = Fraction(4)
 WRONG_ULP = 1e6

@@ -11,9 +11,9 @@ from random import Random
 from statistics import median
 from time import process_time
 
-from heavytop.exact.balls import ball, working_precision
-from heavytop.exact.validated import Validated
-from heavytop.exact.zhukovsky_volterra import ZhukovskyVolterra
+from heavytop.exact.cases.zhukovsky_volterra import ZhukovskyVolterra
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import ball, working_precision
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 

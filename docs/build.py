@@ -72,7 +72,7 @@ def write_claims() -> None:
     """The part of the page of audited claims that is made from the library."""
     import msgspec
 
-    from heavytop.report.claims_page import page
+    from heavytop.render.claims_page import page
     from heavytop.suite.claim_library import Library, document, is_current
 
     kept = ROOT / "results" / "claims" / "library.json"

@@ -13,10 +13,10 @@ import pytest
 from typer.testing import CliRunner
 
 from heavytop.cli import app
-from heavytop.cli.motion_output import with_file_of_latex
+from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import InputError
 from heavytop.suite.score import assess
-from heavytop.suite.trajectory_file import read
+from heavytop.trajectories.files import read
 from support import in_process
 
 SHOWN = "quaternion,matrix,euler:ZXZ,position,omega-space"

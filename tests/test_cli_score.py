@@ -15,19 +15,18 @@ from typer.testing import CliRunner
 
 import heavytop as ht
 import heavytop.suite.score as score_module
+from heavytop.cases import CASES
 from heavytop.cli import app
 from heavytop.errors import InputError
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE
-from heavytop.report.html import report_page
-from heavytop.report.score_page import score_report
-from heavytop.report.score_text import guessed, requirement, score_text
-from heavytop.suite.cases import CASES
-from heavytop.suite.given import Given, of_arrays
+from heavytop.render.page import report_page
+from heavytop.render.score import guessed, requirement, score_report, score_text
 from heavytop.suite.plan import read
 from heavytop.suite.score import assess
-from heavytop.suite.trajectory_file import read as read_file
+from heavytop.trajectories.files import read as read_file
+from heavytop.trajectories.observed import Given, of_arrays
 
 CASE = CASES["lagrange"]
 TIMES = [Fraction(k) for k in range(1, 9)]
@@ -228,7 +227,7 @@ def test_the_data_of_a_case_can_be_pasted_everywhere(name: str, tmp_path: Path) 
     exec(data["python"], names)
     assert (names["top"], names["start"]) == (case.top, case.start)
     # CSV
-    from heavytop.suite.trajectory_file import read as read_trajectory
+    from heavytop.trajectories.files import read as read_trajectory
 
     rows = [",".join([time, *state]) for time, state in zip(made["times"], made["states"], strict=True)]
     (tmp_path / "a.csv").write_text("\n".join([data["csv"], *rows]))

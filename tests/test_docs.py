@@ -17,10 +17,10 @@ import typer
 
 import heavytop as ht
 from heavytop.cli import app
+from heavytop.compare import noise
 from heavytop.integrate.peers.source import commands_in
 from heavytop.kinds import KINDS
-from heavytop.report import policy
-from heavytop.report.terminal import brief
+from heavytop.render.terminal import brief
 from heavytop.suite import plan
 from support import from_a_wheel, in_process
 from support.documents import PAGES, ROOT, Block, blocks, folder_like_a_checkout, run_shell
@@ -148,7 +148,7 @@ def read_toml(text: str, folder: Path) -> None:
     elif "kind" in content:
         assert ht.audit(file).verdict in ("holds", "refuted")
     else:
-        assert policy.load(file) != policy.Policy()
+        assert noise.load(file) != noise.Policy()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)

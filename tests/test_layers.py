@@ -10,35 +10,39 @@ from heavytop.kinds import KINDS
 ALSO_WORDS = {"drift", "growth", "audit", "score", "local_error", "hunt"}
 """Names that are quantities, sections or commands as well."""
 SOURCE = Path(__file__).parents[1] / "src" / "heavytop"
-GROUND = {"display", "errors", "former_names", "last_call", "precision", "processes", "records", "version"}
-GROUND |= {"written_numbers"}
-MOTIONS = GROUND | {"top", "exact", "claims", "integrate"}
+GROUND = {"display", "errors", "files", "precision", "processes", "records", "version", "written_numbers"}
+FLOORS = (
+    {"top"},
+    {"multiword"},
+    {"exact"},
+    {"claims"},
+    {"cases"},
+    {"integrate"},
+    {"measure"},
+    {"event_times"},
+    {"diagnose"},
+    {"trajectories"},
+    {"suite"},
+    {"document"},
+    {"store"},
+    {"compare"},
+    {"render"},
+    {"kinds"},
+    {"api"},
+    {"cli", "pytest_plugin", "__init__"},
+    {"__main__"},
+)
+"""The rooms from the ground up: each imports only from those before it."""
 MAY_IMPORT = {
     "errors": set(),
-    "precision": {"errors"},
     "display": set(),
-    "last_call": set(),
+    "files": {"errors"},
+    "precision": {"errors"},
     "processes": set(),
     "records": set(),
-    "former_names": {"records"},
     "version": set(),
     "written_numbers": {"errors", "precision"},
-    "top": GROUND,
-    "words": GROUND | {"top"},
-    "exact": GROUND | {"top", "words"},
-    "claims": GROUND | {"top", "exact"},
-    "integrate": GROUND | {"top", "words"},
-    "measure": MOTIONS,
-    "event_times": GROUND | {"top", "words", "exact", "integrate", "measure"},
-    "suite": MOTIONS | {"measure"},
-    "report": MOTIONS | {"measure", "event_times", "suite"},
-    "kinds": MOTIONS | {"measure", "suite", "report"},
-    "api": MOTIONS | {"measure", "event_times", "suite", "report", "kinds"},
-    "cli": MOTIONS | {"measure", "event_times", "suite", "report", "kinds", "api"},
-    "__main__": {"cli"},
-    "pytest_plugin": GROUND | {"suite", "api"},
-    "__init__": GROUND | {"top", "integrate", "measure", "event_times", "api"},
-}
+} | {room: GROUND.union(*FLOORS[:floor]) for floor, rooms in enumerate(FLOORS) for room in rooms}
 
 
 def imports(path: Path) -> set[str]:

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 import heavytop as ht
-from heavytop.suite.cases import named_bodies
-from heavytop.top.given_motion import motion_of
+from heavytop.cases import named_bodies
+from heavytop.top.bodies import motion_of
 
 PAGE = (Path(__file__).parents[1] / "docs" / "bodies.md").read_text("utf-8")
 STORED: dict[str, tuple[str, str, str, list[str], str]] = {

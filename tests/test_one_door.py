@@ -10,11 +10,11 @@ from typer.testing import CliRunner
 
 import heavytop as ht
 from heavytop.api.integrators import check_integrator, new_integrator
+from heavytop.cases import case
 from heavytop.cli import app
 from heavytop.errors import HeavyTopError
-from heavytop.suite.cases import case
 from heavytop.suite.score import required
-from heavytop.suite.trajectory_file import read
+from heavytop.trajectories.files import read
 
 DATA = {
     "inertia": "3,2,1",

@@ -18,22 +18,12 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from heavytop.cli import app, progress
-from heavytop.cli.progress import (
-    Bar,
-    Estimator,
-    Progress,
-    counted,
-    duration,
-    reaching,
-    told_when_slow,
-    waiting,
-    watched,
-)
+from heavytop.cli import app, output
+from heavytop.cli.output import Bar, Estimator, Progress, counted, duration, reaching, told_when_slow, waiting, watched
 from heavytop.measure.motion import compute
 from heavytop.precision import DOUBLE
 from heavytop.records import SCHEMA, Report
-from heavytop.report import store
+from heavytop.store import store
 from heavytop.top.equations import HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -172,7 +162,7 @@ def test_a_reference_reports_on_a_terminal_and_its_output_stays_clean() -> None:
 def test_every_command_says_once_where_it_is_when_it_takes_long(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(progress, "SILENCE", 0.0)
+    monkeypatch.setattr(output, "SILENCE", 0.0)
     said = set()
     data = ["--inertia", "3,2,1", "--weight", "1", "--centre", "1/2,1/3,1/5", "--omega", "1/10,2/5,9/10"]
     data += ["--gamma", "3/5,0,4/5", "--times"]
@@ -197,7 +187,7 @@ def test_every_command_says_once_where_it_is_when_it_takes_long(
 
 
 def test_the_line_says_what_is_done_and_how_far(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
-    monkeypatch.setattr(progress, "SILENCE", 0.1)
+    monkeypatch.setattr(output, "SILENCE", 0.1)
     with told_when_slow("score"), counted("comparison", 8, "states", 1.0) as advance:
         advance()
         advance()

@@ -12,14 +12,14 @@ from pathlib import Path
 import pytest
 
 from heavytop.api.integrators import LANGUAGES, new_integrator
+from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.integrate import peers
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers.command import close_all
 from heavytop.integrate.peers.source import commands_in
-from heavytop.integrate.taylor import propagate
 from heavytop.kinds import KINDS
 from heavytop.precision import DOUBLE
-from heavytop.suite.cases import CASES
 from heavytop.suite.integrator_check import check
 from heavytop.suite.plan import read
 

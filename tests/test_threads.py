@@ -16,23 +16,30 @@ import numpy
 import pytest
 from flint import arb, ctx
 
-from heavytop.exact.balls import ball_from, ball_text, midpoint, radius, to_bits, working_precision
-from heavytop.exact.closed_form import series_length
-from heavytop.exact.euler import Euler
-from heavytop.exact.flint_context import ContextChanged, whole_evaluation
-from heavytop.exact.lagrange import Lagrange
-from heavytop.exact.validated import Validated
-from heavytop.integrate.engines import compiled
+from heavytop.cases import CASES
+from heavytop.exact.cases.euler import Euler
+from heavytop.exact.cases.lagrange import Lagrange
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import (
+    ContextChanged,
+    ball_from,
+    ball_text,
+    midpoint,
+    radius,
+    series_length,
+    to_bits,
+    whole_evaluation,
+    working_precision,
+)
 from heavytop.integrate.ensemble import propagate_ensemble
-from heavytop.integrate.taylor import first_steps, propagate
+from heavytop.integrate.heyoka.engines import compiled
+from heavytop.integrate.heyoka.motions import first_steps, propagate
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.drift import Drift
 from heavytop.measure.reference import reference
+from heavytop.measure.scorer import Drift
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, real, time_text
-from heavytop.suite.cases import CASES
-from heavytop.top.equations import HEAVY_TOP
+from heavytop.top.equations import HEAVY_TOP, holding
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.integrals import holding
 from support.helpers import run_peer
 
 F = Fraction

@@ -8,25 +8,24 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from heavytop.api import plot
-    from heavytop.api.claims import Audit, ClaimLibrary, audit, claim_library
+    from heavytop.api.claims import ClaimLibrary, audit, claim_library
     from heavytop.api.derivatives import DerivativeScore, score_derivatives
     from heavytop.api.events import events, poincare
     from heavytop.api.hunt import Hunt, hunt
-    from heavytop.api.motions import ensemble, propagate, reference
-    from heavytop.api.prepared import Integrator, Propagated
+    from heavytop.api.motions import Integrator, Propagated, ensemble, propagate, reference
     from heavytop.api.reports import Comparison, Report, compare, read_report, run
+    from heavytop.api.run_folder import read_survey
     from heavytop.api.scores import Score, Summary, drift, score
-    from heavytop.api.surveys import read_survey
+    from heavytop.claims.audit.judge import Audit
     from heavytop.errors import Contradiction, HeavyTopError, InputError, OutOfReach
-    from heavytop.event_times.records import Events, ReferenceEvents, Section
+    from heavytop.event_times.functions import Events, ReferenceEvents, Section
     from heavytop.integrate.trajectory import Outcome, Trajectory
     from heavytop.measure.reference import Reference
     from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, available, real
     from heavytop.top.attitude import Attitude
     from heavytop.top.bodies import Body
-    from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
+    from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System, holding
     from heavytop.top.heavy_top import HeavyTop, State
-    from heavytop.top.integrals import holding
 
     __version__: str
 

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import MAX_EMAX, MIN_EMIN, ROUND_HALF_EVEN, Context, Decimal, Overflow
 from fractions import Fraction
+from functools import wraps
 from numbers import Rational
-from operator import index
-from typing import Any, cast
+from operator import index, is_
+from typing import Any, TypeVar, cast
 
 from heavytop.errors import InputError, quoted
 
@@ -393,3 +394,34 @@ def native_text(value: Any, precision: Precision) -> str:
     if not numpy.isfinite(value):
         return str(value)
     return decimal_text(exact(value), precision.digits)
+
+
+# What a function gave for the last arguments, kept for those who ask again with the very same objects.
+
+
+Found = TypeVar("Found")
+
+
+def last_call(function: Callable[..., Found]) -> Callable[..., Found]:
+    """``function`` of positional arguments that do not change, called again only where one is another object.
+
+    An exception is not kept.  Threads may call it: at worst each computes for itself.
+    """
+    kept: tuple[tuple[Any, ...], Any] | None = None
+
+    @wraps(function)
+    def look_up(*arguments: Any) -> Found:
+        nonlocal kept
+        before = kept
+        if before is not None and len(before[0]) == len(arguments) and _are_same(before[0], arguments):
+            found: Found = before[1]
+            return found
+        found = function(*arguments)
+        kept = arguments, found
+        return found
+
+    return look_up
+
+
+def _are_same(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
+    return all(map(is_, one, other))

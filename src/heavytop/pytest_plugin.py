@@ -74,8 +74,8 @@ def gate(
         PeerFailed: where the integrator breaks its contract.
     """
     import heavytop as ht
+    from heavytop.cases import case as case_named
     from heavytop.errors import InputError
-    from heavytop.suite.cases import case as case_named
 
     known = case_named(case)
     given = integrator_or_states

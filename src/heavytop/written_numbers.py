@@ -9,16 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from heavytop.errors import InputError
-from heavytop.precision import (
-    DOUBLE,
-    EXTENDED,
-    QUAD,
-    Precision,
-    decimal_text,
-    exact,
-    real,
-    round_to,
-)
+from heavytop.precision import DOUBLE, EXTENDED, QUAD, Precision, decimal_text, exact, real, round_to
 
 _HEX = re.compile(r"([+-]?)0[xX](?=\.?[0-9a-fA-F])([0-9a-fA-F]*)\.?([0-9a-fA-F]*)(?:[pP]([+-]?[0-9]{1,6}))?")
 _NOT_FINITE = re.compile(r"[+-]?(nan(\([^)]*\))?|inf|infinity|1\.?#(inf|ind|qnan|snan)\d*)", re.IGNORECASE)

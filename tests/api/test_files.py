@@ -7,7 +7,7 @@ import pytest
 
 import heavytop as ht
 from heavytop.records import SCHEMA, Report
-from heavytop.suite.trajectory_file import read
+from heavytop.trajectories.files import read
 from support.reports import store
 
 MOTION = """{"inertia": ["2", "2", "1"], "weight": "1", "centre": [0, 0, 1], "omega": [0, 0, 1], "gamma": [0, 0, 1],

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import heavytop as ht
+from heavytop.cases import case
 from heavytop.errors import InputError
 from heavytop.pytest_plugin import gate
-from heavytop.suite.cases import case
 
 TESTS = """
 import sys

@@ -8,8 +8,8 @@ from fractions import Fraction
 import pytest
 import sympy
 
-from heavytop.claims.algebra import Assumptions, Field
-from heavytop.claims.evaluate import evaluate
+from heavytop.claims.algebra.evaluate import evaluate
+from heavytop.claims.algebra.fields import Assumptions, Field
 
 T, A, B = sympy.Symbol("t", real=True), sympy.Symbol("a", positive=True), sympy.Symbol("b", positive=True)
 TRUE = [

@@ -8,12 +8,12 @@ from functools import cache
 import pytest
 import sympy
 
-from heavytop.claims import ershkov, ershkov_general
-from heavytop.claims.audit import audit, only_branch
-from heavytop.claims.ershkov_audit import GeneralClaim, PartialClaim
-from heavytop.claims.judge import Audit, Row, judge
+from heavytop.claims.audit.audit import audit, only_branch
+from heavytop.claims.audit.judge import Audit, Row, judge
+from heavytop.claims.library import ershkov, ershkov_general
+from heavytop.claims.library.ershkov_audit import GeneralClaim, PartialClaim
 from heavytop.errors import InputError
-from heavytop.exact.balls import FUNCTIONS, ball, working_precision
+from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
 from heavytop.top.equations import HEAVY_TOP
 
 

@@ -8,13 +8,12 @@ import pytest
 import sympy
 
 from claims.test_where import TOPS
-from heavytop.claims.algebra import Field
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.context import STATE, TIME
-from heavytop.claims.from_file import claim_from_table
-from heavytop.claims.judge import Audit
-from heavytop.claims.proof import Region
-from heavytop.claims.statement import ALL, Flow, Formulas, Setting, Statement
+from heavytop.claims.algebra.fields import Field
+from heavytop.claims.algebra.prover import Region
+from heavytop.claims.algebra.statement import ALL, Flow, Formulas, Setting, Statement
+from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.claims.audit.context import STATE, TIME
+from heavytop.claims.audit.judge import Audit
 from heavytop.errors import InputError
 from heavytop.top.equations import system
 

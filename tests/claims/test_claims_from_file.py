@@ -9,10 +9,9 @@ from importlib.resources import files
 import pytest
 from typer.testing import CliRunner
 
-from heavytop.claims.audit import audit, audit_claim
-from heavytop.claims.from_file import claim_from_table
-from heavytop.claims.guard import in_time
-from heavytop.claims.judge import Audit
+from heavytop.claims.audit.audit import audit, audit_claim, claim_from_table
+from heavytop.claims.audit.guard import in_time
+from heavytop.claims.audit.judge import Audit
 from heavytop.errors import InputError
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 

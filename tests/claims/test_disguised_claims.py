@@ -10,12 +10,11 @@ from pathlib import Path
 import pytest
 import sympy
 
-from heavytop.claims.algebra import Assumptions, Field
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.combination import nonnegative_combination
-from heavytop.claims.defined import Defined, at_values, rate_along
-from heavytop.claims.from_file import claim_from_table
-from heavytop.claims.relations import solve_relations
+from heavytop.claims.algebra.conditions import solve_relations
+from heavytop.claims.algebra.fields import Assumptions, Field
+from heavytop.claims.algebra.signs import nonnegative_combination
+from heavytop.claims.algebra.structure import Defined, at_values, rate_along
+from heavytop.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.errors import InputError
 from heavytop.top.equations import HEAVY_TOP
 

@@ -7,11 +7,10 @@ import mpmath
 import pytest
 import sympy
 
-from heavytop.claims.algebra import Assumptions, Field
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.elliptic import cn, dn, sn
-from heavytop.claims.evaluate import evaluate
-from heavytop.claims.from_file import claim_from_table
+from heavytop.claims.algebra.evaluate import evaluate
+from heavytop.claims.algebra.fields import Assumptions, Field
+from heavytop.claims.algebra.structure import cn, dn, sn
+from heavytop.claims.audit.audit import audit_claim, claim_from_table
 from heavytop.errors import InputError
 
 T = sympy.Symbol("t", real=True)

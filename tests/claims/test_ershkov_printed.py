@@ -6,9 +6,9 @@ from random import Random
 import numpy
 import pytest
 
-from heavytop.claims import ershkov
-from heavytop.claims.ershkov import PartialCase
-from heavytop.exact.balls import FUNCTIONS, ball, working_precision
+from heavytop.claims.library import ershkov
+from heavytop.claims.library.ershkov import PartialCase
+from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
 from heavytop.measure.claim_error import evaluation_error, exact_claim, first_failure
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, number, real
 from support.helpers import positive

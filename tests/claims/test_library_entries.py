@@ -5,10 +5,9 @@ import tomllib
 
 import pytest
 
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.entry import FOLDER, library, split
-from heavytop.claims.from_file import claim_from_table
-from heavytop.claims.judge import verdict_of
+from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.claims.audit.judge import verdict_of
+from heavytop.claims.library.entry import FOLDER, library, split
 
 QUICK = (
     "area-integral", "energy", "energy-gamma-down", "free-body-delta", "gyrostat-area", "gyrostat-area-without-rotor",

@@ -7,17 +7,15 @@ from fractions import Fraction
 import pytest
 import sympy
 
-from heavytop.claims.algebra import Assumptions, Field
-from heavytop.claims.arcs import Arcs
-from heavytop.claims.assume import assume
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.conditions import Kind, Need
-from heavytop.claims.context import STATE
-from heavytop.claims.from_file import claim_from_table
-from heavytop.claims.proof import Region
-from heavytop.claims.prover import Prover
-from heavytop.claims.sign import Sign, used
-from heavytop.claims.statement import ALL, Flow, Formulas, Setting, Statement
+from heavytop.claims.algebra.arcs import Arcs
+from heavytop.claims.algebra.conditions import Kind, Need
+from heavytop.claims.algebra.fields import Assumptions, Field
+from heavytop.claims.algebra.prover import Prover, Region
+from heavytop.claims.algebra.reader import assume
+from heavytop.claims.algebra.signs import Sign, used
+from heavytop.claims.algebra.statement import ALL, Flow, Formulas, Setting, Statement
+from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.claims.audit.context import STATE
 from heavytop.top.equations import HEAVY_TOP
 
 T = sympy.Symbol("t", real=True)

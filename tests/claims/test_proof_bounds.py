@@ -8,18 +8,22 @@ import pytest
 import sympy
 from flint import arb
 
-from heavytop.claims.algebra import Assumptions, Field
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.conditions import Kind, Need, condition, conditions_of, is_exactly_zero, written
-from heavytop.claims.from_file import claim_from_table
-from heavytop.claims.judge import judge
-from heavytop.claims.proof import Region
-from heavytop.claims.prover import Prover
-from heavytop.claims.real_zeros import conditions_for_zero
-from heavytop.claims.regularity import Regularity
-from heavytop.claims.sign import Sign, used
-from heavytop.claims.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
-from heavytop.claims.structure import sign_of as sign_by_structure
+from heavytop.claims.algebra.conditions import (
+    Kind,
+    Need,
+    condition,
+    conditions_for_zero,
+    conditions_of,
+    is_exactly_zero,
+    written,
+)
+from heavytop.claims.algebra.fields import Assumptions, Field, Regularity
+from heavytop.claims.algebra.prover import Prover, Region
+from heavytop.claims.algebra.signs import Sign, used
+from heavytop.claims.algebra.statement import AFTER, ALL, BEFORE, Domain, Flow, Formulas, Setting, Statement
+from heavytop.claims.algebra.structure import sign_of as sign_by_structure
+from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.claims.audit.judge import judge
 from heavytop.top.equations import system
 
 T, A = sympy.Symbol("t", real=True), sympy.Symbol("a", real=True)
@@ -374,7 +378,7 @@ def test_what_is_said_of_an_undecided_residual_holds_all_balls(monkeypatch) -> N
     gudermannian = sympy.asin(sympy.tanh(A)) - 2 * sympy.atan(sympy.tanh(A / 2))
     statement = Statement("1", 1, "smooth", ALL, sympy.exp(gudermannian) - 1, "")
     for ball in (arb(0.5, 0.75), arb(-0.5, 0.75), arb(0, 1.25)):
-        monkeypatch.setattr("heavytop.claims.judge.evaluate", lambda *_, ball=ball: ball)
+        monkeypatch.setattr("heavytop.claims.audit.judge.evaluate", lambda *_, ball=ball: ball)
         (row,) = judge([statement], setting)
         assert 1.25 <= float(row.residual.removeprefix("|residual| < ").removesuffix(" at the sample points")) < 1.27
 

@@ -9,9 +9,8 @@ from typing import Any
 import mpmath
 import pytest
 
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.from_file import claim_from_table
-from heavytop.claims.judge import Audit
+from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.claims.audit.judge import Audit
 from heavytop.errors import InputError
 
 EXAMPLE = files("heavytop.claims") / "examples" / "pendulum-quadrature.toml"

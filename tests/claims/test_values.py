@@ -12,17 +12,14 @@ import mpmath
 import pytest
 from rich.console import Console
 
-from heavytop.claims import entry as entries
-from heavytop.claims import verdicts
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.from_file import claim_from_table, read_claim
-from heavytop.claims.judge import Audit, Row
-from heavytop.claims.printed_number import PrintedNumber
-from heavytop.claims.values import ValueClaim
+from heavytop.claims.audit.audit import audit, audit_claim, claim_from_table, read_claim
+from heavytop.claims.audit.judge import Audit, Row
+from heavytop.claims.audit.values import PrintedNumber, ValueClaim
+from heavytop.claims.library import entry as entries
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.kinds.audit import AuditTable
-from heavytop.report.audit_text import audit_text
+from heavytop.render.claims import audit_text
 from heavytop.suite.checkpoint import Saved
 from heavytop.top.equations import system
 from support import in_process
@@ -421,7 +418,7 @@ def test_a_report_counts_the_digits_that_are_right(tmp_path: Path, monkeypatch: 
     body = FILE.format("0.203").replace('name = "a table"\n', "")
     (tmp_path / "three.toml").write_text(head + body, "utf-8")
     monkeypatch.setattr(entries, "FOLDER", tmp_path)
-    monkeypatch.setattr(verdicts, "FOLDER", tmp_path)
+    monkeypatch.setattr(audit, "FOLDER", tmp_path)
     entries.library.cache_clear()
     try:
         (task,) = AuditTable(claims=["three"]).tasks(lambda name: pytest.fail(name))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 import sympy
 
-from heavytop.claims.algebra import Assumptions, Field
-from heavytop.claims.context import STATE
-from heavytop.claims.proof import Region
-from heavytop.claims.relations import solve_relations
-from heavytop.claims.sign import Sign, used
-from heavytop.claims.statement import ALL, Flow, Setting, Statement
+from heavytop.claims.algebra.conditions import solve_relations
+from heavytop.claims.algebra.fields import Assumptions, Field
+from heavytop.claims.algebra.prover import Region
+from heavytop.claims.algebra.signs import Sign, used
+from heavytop.claims.algebra.statement import ALL, Flow, Setting, Statement
+from heavytop.claims.audit.context import STATE
 
 T = sympy.Symbol("t", real=True)
 A, B, C, D, E = SYMBOLS = sympy.symbols("a b c d e", real=True)

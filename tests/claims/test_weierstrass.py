@@ -8,11 +8,9 @@ from typing import Any
 import pytest
 import sympy
 
-from heavytop.claims import weierstrass
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.evaluate import evaluate
-from heavytop.claims.from_file import claim_from_table
-from heavytop.claims.judge import Audit
+from heavytop.claims.algebra.evaluate import evaluate, wp, wpprime
+from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.claims.audit.judge import Audit
 from heavytop.errors import InputError
 
 U, G2, G3 = sympy.symbols("u g2 g3", real=True)
@@ -84,16 +82,12 @@ def test_invariants_that_move_are_not_proven() -> None:
 @pytest.mark.parametrize(("g2", "g3"), [(4, 1), (4, -1), (5, 0), (1, 3), (-2, 1), (0, -2), (-3, 0)])
 def test_balls_of_weierstrass_functions_satisfy_their_equation_and_begin_as_their_series(g2: int, g3: int) -> None:
     place = {U: Fraction(1, 50), G2: Fraction(g2), G3: Fraction(g3)}
-    p, q = (
-        float(evaluate(f(U, G2, G3, evaluate=False), place, 192).mid()) for f in (weierstrass.wp, weierstrass.wpprime)
-    )
+    p, q = (float(evaluate(f(U, G2, G3, evaluate=False), place, 192).mid()) for f in (wp, wpprime))
     u = 1 / 50
     assert abs(p - (1 / u**2 + g2 * u**2 / 20 + g3 * u**4 / 28 + g2**2 * u**6 / 1200)) < 1e-11
     assert abs(q - (-2 / u**3 + g2 * u / 10 + g3 * u**3 / 7)) < 1e-8
     far = {**place, U: Fraction(7, 5)}
-    equation = (
-        weierstrass.wpprime(U, G2, G3) ** 2 - 4 * weierstrass.wp(U, G2, G3) ** 3 + G2 * weierstrass.wp(U, G2, G3) + G3
-    )
+    equation = wpprime(U, G2, G3) ** 2 - 4 * wp(U, G2, G3) ** 3 + G2 * wp(U, G2, G3) + G3
     assert evaluate(equation, far, 192).contains(0)
 
 

@@ -7,10 +7,9 @@ import pytest
 from flint import acb, arb
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.abel import Inversion
-from heavytop.exact.asymptotic import Approach
-from heavytop.exact.balls import working_precision
-from heavytop.exact.gaps import FourierBound, Gap, Roots, SineSums, fourier_rows
+from heavytop.exact.flint.balls import working_precision
+from heavytop.exact.separable.abel import Inversion
+from heavytop.exact.separable.oscillation import Approach, FourierBound, Gap, Roots, SineSums, fourier_rows
 
 BITS = 256
 

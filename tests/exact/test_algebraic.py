@@ -7,15 +7,19 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass, OutOfReach
-from heavytop.exact.balls import midpoint, radius
+from heavytop.exact.cases.algebraic_starts import (
+    chaplygin_curve,
+    chaplygin_motion,
+    goryachev_curve,
+    goryachev_motion,
+    kowalewski_curve,
+    kowalewski_motion,
+)
+from heavytop.exact.cases.lagrange import polynomial
+from heavytop.exact.cases.one_interval import Curve, gaps, quadratics
 from heavytop.exact.catalogue import find
-from heavytop.exact.chaplygin import chaplygin_curve, chaplygin_motion
-from heavytop.exact.goryachev import goryachev_curve, goryachev_motion
-from heavytop.exact.kowalewski import kowalewski_curve, kowalewski_motion
-from heavytop.exact.one_gap import Curve, gaps
-from heavytop.exact.reduced import polynomial
-from heavytop.exact.steklov import quadratics
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import midpoint, radius
 from support.proofs import AsRounded, assert_algebraic_solves, assert_attitude
 
 F = Fraction

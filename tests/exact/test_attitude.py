@@ -9,11 +9,11 @@ import pytest
 from flint import fmpq_mpoly_ctx
 
 import heavytop as ht
-from heavytop.exact.axes import renamed_state, renamed_top
-from heavytop.exact.validated import Validated
+from heavytop.cases import CASES
+from heavytop.exact.closed_form import renamed_state, renamed_top
+from heavytop.exact.enclosure.run import Validated
 from heavytop.measure.reference import Ball
-from heavytop.suite.cases import CASES
-from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import perpendicular
 
 NAMES = (
     "euler",

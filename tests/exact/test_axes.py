@@ -5,12 +5,12 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import NotInClass
-from heavytop.exact.axes import ALL, Renamed, inverse, renamed_state, renamed_top
-from heavytop.exact.bobylev_steklov import bobylev_steklov_motion
-from heavytop.exact.ershkov_partial import ErshkovPartial
-from heavytop.exact.euler import Euler
-from heavytop.exact.grioli import grioli_motion
-from heavytop.top.angles import perpendicular
+from heavytop.exact.cases.bobylev_steklov import bobylev_steklov_motion
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.cases.euler import Euler
+from heavytop.exact.cases.grioli import grioli_motion
+from heavytop.exact.closed_form import ALL, Renamed, inverse, renamed_state, renamed_top
+from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_solves

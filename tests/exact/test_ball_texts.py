@@ -6,7 +6,7 @@ from random import Random
 
 from flint import arb
 
-from heavytop.exact.balls import midpoint, radius, value_text, working_precision
+from heavytop.exact.flint.balls import midpoint, radius, value_text, working_precision
 
 
 def test_the_printed_radius_encloses_the_ball_and_no_smaller_one_does() -> None:

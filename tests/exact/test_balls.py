@@ -7,7 +7,7 @@ import pytest
 from flint import arb, arb_series
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.balls import (
+from heavytop.exact.flint.balls import (
     ball,
     ball_from,
     ball_text,

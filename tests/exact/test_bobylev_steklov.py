@@ -7,11 +7,9 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass
-from heavytop.exact.attitude import attitude_of
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
-from heavytop.exact.bobylev_steklov import BobylevSteklov, bobylev_steklov_motion
+from heavytop.exact.cases.bobylev_steklov import BobylevSteklov, bobylev_steklov_motion
 from heavytop.exact.catalogue import find
-from heavytop.exact.motion import initial_xi
+from heavytop.exact.closed_form import ALL, attitude_of, initial_xi, renamed_state, renamed_top
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import (
     assert_agrees,

@@ -11,11 +11,11 @@ from flint import arb
 
 import heavytop as ht
 from heavytop.errors import InputError, OutOfReach
-from heavytop.exact.balls import midpoint, radius
 from heavytop.exact.bodies import BodyMotion, resolve
+from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.top.attitude import Attitude, multiplied, transposed
+from heavytop.top.bodies import IDENTITY, principal_axes
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
-from heavytop.top.principal import IDENTITY, principal_axes
 from support.full_tensor import integrate, rotation
 
 BITS = 110
@@ -171,7 +171,7 @@ def test_what_rounding_moves_is_bounded_and_small(bits: int) -> None:
 
 def test_an_enclosure_that_ignores_the_rounding_misses_the_true_motion() -> None:
     """A planted fault: data rounded to 40 bits without their uncertainty give balls that do not hold the truth."""
-    from heavytop.exact.validated import Validated
+    from heavytop.exact.enclosure.run import Validated
 
     start = ht.State((1, 2, -3), attitude=ht.Attitude.quaternion(1, 0, 0, 0))
     true = BodyMotion(LOPSIDED, start).state(Fraction(2), 120)

@@ -9,11 +9,10 @@ import pytest
 from flint import arb
 
 from heavytop.errors import NotInClass, OutOfReach
-from heavytop.exact.attitude import attitude_of
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
-from heavytop.exact.balls import working_precision
+from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
 from heavytop.exact.catalogue import find
-from heavytop.exact.delone import Delone, DeloneHomoclinic
+from heavytop.exact.closed_form import ALL, attitude_of, renamed_state, renamed_top
+from heavytop.exact.flint.balls import working_precision
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import (
     assert_agrees,

@@ -11,14 +11,11 @@ import numpy as np
 import pytest
 from flint import arb
 
-from heavytop.exact import derivatives as module
-from heavytop.exact.balls import midpoint, radius, working_precision
-from heavytop.exact.derivatives import Derivatives, derivatives
-from heavytop.exact.enclosure import Errors, Node, start_node, step
-from heavytop.exact.field_derivatives import moved
-from heavytop.exact.singular import largest_singular_value
-from heavytop.exact.step_derivatives import step_derivatives
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure import derivatives as module
+from heavytop.exact.enclosure.derivatives import Derivatives, derivatives, moved, step_derivatives
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.enclosure.step import Errors, Node, start_node, step
+from heavytop.exact.flint.balls import largest_singular_value, midpoint, radius, working_precision
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 from support.derivative_laws import BITS, SIX, chain, difference, holds, known, largest_radius, laws, of

@@ -9,12 +9,13 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass, OutOfReach
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
-from heavytop.exact.balls import midpoint
+from heavytop.exact.cases.dokshevich import Dokshevich, dokshevich_motion
 from heavytop.exact.catalogue import find
-from heavytop.exact.dokshevich import Dokshevich, dokshevich_motion
-from heavytop.exact.validated import Validated
-from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import midpoint
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import dot
 from support.proofs import (
     AsRounded,
     assert_algebraic_solves,

@@ -12,15 +12,16 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass
-from heavytop.exact.balls import ball, midpoint, radius, working_precision
-from heavytop.exact.ershkov_partial import ErshkovPartial
-from heavytop.exact.gyrostat import Gyrostat
-from heavytop.exact.lagrange import Lagrange
-from heavytop.exact.validated import Validated
-from heavytop.exact.weierstrass import DegenerateLattice, Lattice
-from heavytop.top.angles import perpendicular
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.cases.gyrostat import Gyrostat
+from heavytop.exact.cases.lagrange import Lagrange
+from heavytop.exact.elliptic.weierstrass import DegenerateLattice, Lattice
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
+from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import cross, dot
 from support.elliptic_helpers import (
     assert_same,
     assert_solves_its_equations,

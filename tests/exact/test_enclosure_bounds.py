@@ -13,12 +13,9 @@ import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
 
 from heavytop.exact import enclosure
-from heavytop.exact.balls import midpoint, radius, working_precision
-from heavytop.exact.enclosure import CAP, Errors, Node, start_node, step
-from heavytop.exact.quadratic import quadratic
-from heavytop.exact.scaled_motion import ScaledMotion
-from heavytop.exact.step_series import Whole
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import ScaledMotion, Validated
+from heavytop.exact.enclosure.step import CAP, Errors, Node, Whole, quadratic, start_node, step
+from heavytop.exact.flint.balls import midpoint, radius, working_precision
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 

@@ -7,15 +7,13 @@ from random import Random
 import pytest
 
 from heavytop.errors import Contradiction
-from heavytop.exact import scaled_motion
-from heavytop.exact.balls import midpoint, radius, relative_bits
-from heavytop.exact.enclosure import start_node, step
-from heavytop.exact.scaled_motion import ScaledMotion
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure import run, start_node, step
+from heavytop.exact.enclosure.run import ScaledMotion, Validated
+from heavytop.exact.flint.balls import midpoint, radius, relative_bits
+from heavytop.multiword.fixed_point import fixed_point_run
+from heavytop.multiword.fixed_point.certified_series import Carrier, Series
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.words import fixed
-from heavytop.words.proven import Carrier, Series
 
 TOP = HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"))
 START = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))
@@ -25,7 +23,7 @@ XI = (Fraction(0), Fraction(1), Fraction(0))
 def in_integers(monkeypatch, solution, time, bits):
     """The same by exact integers, with more bits: its own pilot, steps and roundings."""
     with monkeypatch.context() as m:
-        m.setattr(scaled_motion, "_GRIDS", ())
+        m.setattr(run, "_GRIDS", ())
         return solution.state(time, bits + 64)
 
 
@@ -91,7 +89,7 @@ def test_random_motions_with_their_attitude_are_held(monkeypatch):
         time = Fraction(random.randint(70, 99), 7)
         balls = one.attitude(time, 100)
         with monkeypatch.context() as m:
-            m.setattr(scaled_motion, "_GRIDS", ())
+            m.setattr(run, "_GRIDS", ())
             require_inside(balls, other.attitude(time, 200))
         assert used_words(one)
         assert not used_words(other)
@@ -131,15 +129,15 @@ def test_moments_of_no_body_go_to_integers_where_their_ratio_is_large():
 
 def test_machine_code_that_is_wrong_is_caught_before_it_is_used(monkeypatch):
     """Constants that are off in the last word by 2^20 units: nothing but the exact comparison could tell."""
-    true = fixed.constants
+    true = fixed_point_run.constants
 
     def damaged(problem, grid, over, factor=Fraction(1)):
         found = true(problem, grid, over, factor)
         found[8 * (grid.words - 1)] += 2.0**20 * grid.unit(grid.words - 1)
         return found
 
-    monkeypatch.setattr(scaled_motion, "_seen_right", set())
-    monkeypatch.setattr(fixed, "constants", damaged)
+    monkeypatch.setattr(run, "_seen_right", set())
+    monkeypatch.setattr(fixed_point_run, "constants", damaged)
     with pytest.raises(Contradiction, match="Machine code in 138 bits"):
         Validated(TOP, START).state(Fraction(8), 60)
 

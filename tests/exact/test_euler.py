@@ -9,8 +9,8 @@ import pytest
 from flint import arb
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import working_precision
-from heavytop.exact.euler import Euler
+from heavytop.exact.cases.euler import Euler
+from heavytop.exact.flint.balls import working_precision
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 

@@ -13,11 +13,11 @@ from flint import ctx
 from exact.test_catalogue import SAMPLES
 from heavytop.errors import NotInClass, OutOfReach
 from heavytop.exact import catalogue
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
-from heavytop.exact.balls import radius, relative_bits
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.catalogue import find
-from heavytop.exact.conditions import hold
-from heavytop.exact.ershkov_partial import ErshkovPartial
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
+from heavytop.exact.flint.balls import radius, relative_bits
+from heavytop.exact.solution import hold
 from heavytop.measure.reference import reference
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State

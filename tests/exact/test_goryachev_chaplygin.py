@@ -6,9 +6,9 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import NotInClass
-from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
-from heavytop.exact.resting import Rest
-from heavytop.exact.validated import Validated
+from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.separable.abel import Rest
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_narrow, assert_solves, positive, rational

@@ -8,12 +8,10 @@ from flint import fmpq_mpoly_ctx
 
 from exact.test_goryachev_chaplygin import UP, motion_from, random_motion
 from heavytop.errors import OutOfReach
-from heavytop.exact.attitude import attitude_of
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
-from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplyginAttitude, Torus, _motion
 from heavytop.exact.catalogue import find
-from heavytop.exact.goryachev_chaplygin import _motion
-from heavytop.exact.goryachev_chaplygin_attitude import GoryachevChaplyginAttitude, Torus
+from heavytop.exact.closed_form import ALL, attitude_of, renamed_state, renamed_top
+from heavytop.exact.flint.balls import ball, working_precision
 from support.proofs import assert_attitude, assert_meets
 
 F = Fraction

@@ -8,13 +8,13 @@ from time import process_time
 import pytest
 
 from heavytop.errors import NotInClass, OutOfReach
-from heavytop.exact import goryachev_chaplygin_rest
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
-from heavytop.exact.balls import working_precision
+from heavytop.exact.cases import goryachev_chaplygin_rest
+from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin
+from heavytop.exact.cases.goryachev_chaplygin_rest import GoryachevChaplyginRest
 from heavytop.exact.catalogue import find
-from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin
-from heavytop.exact.goryachev_chaplygin_rest import GoryachevChaplyginRest
-from heavytop.exact.validated import Validated
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import working_precision
 from heavytop.measure.reference import reference
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple

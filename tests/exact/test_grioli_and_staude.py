@@ -7,10 +7,9 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, NotInClass
-from heavytop.exact.catalogue import find
-from heavytop.exact.ershkov_partial import ErshkovPartial
-from heavytop.exact.grioli import Grioli, grioli_motion
-from heavytop.exact.staude import (
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.cases.grioli import Grioli, grioli_motion
+from heavytop.exact.cases.staude import (
     Staude,
     staude_directions,
     staude_motion,
@@ -19,8 +18,10 @@ from heavytop.exact.staude import (
     staude_rotations,
     staude_stability,
 )
+from heavytop.exact.catalogue import find
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import cross, dot
 from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 
 

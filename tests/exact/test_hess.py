@@ -9,16 +9,15 @@ import pytest
 from flint import acb, arb, arb_mat
 
 from heavytop.errors import NotInClass, OutOfReach
-from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.cases.hess import Hess, HessPendulum
+from heavytop.exact.cases.hess_transfer import MOST_SEGMENTS, RATIO, Segment, System2, Transfer, plan
 from heavytop.exact.catalogue import find
-from heavytop.exact.hess import Hess
-from heavytop.exact.hess_pendulum import HessPendulum
-from heavytop.exact.hess_transfer import MOST_SEGMENTS, RATIO, Segment, System2, Transfer, plan
-from heavytop.exact.scales import unit_of_time
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import ball, midpoint, radius, unit_of_time, working_precision
 from heavytop.measure.reference import reference
 from heavytop.top.equations import HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import dot
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 F = Fraction

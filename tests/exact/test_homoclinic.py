@@ -7,10 +7,10 @@ import pytest
 import sympy
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import FUNCTIONS, ball, midpoint, radius, working_precision
-from heavytop.exact.delone import DeloneHomoclinic
-from heavytop.exact.ershkov_partial import ErshkovPartial, hyperbolic, hyperbolic_angles
-from heavytop.top.angles import attitude_from_angles, gamma_from_angles, perpendicular
+from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial, hyperbolic, hyperbolic_angles
+from heavytop.exact.flint.balls import FUNCTIONS, ball, midpoint, radius, working_precision
+from heavytop.top.attitude import attitude_from_angles, gamma_from_angles, perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters
 from support.helpers import VECTORS, positive
 

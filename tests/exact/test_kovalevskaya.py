@@ -7,14 +7,11 @@ import pytest
 from flint import acb, acb_series, arb
 
 from heavytop.errors import NotInClass
-from heavytop.exact.balls import Undecided, ball, midpoint, working_precision
-from heavytop.exact.closed_form import series_length
-from heavytop.exact.kovalevskaya import Kovalevskaya
-from heavytop.exact.kovalevskaya_abel import AbelMotion, _fourth_root
-from heavytop.exact.kovalevskaya_level import ORDERS, Level, start_of
-from heavytop.exact.kovalevskaya_theta import ThetaMotion
-from heavytop.exact.resting import Rest
-from heavytop.exact.validated import Validated
+from heavytop.exact.cases.kovalevskaya import AbelMotion, Kovalevskaya, _fourth_root
+from heavytop.exact.cases.kovalevskaya_theta import ORDERS, Level, ThetaMotion, start_of
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import Undecided, ball, midpoint, series_length, working_precision
+from heavytop.exact.separable.abel import Rest
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_narrow, assert_solves, positive, rational, triple
 

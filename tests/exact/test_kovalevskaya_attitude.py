@@ -7,14 +7,13 @@ import pytest
 from flint import arb
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.attitude import attitude_of
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
-from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.cases.kovalevskaya import Kovalevskaya, along_gamma, level_vector
+from heavytop.exact.cases.kovalevskaya_theta import Level, start_of
 from heavytop.exact.catalogue import find
-from heavytop.exact.kovalevskaya import Kovalevskaya
-from heavytop.exact.kovalevskaya_attitude import along_gamma, level_vector
-from heavytop.exact.kovalevskaya_level import Level, start_of
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from heavytop.exact.closed_form import ALL, attitude_of, renamed_state, renamed_top
+from heavytop.exact.flint.balls import ball, working_precision
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import cross, dot
 from support.proofs import assert_attitude, assert_meets, positive, rational, triple
 
 F = Fraction

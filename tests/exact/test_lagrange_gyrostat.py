@@ -6,11 +6,11 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import NotInClass
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
-from heavytop.exact.balls import midpoint
+from heavytop.exact.cases.lagrange import LagrangeGyrostat
 from heavytop.exact.catalogue import find
-from heavytop.exact.lagrange_gyrostat import LagrangeGyrostat
-from heavytop.exact.validated import Validated
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import midpoint
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational

@@ -7,7 +7,7 @@ import pytest
 from flint import arb
 
 from heavytop.errors import NotInClass
-from heavytop.exact.pendulum import Pendulum
+from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_agrees, assert_attitude, assert_narrow, assert_solves, positive, rational, triple
 

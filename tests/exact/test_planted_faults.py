@@ -6,9 +6,9 @@ from fractions import Fraction
 import pytest
 from flint import arb
 
-from heavytop.exact.axes import Renamed
-from heavytop.exact.balls import working_precision
-from heavytop.exact.euler import Euler
+from heavytop.exact.cases.euler import Euler
+from heavytop.exact.closed_form import Renamed
+from heavytop.exact.flint.balls import working_precision
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_agrees, assert_attitude, assert_solves
 

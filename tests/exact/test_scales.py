@@ -9,10 +9,9 @@ import pytest
 
 from exact.test_every_naming import MOTIONS
 from heavytop.errors import OutOfReach
-from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.catalogue import find
-from heavytop.exact.scales import unit_of_time
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import ball, midpoint, radius, unit_of_time, working_precision
 from heavytop.measure.certify import bits_of
 from heavytop.measure.reference import reference
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP

@@ -8,12 +8,12 @@ from time import process_time
 import pytest
 
 from heavytop.errors import NotInClass
+from heavytop.exact.cases.lagrange import Lagrange, SphericalTop
+from heavytop.exact.cases.pendulum import Pendulum
 from heavytop.exact.catalogue import find, matches
-from heavytop.exact.lagrange import Lagrange
-from heavytop.exact.pendulum import Pendulum
-from heavytop.exact.spherical import SphericalTop
-from heavytop.exact.validated import Validated
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
+from heavytop.exact.enclosure.run import Validated
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import cross, dot
 from support.proofs import assert_attitude, assert_meets, assert_narrow, assert_solves, positive, rational, triple
 
 F = Fraction

@@ -7,11 +7,11 @@ import pytest
 from flint import fmpq_mpoly_ctx
 
 from heavytop.errors import LevelNotDone, NotInClass
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
+from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin, Sretensky
 from heavytop.exact.catalogue import find
-from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin, Sretensky
-from heavytop.exact.resting import Rest
-from heavytop.exact.validated import Validated
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.separable.abel import Rest
 from heavytop.top.equations import HEAVY_GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational

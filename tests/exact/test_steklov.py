@@ -6,10 +6,10 @@ from fractions import Fraction
 import pytest
 
 from heavytop.errors import InputError, NotInClass
-from heavytop.exact.balls import midpoint, radius
+from heavytop.exact.cases.one_interval import Steklov, quadratics, steklov_motion
 from heavytop.exact.catalogue import find
-from heavytop.exact.steklov import Steklov, quadratics, steklov_motion
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.top.heavy_top import HeavyTop, State
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 

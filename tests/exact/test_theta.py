@@ -6,11 +6,9 @@ from fractions import Fraction
 import pytest
 from flint import acb, arb, arb_series, ctx
 
-from heavytop.exact.balls import ball, radius, working_precision
-from heavytop.exact.closed_form import series_length
-from heavytop.exact.jacobi import jacobi, wave
-from heavytop.exact.theta import Theta
-from heavytop.exact.weierstrass import Lattice, from_invariants
+from heavytop.exact.elliptic.jacobi import jacobi, wave
+from heavytop.exact.elliptic.weierstrass import Lattice, Theta, from_invariants
+from heavytop.exact.flint.balls import ball, radius, series_length, working_precision
 
 TINY = Fraction(1, 10**30)
 PARAMETERS = [

@@ -6,8 +6,8 @@ import pytest
 from flint import acb, arb, arb_mat
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.balls import working_precision
-from heavytop.exact.two_frequencies import Factor, LineIntegral, Symmetry, counts, error_of, points
+from heavytop.exact.flint.balls import working_precision
+from heavytop.exact.separable.abel import Factor, LineIntegral, Symmetry, counts, error_of, points
 
 BITS = 120
 SYMMETRIES = [Symmetry(*pair) for pair in product((False, True), repeat=2)]

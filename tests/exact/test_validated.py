@@ -12,16 +12,16 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, OutOfReach
-from heavytop.exact import enclosure, runs
-from heavytop.exact.balls import midpoint, radius, relative_bits, working_precision
-from heavytop.exact.delone import DeloneHomoclinic
-from heavytop.exact.ershkov_partial import ErshkovPartial
-from heavytop.exact.quadratic import quadratic
-from heavytop.exact.validated import Validated
+from heavytop.exact import enclosure
+from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.enclosure import run
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.enclosure.step import quadratic
+from heavytop.exact.flint.balls import midpoint, radius, relative_bits, working_precision
 from heavytop.measure.certify import bits_of
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System, area, energy, gamma_squared
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.integrals import area, energy, gamma_squared
 
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text(encoding="utf-8"))
 BITS_OF_60_DIGITS = 200
@@ -306,7 +306,7 @@ def test_where_the_bits_of_the_pilot_do_no_step_is_taken_twice(before, monkeypat
         steps.append(node.time)
         return enclosure.step(field, node, *arguments)
 
-    monkeypatch.setattr(runs, "step", counted)
+    monkeypatch.setattr(run, "step", counted)
     found = solution.state(Fraction(8), 203)
     assert [(midpoint(b), radius(b)) for b in found] == [(midpoint(b), radius(b)) for b in fresh]
     # the step that covers the time is known to the pilot by its end alone

@@ -7,9 +7,16 @@ import pytest
 from flint import acb, arb
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.balls import ball, radius, working_precision
-from heavytop.exact.quartic import QuarticMotion
-from heavytop.exact.weierstrass import DegenerateLattice, Lattice, _cubic_roots, as_ball, from_invariants, thetas
+from heavytop.exact.elliptic.quartic import QuarticMotion
+from heavytop.exact.elliptic.weierstrass import (
+    DegenerateLattice,
+    Lattice,
+    _cubic_roots,
+    as_ball,
+    from_invariants,
+    thetas,
+)
+from heavytop.exact.flint.balls import ball, radius, working_precision
 
 NARROW = Fraction(1, 10**35)
 TINY = Fraction(1, 10**30)

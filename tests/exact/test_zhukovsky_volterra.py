@@ -8,14 +8,15 @@ import pytest
 
 import heavytop as ht
 from heavytop.errors import LevelNotDone, NotInClass
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
-from heavytop.exact.balls import midpoint
+from heavytop.exact.cases.gyrostat import Gyrostat
+from heavytop.exact.cases.zhukovsky_volterra import ZhukovskyVolterra
 from heavytop.exact.catalogue import find
-from heavytop.exact.gyrostat import Gyrostat
-from heavytop.exact.validated import Validated
-from heavytop.exact.zhukovsky_volterra import ZhukovskyVolterra
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import midpoint
 from heavytop.top.equations import HEAVY_GYROSTAT
-from heavytop.top.heavy_top import HeavyTop, State, dot
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import dot
 from support.proofs import assert_attitude, assert_narrow, assert_solves, positive, rational
 
 F = Fraction

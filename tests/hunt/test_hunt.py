@@ -12,9 +12,8 @@ from heavytop.kinds import KINDS
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import exact
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.hunt.draw import FAMILIES, MOST_TURNS, drawn, possible, turns
-from heavytop.suite.hunt.measured import Meter
-from heavytop.suite.hunt.shrink import digits
+from heavytop.suite.hunt.measured import FAMILIES, MOST_TURNS, Meter, drawn, possible, turns
+from heavytop.suite.hunt.search import digits
 from heavytop.suite.plan import expand, load
 from support.in_process import heavytop
 

@@ -8,10 +8,10 @@ from time import perf_counter
 
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.kinds import KINDS, work_precision
 from heavytop.records import Row
-from heavytop.suite.cases import CASES
-from heavytop.suite.workers import rows as measured
+from heavytop.suite.run import rows as measured
 from support.reports import expand, load
 
 MODULE = '''

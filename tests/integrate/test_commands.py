@@ -16,15 +16,15 @@ import numpy as np
 import pytest
 
 import heavytop as ht
+from heavytop.cases import CASES
 from heavytop.errors import InputError, PeerFailed, Unsupported
 from heavytop.integrate import peers
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers import command as commands
 from heavytop.integrate.peers.command import Command, Session, number_text
 from heavytop.integrate.peers.source import commands_in, named
-from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, real
-from heavytop.suite.cases import CASES
 from heavytop.suite.integrator_check import check
 from heavytop.top.equations import GYROSTAT
 from heavytop.written_numbers import number as written

@@ -9,16 +9,16 @@ from threading import get_ident
 import numpy
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
-from heavytop.integrate import lanes
 from heavytop.integrate.ensemble import propagate_ensemble
-from heavytop.integrate.lanes import Lanes
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka import lanes
+from heavytop.integrate.heyoka.lanes import Lanes
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, real
-from heavytop.suite.cases import CASES
-from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import perpendicular
 from heavytop.top.heavy_top import HeavyTop, State
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))

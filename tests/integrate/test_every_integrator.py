@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from heavytop.cases import CASES, Case
 from heavytop.errors import InputError, PeerFailed
-from heavytop.exact.validated import Validated
-from heavytop.integrate import peers, reach, registry
+from heavytop.exact.enclosure.run import Validated
+from heavytop.integrate import integrator, peers, registry
 from heavytop.integrate.broken import FAULTS, Fault
 from heavytop.integrate.integrator import INTEGRATORS, load
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, exact, number, real
-from heavytop.suite.cases import CASES, Case
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 from support.in_process import heavytop
@@ -262,7 +262,7 @@ def need(name: str) -> None:
 @pytest.fixture(autouse=True)
 def everything_in_reach(monkeypatch: pytest.MonkeyPatch) -> None:
     """The guard stands before the integrators: here they are tried themselves."""
-    monkeypatch.setattr(reach, "MOST_STEPS", 10**400)
+    monkeypatch.setattr(integrator, "MOST_STEPS", 10**400)
 
 
 @pytest.mark.parametrize("clause", CONTRACT, ids=lambda clause: clause.__name__)

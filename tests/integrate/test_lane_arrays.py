@@ -5,13 +5,12 @@ from fractions import Fraction
 import numpy
 import pytest
 
-from heavytop.exact.balls import midpoint, radius
-from heavytop.integrate.engines import arrays
+from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.integrate.ensemble import propagate_ensemble
-from heavytop.integrate.lane_grid import states_on_a_grid
-from heavytop.integrate.pair_arrays import Numerators
+from heavytop.integrate.heyoka.engines import arrays
+from heavytop.integrate.heyoka.lanes import states_on_a_grid
+from heavytop.integrate.multiword.lanes import Numerators, double_double_states
 from heavytop.integrate.trajectory import Problem
-from heavytop.integrate.words_grid import double_double_states
 from heavytop.measure.truth import Known, known_motion
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, exact
 from heavytop.suite.sweeps import Random

@@ -8,14 +8,15 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.display import Lines, Table
 from heavytop.errors import InputError
-from heavytop.integrate import stepper, words
-from heavytop.integrate.taylor import first_steps, propagate
+from heavytop.integrate.heyoka import motions
+from heavytop.integrate.heyoka.motions import first_steps, propagate
+from heavytop.integrate.multiword import motions as multiword_motions
+from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Outcome, Trajectory
-from heavytop.integrate.words import propagate_words
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact, number, parse
-from heavytop.suite.cases import CASES
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import RoundedTimes, check_times
 
@@ -116,7 +117,7 @@ def test_an_equilibrium_and_units_of_any_size(name: str) -> None:
 
 def test_a_run_of_few_steps_between_many_times_is_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = []
-    monkeypatch.setattr(stepper.Stepper, "sample", lambda *_: taken.append(1))
+    monkeypatch.setattr(motions.Stepper, "sample", lambda *_: taken.append(1))
     assert len(propagate(CASE.top, CASE.start, regular(1000, 50), DOUBLE).states) == 1001
     assert taken == []
 
@@ -209,7 +210,7 @@ def test_states_out_of_two_words_have_the_bits_of_exact_numbers(name: str, monke
     asked = {"xi": (Fraction(1), Fraction(0), Fraction(0))}
     start = State(CASE.start.omega, (0, 0, 1))
     found = [propagate_words(CASE.top, start, times, precision, **asked)]
-    monkeypatch.setattr(words, "sums_of_two", lambda *_: None)
+    monkeypatch.setattr(multiword_motions, "sums_of_two", lambda *_: None)
     found.append(propagate_words(CASE.top, start, times, precision, **asked))
     quick, exactly = ([[exact(value) for value in state] for state in run.states] for run in found)
     assert quick == exactly

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from heavytop.cases import CASES
+from heavytop.compare.noise import Policy
 from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate import peers
 from heavytop.integrate.peers import contract
 from heavytop.kinds import work_precision
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import Report
-from heavytop.report.junit import comparison_junit
-from heavytop.report.policy import Policy
-from heavytop.suite.cases import CASES
+from heavytop.render.export import comparison_junit
 from support.helpers import run_peer, without_progress
 from support.reports import all_good, compare, expand, html, load, measure, plan_of
 

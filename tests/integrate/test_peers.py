@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.errors import InputError
 from heavytop.integrate import peers
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.integrator import INTEGRATORS
 from heavytop.integrate.peers.double import Solved, count, double_peer, rates
 from heavytop.integrate.peers.mpmath_taylor import odefun
-from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.precision import DOUBLE, QUAD, exact, real
-from heavytop.suite.cases import CASES
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from support.helpers import run_peer
 

@@ -5,15 +5,14 @@ from fractions import Fraction
 import numpy
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.errors import Contradiction, InputError
-from heavytop.exact.validated import Validated
-from heavytop.integrate import engines
-from heavytop.integrate.engines import compiled
-from heavytop.integrate.selfcheck import GAMMA, OMEGA, PARAMETERS, check, derivatives
-from heavytop.integrate.taylor import propagate
+from heavytop.exact.enclosure.run import Validated
+from heavytop.integrate.heyoka import engines
+from heavytop.integrate.heyoka.engines import GAMMA, OMEGA, PARAMETERS, check, compiled, derivatives
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, real
-from heavytop.suite.cases import CASES
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 

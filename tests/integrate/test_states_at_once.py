@@ -6,11 +6,11 @@ from random import Random
 import numpy
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.errors import PeerFailed
 from heavytop.integrate.peers.command import Reply, Request, _times_written
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, QUAD
-from heavytop.suite.cases import CASES
 
 CASE = CASES["lagrange"]
 TIMES = [Fraction(k, 8) for k in range(1, 10)]

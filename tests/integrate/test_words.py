@@ -9,21 +9,23 @@ from random import Random
 import pytest
 
 from heavytop.errors import Contradiction, InputError
+from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.catalogue import find
-from heavytop.exact.gyrostat import Gyrostat
 from heavytop.exact.solution import ExactSolution
-from heavytop.integrate import words as words_module
-from heavytop.integrate import words_engines
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.multiword import engines
+from heavytop.integrate.multiword import motions as words_module
+from heavytop.integrate.multiword.lanes import propagate_words_ensemble
+from heavytop.integrate.multiword.motions import propagate_words, sums_of_two
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
-from heavytop.integrate.words import propagate_words, sums_of_two
-from heavytop.integrate.words_ensemble import propagate_words_ensemble
+from heavytop.multiword.codegen import recurrence
+from heavytop.multiword.codegen.machine_code import once
+from heavytop.multiword.double_double import double_double_run, steps
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, Precision, exact, number, real
-from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
-from heavytop.top.heavy_top import HeavyTop, State, dot
-from heavytop.words import double_double, floating, recurrence
-from heavytop.words.machine import once
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import dot
 from support.helpers import VECTORS, start_of, top_of, unit_vector
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
@@ -284,8 +286,8 @@ def test_heyoka_refuses_double_double() -> None:
 
 def test_wrong_machine_code_is_caught_by_the_step_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wrong sign in one lane, in one of the two recurrences or in both."""
-    monkeypatch.setattr(floating, "machine", once(double_double.build))
-    monkeypatch.setattr(words_engines, "_made", {})
+    monkeypatch.setattr(double_double_run, "machine", once(steps.build))
+    monkeypatch.setattr(engines, "_made", {})
     damaged = [list(part) for part in recurrence.GATHERED]
     damaged[2][4] = (6, -1)
     monkeypatch.setattr(recurrence, "GATHERED", tuple(map(tuple, damaged)))

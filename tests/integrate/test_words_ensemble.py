@@ -6,12 +6,12 @@ from random import Random
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.integrate import words_lanes
+from heavytop.integrate.multiword import lanes
+from heavytop.integrate.multiword.lanes import propagate_words_ensemble
+from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.integrate.words import propagate_words
-from heavytop.integrate.words_ensemble import propagate_words_ensemble
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, QUAD, exact
-from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -70,8 +70,8 @@ def test_every_tolerance_is_kept_in_lanes(exponent: int) -> None:
 def test_no_bit_depends_on_order_threads_chunks_or_company(monkeypatch: pytest.MonkeyPatch) -> None:
     given = problems()
     runs = propagate_words_ensemble(given, TIMES, threads=1)
-    monkeypatch.setattr(words_lanes, "_FIRST_CHUNK", 3)
-    monkeypatch.setattr(words_lanes, "CHUNK_SECONDS", 0.0)
+    monkeypatch.setattr(lanes, "_FIRST_CHUNK", 3)
+    monkeypatch.setattr(lanes, "CHUNK_SECONDS", 0.0)
     turned = propagate_words_ensemble(given[::-1], TIMES, threads=3)[::-1]
     alone = [propagate_words_ensemble([problem], TIMES)[0] for problem in given[:7]]
     few = propagate_words_ensemble(given, TIMES[-1:])
@@ -85,7 +85,7 @@ def test_no_bit_depends_on_order_threads_chunks_or_company(monkeypatch: pytest.M
 def test_motions_that_outgrow_n0_go_on_where_they_were_and_are_right(monkeypatch: pytest.MonkeyPatch) -> None:
     given = problems()
     runs = propagate_words_ensemble(given, TIMES)
-    monkeypatch.setattr(words_lanes, "first_low_order", lambda arithmetic: 2)
+    monkeypatch.setattr(lanes, "first_low_order", lambda arithmetic: 2)
     raised = propagate_words_ensemble(given, TIMES, threads=2)
     for a, b in zip(runs, raised, strict=True):
         assert a.times == b.times

@@ -8,22 +8,19 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from heavytop.compare.compare import compare
+from heavytop.compare.noise import Policy
+from heavytop.document.document import Block, Chart, Headline, Section, Sources, Value
+from heavytop.document.document import Table as Cells
 from heavytop.kinds import KINDS, Kind
 from heavytop.measure.scalar import of_fraction
 from heavytop.records import SCHEMA, Against, Beside, Quantity, Report, Row, RowKey, Subject, by_name
-from heavytop.report.compare import compare
-from heavytop.report.document import Block, Chart, Headline, Value
-from heavytop.report.document import Table as Cells
-from heavytop.report.html import report_page
-from heavytop.report.policy import Policy
-from heavytop.report.section import Section, Sources
-from heavytop.report.terminal import summary
+from heavytop.render.page import report_page
+from heavytop.render.terminal import summary
 from heavytop.suite.checkpoint import Checkpoint, Saved
-from heavytop.suite.kind import Find, Table
 from heavytop.suite.plan import expand, load
-from heavytop.suite.rows import exact_row
+from heavytop.suite.rows import Find, Table, Task, exact_row
 from heavytop.suite.run import run
-from heavytop.suite.task import Task
 
 WEIGHT = Quantity("toy_weight")
 PLAN = """name = "toys"

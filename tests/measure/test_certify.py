@@ -9,13 +9,13 @@ import pytest
 from flint import arb
 
 from heavytop.errors import Contradiction, InputError, OutOfReach
-from heavytop.exact.axes import Renamed
-from heavytop.exact.balls import midpoint, radius, working_precision
-from heavytop.exact.delone import DeloneHomoclinic
-from heavytop.exact.ershkov_partial import ErshkovPartial
-from heavytop.exact.euler import Euler
-from heavytop.exact.kovalevskaya import Kovalevskaya
-from heavytop.exact.validated import Validated
+from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.cases.euler import Euler
+from heavytop.exact.cases.kovalevskaya import Kovalevskaya
+from heavytop.exact.closed_form import Renamed
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import midpoint, radius, working_precision
 from heavytop.measure.certify import _digits, agreed_digits, certify
 from heavytop.measure.reference import reference
 from heavytop.measure.scalar import GUARD_BITS

@@ -5,15 +5,14 @@ from fractions import Fraction
 import pytest
 from flint import arb
 
-from heavytop.claims.ershkov import PartialCase
+from heavytop.claims.library.ershkov import PartialCase
 from heavytop.errors import OutOfReach
-from heavytop.exact.balls import ball, midpoint, radius, working_precision
-from heavytop.exact.delone import DeloneHomoclinic
+from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds.claim_model import true_motion
-from heavytop.measure.claim_error import claim_attitude, exact_claim, model_error
-from heavytop.measure.computed_reference import ComputedReference, compute
-from heavytop.measure.parting import CLAIM_XI
+from heavytop.measure.claim_error import CLAIM_XI, claim_attitude, exact_claim, model_error
+from heavytop.measure.truth import ComputedReference, compute
 from support.helpers import VECTORS
 
 TWO = PartialCase(Fraction(1), Fraction(2), Fraction(1))
@@ -74,7 +73,7 @@ def test_the_computed_truth_and_the_closed_form_agree_where_there_are_both() -> 
 
 
 def test_a_computed_reference_that_does_not_arrive_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heavytop.measure.computed_reference.EFFORT", 1e-4)
+    monkeypatch.setattr("heavytop.measure.truth.EFFORT", 1e-4)
     with pytest.raises(OutOfReach, match="stopped at the step limit"):
         computed(SIX.solves, [Fraction(10)])
 

@@ -6,12 +6,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from heavytop.measure.diagnosis import diagnose
-from heavytop.measure.suspects import motion
-from heavytop.measure.written import rounding
+from heavytop.cases import CASES
+from heavytop.diagnose.diagnosis import diagnose
+from heavytop.diagnose.samples import motion
+from heavytop.measure.scalar import rounding
 from heavytop.precision import DOUBLE, QUAD
-from heavytop.report.diagnosis_text import diagnosis_text
-from heavytop.suite.cases import CASES
+from heavytop.render.score import diagnosis_text
 from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
 from heavytop.top.heavy_top import HeavyTop, State
 

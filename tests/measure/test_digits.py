@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.integrate.trajectory import Outcome, Problem
-from heavytop.measure.digits import RELATIVE, digits_kept, digits_text
+from heavytop.measure.scalar import RELATIVE, digits_kept, digits_text
 from heavytop.measure.truth import known_motion
 from heavytop.precision import DOUBLE, QUAD
 from heavytop.records import SCHEMA, Metric, Report
-from heavytop.report import digits_chart
-from heavytop.report.overview import worst
-from heavytop.suite.cases import CASES
-from heavytop.suite.given import Given
+from heavytop.render import plots
+from heavytop.render.text import worst
 from heavytop.suite.score import score
+from heavytop.trajectories.observed import Given
 from support import in_process
 from support.report_helpers import error, row
 from support.reports import html, replace, summary
@@ -119,7 +119,7 @@ def test_every_surface_says_the_same(tmp_path: Path) -> None:
     lines = [line.split() for line in command("show", tmp_path / "out").splitlines()]
     assert [said in line for line in lines if line[:1] == ["motion"]] == [True]
     report = Report(SCHEMA, {"name": "one"}, {}, [score(motion)])
-    (drawn,) = digits_chart.digits([("", report)]).rows
+    (drawn,) = plots.digits([("", report)]).rows
     assert said in drawn
     assert f"{said} of 16 digits left at T = 4" in html.report_page(report)
 

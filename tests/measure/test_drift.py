@@ -5,18 +5,17 @@ from fractions import Fraction
 import numpy
 import pytest
 
-from heavytop.exact.balls import ball, working_precision
-from heavytop.exact.delone import DeloneHomoclinic
-from heavytop.integrate.taylor import propagate
+from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.flint.balls import ball, working_precision
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.drift import Drift
 from heavytop.measure.scalar import metric, of_fraction, root, text, to_ball
-from heavytop.measure.solution_error import SolutionError, split
+from heavytop.measure.scorer import Drift, SolutionError, split
 from heavytop.measure.truth import Truth
 from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, EXTENDED, QUAD, exact, number, real
 from heavytop.records import Against
+from heavytop.top.equations import holding
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.integrals import holding
 
 TOP = HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0))
 START = State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5"))

@@ -4,13 +4,13 @@ from fractions import Fraction
 
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.errors import Contradiction
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
-from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
+from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.truth import Known, certified, known_motion
 from heavytop.precision import DOUBLE, QUAD
-from heavytop.suite.cases import CASES
 from heavytop.top.heavy_top import HeavyTop, State
 
 

@@ -7,16 +7,15 @@ from itertools import accumulate, pairwise
 import numpy
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.errors import PeerFailed
 from heavytop.integrate.broken import FAULTS
+from heavytop.integrate.heyoka.motions import first_steps, propagate
 from heavytop.integrate.integrator import INTEGRATORS
-from heavytop.integrate.taylor import first_steps, propagate
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.integrator import ChosenIntegrator
-from heavytop.measure.local_error import LocalError
-from heavytop.measure.single_calls import single_calls
+from heavytop.measure.local_error import LocalError, single_calls
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, exact
-from heavytop.suite.cases import CASES
 from heavytop.top.heavy_top import HeavyTop, State
 
 

@@ -5,11 +5,10 @@ from itertools import pairwise
 
 import pytest
 
-from heavytop.claims.ershkov import PartialCase
+from heavytop.claims.library.ershkov import PartialCase
 from heavytop.errors import OutOfReach
-from heavytop.measure import parting as module
-from heavytop.measure.claim_error import exact_claim
-from heavytop.measure.parting import CLOSE, PARTED, parting, true_solution
+from heavytop.measure import claim_error as module
+from heavytop.measure.claim_error import CLOSE, PARTED, exact_claim, parting, true_solution
 from heavytop.precision import exact
 from support.reports import expand, load, measure
 

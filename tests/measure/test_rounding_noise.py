@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from heavytop.cases import CASES
 from heavytop.measure.rounding_noise import MOST_SEEDS, RERUNS, bands, duration_band, factor, least, scaled
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import DOUBLE, exact, rounded
 from heavytop.records import Metric, Quantity, by_name
-from heavytop.suite.cases import CASES
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP
 
 

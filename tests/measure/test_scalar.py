@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from flint import arb
 
-from heavytop.exact.balls import ball, midpoint, radius, working_precision
+from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.measure.scalar import UNRESOLVED, larger, largest, metric, resolved, root, text, to_ball
-from heavytop.measure.solution_error import split
+from heavytop.measure.scorer import split
 
 
 def around(middle: int, wide: int) -> arb:

@@ -8,17 +8,15 @@ import pytest
 from flint import arb
 
 from heavytop.errors import OutOfReach
-from heavytop.exact import validated
-from heavytop.exact.balls import midpoint, radius
-from heavytop.exact.ershkov_partial import ErshkovPartial
-from heavytop.exact.validated import Validated
-from heavytop.integrate.taylor import propagate
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.enclosure import run as validated
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import midpoint, radius
+from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.multiword.motions import follow
 from heavytop.integrate.trajectory import Problem
-from heavytop.integrate.words import follow
-from heavytop.measure import computed_reference
 from heavytop.measure import truth as truths
-from heavytop.measure.computed_reference import ComputedReference, of_rounded
-from heavytop.measure.truth import Truth, known_motion, truth
+from heavytop.measure.truth import ComputedReference, Truth, known_motion, of_rounded, truth
 from heavytop.precision import DOUBLE, QUAD, Precision, exact, number, real
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import HeavyTop, State
@@ -190,13 +188,13 @@ def test_the_choice_and_the_text_are_the_same_however_busy_the_machine_is(monkey
 
 def test_the_words_of_both_runs_differ_though_their_formats_are_served_by_the_same() -> None:
     (computed,) = of_rounded([chaotic(QUAD)], times(2))
-    assert computed.words[1] >= computed.words[0] + computed_reference.MORE_BITS
+    assert computed.words[1] >= computed.words[0] + truths.MORE_BITS
     assert 0 < computed.radius(Fraction(2)) < Fraction(1, 2**140)
 
 
 def test_what_takes_longer_than_anyone_waits_has_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(validated, "seconds_a_step", lambda *_: 1e9)
-    monkeypatch.setattr(computed_reference, "EFFORT", 0.005)
+    monkeypatch.setattr(truths, "EFFORT", 0.005)
     problem = chaotic(real(300))
     with pytest.raises(OutOfReach, match="stopped at the step limit"):
         of_rounded([problem], times(200, 2))
@@ -216,7 +214,7 @@ def test_one_late_sample_is_not_computed_where_no_digit_is_left_on_the_way(
         steps += run.steps
         return run
 
-    monkeypatch.setattr(computed_reference, "follow", counted)
+    monkeypatch.setattr(truths, "follow", counted)
     answer = truth(chaotic(precision), [Fraction(horizon)])
     assert isinstance(answer, str)
     far = abs(horizon) > 10**20
@@ -227,21 +225,21 @@ def test_one_late_sample_is_not_computed_where_no_digit_is_left_on_the_way(
 
 
 def test_the_first_steps_forecast_a_run_up_to_its_effort_and_not_beyond(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(computed_reference, "_PILOT_STEPS", 20)
-    monkeypatch.setattr(computed_reference, "seconds_a_step", lambda bits: 1.0)
-    monkeypatch.setattr(computed_reference, "EFFORT", 40.0)
+    monkeypatch.setattr(truths, "_PILOT_STEPS", 20)
+    monkeypatch.setattr(truths, "seconds_a_step", lambda bits: 1.0)
+    monkeypatch.setattr(truths, "EFFORT", 40.0)
 
     reached = follow(chaotic(real(84)), [number(Fraction(10**6), real(84))], step_limit=20).time_reached
     for beyond, says in ((Fraction(0), "stopped at the step limit"), (Fraction(1, 2**20), "takes too long")):
         at = exact(number(2 * reached * (1 + beyond), real(84)))
         with pytest.raises(OutOfReach, match=says):
-            computed_reference.compute([chaotic], [at], 84)
+            truths.compute([chaotic], [at], 84)
 
 
 def test_runs_that_agree_to_the_last_bit_are_off_by_a_rounding_of_the_coarser() -> None:
     state = [Fraction(n, 8) for n in (1, -5, 3, 2, 0, -1)]
     for bits in (60, 100):
-        balls = computed_reference._group_balls(state, [*state[:5], Fraction(-9, 8)], bits)
+        balls = truths._group_balls(state, [*state[:5], Fraction(-9, 8)], bits)
         found = [radius(ball) * 2**bits for ball in balls]
         assert all(Fraction(5, 8) <= each < Fraction(6, 8) for each in found[:3])
         assert all(2**bits < each < 2**bits * (1 + Fraction(1, 2**28)) for each in found[3:])

@@ -10,18 +10,16 @@ import msgspec
 import pytest
 
 import heavytop.exact
-from heavytop.claims.ershkov import PartialCase
-from heavytop.exact.axes import ALL, renamed_state, renamed_top
+from heavytop.cases import CASES
+from heavytop.claims.library.ershkov import PartialCase
+from heavytop.compare.verdicts import weaker
 from heavytop.exact.catalogue import find
+from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds.claim_model import true_motion
-from heavytop.measure.computed_reference import of_rounded
-from heavytop.measure.ensemble_reference import reference
-from heavytop.measure.truth import Known, known_motion
+from heavytop.measure.truth import Known, known_motion, of_rounded, reference
 from heavytop.precision import DOUBLE
 from heavytop.records import Against
-from heavytop.report.against import weaker
-from heavytop.suite.cases import CASES
 from support.reports import expand, measure, plan_of
 
 ONE = Fraction(1)

@@ -13,10 +13,9 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop.claims.audit import audit_claim
-from heavytop.claims.entry import Entry
-from heavytop.claims.from_file import claim_from_table
-from heavytop.report.claims_page import page
+from heavytop.claims.audit.audit import audit_claim, claim_from_table
+from heavytop.claims.library.entry import Entry
+from heavytop.render.claims_page import page
 from heavytop.suite import claim_library
 from heavytop.suite.claim_library import Equation, Library, Published, is_current
 

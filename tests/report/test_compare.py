@@ -6,13 +6,13 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from heavytop.compare.noise import Policy, Rule, Timings
+from heavytop.compare.verdicts import Verdict, judge_seconds
+from heavytop.document.names import short
 from heavytop.errors import InputError
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Against, Data, Law, Metric, Row, Series
-from heavytop.report.policy import Policy, Rule, Timings
-from heavytop.report.printable import short
-from heavytop.report.verdicts import Verdict, judge_seconds
 from support.reports import compare, replace, store
 from support.small_reports import error, report, row
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Report
-from heavytop.report.document_formats import to_json, to_markdown
+from heavytop.render.export import to_json, to_markdown
 from support import in_process
 from support.report_helpers import claim_rows
 from support.reports import store

@@ -13,11 +13,11 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 
+from heavytop.document.names import row_name
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.records import Report
-from heavytop.report.export import FORMATS, LOST, export
-from heavytop.report.names import row_name
+from heavytop.render.export import FORMATS, LOST, export
 from support import in_process
 from support.reports import store
 

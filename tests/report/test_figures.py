@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 import numpy
 import pytest
 
-from heavytop.claims.ershkov import PartialCase
-from heavytop.measure.curves import PAPER_FIGURES, drawings, exact_curves, true_curves
-from heavytop.report.figures import draw_figures
+from heavytop.claims.library.ershkov import PartialCase
+from heavytop.measure.claim_error import PAPER_FIGURES, drawings, exact_curves, true_curves
+from heavytop.render.figures import draw_figures
 
 
 def case(ratio: int) -> PartialCase:

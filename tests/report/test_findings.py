@@ -2,11 +2,11 @@
 
 import pytest
 
+from heavytop.compare.findings import MOST
+from heavytop.compare.noise import Policy
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Against, Law, Row, Subject
-from heavytop.report.findings import MOST
-from heavytop.report.policy import Policy
 from support.report_helpers import error
 from support.reports import compare, replace
 from support.small_reports import report, row

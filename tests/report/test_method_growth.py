@@ -5,10 +5,10 @@ import math
 import numpy
 import pytest
 
+from heavytop.compare.noise import Policy
+from heavytop.document.svg import quiet_style
 from heavytop.records import SCHEMA, Report, Series
-from heavytop.report.method_growth import alike, method_growth, trend
-from heavytop.report.policy import Policy
-from heavytop.report.svg import quiet_style
+from heavytop.render.work_precision import alike, method_growth, trend
 from support.report_helpers import GROWTH, HOSTILE, LONG, WORK, law, method
 from support.reports import compare, comparison_page
 

@@ -8,15 +8,15 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from heavytop.cases import CASES
+from heavytop.compare.noise import Policy
 from heavytop.errors import InputError
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import Data, Law, Quantity, Row, Series
-from heavytop.report.policy import Policy
-from heavytop.suite.cases import CASES
-from heavytop.suite.given import of_arrays
 from heavytop.suite.rows import data_of
 from heavytop.suite.score import score
+from heavytop.trajectories.observed import of_arrays
 from support.reports import compare, expand, load, measure, replace, rows, store
 from support.small_reports import report, row
 

@@ -12,18 +12,16 @@ import msgspec
 import pytest
 from rich.console import Console
 
+from heavytop.compare.compare import Comparison
+from heavytop.compare.noise import Policy
+from heavytop.document.document import logarithm
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Law, Report, Series
-from heavytop.report.compare import Comparison
-from heavytop.report.comparison_text import comparison
-from heavytop.report.history import history_json, history_text
-from heavytop.report.history_page import history_page
-from heavytop.report.junit import comparison_junit
-from heavytop.report.markdown import comparison_markdown
-from heavytop.report.policy import Policy
-from heavytop.report.section import logarithm
-from heavytop.report.text import table
+from heavytop.render.comparison import comparison
+from heavytop.render.export import comparison_junit, comparison_markdown
+from heavytop.render.history import history_json, history_page, history_text
+from heavytop.render.text import table
 from support.reports import compare, comparison_page, history, replace, report_page, summary
 from support.small_reports import error, report, row
 

@@ -5,7 +5,7 @@ from io import StringIO
 from rich.console import Console
 
 from heavytop.records import SCHEMA, Metric, Report
-from heavytop.report.overview import worst
+from heavytop.render.text import worst
 from support.reports import Row
 
 

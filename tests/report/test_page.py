@@ -13,14 +13,14 @@ from typing import Any
 import pytest
 
 import heavytop as ht
+from heavytop.cases import CASES
+from heavytop.compare.noise import Policy
 from heavytop.precision import DOUBLE
 from heavytop.records import Report, Row
-from heavytop.report.history_page import history_page
-from heavytop.report.policy import Policy
-from heavytop.report.score_page import score_report
-from heavytop.suite.cases import CASES
-from heavytop.suite.given import of_arrays
+from heavytop.render.history import history_page
+from heavytop.render.score import score_report
 from heavytop.suite.score import Assessment, assess
+from heavytop.trajectories.observed import of_arrays
 from support.report_helpers import HOSTILE, error, full_report
 from support.reports import compare, history, html, replace, store
 

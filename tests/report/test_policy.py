@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from heavytop.compare.noise import Policy, adjusted, load
+from heavytop.compare.verdicts import Verdict
 from heavytop.errors import InputError
 from heavytop.precision import exact
 from heavytop.records import Law, Row
-from heavytop.report.policy import Policy, adjusted, load
-from heavytop.report.verdicts import Verdict
 from support.reports import compare, replace
 from support.small_reports import error, report, row
 

@@ -8,12 +8,19 @@ from fractions import Fraction
 
 import pytest
 
+from heavytop.compare.noise import (
+    Policy,
+    RoundingBound,
+    Rule,
+    apart,
+    irreproducible,
+    noisier,
+    of_starts,
+    reaches_further,
+)
 from heavytop.kinds import KINDS
-from heavytop.measure.reruns import some_of
+from heavytop.measure.rounding_noise import some_of
 from heavytop.records import Against, Data, Metric, Quantity, Row, Series
-from heavytop.report.noise import apart, irreproducible, noisier, of_starts, reaches_further
-from heavytop.report.policy import Policy, Rule
-from heavytop.report.rounding_bound import RoundingBound
 from heavytop.top.amplification import amplification
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from support import degraded_integrators as degraded

@@ -6,15 +6,15 @@ from typing import Any
 
 import pytest
 
+from heavytop.compare.work_precision import Line, Point, beside_ours, leads, panels
+from heavytop.document.document import Headline
+from heavytop.document.svg import quiet_style
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Metric, Report, Series
-from heavytop.report.answers import fastest
-from heavytop.report.document import Headline
-from heavytop.report.pictures import draw_report
-from heavytop.report.svg import quiet_style
-from heavytop.report.work_plots import work_precision
-from heavytop.report.work_precision import Line, Point, beside_ours, leads, panels
+from heavytop.render.page import fastest
+from heavytop.render.plots import draw_report
+from heavytop.render.work_precision import work_precision
 from support.reports import Row, summary
 
 KIND = ("svg", "pdf")

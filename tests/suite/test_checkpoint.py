@@ -15,11 +15,11 @@ import pytest
 
 from heavytop.api.run_folder import prepare
 from heavytop.errors import InputError
+from heavytop.files import line
 from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Metric, Report
-from heavytop.suite import one_row
+from heavytop.suite import rows as one_row
 from heavytop.suite.checkpoint import Checkpoint, Saved, locked
-from heavytop.suite.files import line
 from support.reports import Row, expand, load, measure, replace, store
 
 SUPPORT = Path(__file__).parents[1] / "support"
@@ -432,7 +432,7 @@ def test_each_row_of_a_finished_run_is_read_from_the_disk_once(tmp_path: Path, m
     read: list[int] = []
     rows = Checkpoint.rows
     monkeypatch.setattr(Checkpoint, "rows", lambda self, indices: (read.extend(indices), rows(self, indices))[1])
-    monkeypatch.setattr("heavytop.report.html.write_report", lambda report, path, kinds: path.touch())
+    monkeypatch.setattr("heavytop.render.page.write_report", lambda report, path, kinds: path.touch())
     run = prepare(str(tmp_path / "plan.toml"), tmp_path / "out", workers=1)
     assert run.measure().good
     assert read == list(range(len(run.tasks)))

@@ -11,14 +11,14 @@ import msgspec
 import pytest
 
 import heavytop as ht
-from heavytop import former_names
+from heavytop import records
 from heavytop.api.run_folder import prepare
+from heavytop.compare.noise import Policy
 from heavytop.errors import InputError
+from heavytop.files import line, verified
 from heavytop.integrate import peers
 from heavytop.integrate.peers.source import command_of, named
-from heavytop.report.policy import Policy
-from heavytop.report.store import DIGEST, FILE
-from heavytop.suite.files import line, verified
+from heavytop.store.store import DIGEST, FILE
 from heavytop.suite.plan import former
 from support import in_process
 from support.reports import compare, plan_of, read_plan, store
@@ -85,7 +85,7 @@ def test_a_scored_file_keeps_whatever_its_writer_called_his_program(now: Path) -
     row = store.read(now).rows[0]
     given = row.key.subject.__class__("given", "words")
     row = msgspec.structs.replace(row, key=msgspec.structs.replace(row.key, subject=given))
-    assert former_names.of_row(row) is row
+    assert records.of_row(row) is row
 
 
 def test_a_plan_of_before_measures_the_same(tmp_path: Path) -> None:
@@ -110,11 +110,11 @@ def test_a_run_of_before_goes_on(now: Path, tmp_path: Path) -> None:
     prepare(file, folder, workers=1, resume=True).measure()
     again, whole = ([row for row in store.read(each).rows if row.key.kind == "drift"] for each in (folder, now))
     assert [row.metrics for row in again] == [row.metrics for row in whole]
-    assert former_names.of_identity({"plan integrator": "words", "commit": "words"}) == {
+    assert records.of_identity({"plan integrator": "words", "commit": "words"}) == {
         "plan integrator": "multiword",
         "commit": "words",
     }
-    assert former_names.of_plan({"name": "words", "integrator": "words"}) == {
+    assert records.of_plan({"name": "words", "integrator": "words"}) == {
         "name": "words",
         "integrator": "multiword",
     }

@@ -10,24 +10,23 @@ import numpy
 import pytest
 from rich.console import Console
 
+from heavytop.cases import CASES
+from heavytop.compare.noise import Policy
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
-from heavytop.integrate import reach
+from heavytop.integrate import integrator
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds import growth
-from heavytop.measure import computed_reference
-from heavytop.measure.ensemble_reference import reference
+from heavytop.measure import truth
 from heavytop.measure.integrator import ChosenIntegrator
+from heavytop.measure.truth import reference
 from heavytop.precision import DOUBLE
 from heavytop.records import Report
-from heavytop.report.policy import Policy
-from heavytop.suite.cases import CASES
+from heavytop.suite.case_text import ensemble_of
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.starts import ensemble_of
-from heavytop.top.equations import GYROSTAT
-from heavytop.top.heavy_top import cross
-from heavytop.top.integrals import holding
+from heavytop.top.equations import GYROSTAT, holding
+from heavytop.top.vectors import cross
 from support.reports import compare, expand, load, measure, summary
 
 CLASSES = ("euler", "lagrange", "kovalevskaya", "generic", "gyrostat")
@@ -168,7 +167,7 @@ def test_chaos_is_exponential_and_takes_every_digit(tmp_path: Path) -> None:
 
 
 def test_what_takes_too_long_to_compute_has_drift_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(computed_reference, "EFFORT_OF_MANY", 1e-3)
+    monkeypatch.setattr(truth, "EFFORT_OF_MANY", 1e-3)
     found = row(tmp_path, "generic", 'horizon = "20", starts = 8, decades = 2')
     assert set(found.laws) == {f"drift_{name}" for name in ("gamma_squared", "area", "energy")}
     assert {law.growth for law in found.laws.values()} == {"unresolved"}
@@ -184,7 +183,7 @@ def test_failed_starts_are_counted_and_never_averaged(tmp_path: Path, monkeypatc
         return type(start)([Fraction(10) ** 140, Fraction(10) ** 140, 1], start.gamma)
 
     plain = row(tmp_path, "lagrange", 'horizon = "20", starts = 10, decades = 2')
-    monkeypatch.setattr(reach, "MOST_STEPS", 10**400)  # so that what overflows is tried
+    monkeypatch.setattr(integrator, "MOST_STEPS", 10**400)  # so that what overflows is tried
     monkeypatch.setattr(growth, "ensemble_of", with_a_wild_one)
     found = row(tmp_path, "lagrange", 'horizon = "20", starts = 10, decades = 2')
     assert plain.metrics["starts_failed"].value == "0"

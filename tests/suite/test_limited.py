@@ -15,9 +15,9 @@ import msgspec
 import pytest
 
 import heavytop as ht
+from heavytop.compare.noise import Policy
 from heavytop.errors import InputError
 from heavytop.kinds import KINDS
-from heavytop.report.policy import Policy
 from heavytop.suite.limited import RowLimits
 from heavytop.suite.plan import read
 from support.helpers import without_progress

@@ -7,10 +7,10 @@ from fractions import Fraction
 import msgspec
 import pytest
 
-from heavytop.integrate import reach
+from heavytop.integrate import integrator
 from heavytop.kinds.break_away_law import break_away_law
 from heavytop.precision import time_text
-from heavytop.suite.task import Task
+from heavytop.suite.rows import Task
 from support.reports import expand, load, measure
 
 TASKS = expand(load("default")[0])
@@ -71,7 +71,7 @@ def test_the_verdict_on_the_claim_is_a_row() -> None:
 
 
 def test_a_run_that_fails_is_a_row_with_its_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reach, "MOST_STEPS", 10**400)  # so that what overflows is tried
+    monkeypatch.setattr(integrator, "MOST_STEPS", 10**400)  # so that what overflows is tried
     given = task("drift lagrange double")
     assert given.case is not None
     wild = replace(given.case.start, omega=(Fraction(10) ** 140, Fraction(10) ** 140, Fraction(1)))

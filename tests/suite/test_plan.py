@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from heavytop.cases import CASES, case
 from heavytop.errors import InputError
-from heavytop.suite.cases import CASES, case
-from heavytop.suite.plan import BUILT_IN, warnings
-from heavytop.suite.sampling import log_spaced
+from heavytop.suite.plan import BUILT_IN, log_spaced, warnings
 from support.reports import expand, load
 from support.reports import plan_of as plan_from
 from support.reports import read_plan as read

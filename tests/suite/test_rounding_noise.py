@@ -4,13 +4,13 @@ from dataclasses import replace as replace_dataclass
 
 import pytest
 
+from heavytop.compare.noise import Policy
+from heavytop.compare.verdicts import Verdict
 from heavytop.errors import InputError
-from heavytop.integrate import reach
+from heavytop.integrate import integrator
 from heavytop.measure.scalar import UNRESOLVED, of_fraction
 from heavytop.precision import decimal_text, exact
 from heavytop.records import SCHEMA, Report, Row, Series
-from heavytop.report.policy import Policy
-from heavytop.report.verdicts import Verdict
 from support.reports import compare, contradictions, expand, measure, plan_of, replace
 
 PLAN = plan_of(
@@ -123,7 +123,7 @@ def test_errors_a_thousand_times_larger_are_worse_in_every_row(reports: list[Rep
 
 
 def test_a_run_that_failed_has_no_bands(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reach, "MOST_STEPS", 10**400)  # so that what overflows is tried
+    monkeypatch.setattr(integrator, "MOST_STEPS", 10**400)  # so that what overflows is tried
     task = expand(PLAN, 0)[-1]
     wild = replace_dataclass(task.case.start, omega=tuple(exact(x) for x in ("1e140", "1e140", "1")))
     key = replace(task.key, precision="double")

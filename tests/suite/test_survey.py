@@ -12,9 +12,10 @@ import numpy
 import pytest
 
 import heavytop as ht
+from heavytop.compare.noise import Policy
 from heavytop.errors import Contradiction, InputError
 from heavytop.integrate.ensemble import propagate_ensemble
-from heavytop.integrate.pair_arrays import Pairs
+from heavytop.integrate.multiword.lanes import Pairs
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds import KINDS
 from heavytop.measure.integrator import ChosenIntegrator
@@ -22,13 +23,12 @@ from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Row
-from heavytop.report.policy import Policy
 from heavytop.suite.checkpoint import Saved
 from heavytop.suite.plan import read
 from heavytop.suite.rows import failed
 from heavytop.suite.survey import measured as records
-from heavytop.suite.survey.drawn import chunks, drawn
 from heavytop.suite.survey.gathered import gathered
+from heavytop.suite.survey.measured import chunks, drawn
 from heavytop.suite.sweeps import Grid, Random
 from support.in_process import heavytop
 from support.reports import compare
@@ -122,7 +122,7 @@ def test_a_reference_that_is_off_is_a_contradiction(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_run_writes_a_row_and_a_record_a_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heavytop.suite.survey.drawn.CHUNK", 4)
+    monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", 4)
     run = heavytop("run", "--plan", plan(tmp_path, 9), "--out", tmp_path / "out", "--workers", 1)
     assert run.returncode == 0, run.stderr
     (row,) = json.loads((tmp_path / "out" / "report.json").read_text())["rows"]
@@ -143,7 +143,7 @@ def test_a_run_writes_a_row_and_a_record_a_motion(tmp_path: Path, monkeypatch: p
 def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("heavytop.suite.survey.drawn.CHUNK", 2)
+    monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", 2)
     tasks = list(read(str(plan(tmp_path, 4)), KINDS)[2])
     rows = [KINDS["survey"].measure(task, Saved()) for task in tasks]
     lost = [failed(task, "heyoka gave up") for task in tasks]
@@ -161,7 +161,7 @@ def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
 
 
 def test_a_resumed_run_leaves_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("heavytop.suite.survey.drawn.CHUNK", 3)
+    monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", 3)
     file, whole, half = plan(tmp_path, 6), tmp_path / "whole", tmp_path / "half"
     ht.run(file, whole, workers=1)
     kind = KINDS["survey"]

@@ -11,7 +11,7 @@ from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
 from heavytop.kinds import KINDS
 from heavytop.suite.sweeps import Random
-from heavytop.top.heavy_top import dot
+from heavytop.top.vectors import dot
 from support.reports import expand, load, rows
 
 GRID = """[[sweep]]

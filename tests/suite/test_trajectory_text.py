@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from heavytop.cases import CASES
 from heavytop.errors import InputError
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.precision import DOUBLE, EXTENDED, QUAD, decimal_text
-from heavytop.suite.cases import CASES
-from heavytop.suite.trajectory_file import read
-from heavytop.suite.trajectory_table import Table, unread
+from heavytop.trajectories.files import Table, read, unread
 from heavytop.written_numbers import format_of, number
 
 CASE = CASES["lagrange"]

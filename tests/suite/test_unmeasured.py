@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from heavytop.compare.noise import Policy
 from heavytop.errors import Contradiction, InputError, OutOfReach
 from heavytop.measure import truth
-from heavytop.report.policy import Policy
 from heavytop.suite.rows import unmeasured
 from support.helpers import without_progress
 from support.in_process import heavytop

@@ -6,18 +6,18 @@ from pathlib import Path
 
 import pytest
 
+from heavytop.cases import CASES
+from heavytop.compare.noise import Policy
+from heavytop.compare.work_precision import panels
 from heavytop.errors import InputError
-from heavytop.exact.balls import midpoint
 from heavytop.exact.catalogue import find
+from heavytop.exact.flint.balls import midpoint
 from heavytop.integrate.peers.scipy_ivp import dop853
 from heavytop.integrate.trajectory import Problem
 from heavytop.kinds import work_precision
 from heavytop.precision import DOUBLE, exact
 from heavytop.records import SCHEMA, Report
-from heavytop.report.method_growth import trend
-from heavytop.report.policy import Policy
-from heavytop.report.work_precision import panels
-from heavytop.suite.cases import CASES
+from heavytop.render.work_precision import trend
 from support.reports import compare, expand, load, measure
 
 HEAD = 'name = "p"\n[[measure]]\nkind = "work_precision"\n'

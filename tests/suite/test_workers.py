@@ -19,13 +19,13 @@ from rich.console import Console
 
 from heavytop.errors import HeavyTopError, InputError
 from heavytop.kinds import KINDS
-from heavytop.measure.digits import digits_kept
+from heavytop.measure.scalar import digits_kept
 from heavytop.records import SCHEMA, Report, Row
-from heavytop.report.consistency import contradictions
-from heavytop.report.terminal import brief, summary
-from heavytop.suite import workers
+from heavytop.render.terminal import brief, summary
+from heavytop.store.checks import contradictions
+from heavytop.suite import run
 from heavytop.suite.plan import read
-from heavytop.suite.task import Task
+from heavytop.suite.rows import Task
 from support.reports import rows
 
 PLAN = """name = "tiny"
@@ -186,7 +186,7 @@ def test_processes_end_when_their_parent_is_killed(tmp_path: Path) -> None:
         "from multiprocessing import active_children\n"
         "from heavytop.kinds import KINDS\n"
         "from heavytop.suite.plan import expand, load\n"
-        "from heavytop.suite.workers import rows\n"
+        "from heavytop.suite.run import rows\n"
         "if __name__ == '__main__':\n"
         f"    tasks = expand(load({str(tmp_path / 'tiny.toml')!r}, KINDS)[0])\n"
         "    stream = rows(tasks, KINDS, 2, None)\n"
@@ -272,7 +272,7 @@ def test_on_a_cluster_too_rows_of_others_end_and_their_workers_live(
     ]
     theirs = tasks_of(tmp_path, f'name = "theirs"\nintegrators = {names}\n'.replace("'", '"') + "".join(tables))
     before = worker_pids()
-    found = dict(workers.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=12.0))
+    found = dict(run.rows([*theirs, tasks[0]], KINDS, 1, cluster, row_timeout=12.0))
     assert [found[index].outcome for index in range(4)] == ["success", "out_of_time", "failed", "success"]
     assert found[1].against == "nothing: mine.py:stuck was stopped after 12 s in pendulum"
     assert "mine.py:dies ended its process 3 times" in found[2].against
@@ -302,8 +302,8 @@ def test_a_row_whose_workers_die_one_after_the_other_is_named(tmp_path: Path, cl
 
 @dask
 def test_a_worker_with_other_versions_is_refused(tasks, cluster: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    here = workers.versions()
-    monkeypatch.setattr(workers, "versions", lambda: here | {"heyoka": "0.1"})
+    here = run.versions()
+    monkeypatch.setattr(run, "versions", lambda: here | {"heyoka": "0.1"})
     with pytest.raises(InputError, match=f"A worker has heyoka {here['heyoka']} instead of 0.1"):
         measured(tasks, 1, cluster)
 
@@ -311,7 +311,7 @@ def test_a_worker_with_other_versions_is_refused(tasks, cluster: str, monkeypatc
 @dask
 def test_a_scheduler_that_does_not_answer_is_a_clear_error(tasks, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(workers, "_ANSWER", 1.0)
+    monkeypatch.setattr(run, "_ANSWER", 1.0)
     for address in ("tcp://127.0.0.1:9", "nonsense"):
         with pytest.raises(InputError, match="No scheduler answers"):
             measured(tasks, 1, address)

@@ -19,13 +19,12 @@ from typing import Any
 import msgspec
 import numpy
 
+from heavytop.compare.noise import Policy
+from heavytop.compare.verdicts import Verdict
 from heavytop.integrate.peers.double import Given, Solved, double_peer
-from heavytop.measure.digits import RELATIVE
-from heavytop.measure.scalar import UNRESOLVED, of_fraction
+from heavytop.measure.scalar import RELATIVE, UNRESOLVED, of_fraction
 from heavytop.precision import decimal_text, exact
 from heavytop.records import SCHEMA, Metric, Report, Row, Series
-from heavytop.report.policy import Policy
-from heavytop.report.verdicts import Verdict
 from heavytop.suite.rows import data_of
 from support.reports import compare, expand, history, measure, plan_of
 

@@ -9,10 +9,9 @@ from fractions import Fraction
 
 from flint import arb, arb_mat
 
-from heavytop.exact.balls import ball, midpoint, radius, working_precision
-from heavytop.exact.derivatives import derivatives
-from heavytop.exact.field_derivatives import Dual, moved
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.derivatives import Dual, derivatives, moved
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP
 from heavytop.top.heavy_top import HeavyTop, State
 
@@ -73,7 +72,7 @@ def _data_laws(motion, found, p, begun, state):
 
 def _integrals(motion):
     """Those that hold for every top, with every datum."""
-    from heavytop.top.integrals import holding
+    from heavytop.top.equations import holding
 
     general = HeavyTop((5, 7, 9), 1, (1, 2, 3), rotor=motion.top.rotor) if motion.system is not GYROSTAT else motion.top
     return holding(general, motion.start, motion.system)

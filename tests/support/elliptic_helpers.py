@@ -4,7 +4,7 @@ from fractions import Fraction
 
 from flint import arb
 
-from heavytop.exact.balls import ball, radius, working_precision
+from heavytop.exact.flint.balls import ball, radius, working_precision
 from heavytop.top.equations import Parameters
 
 

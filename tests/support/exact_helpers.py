@@ -8,7 +8,7 @@ from random import Random
 
 from flint import arb
 
-from heavytop.exact.balls import ball, working_precision
+from heavytop.exact.flint.balls import ball, working_precision
 
 
 def residual(solution, time: Fraction, digits: int = 60) -> list[arb]:

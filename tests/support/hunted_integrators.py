@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy
 
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Trajectory
 from heavytop.precision import Precision
 from heavytop.top.equations import System

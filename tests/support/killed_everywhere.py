@@ -10,12 +10,12 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-import heavytop.report.html
+import heavytop.render.page
 import heavytop.suite.run
 from heavytop.api import run_folder
+from heavytop.files import replace
 from heavytop.kinds import KINDS
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.files import replace
 from heavytop.suite.plan import expand, load
 
 warnings.simplefilter("ignore")  # of forks in a process with threads: those do nothing here
@@ -35,7 +35,7 @@ def rows(tasks, kinds, workers, scheduler, done, saved, *_) -> Iterator:
 
 heavytop.suite.run.rows = rows
 run_folder.environment = lambda: SURROUNDINGS
-heavytop.report.html.write_report = lambda report, path, kinds: replace(path, repr(report.rows).encode())  # quick
+heavytop.render.page.write_report = lambda report, path, kinds: replace(path, repr(report.rows).encode())  # quick
 
 
 def run(out: Path, killed_at: int) -> int:

@@ -8,9 +8,9 @@ from fractions import Fraction
 import mpmath
 from flint import arb
 
-from heavytop.exact.attitude import attitude_of
-from heavytop.exact.balls import ball, midpoint, radius, working_precision
-from heavytop.exact.validated import Validated
+from heavytop.exact.closed_form import attitude_of
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import ball, midpoint, radius, working_precision
 from heavytop.top.equations import HEAVY_TOP, Parameters
 
 DIGITS_60 = 200

@@ -9,23 +9,23 @@ from typing import Any
 import msgspec
 
 from heavytop import records
+from heavytop.compare import compare as _compare
+from heavytop.document.kind import kind_of
 from heavytop.errors import PeerFailed
 from heavytop.kinds import KINDS
 from heavytop.records import Against, Metric, Quantity, RowKey, Series, Subject
-from heavytop.report import compare as _compare
-from heavytop.report import consistency as _consistency
-from heavytop.report import history as _history
-from heavytop.report import html as _html
-from heavytop.report import overview as _overview
-from heavytop.report import store as _store
-from heavytop.report import terminal as _terminal
-from heavytop.report import text as _text
-from heavytop.report.kind import kind_of
+from heavytop.render import history as _history
+from heavytop.render import page as _html
+from heavytop.render import terminal as _terminal
+from heavytop.render import text as _overview
+from heavytop.render import text as _text
+from heavytop.store import checks as _consistency
+from heavytop.store import store as _store
 from heavytop.suite import plan as _plan
-from heavytop.suite import workers as _workers
+from heavytop.suite import run as _workers
 from heavytop.suite.checkpoint import Saved
+from heavytop.suite.rows import Task
 from heavytop.suite.rows import failed as failed_row
-from heavytop.suite.task import Task
 
 compare = partial(_compare.compare, kinds=KINDS)
 history = partial(_history.history, kinds=KINDS)

@@ -7,9 +7,9 @@ from fractions import Fraction
 import pytest
 from llvmlite import binding
 
+from heavytop.multiword.codegen.machine_code import Processor
+from heavytop.multiword.problem import Scaled
 from heavytop.top.equations import HEAVY_TOP, Parameters
-from heavytop.words.machine import Processor
-from heavytop.words.scaled import Scaled
 
 
 def problem(spin: int = 1, attitude: bool = False) -> Scaled:

@@ -8,10 +8,10 @@ from itertools import permutations
 
 import pytest
 
+from heavytop.cases import CASES
+from heavytop.integrate.multiword.motions import follow
 from heavytop.integrate.trajectory import Problem
-from heavytop.integrate.words import follow
 from heavytop.precision import QUAD, exact, number
-from heavytop.suite.cases import CASES
 from heavytop.top.amplification import FOLLOWED, amplification, rate
 from heavytop.top.equations import HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 import sympy
 
-from heavytop.exact.balls import FUNCTIONS, ball, working_precision
-from heavytop.top.angles import (
+from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
+from heavytop.top.attitude import (
     attitude_from_angles,
     euler_angles,
     gamma_from_angles,
@@ -16,7 +16,7 @@ from heavytop.top.angles import (
     rotation_angle,
     unwrap,
 )
-from heavytop.top.heavy_top import cross, dot
+from heavytop.top.vectors import cross, dot
 from support.helpers import unit_vector
 
 

@@ -9,13 +9,14 @@ from typing import Any
 import pytest
 
 from heavytop.errors import InputError
-from heavytop.exact.balls import FUNCTIONS, ball, working_precision
-from heavytop.top.angles import attitude_from_angles, gamma_from_angles
+from heavytop.exact.flint.balls import FUNCTIONS, ball, working_precision
 from heavytop.top.attitude import (
     SEQUENCES,
     Attitude,
+    attitude_from_angles,
     continuous,
     euler_of_rows,
+    gamma_from_angles,
     matrix_of_quaternion,
     multiplied,
     quaternion_of_rows,
@@ -24,7 +25,7 @@ from heavytop.top.attitude import (
     rows_of_euler,
     transposed,
 )
-from heavytop.top.heavy_top import cross, dot
+from heavytop.top.vectors import cross, dot
 
 IDENTITY = tuple(tuple(Fraction(i == j) for j in range(3)) for i in range(3))
 

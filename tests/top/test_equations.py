@@ -8,10 +8,11 @@ import pytest
 import sympy
 from flint import arb, fmpq
 
-from heavytop.exact.balls import ball, working_precision
-from heavytop.integrate.engines import expressions
+from heavytop.exact.flint.balls import ball, working_precision
+from heavytop.integrate.heyoka.engines import expressions
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, SYSTEMS, Parameters
-from heavytop.top.heavy_top import HeavyTop, State, cross
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import cross
 from support.helpers import fraction, positive, unit_vector, vector
 
 

@@ -8,22 +8,26 @@ import pytest
 from flint import fmpq, fmpq_mpoly_ctx
 
 from heavytop.errors import InputError
-from heavytop.exact.axes import orientation, renamed_state, renamed_top
-from heavytop.top.amplification import rate
+from heavytop.exact.closed_form import orientation, renamed_state, renamed_top
+from heavytop.top.amplification import rate, square_of_rate
 from heavytop.top.equations import (
     GYROSTAT,
     HEAVY_GYROSTAT,
     HEAVY_TOP,
     Parameters,
+    area_with_rotor,
     gyrostat,
     heavy_gyrostat,
     heavy_top,
+    holding,
+    kovalevskaya_yehia,
+    largest,
+    sretensky,
     system,
     system_of,
 )
-from heavytop.top.heavy_top import HeavyTop, State, cross, data_texts, dot, require_physical
-from heavytop.top.integrals import area_with_rotor, holding, kovalevskaya_yehia, largest, sretensky
-from heavytop.top.rates import square_of_rate
+from heavytop.top.heavy_top import HeavyTop, State, data_texts, require_physical
+from heavytop.top.vectors import cross, dot
 from support.helpers import fraction, positive, unit_vector, vector
 
 STARTS = State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5"))

@@ -8,9 +8,9 @@ import pytest
 from flint import fmpq, fmpq_poly
 
 from heavytop.top import equations
-from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, heavy_top
-from heavytop.top.heavy_top import HeavyTop, State, cross, dot
-from heavytop.top.integrals import holding
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, heavy_top, holding
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import cross, dot
 from support.helpers import fraction, positive, unit_vector, vector
 
 

@@ -9,18 +9,27 @@ import numpy
 import pytest
 from llvmlite import ir
 
+from heavytop.multiword.codegen.machine_code import (
+    DOUBLES,
+    INT,
+    INT_POINTER,
+    INTEGERS,
+    LANES,
+    POINTER,
+    Machine,
+    compiled,
+    doubles,
+    function,
+    pointer,
+)
+from heavytop.multiword.fixed_point import products
+from heavytop.multiword.fixed_point.arithmetic import Grid, exact, grid_of
+from heavytop.multiword.fixed_point.fixed_point_run import Fixed
+from heavytop.multiword.fixed_point.products import DigitRows, digits_of
+from heavytop.multiword.fixed_point.steps import rows_of, size_of
+from heavytop.multiword.integers.integer_series import Whole
+from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
-from heavytop.words import digit_rows, digit_sums
-from heavytop.words.digit_rows import DigitRows, digits_of
-from heavytop.words.digits import exact, grid_of
-from heavytop.words.fixed import Fixed
-from heavytop.words.grid_series import rows_of, size_of
-from heavytop.words.kernels import Grid
-from heavytop.words.machine import DOUBLES, INTEGERS, Machine, compiled, doubles, pointer
-from heavytop.words.run import Status
-from heavytop.words.scaled import Scaled
-from heavytop.words.vector import INT, INT_POINTER, LANES, POINTER, function
-from heavytop.words.whole import Whole
 from support.words_helpers import LEVELS, problem
 
 LARGEST = 2**23 + 4
@@ -45,7 +54,7 @@ def known_sums(rows: numpy.ndarray, starts: tuple[list[int], list[int]], levels:
         for i in range(levels):
             for j in range(levels - i):
                 total[lane] += sum(int(rows[a + i, lane]) * int(rows[b + j, lane]) for a, b in pairs) << (
-                    digit_sums.BITS * (levels - 1 - i - j)
+                    products.BITS * (levels - 1 - i - j)
                 )
     return total
 
@@ -70,10 +79,10 @@ def test_sums_of_products_are_exact(wide: bool, kind: str) -> None:
         machine.functions["sums"](*map(pointer, arrays), orders, levels, pointer(sums))
         starts = [row * n for n in range(orders)]
         found = sums.reshape(-1, LANES)
-        assert numpy.abs(found).max() < 2.0**digit_sums.SUM_BITS
+        assert numpy.abs(found).max() < 2.0**products.SUM_BITS
         known = known_sums(table, (starts, starts[::-1]), levels)
         for lane in range(LANES):
-            whole = sum(int(s) << digit_sums.BITS * (levels - k) for k, s in enumerate(found[:, lane]))
+            whole = sum(int(s) << products.BITS * (levels - k) for k, s in enumerate(found[:, lane]))
             assert whole == known[lane]
 
 
@@ -82,22 +91,20 @@ def test_what_is_left_out_of_a_sum_is_as_small_as_is_said(words: int) -> None:
     """(J + 1)/4 units of the last word a product, of which the largest digits use more than half."""
     grid = grid_of(words)
     count = digits_of(grid)
-    unit = Fraction(2) ** (2 * digit_rows._HEAD + grid.total)
+    unit = Fraction(2) ** (2 * products._HEAD + grid.total)
     left_out = sum(
-        Fraction(LARGEST**2, 2 ** (digit_sums.BITS * (i + j + 2)))
-        for i in range(count)
-        for j in range(count - i, count)
+        Fraction(LARGEST**2, 2 ** (products.BITS * (i + j + 2))) for i in range(count) for j in range(count - i, count)
     )
-    lacking = 2 * Fraction(LARGEST, 2**digit_sums.BITS) * Fraction(1, 2 ** (digit_sums.BITS * count + 1))
+    lacking = 2 * Fraction(LARGEST, 2**products.BITS) * Fraction(1, 2 ** (products.BITS * count + 1))
     said = Fraction(count + 1, 4)
     assert (left_out + lacking) * unit <= said
-    spare = digit_sums.BITS * count - grid.total - digit_rows._HEAD - digit_rows._BEHIND
+    spare = products.BITS * count - grid.total - products._HEAD - products._BEHIND
     assert (left_out + lacking) * unit * 2**spare > said / 2
 
 
 def test_with_more_products_in_a_sum_some_would_be_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """The number of products is what keeps sums exact: with four times as many, large digits are added up wrongly."""
-    monkeypatch.setattr(digit_sums, "_PRODUCTS", 4 * digit_sums._PRODUCTS)
+    monkeypatch.setattr(products, "_PRODUCTS", 4 * products._PRODUCTS)
     machine, levels, orders = sums_code(True), 8, 60
     table = doubles(LANES * levels * orders).reshape(-1, LANES)
     table[:] = LARGEST - numpy.random.default_rng(1).integers(0, 9, len(table))[:, None]
@@ -105,7 +112,7 @@ def test_with_more_products_in_a_sum_some_would_be_wrong(monkeypatch: pytest.Mon
     arrays = [table.ravel(), table[levels * (orders - 1) :].ravel(), where.astype(numpy.int64)]
     machine.functions["sums"](*map(pointer, arrays), orders, levels, pointer(sums))
     starts = [levels * n for n in range(orders)]
-    whole = sum(int(s) << digit_sums.BITS * (levels - k) for k, s in enumerate(sums[::LANES]))
+    whole = sum(int(s) << products.BITS * (levels - k) for k, s in enumerate(sums[::LANES]))
     assert whole != known_sums(table, (starts, starts[::-1]), levels)[0]
 
 
@@ -128,8 +135,8 @@ def conversion(grid: Grid) -> Machine:
 def test_digits_are_those_of_the_words_and_sums_become_words(words: int) -> None:
     grid, random = grid_of(words), Random(words)
     count, machine = digits_of(grid), conversion(grid)
-    last = Fraction(2) ** (digit_rows._HEAD - digit_sums.BITS * count)
-    assert last <= Fraction(2) ** (-grid.total - digit_rows._BEHIND)
+    last = Fraction(2) ** (products._HEAD - products.BITS * count)
+    assert last <= Fraction(2) ** (-grid.total - products._BEHIND)
     for _ in range(40):
         given, found = doubles(LANES * grid.words), doubles(LANES * count)
         for k in range(grid.words):
@@ -141,17 +148,17 @@ def test_digits_are_those_of_the_words_and_sums_become_words(words: int) -> None
         assert numpy.abs(found).max() <= LARGEST
         assert (found == numpy.round(found)).all()
         for lane in range(LANES):
-            value = sum(int(d) * last * 2 ** (digit_sums.BITS * (count - 1 - j)) for j, d in enumerate(found[lane::8]))
+            value = sum(int(d) * last * 2 ** (products.BITS * (count - 1 - j)) for j, d in enumerate(found[lane::8]))
             assert abs(value - exact(given[lane::8])) <= last / 2
-    unit = Fraction(2) ** (2 * digit_rows._HEAD - digit_sums.BITS * (count + 1))
+    unit = Fraction(2) ** (2 * products._HEAD - products.BITS * (count + 1))
     for _ in range(40):
         given, found = doubles(LANES * (count + 1)), doubles(LANES * grid.words)
         for k in range(1 + count):
-            most = 2**digit_sums.SUM_BITS if k > 3 else 2**10
+            most = 2**products.SUM_BITS if k > 3 else 2**10
             given[LANES * k : LANES * (k + 1)] = [random.randint(-most, most) for _ in range(LANES)]
         machine.functions["words"](pointer(given), pointer(found))
         for lane in range(LANES):
-            value = sum(int(s) * unit * 2 ** (digit_sums.BITS * (count - k)) for k, s in enumerate(given[lane::8]))
+            value = sum(int(s) * unit * 2 ** (products.BITS * (count - k)) for k, s in enumerate(given[lane::8]))
             assert abs(value - exact(found[lane::8])) * 2 ** (grid.total + 4) <= 1
             for k in range(grid.words - 1):
                 assert (Fraction(found[LANES * k + lane]) * 2 ** (grid.bits * (k + 1))).denominator == 1
@@ -207,8 +214,8 @@ def test_digits_that_count_as_zero_are(name: str) -> None:
         count, row = digits_of(grid), size_of(grid, run.vectors).row
         for n in range(run.order + 1):
             digits = run.rows[row * n : row * (n + 1)].reshape(-1, LANES)
-            assert not digits[: digit_rows._BEFORE].any()
-            for side in digits[digit_rows._BEFORE :].reshape(1 + run.vectors, count, LANES):
+            assert not digits[: products._BEFORE].any()
+            for side in digits[products._BEFORE :].reshape(1 + run.vectors, count, LANES):
                 assert not side[: run.places[n]].any()
         assert run.places[: run.order + 1].max() > 0
 

@@ -14,15 +14,22 @@ import numpy
 import pytest
 from llvmlite import ir
 
+from heavytop.multiword.codegen.machine_code import (
+    DOUBLE,
+    DOUBLES,
+    POINTER,
+    Processor,
+    compiled,
+    doubles,
+    function,
+    pointer,
+)
+from heavytop.multiword.double_double import steps as dd
+from heavytop.multiword.double_double.arithmetic import by_constant, log2, power_of_two, split, split_constant
+from heavytop.multiword.double_double.double_double_run import Floating, Ladder
+from heavytop.multiword.double_double.eight_lane_run import Eight
+from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import HEAVY_TOP, Parameters
-from heavytop.words import double_double as dd
-from heavytop.words.eight import Eight
-from heavytop.words.floating import Floating, Ladder
-from heavytop.words.machine import DOUBLES, Processor, compiled, doubles, pointer
-from heavytop.words.pairs import by_constant, log2, power_of_two, split, split_constant
-from heavytop.words.run import Status
-from heavytop.words.scaled import Scaled
-from heavytop.words.vector import DOUBLE, POINTER, function
 from support.words_helpers import LEVELS, problem
 
 PATH = os.pathsep.join(map(str, Path(__file__).parents[:2]))

@@ -4,11 +4,10 @@ from fractions import Fraction
 
 import pytest
 
+from heavytop.multiword.double_double.double_double_run import FALL_IN_LANES, Floating, Ladder
+from heavytop.multiword.double_double.eight_lane_run import Eight, exact_state
+from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
-from heavytop.words.eight import Eight, exact_state
-from heavytop.words.floating import FALL_IN_LANES, Floating, Ladder
-from heavytop.words.run import Status
-from heavytop.words.scaled import Scaled
 from support.helpers import rotor
 from support.words_helpers import LEVELS
 

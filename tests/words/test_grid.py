@@ -8,16 +8,23 @@ import numpy
 import pytest
 from llvmlite import ir
 
+from heavytop.multiword.codegen.machine_code import (
+    DOUBLES,
+    INT,
+    POINTER,
+    Machine,
+    compiled,
+    doubles,
+    function,
+    once,
+    pointer,
+)
+from heavytop.multiword.fixed_point import arithmetic, fixed_point_run
+from heavytop.multiword.fixed_point.arithmetic import EXPONENT_BITS, Grid, digits, exact, grid_for, grid_of
+from heavytop.multiword.fixed_point.fixed_point_run import Fixed
+from heavytop.multiword.fixed_point.steps import build
+from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import HEAVY_TOP, Parameters
-from heavytop.words import fixed, kernels
-from heavytop.words.digits import digits, exact, grid_for, grid_of
-from heavytop.words.fixed import Fixed
-from heavytop.words.grid import build
-from heavytop.words.kernels import EXPONENT_BITS, Grid
-from heavytop.words.machine import DOUBLES, Machine, compiled, doubles, once, pointer
-from heavytop.words.run import Status
-from heavytop.words.scaled import Scaled
-from heavytop.words.vector import INT, POINTER, function
 from support.words_helpers import LEVELS, problem
 
 HORIZON = 2
@@ -68,7 +75,7 @@ def test_the_smallest_grid_that_has_the_bits_is_taken(bits: int, words: int, wid
 def product_code(grid: Grid) -> Machine:
     """products(left, right, count, sums, seen) in all K levels, callable from here."""
     module = ir.Module("products")
-    written = kernels.write_kernels(module, grid, 8 * grid.words)[-1]
+    written = arithmetic.write_kernels(module, grid, 8 * grid.words)[-1]
     made, code = function(module, "products", ir.VoidType(), [POINTER, POINTER, INT, POINTER, POINTER])
     code.builder.call(written, made.args)
     code.builder.ret_void()
@@ -158,8 +165,8 @@ def test_words_that_are_too_wide_give_no_wrong_number(bits: int) -> None:
 
 def test_without_the_check_some_would_be_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """The check is what makes them right: with the sums unwatched, words of 51 bits give wrong numbers."""
-    monkeypatch.setattr(kernels.Accumulator, "look", lambda self, k: None)
-    monkeypatch.setattr(fixed, "machine", once(build))
+    monkeypatch.setattr(arithmetic.Accumulator, "look", lambda self, k: None)
+    monkeypatch.setattr(fixed_point_run, "machine", once(build))
     random, grid, span, wrong = Random(51), Grid(3, 51), Fraction(HORIZON), 0
     for _ in range(15):
         scaled = random_problem(random)
@@ -228,8 +235,8 @@ def test_what_an_unstable_axis_amplifies_is_on_the_grid() -> None:
     p = Parameters((Fraction(3), Fraction(2), Fraction(1)), (Fraction(0),) * 3, Fraction(0))
     y = (Fraction(1, 2**140), Fraction(1), Fraction(0), Fraction(5, 8), Fraction(-3, 8), Fraction(11, 16))
     scaled = Scaled.of(HEAVY_TOP, p, y, bounded=True)
-    assert fixed.spread(scaled) >= 140
-    grid, finer = grid_for(120 + fixed.spread(scaled)), grid_of(12)
+    assert fixed_point_run.spread(scaled) >= 140
+    grid, finer = grid_for(120 + fixed_point_run.spread(scaled)), grid_of(12)
     assert grid is not None
     runs, span = [Fixed(scaled, each, True) for each in (grid, finer)], 160 * scaled.rate
     for run in runs:

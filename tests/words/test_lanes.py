@@ -5,9 +5,9 @@ from random import Random
 
 import pytest
 
+from heavytop.multiword.codegen.recurrence import coefficients, rates
+from heavytop.multiword.problem import Scaled
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
-from heavytop.words.lanes import coefficients, rates
-from heavytop.words.scaled import Scaled
 from support.helpers import fraction, positive, rotor, vector
 
 

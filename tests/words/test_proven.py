@@ -7,15 +7,14 @@ from random import Random
 import numpy
 import pytest
 
-from heavytop.exact.scaled_motion import ScaledMotion
-from heavytop.exact.step_series import lacking
+from heavytop.exact.enclosure.run import ScaledMotion
+from heavytop.exact.enclosure.step import lacking
+from heavytop.multiword.codegen.machine_code import doubles, pointer
+from heavytop.multiword.codegen.recurrence import LEFT, RIGHT
+from heavytop.multiword.fixed_point import arithmetic, certified_series
+from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
+from heavytop.multiword.fixed_point.certified_series import Carrier
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
-from heavytop.words import extents, proven
-from heavytop.words.digits import grid_of
-from heavytop.words.kernels import Grid
-from heavytop.words.lanes import LEFT, RIGHT
-from heavytop.words.machine import doubles, pointer
-from heavytop.words.proven import Carrier
 from support.helpers import rotor
 from support.words_helpers import LEVELS
 
@@ -135,7 +134,7 @@ def test_the_bound_is_the_theorem_in_exact_numbers(words: int) -> None:
     level = sum(v for (i, j), v in m.items() if i + j == words - 1)
     assert kept > level
     column = numpy.full((words, 1), 2.0**grid.bits)
-    each, once = proven._error(grid, proven._levels(grid, column, column)[1], orders)
+    each, once = certified_series._error(grid, certified_series._levels(grid, column, column)[1], orders)
     largest = Fraction(3, 2) * 2**52 + orders * (level + words * 2**grid.bits)
     rounding = largest / 2**53
     for terms in (1, orders):
@@ -143,7 +142,7 @@ def test_the_bound_is_the_theorem_in_exact_numbers(words: int) -> None:
     motion = some_motion(Random(2))
     carrier = Carrier(motion.scaled, grid, True)
     widest, added = numpy.zeros((2, words, 8)), numpy.zeros((1, words, 8))
-    each, once = proven._error(grid, numpy.zeros(2 * words - 1), orders)
+    each, once = certified_series._error(grid, numpy.zeros(2 * words - 1), orders)
     for scale in (0.0, 2.0**20):
         sums = [
             Fraction(scale) * (2 * Fraction(each * n + once) + Fraction(carrier._of_constants)) for n in range(1, 41)
@@ -182,7 +181,7 @@ def test_how_large_words_are_is_measured_on_the_words_themselves(words: int, vec
     table = rows.reshape(orders + 1, 1 + vectors, words, 8)
     table[:] = numpy.stack([right, *left], axis=1)
     found = [doubles(8 * count) for count in (*[vectors * (orders + 1)] * 2, (1 + vectors) * words, vectors * words)]
-    extents.machine(words, vectors).functions["extents"](pointer(rows), orders, *map(pointer, found))
+    arithmetic.machine(words, vectors).functions["extents"](pointer(rows), orders, *map(pointer, found))
     values, sizes, widest, added = (array.reshape(-1, 8) for array in found)
     assert (widest.reshape(table.shape[1:]) == numpy.abs(table).max(axis=0)).all()
     for n, block in enumerate(y.reshape(-1, words, 8)):

@@ -7,14 +7,13 @@ from random import Random
 
 import pytest
 
+from heavytop.multiword.codegen.recurrence import MOST_ORDER
+from heavytop.multiword.double_double import steps as dd
+from heavytop.multiword.double_double import steps as parts
+from heavytop.multiword.double_double.double_double_run import Floating, Ladder
+from heavytop.multiword.double_double.eight_lane_run import Eight
+from heavytop.multiword.problem import Scaled, Status
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
-from heavytop.words import double_double as dd
-from heavytop.words import split_orders as parts
-from heavytop.words.eight import Eight
-from heavytop.words.floating import Floating, Ladder
-from heavytop.words.recurrence import MOST_ORDER
-from heavytop.words.run import Status
-from heavytop.words.scaled import Scaled
 from support.helpers import rotor
 from support.words_helpers import problem
 

@@ -5,17 +5,16 @@ from random import Random
 
 import pytest
 
-from heavytop.exact.balls import midpoint
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import midpoint
+from heavytop.integrate.multiword.motions import propagate_words
 from heavytop.integrate.trajectory import Outcome
-from heavytop.integrate.words import propagate_words
+from heavytop.multiword.codegen.recurrence import rates
+from heavytop.multiword.integers.integer_series import Whole, field_of
+from heavytop.multiword.problem import Scaled, Status
 from heavytop.precision import exact, real
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, Parameters
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.words.lanes import rates
-from heavytop.words.run import Status
-from heavytop.words.scaled import Scaled
-from heavytop.words.whole import Whole, field_of
 from support.helpers import fraction, positive, rotor, vector
 from support.words_helpers import problem
 

@@ -10,11 +10,22 @@ from pathlib import Path
 from typing import Any, SupportsIndex, TypeAlias, TypeVar
 
 from heavytop.errors import InputError, quoted
-from heavytop.last_call import last_call
-from heavytop.precision import DOUBLE, Precision, exact, parse, physical, require, shown, usable_tolerance, whole
+from heavytop.precision import (
+    DOUBLE,
+    Precision,
+    exact,
+    last_call,
+    parse,
+    physical,
+    require,
+    shown,
+    usable_tolerance,
+    whole,
+)
 from heavytop.top.bodies import Body
 from heavytop.top.equations import SYSTEMS, WHICH_SYSTEM, System, system_of
-from heavytop.top.heavy_top import HeavyTop, State, dot, ordered, require_physical, vector
+from heavytop.top.heavy_top import HeavyTop, State, require_physical
+from heavytop.top.vectors import dot, ordered, vector
 
 Number: TypeAlias = int | float | str | Fraction | Decimal | SupportsIndex
 """A number: an integer, a float of any format (the exact binary number it is), or exact text such as "-2/5"."""

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from heavytop.api import arguments
-from heavytop.claims.audit import PAPER, only_branch, require_branch
-from heavytop.claims.audit import audit as audit_named
-from heavytop.claims.entry import Entry, library, require_tag
-from heavytop.claims.judge import Audit as Audit
-from heavytop.claims.verdicts import Judged, judged
+from heavytop.claims.audit.audit import PAPER, Judged, judged, only_branch, require_branch
+from heavytop.claims.audit.audit import audit as audit_named
+from heavytop.claims.audit.judge import Audit
+from heavytop.claims.library.entry import Entry, library, require_tag
 from heavytop.display import Table, Tabular
 from heavytop.top.equations import System
 

@@ -11,23 +11,29 @@ from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.errors import InputError, OutOfReach, quoted
 from heavytop.event_times.dense import dense
-from heavytop.event_times.functions import EventFunction, event_function, first_term, turned
+from heavytop.event_times.functions import (
+    PROVEN,
+    EventFunction,
+    Events,
+    ReferenceEvents,
+    Section,
+    event_function,
+    first_term,
+    turned,
+)
 from heavytop.event_times.located import locate
 from heavytop.event_times.proven import proven_events
-from heavytop.event_times.records import PROVEN, Events, ReferenceEvents, Section
-from heavytop.exact.balls import value_text
 from heavytop.exact.bodies import Resolved, resolve
-from heavytop.exact.scales import require_handy
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import require_handy, value_text
 from heavytop.integrate.peers.source import named
+from heavytop.measure.motion import Setup
 from heavytop.measure.reference import DIGITS, Ball
-from heavytop.measure.setup import Setup
 from heavytop.precision import DOUBLE, Precision, exact, exact_text, physical, whole
 from heavytop.top.amplification import amplification
 from heavytop.top.bodies import Body
-from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.equations import HEAVY_TOP, System, area, energy
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.integrals import area, energy
 
 _DATA_BITS = 192
 Function = str | Callable[[Any, Any], Any]

@@ -12,14 +12,14 @@ from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.errors import InputError, quoted
 from heavytop.integrate import peers
+from heavytop.integrate.integrator import Source
 from heavytop.integrate.peers.command import close_all
-from heavytop.integrate.peers.source import Source, named
+from heavytop.integrate.peers.source import named
 from heavytop.measure.integrator import ChosenIntegrator
 from heavytop.precision import DOUBLE_DOUBLE, Precision, exact, physical, time_text, whole
-from heavytop.report.hunt_text import hunt_text
-from heavytop.suite.hunt.draw import FAMILIES, Family
-from heavytop.suite.hunt.found import documents
-from heavytop.suite.hunt.search import Advance, Asked, Hunted
+from heavytop.render.hunt import hunt_text
+from heavytop.suite.hunt.measured import FAMILIES, Family
+from heavytop.suite.hunt.search import Advance, Asked, Hunted, documents
 from heavytop.suite.hunt.search import hunt as search
 
 _MOST = 1_000_000

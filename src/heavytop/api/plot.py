@@ -28,12 +28,12 @@ from heavytop.api.plot_data import (
     principal,
     samples,
 )
+from heavytop.document.svg import COLOURS, decades
 from heavytop.errors import InputError, quoted
-from heavytop.event_times.records import Events, ReferenceEvents, Section, component
+from heavytop.event_times.functions import Events, ReferenceEvents, Section, component
 from heavytop.integrate.trajectory import Trajectory
-from heavytop.measure.sample_errors import Logs, sample_drifts, sample_errors
+from heavytop.measure.scorer import Logs, sample_drifts, sample_errors
 from heavytop.precision import exact
-from heavytop.report.svg import COLOURS, decades
 from heavytop.top.equations import NAMES
 from heavytop.top.heavy_top import HeavyTop
 

@@ -15,8 +15,7 @@ from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.measure.reference import Reference
 from heavytop.precision import exact
-from heavytop.top.angles import perpendicular
-from heavytop.top.attitude import rotated, transposed
+from heavytop.top.attitude import perpendicular, rotated, transposed
 from heavytop.top.equations import Parameters
 from heavytop.top.heavy_top import HeavyTop
 

@@ -12,19 +12,18 @@ from heavytop import records
 from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.api.run_folder import prepare
+from heavytop.compare import compare as comparing
+from heavytop.compare import noise as policies
 from heavytop.display import Table, Tabular
+from heavytop.document.names import printable, row_name, short
 from heavytop.errors import InputError, quoted
 from heavytop.kinds import KINDS
-from heavytop.measure.digits import digits_kept
+from heavytop.measure.scalar import digits_kept
 from heavytop.precision import whole
-from heavytop.report import compare as comparing
-from heavytop.report import policy as policies
-from heavytop.report import store
-from heavytop.report.comparison_text import headline, metric_name, values
-from heavytop.report.names import row_name
-from heavytop.report.parquet import COLUMNS, lines
-from heavytop.report.printable import printable, short
-from heavytop.report.text import drifts, failed
+from heavytop.render.comparison import headline, metric_name, values
+from heavytop.render.text import drifts, failed
+from heavytop.store import store
+from heavytop.store.parquet import COLUMNS, lines
 
 if TYPE_CHECKING:
     import pandas

@@ -14,26 +14,27 @@ from typing import Any
 from msgspec.structs import replace
 
 from heavytop.api import arguments
-from heavytop.errors import InputError
-from heavytop.integrate.peers import name_of
+from heavytop.document.names import printable, row_name
+from heavytop.errors import InputError, quoted
+from heavytop.integrate.integrator import name_of
 from heavytop.integrate.peers.command import Command, greeting
 from heavytop.integrate.peers.source import named, seconds_of
 from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Report, Row
-from heavytop.report import html, overview, parquet, store
-from heavytop.report.checks import check_rows
-from heavytop.report.environment import environment
-from heavytop.report.names import row_name
-from heavytop.report.printable import printable
-from heavytop.report.terminal import brief
+from heavytop.render import page, text
+from heavytop.render.terminal import brief
+from heavytop.store import parquet, store
+from heavytop.store.checks import check_rows
+from heavytop.store.store import environment
 from heavytop.suite import checkpoint
 from heavytop.suite.checkpoint import Checkpoint, identity_of
 from heavytop.suite.plan import read, warnings
+from heavytop.suite.rows import Task
 from heavytop.suite.run import Progress, unheard
 from heavytop.suite.run import run as run_tasks
-from heavytop.suite.survey import table as survey
-from heavytop.suite.survey.gathered import contents, gathered
-from heavytop.suite.task import Task
+from heavytop.suite.survey import gathered as survey
+from heavytop.suite.survey.gathered import COLUMNS, FILE, contents, gathered
+from heavytop.top.vectors import ordered
 
 PAGE = "report.html"
 _ANOTHER = "Give another --out."
@@ -81,7 +82,7 @@ class Run:
         checkpoint.require_same(report.plan, self.identity, self.directory)
         if self.parquet:
             parquet.write(self.directory / parquet.FILE, report.rows, report.plan)
-        return Ended(brief(report, report.rows, KINDS), overview.all_good(report.rows, KINDS))
+        return Ended(brief(report, report.rows, KINDS), text.all_good(report.rows, KINDS))
 
     def measure(self, progress: Progress = unheard, begun: Progress = unheard) -> Ended:
         """Measure what is not there yet, write the report and sum it up.
@@ -135,8 +136,8 @@ class Run:
             parquet.write(self.directory / parquet.FILE, rows(), report.plan)
         store.write(report, self.directory, rows())
         if len(self.tasks) <= MOST_ON_A_PAGE:
-            html.write_report(replace(report, rows=list(rows())), self.directory / PAGE, KINDS)
-        return Ended(brief(report, rows(), KINDS), overview.all_good(rows(), KINDS))
+            page.write_report(replace(report, rows=list(rows())), self.directory / PAGE, KINDS)
+        return Ended(brief(report, rows(), KINDS), text.all_good(rows(), KINDS))
 
 
 def prepare(
@@ -205,3 +206,51 @@ def require_fit(directory: Path, resume: bool) -> None:
     if content:
         remedy = "Give a new folder with --out." + (" Or go on with --resume." if begun else "")
         raise InputError(f"{directory} already holds {', '.join(sorted(content)[:5])}.", remedy)
+
+
+# Records of surveys, one row a motion, from Python.
+
+
+def read_survey(path: str | os.PathLike[str], *, columns: Sequence[str] | None = None, lazy: bool = False) -> Any:
+    """The records of a survey.
+
+    Arguments:
+        path: the folder of a run, or its survey.parquet.
+        columns: read only these; None for all.
+        lazy: a polars LazyFrame, which reads what is asked of it.
+
+    Returns:
+        A pandas DataFrame with one row a motion.  Its columns are ``sweep``, ``index`` in it, ``class``, ``outcome``,
+        ``digits_right``, ``error_max``, ``steps``, ``drift_*``, the rounded top and start.  What could not be measured
+        is missing.
+
+    Raises:
+        InputError: where there is no survey, for a column that is not there, and where pandas (of a lazy one, polars)
+            is not installed.
+    """
+    where = arguments.path(path, "path")
+    file = where / FILE if where.is_dir() else where
+    known = f"Use {', '.join(COLUMNS)}."
+    wanted = None if columns is None else [columns] if isinstance(columns, str) else ordered(columns, "columns", known)
+    for name in wanted or ():
+        if not isinstance(name, str) or name not in COLUMNS:
+            raise InputError(f"There is no column {quoted(name)} in a survey.", known)
+    if not file.is_file():
+        raise InputError(f"There is no survey at {where}.", f"Give the folder of a run that holds {FILE}.")
+    if arguments.flag(lazy, "lazy"):
+        try:
+            import polars
+        except ImportError:
+            raise InputError("A lazy survey needs polars.", "Install it with: pip install polars") from None
+        frame = polars.scan_parquet(file)
+        return frame if wanted is None else frame.select(wanted)
+    try:
+        import pandas
+    except ImportError:
+        raise InputError("A table needs pandas.", "Install it with: pip install pandas") from None
+    import pyarrow
+
+    try:
+        return pandas.read_parquet(file, columns=wanted, engine="pyarrow")
+    except (OSError, pyarrow.ArrowException) as error:
+        raise InputError(f"{file} cannot be read: {error}.", "Give the folder of a finished run.") from None

@@ -9,15 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from heavytop.compare.compare import CONTROL, Trial, compare, trial
+from heavytop.compare.noise import Policy
 from heavytop.integrate.broken import FAULTS
 from heavytop.kinds import KINDS
 from heavytop.records import SCHEMA, Report, Row
-from heavytop.report.compare import compare
-from heavytop.report.policy import Policy
-from heavytop.report.selftest import CONTROL, Trial, trial
 from heavytop.suite.plan import expand, load
-from heavytop.suite.task import Task
-from heavytop.suite.workers import rows
+from heavytop.suite.rows import Task
+from heavytop.suite.run import rows
 
 
 def tasks(plan: str = "selftest") -> list[Task]:

@@ -12,11 +12,11 @@ import sys
 
 from heavytop.cli import output
 from heavytop.cli.app import app
-from heavytop.cli.motion_output import with_file_of_latex
+from heavytop.cli.motions import with_file_of_latex
 from heavytop.errors import HeavyTopError
 
 # the commands, in the order of `heavytop --help`
-from heavytop.cli import run, reports, motions, score, claims, selftest, integrators, hunt, listing  # noqa: F401
+from heavytop.cli import reports, motions, claims, integrators  # noqa: F401
 
 
 _COMPLETE = "_HEAVYTOP_COMPLETE"

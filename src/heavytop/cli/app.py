@@ -75,7 +75,7 @@ def plans(begun: str) -> list[str]:
 
 def cases(begun: str) -> list[str]:
     """The same of cases."""
-    from heavytop.suite.cases import CASES
+    from heavytop.cases import CASES
 
     return [name for name in CASES if name.startswith(begun)]
 
@@ -85,7 +85,7 @@ def command(function: Callable[..., int]) -> Callable[..., None]:
 
     @wraps(function)
     def with_exit_code(*args: Any, **options: Any) -> None:
-        from heavytop.cli.progress import told_when_slow
+        from heavytop.cli.output import told_when_slow
 
         with told_when_slow(name):
             code = function(*args, **options)

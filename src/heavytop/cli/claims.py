@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from heavytop.cli.app import Json, absolute, command, print_json, require_new, show_on_terminal
-from heavytop.cli.progress import counted, followed, waiting
+from heavytop.cli.output import counted, followed, waiting
 from heavytop.errors import InputError
 
 _AUDIT_SECONDS, _FIGURE_SECONDS, _ENTRY_SECONDS = 6.0, 1.0, 1.0
@@ -32,9 +32,9 @@ def audit(
     Exit 0 if all equations hold, 1 if one is refuted, 3 if none is refuted but one is undecided.  Takes 5 to 20
     seconds.  With --library: 0 if every verdict is the expected one, 1 if one is not, 3 if one is undecided.
     """
-    from heavytop.claims.audit import PAPER, only_branch, require_branch
-    from heavytop.claims.audit import audit as audit_named
-    from heavytop.claims.guard import SECONDS
+    from heavytop.claims.audit.audit import PAPER, only_branch, require_branch
+    from heavytop.claims.audit.audit import audit as audit_named
+    from heavytop.claims.audit.guard import SECONDS
 
     if library or not claim:
         return _library(claim, system, branch, json) if library else _no_claim()
@@ -51,7 +51,7 @@ def audit(
     if json:
         print_json(report.to_json())
     else:
-        from heavytop.report.audit_text import audit_text
+        from heavytop.render.claims import audit_text
 
         show_on_terminal(audit_text(report))
     return report.exit_code
@@ -68,7 +68,7 @@ def _library(claim: str, system: str | None, branch: str | None, json: bool) -> 
     if json:
         print_json(found.to_json())
     else:
-        from heavytop.report.claims_text import unexpected_text
+        from heavytop.render.claims import unexpected_text
 
         show_on_terminal(unexpected_text(found))
     return int(found.exit_code)
@@ -87,7 +87,7 @@ def claims(
     if json:
         print_json(found.to_json())
     else:
-        from heavytop.report.claims_text import claims_text
+        from heavytop.render.claims import claims_text
 
         show_on_terminal(claims_text(found))
     return 0
@@ -95,7 +95,7 @@ def claims(
 
 def _listed(tag: str | None, anew: bool) -> Any:
     from heavytop.api.claims import claim_library
-    from heavytop.claims.entry import library
+    from heavytop.claims.library.entry import library
 
     with counted("audits", len(library()), "claims", _ENTRY_SECONDS) as advance:
         return claim_library(tag, anew=anew, done=advance)
@@ -122,13 +122,13 @@ def figures(
 
 def _drawn(out: Path, report: Path | None) -> list[Path]:
     if report is None:
-        from heavytop.measure.curves import FIGURES, drawings
-        from heavytop.report.figures import draw_figures
+        from heavytop.measure.claim_error import FIGURES, drawings
+        from heavytop.render.figures import draw_figures
 
         with counted("figures", FIGURES, "figures", _FIGURE_SECONDS) as advance:
             return draw_figures(drawings(), out, advance)
     from heavytop.kinds import KINDS
-    from heavytop.report import store
-    from heavytop.report.pictures import draw_report
+    from heavytop.render.plots import draw_report
+    from heavytop.store import store
 
     return draw_report(store.read(report, KINDS), out, KINDS)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from textwrap import fill
 from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, command, print_json
+from heavytop.cli.app import Json, cases, command, print_json, show_on_terminal
+from heavytop.cli.output import Progress
 
 _WHOLE_WORDS: Any = {"break_long_words": False, "break_on_hyphens": False}
 
@@ -26,9 +28,8 @@ def check_integrator(
     from dataclasses import asdict
 
     from heavytop.api.integrators import check_integrator as check
-    from heavytop.cli.output import say_former
-    from heavytop.cli.progress import waiting
-    from heavytop.former_names import current
+    from heavytop.cli.output import say_former, waiting
+    from heavytop.records import current
 
     say_former([integrator])
     with waiting("each part of the contract", 60):
@@ -62,3 +63,163 @@ def new(
     print(fill(f"{folder}: {', '.join(files)}", 80, subsequent_indent="  ", **_WHOLE_WORDS))
     print(f"Next: cd {folder}; {LANGUAGES[language].build}; heavytop check-integrator mine.toml")
     return 0
+
+
+# `hunt`.
+
+
+@command
+def hunt(
+    integrator: Annotated[str, typer.Option(help="A name of `heavytop list`, mine.toml or mine.py:solve.")] = "heyoka",
+    precision: Annotated[str, typer.Option(help="Number format.")] = "double",
+    horizon: Annotated[str, typer.Option(help="Time up to which errors count.")] = "100",
+    budget: Annotated[str, typer.Option(help="Motions, 5000, or seconds, 60s.")] = "5000",
+    family: Annotated[str, typer.Option(help="any, euler, lagrange or kovalevskaya.")] = "any",
+    against: Annotated[str | None, typer.Option(help="Search for the largest ratio to its error.")] = None,
+    limit: Annotated[str | None, typer.Option(help="What is found: an error in eps T^1.5, or a ratio.")] = None,
+    seed: Annotated[int, typer.Option(help="Search otherwise.")] = 1,
+    json: Json = False,
+) -> int:
+    """Search for the motion that breaks an integrator.
+
+    Bodies and starts are tried that are random, then ever worse.  What is found is shrunk to the simplest data that
+    still show it, and proven.  Found is a run that fails, or an error two decades beyond what the integrator's own law
+    and the motion's amplification explain.  5000 motions of heyoka take three minutes.  Exit code 1 if anything is
+    found, else 0.
+    """
+    from heavytop.api.hunt import hunt as search
+    from heavytop.cli.output import say_former
+
+    say_former([integrator])
+    found = search(integrator, precision, horizon, budget, family, against, limit, seed)  # type: ignore[arg-type]
+    if json:
+        print_json(found.document())
+    else:
+        print(found)
+    return 1 if found.found else 0
+
+
+# `list`.
+
+
+_FORMS = {
+    "command": "Command line",
+    "csv": "CSV, above the states of a trajectory",
+    "json": "JSON, in a trajectory",
+    "toml": "TOML, in a plan",
+    "python": "Python",
+}
+
+
+@command
+def list_(
+    case: Annotated[
+        str | None, typer.Option(help="Show the data of that case, ready to paste.", autocompletion=cases)
+    ] = None,
+    json: Json = False,
+) -> int:
+    """List cases, plans, formats and integrators."""
+    if case is not None:
+        return _one_case(case, json)
+    listed = _everything()
+    if json:
+        print_json(listed)
+        return 0
+    print("Cases (--case NAME shows the data)")
+    _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["cases"]}, indent=15)
+    print("Bodies (cases too: the standard tests of other programs)")
+    _lines({each["name"]: f"{each['system']:14} {each['about']}" for each in listed["bodies"]}, indent=15)
+    plans = f"{', '.join(listed['plans'])}, or a TOML file"
+    print("Plans")
+    print(fill(plans, 80, initial_indent="  ", subsequent_indent="  "))
+    print(f"Systems\n  {', '.join(listed['systems'])}")
+    print("Number formats")
+    _lines(listed["formats"])
+    print("Integrators")
+    _lines(listed["integrators"])
+    return 0
+
+
+def _lines(notes: dict[str, str], indent: int = 0) -> None:
+    """A name and its note a line, folded at 80 columns."""
+    width = max(map(len, notes))
+    for name, note in notes.items():
+        print(fill(note, 80, initial_indent=f"  {name:{width}} ", subsequent_indent=" " * (width + 3 + indent)))
+
+
+def _everything() -> dict[str, Any]:
+    from heavytop.cases import CASES, named_bodies
+    from heavytop.integrate import peers
+    from heavytop.precision import FORMATS, available
+    from heavytop.suite.plan import BUILT_IN
+    from heavytop.top.equations import SYSTEMS
+
+    notes = {form.name: f"{form.bits} bits" for form in FORMATS} | {"real": "24 to 20000 bits"}
+    known, reasons = peers.known(), peers.available()
+    integrators = {
+        name: reasons[name] or (each.formats_text if each.streams else "") or "installed"
+        for name, each in sorted(known.items(), key=lambda item: not item[1].streams)
+    }
+    return {
+        "cases": [{"name": case.name, "system": case.system.name, "about": case.about} for case in CASES.values()],
+        "bodies": [
+            {"name": case.name, "system": case.system.name, "about": case.about} for case in named_bodies().values()
+        ],
+        "plans": list(BUILT_IN),
+        "systems": [system.name for system in SYSTEMS],
+        "formats": {
+            "real:BITS" if name == "real" else name: notes[name] if reason is None else f"not available: {reason}"
+            for name, reason in available().items()
+        },
+        "integrators": integrators,
+        "capabilities": {name: each.capabilities() for name, each in known.items()},
+    }
+
+
+def _one_case(name: str, json: bool) -> int:
+    from heavytop.cases import case as case_named
+    from heavytop.suite.case_text import case_data, forms
+
+    found = case_named(name)
+    if json:
+        print_json(
+            case_data(found)
+            | {"about": found.about, "source": found.source, "units": found.units}
+            | {key: forms(found)[key] for key in ("command", "csv", "toml", "python")}
+        )
+        return 0
+    print(fill(f"{found.name}: {found.about}", 80))
+    if found.source:
+        print(fill(f"Source: {found.source}. Units: {found.units}.", 80))
+    for form, text in forms(found).items():
+        print(f"\n{_FORMS[form]}\n{text}")
+    return 0
+
+
+# `selftest`.
+
+
+@command
+def selftest(
+    workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
+    json: Json = False,
+) -> int:
+    """Try the detectors on integrators broken on purpose.
+
+    Exit 1 if a fault they should see slips through.  Takes two minutes on two cores.
+    """
+    from heavytop.api import arguments
+    from heavytop.api import selftest as detectors
+    from heavytop.kinds import KINDS
+
+    at_once = arguments.count(workers, "workers") or os.cpu_count() or 1
+    tasks = detectors.tasks()
+    with Progress(tasks, KINDS, at_once) as advance:
+        trials = detectors.trials(tasks, at_once, advance)
+    if json:
+        print_json({"trials": [trial.to_json() for trial in trials]})
+    else:
+        from heavytop.render.text import selftest_text
+
+        show_on_terminal(selftest_text(trials))
+    return 0 if all(trial.as_expected for trial in trials) else 1

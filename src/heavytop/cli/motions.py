@@ -2,25 +2,172 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shlex
+import sys
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, command, numbers
-from heavytop.cli.events import EventDirection, Events, farthest, of_motion, requested, with_events
-from heavytop.cli.motion_output import made_by, require_one_output, write_motion
-from heavytop.cli.output import say, say_former
-from heavytop.cli.progress import reaching, watched
+from heavytop.cli.app import Json, command, numbers, print_json, show_on_terminal, writing
+from heavytop.cli.output import reaching, say, say_former, watched
 from heavytop.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from heavytop.report.motion_table import MotionTable
-    from heavytop.top.outputs import Output
+    from heavytop.render.motion import MotionTable
+    from heavytop.top.attitude import Output
+
+
+# One motion on the terminal, as JSON, CSV or LaTeX: the same numbers, with what makes them citable.
+
+
+_SCREEN = Path("-")
+_LATEX = "--latex"
+
+
+def with_file_of_latex(arguments: list[str]) -> list[str]:
+    """The arguments of the command line, with ``-`` for standard output behind a ``--latex`` without a file."""
+    found: list[str] = []
+    for argument in arguments:
+        if found[-1:] == [_LATEX] and argument.startswith("--"):
+            found.append(str(_SCREEN))
+        found.append(argument)
+    return [*found, str(_SCREEN)] if found[-1:] == [_LATEX] else found
+
+
+def made_by() -> tuple[str, str]:
+    """The command as it was typed, and the version and commit of the program."""
+    from heavytop.version import commit, version
+
+    made_from = commit()
+    return shlex.join(["heavytop", *sys.argv[1:]]), version() + (f" (commit {made_from})" if made_from else "")
+
+
+def require_one_output(csv: Path | None, latex: Path | None, json: bool) -> None:
+    """Raises InputError where standard output would get two documents, or one file two."""
+    asked = (("--csv", csv == _SCREEN), (_LATEX, latex == _SCREEN), ("--json", json))
+    on_screen = [name for name, wanted in asked if wanted]
+    if len(on_screen) > 1:
+        raise InputError(f"{' and '.join(on_screen)} both print on standard output.", "Give a file for one of them.")
+    if csv is not None and csv == latex != _SCREEN:
+        raise InputError(f"{csv} is asked for as CSV and as LaTeX.", "Give two files.")
+
+
+def write_motion(
+    document: Callable[[], dict[str, Any]],
+    make_table: Callable[[], MotionTable],
+    text: Callable[[MotionTable], RenderableType],
+    csv: Path | None,
+    latex: Path | None,
+    json: bool,
+) -> None:
+    """Write the files asked for, and one document on standard output: JSON, CSV, LaTeX or the table.
+
+    Raises InputError for a file that cannot be written.
+    """
+    table = None if json and csv is None and latex is None else make_table()
+    screen = None
+    for path, make in ((csv, "csv"), (latex, "latex")):
+        if path is None or table is None:
+            continue
+        content = getattr(table, make)()
+        if path == _SCREEN:
+            screen = content
+        else:
+            _write_text(path, content)
+            say(f"wrote {path}")
+    if json:
+        command, version = made_by()
+        print_json({**document(), "command": command, "version": version})
+    elif screen is not None:
+        print(screen, end="")
+    elif table is not None:
+        show_on_terminal(text(table))
+
+
+def _write_text(path: Path, content: str) -> None:
+    with writing():
+        try:
+            path.write_text(content, encoding="utf-8")
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path} cannot be written: {error}.") from None
+
+
+# The options of `propagate` and `reference` for events.
+
+
+Events = Annotated[
+    list[str] | None,
+    typer.Option("--events", help="Also the times, up to the last, at which omega1=0 or the like changes sign."),
+]
+EventDirection = Annotated[
+    int, typer.Option("--event-direction", help="1: where it rises with time; -1: where it falls; 0: both.")
+]
+
+
+def requested(texts: Sequence[str] | None, direction: int) -> list[str]:
+    """The functions asked for, read before anything is computed; raises InputError for what is none."""
+    from heavytop.api.events import require_direction
+    from heavytop.event_times.functions import event_function
+
+    require_direction(direction)
+    for text in texts or ():
+        event_function(text)
+    return list(texts or ())
+
+
+def farthest(times: Sequence[str]) -> Fraction:
+    """The time farthest from 0."""
+    from heavytop.precision import exact
+
+    return max(map(exact, times), key=abs)
+
+
+def of_motion(
+    functions: Sequence[str],
+    direction: int,
+    top: Any,
+    start: Any,
+    times: Sequence[str],
+    system: str | None,
+    reached: Callable[[Fraction], None],
+    settings: dict[str, Any],
+) -> list[Any]:
+    """The events of each function up to the time farthest from 0; settings: of :func:`heavytop.api.events.events`."""
+    if not functions:
+        return []
+    from heavytop.api.events import events
+
+    until = farthest(times)
+    return [
+        events(top, start, until, function, direction, system=system, reached=reached, **settings)
+        for function in functions
+    ]
+
+
+def with_events(
+    document: Callable[[], dict[str, Any]], table: Any, text: Callable[[Any], Any], found: Sequence[Any]
+) -> tuple[Callable[[], dict[str, Any]], Any, Callable[[Any], Any]]:
+    """The document, the table and the text of a motion, with the events behind, where any were asked for."""
+    if not found:
+        return document, table, text
+
+    def text_with_events(shown: Any) -> Any:
+        from rich.console import Group
+
+        from heavytop.render.motion import events_text
+
+        return Group(text(shown), events_text(found))
+
+    def document_with_events() -> dict[str, Any]:
+        return {**document(), "events": [each.to_json() if hasattr(each, "to_json") else each for each in found]}
+
+    return document_with_events, table, text_with_events
+
 
 Inertia = Annotated[
     str | None,
@@ -141,12 +288,12 @@ def propagate(
         )
 
     def table() -> MotionTable:
-        from heavytop.report.motion_table import of_motion as table_of
+        from heavytop.render.motion import of_motion as table_of
 
         return table_of(motion, *made_by()).of_case(case)
 
     def text(shown: MotionTable) -> RenderableType:
-        from heavytop.report.motion_text import motion_text
+        from heavytop.render.motion import motion_text
 
         return motion_text(motion, shown)
 
@@ -223,12 +370,12 @@ def reference(
         found.require_outputs(wanted)
 
     def table() -> MotionTable:
-        from heavytop.report.motion_table import of_reference
+        from heavytop.render.motion import of_reference
 
         return of_reference(found, wanted, *made_by()).of_case(case)
 
     def text(shown: MotionTable) -> RenderableType:
-        from heavytop.report.motion_text import reference_text
+        from heavytop.render.motion import reference_text
 
         return reference_text(found, shown)
 
@@ -241,7 +388,7 @@ def reference(
 
 def _outputs(show: str | None, point: str | None, pivot: str | None) -> tuple[Output, ...]:
     """The outputs asked for; raises InputError for one that is unknown, and for a point or pivot without a position."""
-    from heavytop.top.outputs import outputs
+    from heavytop.top.attitude import outputs
 
     places = [None if each is None else numbers(each) for each in (point, pivot)]
     if show is None and places == [None, None]:
@@ -303,7 +450,7 @@ def _motion(
     texts: the options, by the keys of a plan.  case: in place of them.
     """
     if case is None:
-        from heavytop.top.given_motion import motion_of
+        from heavytop.top.bodies import motion_of
 
         given = {key: _value(key, text) for key, text in texts.items()}
         top, start = motion_of(given, normalize)
@@ -320,7 +467,7 @@ def _value(key: str, text: str | None) -> Any:
 
 def _of_case(name: str, system: str | None, others: list[str]) -> Any:
     """Body, start and system of a case; raises InputError where options say them too."""
-    from heavytop.suite.cases import case
+    from heavytop.cases import case
 
     if others:
         raise InputError(f"--case {name} and --{others[0].replace('_', '-')} were given.", "Give one of them.")

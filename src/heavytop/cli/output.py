@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import errno
 import io
+import math
 import os
 import sys
-from collections.abc import Iterable
-from typing import Any, TextIO
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from threading import Event, Thread, Timer
+from time import perf_counter
+from typing import Any, Self, TextIO
 
-from heavytop import former_names
+from heavytop import records
 from heavytop.errors import HeavyTopError
 
 READER_GONE = 141
@@ -102,7 +106,7 @@ def say(text: str) -> None:
 def say_former(names: Iterable[str]) -> None:
     """A line for each name among these that an integrator had before."""
     for name in sorted(set(names)):
-        if text := former_names.notice(name):
+        if text := records.notice(name):
             say(f"note: {text}")
 
 
@@ -115,3 +119,249 @@ def printable(document: str) -> str:
 
         return json.dumps(json.loads(document), indent=1)
     return document
+
+
+# How far a command has come, on standard error: a bar on a terminal, and everywhere a line when it takes long.
+
+
+_TRUST, _MEASURED = 0.05, 0.1
+"""The expected speed counts at first as much as a twentieth of the work, and no more when a tenth of it is done."""
+_EVEN = 1e-12
+"""The same of work that goes on evenly, whose speed shows at once."""
+_EVERY = 0.5
+"""Seconds between two looks at work that does not report by itself."""
+SILENCE = 10.0
+"""Seconds after which a command says what it is at."""
+_open: list[Bar] = []
+"""The bars of what is being done in this process, the innermost last."""
+
+
+class Estimator:
+    """How long work of known weight will still take.
+
+    total: the sum of the weights of its parts.  expected: seconds for a weight of 1, before anything was measured.
+    clock: seconds from any moment on.  trust: how much of the work the expected speed counts as at first.
+
+    When a tenth is done, its speed alone counts.  Then the estimate is right within a factor of 2 if the weights of
+    what is done and of what is left are wrong by factors that differ by less than 2.
+    """
+
+    def __init__(
+        self, total: float, expected: float = 1.0, clock: Callable[[], float] = perf_counter, trust: float = _TRUST
+    ) -> None:
+        self._trust = trust
+        self.total = max(total, 0.0)
+        self.done = 0.0
+        self._expected = expected
+        self._clock = clock
+        self._began = self._last = clock()
+
+    def advance(self, weight: float) -> None:
+        """A part is done, now."""
+        self.done = min(self.total, self.done + weight)
+        self._last = self._clock()
+
+    def reach(self, done: float) -> None:
+        """So much in all is done, now; never less than before."""
+        if done > self.done:
+            self.advance(done - self.done)
+
+    @property
+    def fraction(self) -> float:
+        """How much of the work is done, 0 to 1."""
+        return self.done / self.total if self.total else 1.0
+
+    def seconds_left(self) -> float:
+        """An estimate; 0 when all is done."""
+        if self.done >= self.total:
+            return 0.0
+        trust = self._trust * self.total * max(0.0, 1 - self.fraction / _MEASURED)
+        speed = (self._last - self._began + trust * self._expected) / (self.done + trust)
+        # since the last part ended, work went on that has not been counted
+        return max((self.total - self.done) * speed - (self._clock() - self._last), 0.0)
+
+
+def duration(seconds: float) -> str:
+    """A time to wait, as short as people say it: 8 s, 1:05, 2:03:00."""
+    whole = math.ceil(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    hours, rest = divmod(whole, 3600)
+    return f"{hours}:{rest // 60:02}:{rest % 60:02}" if hours else f"{rest // 60}:{rest % 60:02}"
+
+
+@contextmanager
+def told_when_slow(command: str) -> Iterator[None]:
+    """Say once, after :data:`SILENCE`, what the command is doing and how far it has come."""
+    began = perf_counter()
+
+    def tell() -> None:
+        so_far = f"{command}: {duration(perf_counter() - began)} so far"
+        if not _open:
+            say(f"{so_far}, going on")
+        elif (bar := _open[-1]).live:
+            bar.console.print(f"heavytop: {so_far}, {bar.state()}", markup=False, highlight=False, soft_wrap=True)
+        else:
+            say(f"{so_far}, {bar.state()}")
+
+    timer = Timer(SILENCE, tell)
+    timer.daemon = True
+    with suppress(RuntimeError):  # no thread to be had
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+class Bar:
+    """What is done, of how many, per cent, time left: a line on a terminal, which is drawn again and again.
+
+    count: how many parts there are, named by ``unit``; 0 where they are not counted.  label: what is being done.
+    """
+
+    label = ""
+    look: Callable[[], None] | None = None
+    """Called before its state is read, where the work does not report by itself."""
+
+    def __init__(self, estimator: Estimator, count: int = 0, unit: str = "rows", console: Any = None) -> None:
+        from rich import progress
+        from rich.console import Console
+
+        self.estimator, self.count, self.unit, self.finished = estimator, count, unit, 0
+        self.console = console or Console(file=messages())
+        self.live = bool(self.console.is_terminal)
+        columns = (
+            progress.TextColumn("{task.description}"),
+            progress.BarColumn(),
+            progress.TextColumn("{task.fields[said]}"),
+        )
+        self.bar = progress.Progress(*columns, console=self.console, disable=not self.live, transient=True)
+        self.id = self.bar.add_task("starting", total=1.0, said=self.said())
+
+    def said(self) -> str:
+        """Parts done of all, per cent, time left."""
+        counted = f"{self.finished}/{self.count} {self.unit}" if self.count else ""
+        percent, left = 100 * self.estimator.fraction, self.estimator.seconds_left()
+        if not percent and not left:
+            return counted or "how far is not known"
+        percent_text = f"{percent:.1g} %" if 0 < percent < 1 else f"{percent:.0f} %"
+        return ", ".join(filter(None, (counted, percent_text, f"about {duration(left)} left")))
+
+    def state(self) -> str:
+        """What is being done and how far it is, in a line."""
+        if self.look is not None:
+            self.look()
+        return ": ".join(filter(None, (self.label, self.said())))
+
+    def show(self, label: str | None = None) -> None:
+        """Draw it as it is now."""
+        self.label = self.label if label is None else label
+        named = None if label is None else label[:40]
+        self.bar.update(self.id, completed=self.estimator.fraction, description=named, said=self.said())
+
+    def __enter__(self) -> Self:
+        self.bar.start()
+        _open.append(self)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        _open.remove(self)
+        self.bar.stop()
+
+
+class Progress(Bar):
+    """The bar of a run, called with each finished task.
+
+    kinds: of measurement, by name, which know what a task costs.  workers: how many tasks run at once.
+    """
+
+    def __init__(self, tasks: Sequence[Any], kinds: Any, workers: int = 1) -> None:
+        self.kinds = kinds
+        super().__init__(Estimator(sum(map(self._cost, tasks)), 1 / max(workers, 1)), len(tasks))
+
+    def begin(self, task: Any) -> None:
+        """Names the task that is running."""
+        self.show(task.label)
+
+    def __call__(self, task: Any) -> None:
+        self.finished += 1
+        self.estimator.advance(self._cost(task))
+        self.show()
+
+    def _cost(self, task: Any) -> float:
+        cost: float = self.kinds[task.key.kind].cost(task)
+        return cost
+
+
+@contextmanager
+def counted(label: str, count: int, unit: str, expected: float) -> Iterator[Callable[[], None]]:
+    """A bar over ``count`` parts of equal weight; gives what to call after each.  expected: seconds of one."""
+    with Bar(Estimator(count, expected), count, unit) as bar, _watched(bar, label):
+
+        def advance() -> None:
+            # drawn by the thread that looks twice a second: there may be very many parts
+            bar.finished += 1
+            bar.estimator.advance(1)
+
+        yield advance
+
+
+@contextmanager
+def followed(label: str, unit: str, expected: float) -> Iterator[Callable[[int, int], None]]:
+    """A bar over parts whose number is found on the way; gives what to call with how many are done, of how many."""
+    with Bar(Estimator(1.0, expected), 0, unit) as bar, _watched(bar, label):
+
+        def advance(done: int, of: int) -> None:
+            bar.finished, bar.count = done, of
+            bar.estimator.reach(done / of)
+            bar.show(label)
+
+        yield advance
+
+
+@contextmanager
+def reaching(label: str, expected: float) -> Iterator[Callable[[float], None]]:
+    """A bar over work that goes on evenly; gives what to call with the part of it that is done."""
+    with Bar(Estimator(1.0, expected, trust=_EVEN)) as bar, _watched(bar, label):
+        yield bar.estimator.reach
+
+
+@contextmanager
+def waiting(label: str, most: float) -> Iterator[None]:
+    """A bar while something works that cannot say how far it is, and is stopped after ``most`` seconds: of these."""
+    began = perf_counter()
+    with watched(f"{label}, {duration(most)} at most", lambda: (perf_counter() - began) / most, most):
+        yield
+
+
+@contextmanager
+def watched(label: str, fraction: Callable[[], float], expected: float) -> Iterator[None]:
+    """A bar over work that does not report: ``fraction`` is asked how much of it is done, from another thread."""
+    with Bar(Estimator(1.0, expected)) as bar:
+        bar.look = lambda: bar.estimator.reach(fraction())
+        with _watched(bar, label):
+            yield
+
+
+@contextmanager
+def _watched(bar: Bar, label: str) -> Iterator[None]:
+    """Draw the bar twice a second, on a terminal."""
+    bar.label = label
+    if not bar.live:
+        yield
+        return
+    stop = Event()
+
+    def draw() -> None:
+        while not stop.wait(_EVERY):
+            bar.state()
+            bar.show(label)
+
+    thread = Thread(target=draw, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import ExitStack
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from time import perf_counter
 from typing import Annotated, Any
 
 import typer
 
-from heavytop.cli.app import Json, command, print_json, show_on_terminal, writing
-from heavytop.cli.progress import counted
+from heavytop.cli.app import Json, absolute, cases, command, plans, print_json, require_new, show_on_terminal, writing
+from heavytop.cli.output import Progress, counted, say, say_former
 from heavytop.errors import InputError
 
 _REPORT_SECONDS = 0.1
@@ -34,14 +36,14 @@ def compare(
 
     Else exit 3 if anything is missing or incomparable, else 0.
     """
+    from heavytop.compare.compare import compare as compare_reports
     from heavytop.kinds import KINDS
-    from heavytop.report import store
-    from heavytop.report.compare import compare as compare_reports
+    from heavytop.store import store
 
     rules = _policy(policy, floor, loss)
     files: list[tuple[Path, str]] = []
     if html is not None:
-        from heavytop.report.html import comparison_page
+        from heavytop.render.page import comparison_page
 
         old, new = _read([baseline, candidate], store.read)
         result = compare_reports(old, new, rules, KINDS)
@@ -51,18 +53,18 @@ def compare(
         before, after = _read([baseline, candidate], store.read_brief)
         result = compare_reports(before, after, rules, KINDS, list_same=all_of_them)
     if markdown is not None:
-        from heavytop.report.markdown import comparison_markdown
+        from heavytop.render.export import comparison_markdown
 
         files.append((markdown, comparison_markdown(result, html)))
     if junit is not None:
-        from heavytop.report.junit import comparison_junit
+        from heavytop.render.export import comparison_junit
 
         files.append((junit, comparison_junit(result)))
     _write(files)
     if json:
         print_json(result.to_json())
     else:
-        from heavytop.report.comparison_text import comparison
+        from heavytop.render.comparison import comparison
 
         show_on_terminal(comparison(result, full))
     return result.exit_code
@@ -78,10 +80,10 @@ def history(
     json: Json = False,
 ) -> int:
     """Show metrics over reports, with every step marked."""
+    from heavytop.compare.noise import glob
     from heavytop.kinds import KINDS
-    from heavytop.report import history as over
-    from heavytop.report import store
-    from heavytop.report.policy import glob
+    from heavytop.render import history as over
+    from heavytop.store import store
 
     if len(reports) < 2:
         raise InputError("A history needs two reports or more.", "Give their folders, the oldest first.")
@@ -93,7 +95,7 @@ def history(
         tracks = [track for track in tracks if track.steps]
     names = [str(path) for path in reports]
     if html is not None:
-        from heavytop.report.history_page import history_page
+        from heavytop.render.history import history_page
 
         _write([(html, history_page(names, read, tracks))])
     if json:
@@ -117,13 +119,13 @@ def _read(paths: list[Path], reader: Callable[..., Any]) -> list[Any]:
 
 def _policy(file: Path | None, floor: str | None, loss: str | None) -> Any:
     """The policy of a file or the default one; the options count before either."""
-    from heavytop.report.policy import Policy, adjusted, load
+    from heavytop.compare.noise import Policy, adjusted, load
 
     return adjusted(Policy() if file is None else load(file), floor, loss)
 
 
 def _write(files: list[tuple[Path, str]]) -> None:
-    from heavytop.suite.files import replace_all
+    from heavytop.files import replace_all
 
     with writing():
         replace_all([(path, text.encode()) for path, text in files])
@@ -142,10 +144,10 @@ def show(
 
     The page is one self-contained file; --parquet writes the rows as a table instead.
     """
+    from heavytop.files import whole
     from heavytop.kinds import KINDS
-    from heavytop.report import parquet as tables
-    from heavytop.report import store
-    from heavytop.suite.files import whole
+    from heavytop.store import parquet as tables
+    from heavytop.store import store
 
     if parquet is not None:
         tables.check_name(parquet)
@@ -160,12 +162,12 @@ def show(
     with ExitStack() as stack:
         stack.enter_context(writing())
         if html is not None:
-            from heavytop.report.html import report_page
+            from heavytop.render.page import report_page
 
             page = report_page(found, KINDS).encode()
             stack.enter_context(whole(html)).write(page)
         if markdown is not None:
-            from heavytop.report.document_formats import to_markdown
+            from heavytop.render.export import to_markdown
 
             stack.enter_context(whole(markdown)).write(to_markdown(found, KINDS).encode())
         if parquet is not None:
@@ -178,9 +180,10 @@ def show(
 def _print(report: Path, full: bool, json: bool) -> None:
     """The summary of a report, in short, in full, or as JSON."""
     from heavytop.kinds import KINDS
-    from heavytop.report import overview, store
-    from heavytop.report.document_formats import to_json
-    from heavytop.report.terminal import brief, summary
+    from heavytop.render import text as overview
+    from heavytop.render.export import to_json
+    from heavytop.render.terminal import brief, summary
+    from heavytop.store import store
 
     if json:
         print_json(to_json(store.read(report, KINDS), KINDS))
@@ -209,8 +212,8 @@ def export(
     Of each number smaller is better: log10 of error and drift, exponents of growth laws, seconds.
     """
     from heavytop.kinds import KINDS
-    from heavytop.report import store
-    from heavytop.report.export import export as exported
+    from heavytop.render.export import export as exported
+    from heavytop.store import store
 
     text = exported(store.read(report, KINDS), to, KINDS)
     if out is None:
@@ -218,3 +221,170 @@ def export(
     else:
         _write([(out, text)])
     return 0
+
+
+# `run`.
+
+
+@command
+def run(
+    plan: Annotated[
+        str, typer.Option(help="smoke, default, growth, long, peers, gate, or a TOML file.", autocompletion=plans)
+    ] = "default",
+    integrator: Annotated[str, typer.Option(help="Measure it beside heyoka: a name, mine.toml, mine.py:solve.")] = "",
+    out: Annotated[Path | None, typer.Option(help="New folder for the report.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the rows that --out already holds.")] = False,
+    workers: Annotated[int | None, typer.Option(help="Local processes; as many as there are processors.")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on instead.")] = None,
+    parquet: Annotated[bool, typer.Option("--parquet", help="Write DIR/rows.parquet too.")] = False,
+    seed: Annotated[int, typer.Option(help="Measure the same motions with other roundings: 0 to 1000.")] = 0,
+    row_timeout: Annotated[
+        str | None, typer.Option(help="Seconds of a row of a third-party integrator, at most.", metavar="SECONDS")
+    ] = None,
+    save_every: Annotated[float, typer.Option(help="Seconds after which a long row saves its place.", min=0)] = 10.0,
+) -> int:
+    """Run a plan of measurements and write its report.
+
+    It goes to DIR/report.json and DIR/report.html.  On two cores smoke takes about 10 seconds, default a minute,
+    gate two minutes, peers five, growth ten, long half an hour.
+    """
+    from heavytop.api.run_folder import PAGE, prepare
+    from heavytop.kinds import KINDS
+    from heavytop.store.store import FILE as REPORT
+    from heavytop.suite.checkpoint import FILE as ROWS
+    from heavytop.suite.plan import former
+
+    asked = prepare(
+        plan,
+        # whatever an integrator does to the working directory
+        None if out is None else absolute(out),
+        resume=resume,
+        workers=workers,
+        scheduler=scheduler,
+        seed=seed,
+        integrator=integrator,
+        save_every=save_every,
+        with_parquet=parquet,
+        row_timeout=row_timeout,
+    )
+    directory = asked.directory
+    say_former({integrator} | former(plan))
+    for warning in asked.warnings:
+        say(f"warning: {warning}")
+    if asked.is_finished:
+        ended = asked.finished()
+        print(ended.summary)
+        print(f"\nReport: {directory / REPORT} (was finished already)")
+        return 0 if ended.good else 3
+    began = perf_counter()
+    try:
+        with _stopped_by_signals(), Progress(asked.tasks, KINDS, asked.workers) as advance:
+            ended = asked.measure(advance, advance.begin)
+    except KeyboardInterrupt as stop:
+        kept = f"finished rows are kept: --out {directory} --resume goes on"
+        said = kept if (directory / ROWS).exists() else "no row was finished"
+        say(f"interrupted; {said}")
+        return 143 if isinstance(stop, _Terminated) else 130
+    print(ended.summary)
+    page = directory / PAGE
+    print(f"\nMade in {perf_counter() - began:.0f} s. Every row: heavytop show {directory} --full")
+    print(f"Report: {directory / REPORT}")
+    print(f"Page:   {page if page.exists() else f'none for so many rows; `heavytop show {directory} --html FILE`'}")
+    return 0 if ended.good else 3
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM, which ends a run like Ctrl-C."""
+
+
+@contextmanager
+def _stopped_by_signals() -> Iterator[None]:
+    """SIGINT and SIGTERM are exceptions, so that what is finished is kept and said."""
+
+    def terminate(*_: object) -> None:
+        raise _Terminated
+
+    handlers: dict[signal.Signals, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: terminate}
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+# `score`.
+
+
+_STATE_SECONDS = 1e-3
+"""Expected of comparing one state."""
+
+
+@command
+def score(
+    trajectory: Annotated[Path, typer.Argument(help="A motion computed elsewhere: .json, .csv, or - to read it.")],
+    case: Annotated[str | None, typer.Option(help="Built-in case of its top and start.", autocompletion=cases)] = None,
+    out: Annotated[Path | None, typer.Option(help="New folder for a report with its row.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page about it to that file.")] = None,
+    require: Annotated[str | None, typer.Option(help="Exit 1 where fewer digits are right: 9.5.")] = None,
+    normalize: Annotated[
+        bool,
+        typer.Option("--normalize", help="Take quaternions, matrices and gamma of any length."),
+    ] = False,
+    json: Json = False,
+) -> int:
+    """Say how many digits of your trajectory are right.
+
+    Digits right at every sample, beside heyoka's in the same format; distance from the known motion; drift of the
+    first integrals; what explains the error, where something does.  The file holds Ω and γ, or quaternions, matrices,
+    Euler angles, positions, Ω in axes of space: docs/score.md.  Takes a few seconds.
+    """
+    from heavytop.cases import case as case_named
+    from heavytop.suite.score import assess, passed, required
+    from heavytop.trajectories.files import read
+
+    if out is not None:
+        out = absolute(out)
+        require_new(out)
+    needed = None if require is None else required(require)
+    given = read(trajectory, None if case is None else case_named(case), normalize)
+    for warning in given.warnings():
+        say(f"warning: {warning}")
+    with counted("score", 2 * len(given.times), "states", _STATE_SECONDS) as advance:
+        found = assess(given, advance)
+    if out is not None or html is not None:
+        _write_score(found, given.sha256, out, None if html is None else absolute(html))
+    if json:
+        from heavytop.render.score import to_json
+
+        print_json(to_json(found) if needed is None else to_json(found) | {"passed": passed(found.row, needed)})
+    else:
+        from heavytop.render.score import requirement, score_text
+
+        show_on_terminal(score_text(found))
+        if html is not None:
+            print(f"\nPage: {html}")
+    good = passed(found.row, needed)
+    if needed is not None and not json:
+        print(f"\n{requirement(found.row, needed)}")
+    return 3 if good is None else 0 if good else 1
+
+
+def _write_score(found: Any, sha256: str, out: Path | None, html: Path | None) -> None:
+    """The report that `compare` and `show` read, and its page."""
+    from heavytop.kinds import KINDS
+    from heavytop.render.page import write_report
+    from heavytop.render.score import score_report
+    from heavytop.store import store
+    from heavytop.store.store import environment
+
+    report = score_report(found, environment(), sha256)
+    if out is not None:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            store.write(report, out)
+        except OSError as error:
+            raise InputError(f"{out} cannot be written: {error}.", "Choose a writable --out with space.") from None
+    if html is not None:
+        with writing():
+            write_report(report, html, KINDS)

@@ -1,7 +1,7 @@
 """Events of a computed motion, located on the Taylor polynomial of every step to the format.
 
 A rational function N/D composed with the polynomials of a step is a quotient of polynomials: its changes of sign
-without a pole are those of N, isolated exactly (:mod:`heavytop.event_times.roots`).  Steps err by a rounding at their
+without a pole are those of N, isolated exactly (:mod:`heavytop.event_times.dense`).  Steps err by a rounding at their
 common
 ends: a change that only shows between the end of one and the beginning of the next is an event at that time.
 """
@@ -16,12 +16,19 @@ from typing import Any, NamedTuple
 from flint import fmpq, fmpq_poly
 
 from heavytop.errors import InputError, quoted
-from heavytop.event_times.dense import Dense, Piece
-from heavytop.event_times.functions import EventFunction, composed, terms_of, turned
-from heavytop.event_times.records import POLYNOMIAL, SAMPLED, Events, arrays
-from heavytop.event_times.roots import refined, sign_after, sign_before, sign_changes
+from heavytop.event_times.dense import Dense, Piece, refined, sign_after, sign_before, sign_changes
+from heavytop.event_times.functions import (
+    POLYNOMIAL,
+    SAMPLED,
+    EventFunction,
+    Events,
+    arrays,
+    composed,
+    terms_of,
+    turned,
+)
+from heavytop.integrate.multiword.motions import native_state
 from heavytop.integrate.trajectory import Outcome
-from heavytop.integrate.words import native_state
 from heavytop.precision import Precision, number
 from heavytop.top.attitude import rotated
 from heavytop.top.vectors import Vector

@@ -1,10 +1,10 @@
 """Events of the true motion as balls: each proven to be there, none missed.
 
 On a step of the enclosure the motion is y(τ) = p(τ) + w(τ), p a polynomial and |w| ≤ W
-(:mod:`heavytop.exact.enclosure`). With balls of radius W in the constant coefficients, a polynomial f of the state is
-enclosed at every τ by one polynomial with ball coefficients; so is its rate along the motion, which is a polynomial of
-the state as well.  A step is divided until in each part either f or its rate is proven not to vanish: in the first case
-there is no zero, in the second at most one, and it is simple.  Signs of f on both sides of a chain of such parts,
+(:mod:`heavytop.exact.enclosure.step`). With balls of radius W in the constant coefficients, a polynomial f of the state
+is enclosed at every τ by one polynomial with ball coefficients; so is its rate along the motion, which is a polynomial
+of the state as well.  A step is divided until in each part either f or its rate is proven not to vanish: in the first
+case there is no zero, in the second at most one, and it is simple.  Signs of f on both sides of a chain of such parts,
 proven, tell whether there is one.
 
 A part in which neither can be proven holds a zero that is not simple or two that are too close for the precision: more
@@ -27,12 +27,10 @@ from flint import arb, arb_poly
 
 from heavytop.errors import Contradiction, HeavyTopError, OutOfReach
 from heavytop.event_times.functions import EventFunction, by_omega, composed, first_term, rate_along, terms_of, turned
-from heavytop.exact.balls import ball, midpoint, radius, working_precision
 from heavytop.exact.bodies import Resolved
-from heavytop.exact.enclosure import Step
-from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.scaled_motion import ScaledMotion
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.run import ScaledMotion, Validated
+from heavytop.exact.enclosure.step import Step
+from heavytop.exact.flint.balls import ball, midpoint, radius, whole_evaluation, working_precision
 from heavytop.precision import decimal_text
 
 _GUARD_BITS = 24

@@ -2,7 +2,7 @@
 
 Everything is computed in principal axes, from exact rationals.  Where the principal axes of a tensor, or an attitude
 given by angles, are irrational, rational data stand for them: a rational rotation A near the principal axes, a rational
-rotation near the attitude.  What they lack is known and bounded (:class:`heavytop.exact.validated.Uncertainty`):
+rotation near the attitude.  What they lack is known and bounded (:class:`heavytop.exact.enclosure.run.Uncertainty`):
 
 the true tensor in the axes A is D + E with D diagonal and E = Aᵀ J A − D, exactly, so that with X = (D + E)⁻¹
 
@@ -11,7 +11,7 @@ the true tensor in the axes A is D + E with D diagonal and E = Aᵀ J A − D, e
 
 and |Ω| is bounded for all times by the energy, |Ω|² ≤ 2 (½ Ω·JΩ + 2 |n|)/min J.  The enclosure takes δ as a part of its
 defect and the error of the start as the radii of its first node, so that its balls hold the *true* motion.  Algebraic
-motions (:mod:`heavytop.exact.algebraic`) are known in themselves, and need none of this.
+motions (:mod:`heavytop.exact.cases.algebraic_starts`) are known in themselves, and need none of this.
 """
 
 from __future__ import annotations
@@ -25,20 +25,26 @@ from typing import Any, cast
 from flint import arb
 
 from heavytop.errors import OutOfReach
-from heavytop.exact.attitude import state_and_attitude
-from heavytop.exact.balls import FUNCTIONS, ball, midpoint, radius, relative_bits, to_bits, working_precision
 from heavytop.exact.catalogue import find
-from heavytop.exact.flint_context import whole_evaluation
+from heavytop.exact.closed_form import state_and_attitude
+from heavytop.exact.enclosure.run import Uncertainty, Validated
+from heavytop.exact.flint.balls import (
+    FUNCTIONS,
+    ball,
+    midpoint,
+    radius,
+    relative_bits,
+    to_bits,
+    whole_evaluation,
+    working_precision,
+)
 from heavytop.exact.solution import ExactSolution
-from heavytop.exact.validated import Uncertainty, Validated
 from heavytop.precision import round_to
 from heavytop.top.amplification import amplification
-from heavytop.top.angles import perpendicular
-from heavytop.top.attitude import Attitude, Rows, rotated, transposed
-from heavytop.top.bodies import Body
+from heavytop.top.attitude import Attitude, Rows, perpendicular, rotated, transposed
+from heavytop.top.bodies import IDENTITY, Body, PrincipalAxes
 from heavytop.top.equations import HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.principal import IDENTITY, PrincipalAxes
 from heavytop.top.vectors import Vector, cross, dot
 
 Finder = Callable[[HeavyTop, State, System], ExactSolution]
@@ -244,7 +250,7 @@ class BodyMotion:
     def with_attitude(self, time: Fraction, bits: int) -> list[arb]:
         """Ω, γ and ξ at ``time`` in the axes given: nine balls.
 
-        ξ starts at the first row of the attitude given, or at :func:`heavytop.top.angles.perpendicular` of γ.
+        ξ starts at the first row of the attitude given, or at :func:`heavytop.top.attitude.perpendicular` of γ.
         Raises OutOfReach where it cannot be proven, InputError for |γ| ≠ 1 where no attitude was given.
         """
         return list(self.whole(time, bits)[1](time, bits))

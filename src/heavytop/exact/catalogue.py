@@ -2,7 +2,7 @@
 
 Constants first, then elementary functions, then elliptic and hyperelliptic ones; the validated enclosure for
 every other motion.
-A class is found by its exact conditions, first on the body and then on the start (:mod:`heavytop.exact.conditions`);
+A class is found by its exact conditions, first on the body and then on the start (:mod:`heavytop.exact.solution`);
 :func:`table` writes them down.  Its constructor makes the same test, and raises NotInClass with what fails.
 """
 
@@ -16,31 +16,26 @@ from functools import partial
 from flint import arb
 
 from heavytop.errors import LevelNotDone, OutOfReach
-from heavytop.exact.axes import ALL, CYCLIC, Axes, Renamed, inverse, renamed_state, renamed_top
-from heavytop.exact.bobylev_steklov import BobylevSteklov
-from heavytop.exact.closed_form import ClosedForm
-from heavytop.exact.conditions import Conditions, equilibrium, hold
-from heavytop.exact.delone import Delone, DeloneHomoclinic
-from heavytop.exact.dokshevich import Dokshevich
-from heavytop.exact.ershkov_partial import ErshkovPartial
-from heavytop.exact.euler import Euler
-from heavytop.exact.goryachev_chaplygin import GoryachevChaplygin, Sretensky
-from heavytop.exact.goryachev_chaplygin_rest import GoryachevChaplyginRest
-from heavytop.exact.grioli import Grioli
-from heavytop.exact.gyrostat import Gyrostat
-from heavytop.exact.hess import Hess
-from heavytop.exact.hess_pendulum import HessPendulum
-from heavytop.exact.kovalevskaya import Kovalevskaya
-from heavytop.exact.lagrange import Lagrange
-from heavytop.exact.lagrange_gyrostat import LagrangeGyrostat
-from heavytop.exact.pendulum import Pendulum
-from heavytop.exact.scales import require_handy
-from heavytop.exact.solution import ExactSolution
-from heavytop.exact.spherical import SphericalTop
-from heavytop.exact.staude import Staude
-from heavytop.exact.steklov import Steklov
-from heavytop.exact.validated import Validated
-from heavytop.exact.zhukovsky_volterra import ZhukovskyVolterra
+from heavytop.exact.cases.bobylev_steklov import BobylevSteklov
+from heavytop.exact.cases.delone import Delone, DeloneHomoclinic
+from heavytop.exact.cases.dokshevich import Dokshevich
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.cases.euler import Euler
+from heavytop.exact.cases.goryachev_chaplygin import GoryachevChaplygin, Sretensky
+from heavytop.exact.cases.goryachev_chaplygin_rest import GoryachevChaplyginRest
+from heavytop.exact.cases.grioli import Grioli
+from heavytop.exact.cases.gyrostat import Gyrostat
+from heavytop.exact.cases.hess import Hess, HessPendulum
+from heavytop.exact.cases.kovalevskaya import Kovalevskaya
+from heavytop.exact.cases.lagrange import Lagrange, LagrangeGyrostat, SphericalTop
+from heavytop.exact.cases.one_interval import Steklov
+from heavytop.exact.cases.pendulum import Pendulum
+from heavytop.exact.cases.staude import Staude
+from heavytop.exact.cases.zhukovsky_volterra import ZhukovskyVolterra
+from heavytop.exact.closed_form import ALL, CYCLIC, Axes, ClosedForm, Renamed, inverse, renamed_state, renamed_top
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import require_handy
+from heavytop.exact.solution import Conditions, ExactSolution, equilibrium, hold
 from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System
 from heavytop.top.heavy_top import HeavyTop, State
 

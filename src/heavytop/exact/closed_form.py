@@ -10,18 +10,106 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
-from typing import Any, ClassVar
+from functools import wraps
+from itertools import permutations
+from math import factorial
+from typing import Any, ClassVar, TypeVar
 
-from flint import acb, acb_series, arb, arb_series
+from flint import acb, acb_series, arb, arb_series, fmpq_series
 
-from heavytop.exact.balls import FUNCTIONS, ball, to_bits
-from heavytop.exact.conditions import Conditions, require
-from heavytop.exact.flint_context import coefficient, current_length
-from heavytop.exact.flint_context import series_length as series_length
-from heavytop.exact.motion import initial_xi
-from heavytop.top.angles import attitude_from_angles
-from heavytop.top.equations import HEAVY_TOP, System
-from heavytop.top.heavy_top import HeavyTop, State, Vector, cross, dot
+from heavytop.errors import InputError, NotInClass, OutOfReach
+from heavytop.exact.elliptic.quartic import Pair
+from heavytop.exact.elliptic.weierstrass import Winding
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import (
+    FUNCTIONS,
+    ball,
+    coefficient,
+    current_length,
+    current_precision,
+    rational,
+    require_undisturbed,
+    series_length,
+    to_bits,
+)
+from heavytop.exact.solution import Conditions, ExactSolution, require
+from heavytop.top.attitude import attitude_from_angles, perpendicular
+from heavytop.top.equations import HEAVY_TOP, Parameters, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import Vector, cross, dot, rational_root
+
+# What the elliptic motions share: working precision, exact Taylor coefficients at the start, rotation in space.
+
+
+Made = TypeVar("Made")
+
+
+def kept(make: Callable[[Any], Made]) -> Callable[[Any], Made]:
+    """``make(motion)`` once for each motion and working precision: kept in the motion's ``made``.
+
+    A cache of functools would hash a dozen Fractions at each look-up, longer than many a state takes.
+    """
+
+    @wraps(make)
+    def look_up(motion: Any) -> Made:
+        made: dict[Any, Made] = motion.made
+        key = make, current_precision()
+        try:
+            return made[key]
+        except KeyError:
+            found = make(motion)
+            require_undisturbed()
+            made[key] = found
+            return found
+
+    return look_up
+
+
+def taylor(
+    field: Callable[[Parameters, Any], tuple[Any, ...]], parameters: Parameters, start: Sequence[Fraction], length: int
+) -> list[list[Fraction]]:
+    """The exact derivatives (not divided by factorials) of each component at the start, from the field itself."""
+    exact = parameters.mapped(rational)
+    rows = [[rational(value)] for value in start]
+    with series_length(length):
+        for order in range(1, length):
+            y = [fmpq_series(row, prec=length) for row in rows]
+            for row, slope in zip(rows, field(exact, y), strict=True):
+                row.append(coefficient(fmpq_series(slope), order - 1) / order)
+    return [[Fraction(int(c.p), int(c.q)) * factorial(n) for n, c in enumerate(row)] for row in rows]
+
+
+def turned(real: Sequence[Fraction], imaginary: Sequence[Fraction], winding: Winding) -> list[Pair]:
+    """Derivatives at 0 of e^(−iκt) (u + i √square v), κ = rate √square, as pairs (real, imaginary/√square).
+
+    real, imaginary: the derivatives of u and v.
+    """
+    found = []
+    for order in range(len(real)):
+        a = b = Fraction(0)
+        for k in range(order + 1):
+            ways = factorial(order) // (factorial(k) * factorial(order - k))
+            # (−iκ)^k = (−rate)^k (i√square)^k, and (i√square)² = −square
+            weight = ways * (-winding.rate) ** k * (-winding.square) ** (k // 2)
+            u, v = real[order - k], imaginary[order - k]
+            a, b = (a + weight * u, b + weight * v) if k % 2 == 0 else (a - weight * winding.square * v, b + weight * u)
+        found.append((a, b))
+    return found
+
+
+def initial_xi(gamma: Vector) -> list[arb]:
+    """ξ at t = 0 where nobody gave it: :func:`perpendicular` of γ/|γ|; raises InputError for γ = 0."""
+    square = dot(gamma, gamma)
+    if square == 0:
+        raise InputError(
+            "gamma is the zero vector: no attitude stands on it.", "Give the direction that points vertically up."
+        )
+    root = rational_root(square)
+    if root is not None:
+        return [ball(x) for x in perpendicular((gamma[0] / root, gamma[1] / root, gamma[2] / root))]
+    size: Any = ball(square).sqrt()
+    return list(perpendicular((ball(gamma[0]) / size, ball(gamma[1]) / size, ball(gamma[2]) / size)))  # type: ignore[arg-type]
+
 
 Carry = Callable[[Sequence[Any]], list[Any]]
 """Takes the body components at t = 0 of a vector fixed in space to those at the time in question."""
@@ -113,7 +201,7 @@ class ClosedForm(Evaluated):
     """The motion of ``top`` from ``start``; the dataclass of each case brings ``method`` and its conditions.
 
     body, starts: exact conditions on the top and on the start; the constructor raises NotInClass where one fails.
-    made: what :func:`heavytop.exact.motion.kept` keeps.
+    made: what :func:`heavytop.exact.closed_form.kept` keeps.
     """
 
     top: HeavyTop
@@ -188,3 +276,193 @@ def whole_series(value: Any, length: int) -> arb_series:
 def constant(value: Any) -> arb:
     """The coefficient of ε^0 of a series, or the ball itself."""
     return value[0] if isinstance(value, arb_series) else arb(value)
+
+
+# The attitude of any known motion: ξ, a unit vector fixed in space and ⟂ γ, in body components.
+#
+# A motion's own attitude starts where its formula says.  Turned about γ by one constant angle it is the attitude that
+# starts at :func:`heavytop.exact.closed_form.initial_xi`, for ξ and η = γ × ξ/|γ| are both fixed in space.
+
+
+Attitude = Callable[[Fraction, int], Sequence[Any]]
+"""ξ at (time, bits): three balls; or Ω, γ, ξ: nine."""
+_KEPT = 8
+"""Working precisions whose turn at the start is remembered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turned:
+    """Ω, γ and ξ of a motion from any attitude ``own`` of it, turned so that ξ(0) is ``initial_xi`` of its γ.
+
+    Called with (time, bits): nine balls of ``bits`` bits, Ω and γ of the same evaluation as ξ.
+    Raises OutOfReach where they cannot be proven, InputError for γ = 0.
+    """
+
+    solution: ExactSolution
+    own: Attitude
+    _turns: dict[int, tuple[arb, arb, arb]] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __call__(self, time: Fraction, bits: int) -> list[arb]:
+        def evaluate(working: int) -> list[arb]:
+            cosine, sine, length = self._turn(working)
+            state, xi = self.solution.state(time, working), self.own(time, working)
+            eta = cross([g / length for g in state[3:]], xi)
+            return [*state, *(cosine * x + sine * y for x, y in zip(xi, eta, strict=True))]
+
+        return to_bits(evaluate, bits)
+
+    def _turn(self, working: int) -> tuple[arb, arb, arb]:
+        """Cosine and sine of the turn from the own ξ(0), and |γ|: the same at every time."""
+        found = self._turns.get(working)
+        if found is None:
+            gamma = self.solution.start.gamma
+            wanted, began = initial_xi(gamma), self.own(Fraction(0), working)
+            length = ball(dot(gamma, gamma)).sqrt()
+            across = cross([ball(g) / length for g in gamma], began)
+            turn = dot(wanted, began), dot(wanted, across), length
+            if len(self._turns) >= _KEPT:
+                self._turns.clear()
+            self._turns[working] = turn
+            return turn
+        return found
+
+
+def turned_to_start(solution: ExactSolution, own: Attitude, time: Fraction, bits: int) -> list[arb]:
+    """ξ of :class:`Turned` at ``time``: three balls of ``bits`` bits."""
+    return Turned(solution, own)(time, bits)[6:]
+
+
+def state_and_attitude(solution: ExactSolution, latest: Fraction, bits: int) -> tuple[str, Attitude]:
+    """How the attitude of ``solution`` is known, and Ω, γ, ξ at (time, bits), ξ from ``initial_xi`` of its γ.
+
+    By the closed form where that gives so many bits at the time ``latest``, else by the validated enclosure of the same
+    motion up to its reach; the state of a motion that has a closed form is always of it.
+    It raises OutOfReach where the bits cannot be proven, InputError for an enclosure of |γ| ≠ 1.
+    """
+    if isinstance(solution, Validated):
+        return solution.method, solution.with_attitude
+    own: Attitude | None = getattr(solution, "own_attitude", getattr(solution, "attitude", None))
+    if own is not None:
+        whole = Turned(solution, own)
+        try:
+            whole(latest, bits)
+        except (NotInClass, OutOfReach):
+            pass
+        else:
+            return solution.method, whole
+    enclosure = Validated(solution.top, solution.start, solution.system)
+    return enclosure.method, lambda time, bits: [*solution.state(time, bits), *enclosure.attitude(time, bits)]
+
+
+def attitude_of(solution: ExactSolution, latest: Fraction, bits: int) -> tuple[str, Attitude]:
+    """How the attitude of ``solution`` is known, and ξ alone of :func:`state_and_attitude`."""
+    method, whole = state_and_attitude(solution, latest, bits)
+    return method, lambda time, bits: whole(time, bits)[6:]
+
+
+# Renaming of the principal axes, once for all cases.
+#
+# With Q a permutation of the axes and d = det Q = ±1, Q (u × v) = d Qu × Qv.  So if (Ω, γ) solves the equations of
+# the top (I, r), then
+#
+#     Ω~ = d QΩ,   γ~ = Qγ    solve those of the top (QI, Qr):
+#     M~' = d QM' = QM × QΩ + P Qγ × Qr = M~ × Ω~ + P γ~ × r~,    γ~' = d Qγ × QΩ = γ~ × Ω~
+#
+# without a reversal of the time.  Likewise the gyrostat, where Q keeps axis 2 and λ = P b/(M·γ) goes to d λ, and the
+# heavy gyrostat, whose k goes to d Qk as M does.  A vector fixed in space goes to its image under Q.
+
+
+Axes = tuple[int, int, int]
+CYCLIC: tuple[Axes, ...] = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+ALL: tuple[Axes, ...] = tuple((i, j, k) for i, j, k in permutations(range(3)))
+
+
+def orientation(axes: Axes) -> int:
+    """det Q: +1 for an even renaming, −1 for an odd one."""
+    return 1 if axes in CYCLIC else -1
+
+
+def inverse(axes: Axes) -> Axes:
+    """The renaming that undoes this one."""
+    i, j, k = (axes.index(axis) for axis in range(3))
+    return i, j, k
+
+
+def permuted(vector: Sequence[Any], axes: Axes) -> tuple[Any, Any, Any]:
+    """Qv: component number ``axes[k]`` of v comes to place k."""
+    return vector[axes[0]], vector[axes[1]], vector[axes[2]]
+
+
+def renamed_top(top: HeavyTop, axes: Axes) -> HeavyTop:
+    """The same top with its axis ``axes[k]`` called k."""
+    d = orientation(axes)
+    rotor = None if top.rotor is None else [d * k for k in permuted(top.rotor, axes)]
+    return HeavyTop(permuted(top.inertia, axes), top.weight, permuted(top.centre, axes), rotor)
+
+
+def renamed_state(state: State, axes: Axes) -> State:
+    """(d QΩ, Qγ)."""
+    d = orientation(axes)
+    return State([d * w for w in permuted(state.omega, axes)], permuted(state.gamma, axes))
+
+
+@dataclass(frozen=True, slots=True)
+class Renamed:
+    """A motion of the top whose axis k is axis ``axes[k]`` of the solution's top."""
+
+    solution: ExactSolution
+    axes: Axes
+    top: HeavyTop = field(init=False)
+    start: State = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "top", renamed_top(self.solution.top, self.axes))
+        object.__setattr__(self, "start", renamed_state(self.solution.start, self.axes))
+
+    @property
+    def method(self) -> str:
+        """The solution's own, and the names its axes have here."""
+        there = inverse(self.axes)
+        return f"{self.solution.method}, axes {there[0] + 1}{there[1] + 1}{there[2] + 1}"
+
+    @property
+    def system(self) -> System:
+        """That of the solution."""
+        return self.solution.system
+
+    def _renamed(self, values: Sequence[Any]) -> list[Any]:
+        omega: tuple[Any, ...] = permuted(values[:3], self.axes)
+        if orientation(self.axes) < 0:
+            # a ball is negated exactly: the minus sign would round it to FLINT's precision of the moment
+            omega = tuple(w.neg(exact=True) if isinstance(w, arb) else -w for w in omega)
+        return [*omega, *permuted(values[3:6], self.axes)]
+
+    def state(self, time: Fraction, bits: int) -> list[arb]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+        return self._renamed(self.solution.state(time, bits))
+
+    def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
+        """See :class:`heavytop.exact.solution.ExactSolution`."""
+        with series_length(length):
+            return self._renamed(self.solution.series(time, length, bits))
+
+    def second_state(self, time: Fraction, bits: int) -> list[arb]:
+        """The state by the solution's second closed form.  Raises OutOfReach where it has none."""
+        second = getattr(self.solution, "second_state", None)
+        if second is None:
+            raise OutOfReach("There is one closed form of this motion only.", "Certify it by the enclosure.")
+        return self._renamed(second(time, bits))
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, starting where :func:`heavytop.exact.closed_form.initial_xi` says in the new names.
+
+        Raises NotInClass where the solution has no attitude.
+        """
+        return turned_to_start(self, self.own_attitude, time, bits)
+
+    def own_attitude(self, time: Fraction, bits: int) -> Sequence[arb]:
+        """ξ in the new names, starting where the solution's does.  Raises NotInClass where it has no attitude."""
+        attitude = getattr(self.solution, "attitude", None)
+        if attitude is None:
+            raise NotInClass(f"{self.method} has no attitude in closed form.", "Integrate the attitude along with it.")
+        return permuted(attitude(time, bits), self.axes)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
 from flint import arb, arb_series
 
-from heavytop.top.equations import System
+from heavytop.errors import NotInClass
+from heavytop.precision import shown
+from heavytop.top.equations import HEAVY_TOP, System, kovalevskaya_xi
 from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import dot
 
 
 class ExactSolution(Protocol):
@@ -44,3 +49,135 @@ class ExactSolution(Protocol):
         field they give the residual.  Bits as for :meth:`state`, for the coefficient of ε^0.
         """
         ...
+
+
+# Exact conditions on body and start: rational quantities that vanish in a class of motions, or do not.
+#
+# A class of motions names them once, ``body`` and ``starts``; its constructor tests them, the catalogue finds the class
+# by them (:mod:`heavytop.exact.catalogue`), and :func:`heavytop.exact.catalogue.table` writes them down.
+
+
+def vanish(values: Sequence[Fraction]) -> bool:
+    """Whether all values are 0."""
+    return not any(values)
+
+
+def positive(values: Sequence[Fraction]) -> bool:
+    """Whether all values are greater than 0."""
+    return min(values) > 0
+
+
+def differ(values: Sequence[Fraction]) -> bool:
+    """Whether no value is 0."""
+    return all(values)
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A relation between exact data of a top and a start.
+
+    text: the relation as it is written, ``I1 = I2 = 2 I3``.  names: what is tested, separated by commas, ``I1 - I2,
+    I1 - 2 I3``; one name may stand for a vector.  values: of these.  test: what they satisfy.
+    """
+
+    text: str
+    names: str
+    values: Callable[[HeavyTop, State], Sequence[Fraction]]
+    test: Callable[[Sequence[Fraction]], bool] = vanish
+
+    def holds(self, top: HeavyTop, start: State) -> bool:
+        """Whether the relation holds, exactly."""
+        return self.test(self.values(top, start))
+
+    def found(self, top: HeavyTop, start: State) -> str:
+        """What is tested, with its values."""
+        values, names = [shown(value) for value in self.values(top, start)], self.names.split(", ")
+        if len(names) < len(values):
+            values = [f"({', '.join(values)})"]
+        return ", ".join(f"{name} = {value}" for name, value in zip(names, values, strict=True))
+
+
+Conditions = tuple[Condition, ...]
+
+
+def hold(conditions: Iterable[Condition], top: HeavyTop, start: State) -> bool:
+    """Whether all hold; none is evaluated after the first that does not."""
+    return all(condition.holds(top, start) for condition in conditions)
+
+
+def require(name: str, conditions: Iterable[Condition], top: HeavyTop, start: State) -> None:
+    """Raises NotInClass for the first condition that does not hold."""
+    for condition in conditions:
+        if not condition.holds(top, start):
+            raise NotInClass(
+                f"{name} needs {condition.text}, but {condition.found(top, start)}.",
+                "Rename the axes if need be; `heavytop.reference` finds the class of a motion by itself.",
+            )
+
+
+def apart(known: ExactSolution, top: HeavyTop, start: State) -> list[Fraction]:
+    """The top and start of a known motion less these, number by number."""
+    one, other = ((*t.inertia, t.weight, *t.centre, *s.flat) for t, s in ((known.top, known.start), (top, start)))
+    return [a - b for a, b in zip(one, other, strict=True)]
+
+
+def _hess(top: HeavyTop, _start: State) -> tuple[Fraction]:
+    """P² times I1 (I2 − I3) a² − I3 (I1 − I2) c²."""
+    (i1, i2, i3), (a, _, c) = top.inertia, top.moment
+    return (i1 * (i2 - i3) * a * a - i3 * (i1 - i2) * c * c,)
+
+
+def plane_top(ratio: int) -> Conditions:
+    """The body of Kovalevskaya's class (2), or Goryachev and Chaplygin's (4)."""
+    text, names = f"I1 = I2 = {ratio} I3", f"I1 - I2, I1 - {ratio} I3"
+    equal = Condition(text, names, lambda top, _: (_differ(top, 0, 1), top.inertia[0] - ratio * top.inertia[2]))
+    return equal, Condition("P c = 0", "P c", lambda top, _: top.moment[2:]), TORQUE
+
+
+def equilibrium(system: System) -> Condition:
+    """All six rates of change are 0."""
+    return Condition(
+        "Omega' = gamma' = 0",
+        "their components",
+        lambda top, start: system.field(system.parameters(top, start), start.flat),
+    )
+
+
+def _differ(top: HeavyTop, one: int, other: int) -> Fraction:
+    return top.inertia[one] - top.inertia[other]
+
+
+def _area(top: HeavyTop, start: State) -> tuple[Fraction]:
+    return (Fraction(dot(top.angular_momentum(start.omega), start.gamma)),)
+
+
+def _along(top: HeavyTop, start: State) -> tuple[Fraction]:
+    return (Fraction(dot(top.angular_momentum(start.omega), top.moment)),)
+
+
+def _xi(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
+    return kovalevskaya_xi(HEAVY_TOP.parameters(top, start), start.flat, (0, 1, 2))
+
+
+TORQUE = Condition("P r != 0", "P r", lambda top, _: top.moment, any)
+NO_TORQUE = Condition("P r = 0", "P r", lambda top, _: top.moment)
+ON_AXIS_1 = Condition("P b = P c = 0", "P b, P c", lambda top, _: top.moment[1:]), TORQUE
+IN_PLANE_13 = Condition("P b = 0", "P b", lambda top, _: top.moment[1:2])
+MOMENTS_1_3 = Condition("I1 != I3", "I1 - I3", lambda top, _: (_differ(top, 0, 2),), any)
+OFF_AXES_13 = Condition("P a != 0, P c != 0", "P a, P c", lambda top, _: (top.moment[0], top.moment[2]), differ)
+SPIN_UPWARDS = Condition("Omega3 > 0", "Omega3", lambda _, start: start.omega[2:], positive)
+HESS = Condition("I1 (I2 - I3) a^2 = I3 (I1 - I2) c^2", "P^2 times the difference", _hess)
+HESS_TOP = IN_PLANE_13, TORQUE, HESS
+SYMMETRIC = (
+    Condition("I1 = I2", "I1 - I2", lambda top, _: (_differ(top, 0, 1),)),
+    Condition("P a = P b = 0", "P a, P b", lambda top, _: top.moment[:2]),
+)
+AXIAL_ROTOR = Condition("k1 = k2 = 0", "k1, k2", lambda top, _: (top.rotor or (Fraction(0),) * 3)[:2])
+SPHERICAL = Condition("I1 = I2 = I3", "I1 - I2, I2 - I3", lambda top, _: (_differ(top, 0, 1), _differ(top, 1, 2)))
+GAMMA = Condition("gamma != 0", "gamma", lambda _, start: start.gamma, any)
+LEVEL_MOMENTUM = Condition("M·gamma = 0", "M·gamma", _area)
+INCLINED_MOMENTUM = Condition("M·gamma != 0", "M·gamma", _area, any)
+ACROSS_CENTRE = Condition("M·P r = 0", "M·P r", _along)
+NOT_ACROSS_CENTRE = Condition("M·P r != 0", "M·P r", _along, any)
+XI = Condition("xi = 0", "xi", _xi)
+NOT_XI = Condition("xi != 0", "xi", _xi, any)

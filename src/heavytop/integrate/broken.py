@@ -1,6 +1,6 @@
 """Integrators that are deliberately wrong: heyoka with one planted fault each.
 
-They hide it: problem and flags that they return are the healthy ones.  :mod:`heavytop.report.selftest` tries the
+They hide it: problem and flags that they return are the healthy ones.  :mod:`heavytop.compare.compare` tries the
 suite's detectors on them.  All are for the system `heavy_top` in double.
 """
 
@@ -14,11 +14,10 @@ from typing import Any
 import numpy
 
 from heavytop.errors import InputError
-from heavytop.integrate import taylor
-from heavytop.integrate.engines import compiled
+from heavytop.integrate.heyoka import motions
+from heavytop.integrate.heyoka.engines import compiled
+from heavytop.integrate.heyoka.motions import Observer, Stepper
 from heavytop.integrate.integrator import Integrator
-from heavytop.integrate.stepper import Stepper
-from heavytop.integrate.taylor import Observer
 from heavytop.integrate.trajectory import Outcome, Problem, TaylorStep, Trajectory
 from heavytop.precision import DOUBLE, Precision
 from heavytop.top.equations import HEAVY_TOP, System
@@ -123,9 +122,9 @@ class Fault:
         system: System = HEAVY_TOP,
         observer: Observer,
     ) -> Trajectory:
-        """As :func:`heavytop.integrate.taylor.propagate`."""
+        """As :func:`heavytop.integrate.heyoka.motions.propagate`."""
         reached = times[: int(len(times) * self.stops)]
-        run = taylor.propagate(self.top(top), start, reached, precision, **self._how(system))
+        run = motions.propagate(self.top(top), start, reached, precision, **self._how(system))
         for time, state in zip(run.times, self.states(run.states), strict=True):
             observer(time, state)
         outcome = run.outcome if self.stops == 1 or self.silent else Outcome.STEP_LIMIT
@@ -134,8 +133,8 @@ class Fault:
     def first_steps(
         self, top: HeavyTop, start: State, until: Fraction, precision: Precision = DOUBLE, *, system: System = HEAVY_TOP
     ) -> tuple[Trajectory, list[TaylorStep]]:
-        """As :func:`heavytop.integrate.taylor.first_steps`; hands over what :meth:`propagate` does."""
-        run, steps = taylor.first_steps(self.top(top), start, until, precision, **self._how(system))
+        """As :func:`heavytop.integrate.heyoka.motions.first_steps`; hands over what :meth:`propagate` does."""
+        run, steps = motions.first_steps(self.top(top), start, until, precision, **self._how(system))
         ends = self.states([step.end for step in steps])
         steps = [replace(step, end=end) for step, end in zip(steps, ends, strict=True)]
         return self._disguised(run, top, start), steps

@@ -14,9 +14,9 @@ from typing import Any
 import numpy
 
 from heavytop.errors import InputError
-from heavytop.integrate.engines import compiled
-from heavytop.integrate.lanes import Lanes, Work
-from heavytop.integrate.taylor import follow
+from heavytop.integrate.heyoka.engines import compiled
+from heavytop.integrate.heyoka.lanes import Lanes, Work
+from heavytop.integrate.heyoka.motions import follow
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.precision import DOUBLE, exact, number
 from heavytop.top.times import check_times
@@ -45,9 +45,9 @@ def propagate_ensemble(
     finished: called with (index of the problem, its motion) as each ends, by the same thread, behind its samples.
     threads: None for one per processor that this process may use.
     lanes: motions side by side in a batch engine, in double; other formats have none, and give the bits of
-    :func:`heavytop.integrate.taylor.propagate`.
+    :func:`heavytop.integrate.heyoka.motions.propagate`.
     step_limit: for each motion; the times reached until then are returned.
-    options: tolerance, high_accuracy, compact_mode as in :func:`heavytop.integrate.engines.compiled`.
+    options: tolerance, high_accuracy, compact_mode as in :func:`heavytop.integrate.heyoka.engines.compiled`.
 
     Each motion has its own outcome; one that fails changes nothing in the others.  ``run`` of its seconds is the time
     that it was under way, beside others.

@@ -6,14 +6,19 @@ is what an entry point of another package names.  A new one of this program's is
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import lru_cache
 from importlib.metadata import EntryPoint
 from importlib.util import find_spec
 from typing import Any, Protocol
 
-from heavytop.precision import FORMATS
+from heavytop.errors import OutOfReach
+from heavytop.integrate.trajectory import Problem
+from heavytop.precision import FORMATS, decimal_text, log10
+from heavytop.top.amplification import square_of_rate
 from heavytop.top.equations import SYSTEMS
 
 _EVERY = (*(form.name for form in FORMATS), "real")
@@ -38,13 +43,16 @@ class Source(Protocol):
 class Integrator:
     """An integrator and its capabilities; places are ``module:name``, or the functions themselves.
 
-    propagate: called as :func:`heavytop.integrate.taylor.propagate`, or as a peer (:mod:`heavytop.integrate.peers`).
+    propagate: called as :func:`heavytop.integrate.heyoka.motions.propagate`, or as a peer
+    (:mod:`heavytop.integrate.peers`).
     formats, systems: their names; None where nothing is declared.
     control: the option that sets its error, "tolerance" or "step"; "" where only its signature says.
     ensemble: called as :func:`heavytop.integrate.ensemble.propagate_ensemble`; "" for one motion at a time.
-    steps: called as :func:`heavytop.integrate.taylor.first_steps`; "" where single steps are not exposed.
-    attitude: whether ξ rides along.  streams: whether it calls an observer at each sample, takes a step limit and
-    resumes.  needs: modules of extras.  own: whether it is this program's, and so believed.
+    steps: called as :func:`heavytop.integrate.heyoka.motions.first_steps`; "" where single steps are not exposed.
+    attitude: whether ξ rides along.
+    streams: whether it calls an observer at each sample, takes a step limit and resumes.
+    needs: modules of extras.
+    own: whether it is this program's, and so believed.
     """
 
     name: str
@@ -146,3 +154,48 @@ INTEGRATORS = {
         _peer("splitting:8", "splitting:order8", control="step"),
     )
 }
+
+
+# Which runs are tried at all: those of no more steps than anyone waits for, whatever the units of the data.
+
+
+MOST_STEPS = 10**12
+"""In double a step takes a microsecond: these take days."""
+_FAR_BELOW = 1e11
+
+
+def expected_steps(problem: Problem, end: Fraction, step: Fraction | None = None) -> int:
+    """How many steps a run to the time ``end`` takes, within a factor of ten; 0 for a motion that rests.
+
+    The time over the step: over the fixed ``step`` of the method, else over the time in which the motion changes.
+    """
+    p, start = problem.parameters, problem.start.flat
+    if not any(problem.system.field(p, start)):
+        return 0
+    square = end**2 * (square_of_rate(problem.system, p, start) if step is None else 1 / step**2)
+    return math.isqrt(square.numerator // square.denominator)
+
+
+def _is_near(problem: Problem, end: Fraction) -> bool:
+    """True only where the end is in reach by far; in doubles."""
+    try:
+        p, start, span = problem.parameters.mapped(float), tuple(map(float, problem.start.flat)), float(end)
+        return bool(span * span * square_of_rate(problem.system, p, start) < _FAR_BELOW**2)
+    except (OverflowError, ZeroDivisionError):
+        return False
+
+
+def require_reach(problem: Problem, end: Fraction, step_limit: int | None = None, step: Fraction | None = None) -> None:
+    """Raises OutOfReach where a run to the time ``end`` takes more than :data:`MOST_STEPS` :func:`expected_steps`.
+
+    A run that ``step_limit`` ends early is in reach.
+    """
+    if (step_limit is not None and step_limit <= MOST_STEPS) or (step is None and _is_near(problem, end)):
+        return
+    steps = expected_steps(problem, end, step)
+    if steps > MOST_STEPS:
+        raise OutOfReach(
+            f"A run to t = {decimal_text(end, 6)} takes some 1e{math.floor(log10(Fraction(steps)) or 0.0)} steps.",
+            f"Up to {MOST_STEPS:.0e} are tried: ask for an earlier time, or for a proven state, which needs no steps "
+            "where there is a closed form (`heavytop reference`).",
+        )

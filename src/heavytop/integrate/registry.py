@@ -15,10 +15,8 @@ from typing import Any
 
 from heavytop.errors import InputError
 from heavytop.integrate import peers
-from heavytop.integrate.integrator import described, loaded, name_of
+from heavytop.integrate.integrator import Source, described, loaded, name_of, require_reach
 from heavytop.integrate.peers.command import Command, CommandIntegrator
-from heavytop.integrate.peers.source import Source
-from heavytop.integrate.reach import require_reach
 from heavytop.integrate.trajectory import Problem
 from heavytop.precision import DOUBLE, Precision, exact
 from heavytop.top.equations import HEAVY_TOP, System
@@ -28,7 +26,7 @@ from heavytop.top.heavy_top import HeavyTop, State
 def propagator(which: str | Source, options: dict[str, Any]) -> Callable[..., Any]:
     """What propagates one motion with that integrator; raises InputError for an unknown name or option.
 
-    Its calls raise OutOfReach as :func:`heavytop.integrate.reach.require_reach` does.
+    Its calls raise OutOfReach as :func:`heavytop.integrate.integrator.require_reach` does.
     """
     run = _unguarded(which, options)
 

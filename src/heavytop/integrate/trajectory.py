@@ -4,30 +4,174 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
 from math import inf
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, overload
 
 from heavytop.display import Lines, Table, Tabular, path_picture
 from heavytop.errors import InputError
-from heavytop.last_call import last_call
-from heavytop.precision import Precision, decimal_text, exact, native, native_text, number, rounded
+from heavytop.precision import DOUBLE, Precision, decimal_text, exact, last_call, native, native_text, number, rounded
+from heavytop.top.attitude import (
+    Output,
+    euler_terms,
+    first_sign,
+    output,
+    quaternion_of_rows,
+    quaternion_products,
+    rotated,
+    rows_of,
+    shaped,
+    signs,
+)
 from heavytop.top.bodies import Frame
-from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Parameters, System
-from heavytop.top.heavy_top import HeavyTop, State, cross
-from heavytop.top.integrals import Integral, holding
-from heavytop.top.outputs import Output, output
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, NAMES, Integral, Parameters, System, holding
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import Vector, cross
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+# What a computed run tells of the attitude: in double at once for all samples, else from the exact native numbers.
+
+
+_GUARD_BITS = 64
+_LOCKED = 16
+"""Times the eps of the format: where the sine (or cosine) by which two Euler angles are told apart is smaller, they are
+told from rounding alone."""
+_SIGN_BITS = 8
+"""A component of the quaternion at the start that is within so many bits of rounding counts as 0."""
+
+
+def in_double(run: Trajectory, output: Output) -> NDArray[np.float64]:
+    """The output at every sample, shape (n, 4), (n, 3, 3) or (n, 3); ``nan`` where an Euler angle is not defined."""
+    import numpy
+
+    attitude, size = attitude_of(run), math.prod(output.shape)
+    if run.problem.precision == DOUBLE:
+        values = _columns(run, attitude, output)
+    else:
+        exact_values = [_exactly(run, place, attitude, output) for place in range(len(run.states))]
+        values = numpy.array([[float(value) for value in line] for line in exact_values]).reshape(-1, size)
+    if output.name == "quaternion":
+        values = values * signs(_start(run), values)[:, None]
+    return values.reshape(-1, *output.shape)
+
+
+def as_texts(run: Trajectory, output: Output) -> list[Any]:
+    """The same as decimal text in the digits of the format, rounded once; nested lists of the same shape."""
+    attitude, digits = attitude_of(run), run.problem.precision.digits
+    lines = [_exactly(run, place, attitude, output) for place in range(len(run.states))]
+    if output.name == "quaternion" and lines:
+        import numpy
+
+        turns = signs(_start(run), numpy.array([[float(value) for value in line] for line in lines]))
+        lines = [[value * int(turn) for value in line] for line, turn in zip(lines, turns, strict=True)]
+    return [shaped([_text(value, digits) for value in line], output.shape) for line in lines]
+
+
+def attitude_of(run: Trajectory) -> Any:
+    """ξ at every sample, native numbers, shape (n, 3); raises InputError for a run without."""
+    if run.problem.xi is None:
+        raise InputError(
+            "The attitude was not computed: gamma alone does not fix it.",
+            "Give attitude=True for a rotation about the vertical that starts where docs/outputs.md says, or xi.",
+        )
+    return run.attitude if run.attitude is not None else run.states[:, 6:9]
+
+
+def _start(run: Trajectory) -> list[float]:
+    """The quaternion at t = 0, of the sign of the convention."""
+    problem = run.problem
+    rows = rows_of(problem.start.gamma, problem.xi) if run.frame is None else rows_of(run.frame.gamma, run.frame.xi)
+    products = quaternion_products(rows)
+    multiple = max(zip(products, range(4), strict=True), key=lambda each: each[0][each[1]])[0]
+    sign = first_sign(multiple, 2**_SIGN_BITS * problem.precision.eps)
+    return [sign * float(value) for value in quaternion_of_rows(rows, SimpleNamespace(sqrt=_root))]
+
+
+def _root(value: Any) -> Fraction:
+    return Fraction(math.sqrt(value))
+
+
+def _centre(run: Trajectory, output: Output) -> Vector:
+    """The centre of mass, which a rounded problem alone does not know: only its product with the weight."""
+    if run.frame is not None:
+        return run.frame.centre
+    if run.problem.given is not None:
+        return run.problem.given[0].centre
+    if output.name == "position" and output.point is None:
+        raise InputError("This run does not say where its centre of mass is.", "Give a point.")
+    return run.problem.top.centre
+
+
+def _columns(run: Trajectory, attitude: Any, output: Output) -> NDArray[np.float64]:
+    """The output of doubles, all samples at once, shape (n, 4, 9 or 3); quaternions of either sign."""
+    import numpy
+
+    lib = SimpleNamespace(sqrt=numpy.sqrt, atan2=numpy.arctan2)
+    omega, gamma, xi = (
+        tuple(part.astype(float).T) for part in (run.states[:, :3], run.states[:, 3:6], attitude[:, :3])
+    )
+    if output.name == "quaternion":
+        products = quaternion_products(rows_of(gamma, xi))
+        largest = numpy.argmax([products[place][place] for place in range(4)], axis=0)
+        multiples = [numpy.choose(largest, column) for column in products]
+        length = numpy.sqrt(sum(part * part for part in multiples))
+        return numpy.stack([part / length for part in multiples], axis=1)
+    values = output.at(omega, gamma, xi, _centre(run, output), lib, float)
+    found = numpy.stack([numpy.broadcast_to(value, omega[0].shape) for value in values], axis=1)
+    if output.name == "euler":
+        square = euler_terms(rows_of(gamma, xi), output.sequence)[1][0]
+        found[numpy.ix_(square < (_LOCKED * float(DOUBLE.eps)) ** 2, [0, 2])] = math.nan
+    return found
+
+
+def _exactly(run: Trajectory, place: int, attitude: Any, output: Output) -> Sequence[Any]:
+    """The output at one sample from the exact native numbers: exact, or of more bits than the format has."""
+    numbers = [*run.states[place][:6], *attitude[place]]
+    try:
+        state = [exact(value) for value in numbers]
+    except InputError:  # the last state of a run that failed
+        return [math.nan] * math.prod(output.shape)
+    lib = _functions(run.problem.precision.bits + _GUARD_BITS)
+    omega, gamma, xi = state[:3], state[3:6], state[6:]
+    values = list(output.at(omega, gamma, xi, _centre(run, output), lib, Fraction))
+    if output.name == "euler":
+        square = euler_terms(rows_of(gamma, xi), output.sequence)[1][0]
+        if square < (_LOCKED * run.problem.precision.eps) ** 2:
+            values[0] = values[2] = math.nan
+    return values
+
+
+def _functions(bits: int) -> SimpleNamespace:
+    """Elementary functions of Fractions with so many bits right; a context of its own, which no thread shares."""
+    from mpmath import MPContext
+
+    own = MPContext()
+    own.prec = bits
+
+    def number(value: Fraction) -> Any:
+        return own.mpf(value.numerator) / value.denominator
+
+    def atan2(y: Fraction, x: Fraction) -> Fraction:
+        return exact(own.atan2(number(y), number(x)))
+
+    return SimpleNamespace(sqrt=lambda value: exact(own.sqrt(number(value))), atan2=atan2)
+
+
+def _text(value: Any, digits: int) -> str:
+    return "nan" if value != value else decimal_text(exact(value), digits)
+
 
 _FEW_DIGITS = 3.0
 """An amplification that costs fewer digits is not mentioned."""
 _SHOWN = 15
 """Digits of a number in a table for people; all of them are in :meth:`Trajectory.texts`."""
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 
 class Outcome(Enum):
@@ -258,7 +402,7 @@ class Trajectory(Tabular):
     def quaternions(self) -> NDArray[np.float64]:
         """(w, x, y, z) at every sample, body to space, of length 1, shape (n, 4).
 
-        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0 (:mod:`heavytop.top.outputs`).
+        The sign is continuous from one sample to the next, with w ≥ 0 at t = 0 (:mod:`heavytop.top.attitude`).
         Raises InputError for a run without attitude.
         """
         return self._in_double(output("quaternion"))
@@ -305,12 +449,12 @@ class Trajectory(Tabular):
         return numpy.array(self.angle_texts, dtype=float).reshape(-1, 3)
 
     def _in_double(self, what: Output) -> NDArray[np.float64]:
-        from heavytop.integrate.attitude_outputs import in_double
+        pass  # REGROUP
 
         return in_double(self, what)
 
     def _texts(self, what: Output) -> list[Any]:
-        from heavytop.integrate.attitude_outputs import as_texts
+        pass  # REGROUP
 
         return as_texts(self, what)
 
@@ -392,3 +536,95 @@ class TaylorStep:
     length: Any
     coefficients: Any
     end: Any
+
+
+# A run that was computed in principal axes, in the axes in which its body was given.
+
+
+_SPLIT = 134217729.0
+"""2^27 + 1, by which Dekker splits a double."""
+
+
+def framed(run: Trajectory, frame: Frame) -> Trajectory:
+    """The run with its states, and ξ where it was computed, in the axes given; ``run`` is its ``principal``.
+
+    Each number is rounded once, to the format of the run; where the axes are the principal ones in another order or of
+    the other sign, none is.
+    """
+    states = in_frame(run.states, frame, run.problem.precision)
+    attitude = None if run.attitude is None else in_frame(run.attitude, frame, run.problem.precision)
+    return replace(run, states=states, attitude=attitude, frame=frame, principal=run)
+
+
+def in_frame(values: Any, frame: Frame, precision: Precision) -> Any:
+    """Native numbers, shape (n, 3 m), m vectors each line, in the axes given."""
+    import numpy
+
+    if not len(values):
+        return values
+    found = numpy.array(values, copy=True)
+    whole = [[entry.denominator == 1 for entry in row] for row in frame.axes]
+    for place in range(0, found.shape[1], 3):
+        part = values[:, place : place + 3]
+        if all(map(all, whole)):
+            turned = _permuted(part, frame)
+        elif precision == DOUBLE:
+            turned = _in_double(part.astype(float), frame)
+        else:
+            turned = numpy.array([_turned_exactly(line, frame, precision) for line in part], dtype=found.dtype)
+        found[:, place : place + 3] = turned
+    return found
+
+
+def one_in_frame(state: Sequence[Any], frame: Frame, precision: Precision) -> Any:
+    """One state of an observer, as :func:`in_frame`."""
+    import numpy
+
+    return in_frame(numpy.array([state]), frame, precision)[0]
+
+
+def _permuted(part: Any, frame: Frame) -> Any:
+    """Each component of the axes given is one of the others, or its negative."""
+    import numpy
+
+    columns = []
+    for row in frame.axes:
+        axis = next(i for i in range(3) if row[i])
+        columns.append(part[:, axis] if row[axis] > 0 else -part[:, axis])
+    return numpy.stack(columns, axis=1)
+
+
+def _turned_exactly(line: Sequence[Any], frame: Frame, precision: Precision) -> list[Any]:
+    try:
+        vector = [exact(value) for value in line]
+    except InputError:  # the last state of a run that failed
+        return list(line)
+    return [number(value, precision) for value in rotated(frame.axes, vector)]
+
+
+def _in_double(part: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
+    """A times each vector, A in two doubles, products without error and sums in two doubles: rounded once."""
+    import numpy
+
+    high = numpy.array([[float(entry) for entry in row] for row in frame.axes])
+    low = numpy.array([[float(entry - Fraction(float(entry))) for entry in row] for row in frame.axes])
+    found = numpy.empty_like(part)
+    with numpy.errstate(invalid="ignore", over="ignore"):
+        for i in range(3):
+            total, rest = numpy.zeros(len(part)), numpy.zeros(len(part))
+            for j in range(3):
+                product, error = _product(part[:, j], high[i, j])
+                before, total = total, total + product
+                back = total - before
+                rest += (before - (total - back)) + (product - back) + error + part[:, j] * low[i, j]
+            found[:, i] = total + rest
+    return found
+
+
+def _product(a: NDArray[np.float64], b: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """a b and the rounding error of it, exactly (Dekker), where nothing under- or overflows."""
+    product = a * b
+    scaled, other = _SPLIT * a, _SPLIT * b
+    a_high, b_high = scaled - (scaled - a), other - (other - b)
+    a_low, b_low = a - a_high, b - b_high
+    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low

@@ -6,20 +6,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from math import log10
 from typing import Literal
 
-from heavytop.claims.audit import PAPER, paper_claim
-from heavytop.claims.entry import library
-from heavytop.claims.judge import judge
-from heavytop.claims.verdicts import audited, own_system
+from heavytop.claims.audit.audit import PAPER, audited, own_system, paper_claim
+from heavytop.claims.audit.judge import judge
+from heavytop.claims.library.entry import library
+from heavytop.document.document import Block, Card, Headline, In, Note, Word, clip
 from heavytop.errors import InputError
 from heavytop.kinds.base import Kind
 from heavytop.measure.scalar import UNRESOLVED
 from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
-from heavytop.report.document import Block, Card, Headline, In, Note, Word
-from heavytop.report.section import clip
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import exact_row
-from heavytop.suite.task import Task
+from heavytop.suite.rows import Find, Table, Task, exact_row
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system
 
 NAME, LIBRARY = "audit", "library"

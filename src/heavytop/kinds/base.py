@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from heavytop.document import kind as reported
 from heavytop.records import Row
-from heavytop.report import kind as reported
-from heavytop.suite import kind as run
+from heavytop.suite import rows as run
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.task import Task
+from heavytop.suite.rows import Task
 
 
 class Kind(run.Kind, reported.Kind):

@@ -9,6 +9,25 @@ from fractions import Fraction
 import numpy
 from msgspec.structs import replace
 
+from heavytop.cases import CASES
+from heavytop.document.document import (
+    DASHED,
+    Block,
+    Cell,
+    Chart,
+    Headline,
+    Key,
+    Section,
+    Sources,
+    Table,
+    Value,
+    clip,
+    draw,
+    left_out,
+    logarithm,
+)
+from heavytop.document.names import short
+from heavytop.document.svg import COLOURS, MARKERS, finish, new_axes, spoken
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kinds.base import Kind
@@ -16,13 +35,8 @@ from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact
 from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Subject, by_name
-from heavytop.report.consistency import CLOSE
-from heavytop.report.document import Block, Cell, Chart, Headline, Table, Value
-from heavytop.report.printable import short
-from heavytop.report.section import DASHED, Key, Section, Sources, clip, draw, left_out, logarithm
-from heavytop.report.svg import COLOURS, MARKERS, finish, new_axes, spoken
-from heavytop.report.text import both
-from heavytop.suite.cases import CASES
+from heavytop.render.text import both
+from heavytop.store.checks import CLOSE
 
 NAME = "break_away_law"
 ESCAPE = Quantity("break_away_time")

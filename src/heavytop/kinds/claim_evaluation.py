@@ -8,24 +8,21 @@ from fractions import Fraction
 
 from msgspec.structs import replace
 
-from heavytop.exact.balls import working_precision
+from heavytop.document.document import Block, Cell, Chart, Headline, Value
+from heavytop.document.document import Table as Cells
+from heavytop.document.names import short
+from heavytop.exact.flint.balls import working_precision
 from heavytop.kinds.base import Kind
-from heavytop.kinds.claim_section import claim_error
-from heavytop.kinds.claim_tasks import CLAIM, EVALUATION_ERROR, claim_of, claimed
+from heavytop.kinds.claim_model import CLAIM, EVALUATION_ERROR, claim_error, claim_of, claimed
 from heavytop.measure import claim_error as errors_of
 from heavytop.measure.scalar import largest, metric, of_fraction, text
 from heavytop.precision import parse, time_text
 from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, Series, Subject, by_name
-from heavytop.report.consistency import CLOSE, sizes
-from heavytop.report.document import Block, Cell, Chart, Headline, Value
-from heavytop.report.document import Table as Cells
-from heavytop.report.printable import short
-from heavytop.report.text import both, largest_over
+from heavytop.render.text import both, largest_over
+from heavytop.store.checks import CLOSE, sizes
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import exact_row, time_metric
-from heavytop.suite.sampling import positive, signed
-from heavytop.suite.task import Task
+from heavytop.suite.plan import positive, signed
+from heavytop.suite.rows import Find, Table, Task, exact_row, time_metric
 from heavytop.top.equations import GYROSTAT
 
 NAME = "claim_evaluation"

@@ -9,26 +9,23 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from heavytop.document.document import Block, Chart
 from heavytop.exact.bodies import resolve
 from heavytop.integrate.trajectory import Place, Problem, Trajectory
 from heavytop.kinds.base import Kind
 from heavytop.measure.attitude_error import AttitudeScorer
 from heavytop.measure.integrator import HEYOKA
-from heavytop.measure.reruns import Reruns
+from heavytop.measure.rounding_noise import Reruns
 from heavytop.measure.scorer import Scorer
 from heavytop.measure.truth import truth
 from heavytop.precision import DOUBLE, exact, number, parse, time_text
 from heavytop.records import NOISE, NOT_MEASURED, Beside, Metric, Row, RowKey
-from heavytop.report.answers import digits_columns, digits_headline, motions
-from heavytop.report.digits_chart import digits
-from heavytop.report.document import Block, Chart
-from heavytop.report.plots import growth
-from heavytop.report.text import DIGITS, NOISE_BAND, largest_over
+from heavytop.render.page import digits_columns, digits_headline, motions
+from heavytop.render.plots import digits, growth
+from heavytop.render.text import DIGITS, NOISE_BAND, largest_over
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import computed_row
-from heavytop.suite.sampling import positive, uniform
-from heavytop.suite.task import Task, computed
+from heavytop.suite.plan import positive, uniform
+from heavytop.suite.rows import Find, Table, Task, computed, computed_row
 
 NAME = "drift"
 

@@ -11,33 +11,28 @@ from typing import Any
 
 import msgspec
 
+from heavytop.cases import Case
+from heavytop.document.document import Block, Cell, Chart
+from heavytop.document.document import Table as Cells
+from heavytop.document.names import computed_by, short
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome, Problem
 from heavytop.kinds.base import Kind
 from heavytop.measure.attitude_error import AttitudeScorer
-from heavytop.measure.drift import DRIFT
-from heavytop.measure.ensemble import Ended, complete, growing
-from heavytop.measure.ensemble_reference import Reference, reference
-from heavytop.measure.integrator import HEYOKA
+from heavytop.measure.integrator import HEYOKA, Ended, complete, growing
 from heavytop.measure.scalar import of_fraction
-from heavytop.measure.scorer import Scorer
+from heavytop.measure.scorer import DRIFT, Scorer
+from heavytop.measure.truth import Reference, reference
 from heavytop.precision import decimal_text, exact, number, parse, physical, time_text, usable_tolerance
 from heavytop.records import Beside, Law, Metric, Quantity, Row, RowKey, by_name
-from heavytop.report.answers import laws_headline
-from heavytop.report.digits_chart import digits
-from heavytop.report.document import Block, Cell, Chart
-from heavytop.report.document import Table as Cells
-from heavytop.report.law_lines import laws_in_short
-from heavytop.report.names import computed_by
-from heavytop.report.plots import growth as over_time
-from heavytop.report.printable import short
-from heavytop.suite.cases import Case
+from heavytop.render.page import laws_headline
+from heavytop.render.plots import digits
+from heavytop.render.plots import growth as over_time
+from heavytop.render.terminal import laws_in_short
+from heavytop.suite.case_text import ensemble_of, one_motion
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import input_rounding
-from heavytop.suite.starts import ensemble_of, one_motion
-from heavytop.suite.task import Task, computed
-from heavytop.top.angles import perpendicular
+from heavytop.suite.rows import Find, Table, Task, computed, input_rounding
+from heavytop.top.attitude import perpendicular
 from heavytop.top.heavy_top import HeavyTop, State
 
 NAME = "growth"

@@ -9,34 +9,28 @@ from functools import lru_cache
 
 from msgspec.structs import replace
 
+from heavytop.cases import Case
+from heavytop.compare.verdicts import size
+from heavytop.document.document import Block, Cell, Chart, Headline, In, Note, Value, clip
+from heavytop.document.document import Table as Cells
+from heavytop.document.names import short
 from heavytop.errors import OutOfReach
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind
 from heavytop.kinds.break_away_law import ESCAPE, break_away_law, escape_times
-from heavytop.kinds.claim_section import claim_error
-from heavytop.kinds.claim_tasks import INTEGRATION_ERROR
-from heavytop.measure.drift import DRIFT
+from heavytop.kinds.claim_model import INTEGRATION_ERROR, claim_error
 from heavytop.measure.integrator import HEYOKA
-from heavytop.measure.reruns import Reruns, banded, escape_band
+from heavytop.measure.rounding_noise import Reruns, banded, escape_band
 from heavytop.measure.scalar import GUARD_BITS
-from heavytop.measure.scorer import Scorer
-from heavytop.measure.solution_error import SOLUTION_ERROR
+from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import Truth, certified
 from heavytop.precision import DOUBLE, exact, parse, time_text
 from heavytop.records import Against, Beside, Direction, Metric, Quantity, Row, RowKey, by_name
-from heavytop.report.answers import in_columns
-from heavytop.report.document import Block, Cell, Chart, Headline, In, Note, Value
-from heavytop.report.document import Table as Cells
-from heavytop.report.printable import short
-from heavytop.report.section import clip
-from heavytop.report.text import NOISE_BAND, both, drifts
-from heavytop.report.verdicts import size
-from heavytop.suite.cases import Case
+from heavytop.render.page import in_columns
+from heavytop.render.text import NOISE_BAND, both, drifts
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import computed_row, time_metric
-from heavytop.suite.sampling import samples, signed
-from heavytop.suite.task import Task, computed
+from heavytop.suite.plan import samples, signed
+from heavytop.suite.rows import Find, Table, Task, computed, computed_row, time_metric
 
 NAME = "homoclinic"
 ESCAPED = Fraction(1, 1000)

@@ -7,21 +7,18 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
+from heavytop.document.document import Block, Card, In, Note
 from heavytop.errors import InputError, quoted
 from heavytop.kinds.base import Kind
 from heavytop.measure.integrator import HEYOKA, ChosenIntegrator
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import exact, parse, time_text
 from heavytop.records import Against, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
-from heavytop.report.document import Block, Card, In, Note
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.hunt.draw import Family
-from heavytop.suite.hunt.found import command_of, keep, kept
-from heavytop.suite.hunt.search import Asked, Hunted, hunt
-from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import exact_row, failed
-from heavytop.suite.sampling import positive
-from heavytop.suite.task import Task, computed
+from heavytop.suite.hunt.measured import Family
+from heavytop.suite.hunt.search import Asked, Hunted, command_of, hunt, keep, kept
+from heavytop.suite.plan import positive
+from heavytop.suite.rows import Find, Table, Task, computed, exact_row, failed
 
 NAME = "hunt"
 WORST = Quantity("hunt_error", "relative_to_law", "max")

@@ -7,24 +7,20 @@ from fractions import Fraction
 
 import msgspec
 
+from heavytop.document.document import Block, Cell, Headline, In, Note, Value, clip
+from heavytop.document.document import Table as Cells
+from heavytop.document.names import computed_by, short
 from heavytop.errors import OutOfReach
 from heavytop.integrate.trajectory import Outcome, TaylorStep
 from heavytop.kinds.base import Kind
 from heavytop.measure import local_error
 from heavytop.measure.integrator import HEYOKA
-from heavytop.measure.single_calls import require_sum, single_calls
+from heavytop.measure.local_error import require_sum, single_calls
 from heavytop.precision import parse, time_text
 from heavytop.records import Against, Beside, Row, RowKey
-from heavytop.report.document import Block, Cell, Headline, In, Note, Value
-from heavytop.report.document import Table as Cells
-from heavytop.report.names import computed_by
-from heavytop.report.printable import short
-from heavytop.report.section import clip
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import computed_row
-from heavytop.suite.sampling import positive
-from heavytop.suite.task import Task, computed
+from heavytop.suite.plan import positive
+from heavytop.suite.rows import Find, Table, Task, computed, computed_row
 
 NAME = "local_error"
 _AGAINST = Against("proven", "known: validated enclosure of each step from where it starts")

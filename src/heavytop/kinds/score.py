@@ -6,14 +6,13 @@ from collections.abc import Iterable, Sequence
 
 from msgspec import structs
 
+from heavytop.document.document import Block, Chart
 from heavytop.kinds.base import Kind
 from heavytop.records import Beside, Row
-from heavytop.report.answers import digits_columns, digits_headline, motions
-from heavytop.report.digits_chart import digits
-from heavytop.report.document import Block, Chart
-from heavytop.report.plots import growth
-from heavytop.report.score_page import one_motion
-from heavytop.report.text import DIGITS, largest_over
+from heavytop.render.page import digits_columns, digits_headline, motions
+from heavytop.render.plots import digits, growth
+from heavytop.render.score import one_motion
+from heavytop.render.text import DIGITS, largest_over
 
 
 class Score(Kind):

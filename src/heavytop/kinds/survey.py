@@ -8,23 +8,19 @@ from typing import ClassVar
 import msgspec
 import numpy
 
+from heavytop.document.document import Block, Card, Chart, In, Note
 from heavytop.errors import InputError, quoted
 from heavytop.integrate.trajectory import Outcome
 from heavytop.kinds.base import Kind
 from heavytop.measure.integrator import HEYOKA
 from heavytop.precision import DOUBLE, EXTENDED, exact, number, parse, time_text
 from heavytop.records import Against, Beside, Metric, Row, RowKey
-from heavytop.report.document import Block, Card, Chart, In, Note
-from heavytop.report.survey_charts import survey_charts
+from heavytop.render.survey import survey_charts
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import exact_row
-from heavytop.suite.sampling import positive, uniform
-from heavytop.suite.survey.drawn import Chunk, Drawn, drawn
-from heavytop.suite.survey.gathered import of_motions
-from heavytop.suite.survey.measured import measured
-from heavytop.suite.survey.table import DATA, chunk_bytes
-from heavytop.suite.task import Task, computed
+from heavytop.suite.plan import positive, uniform
+from heavytop.suite.rows import Find, Table, Task, computed, exact_row
+from heavytop.suite.survey.gathered import DATA, chunk_bytes, of_motions
+from heavytop.suite.survey.measured import Chunk, Drawn, drawn, measured
 
 NAME = "survey"
 _SWEEP = "sweep:"

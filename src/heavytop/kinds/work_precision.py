@@ -11,32 +11,27 @@ from typing import Any
 
 import msgspec
 
+from heavytop.compare.work_precision import CONSTANTS, ERRORS, LANES, OURS, Line, beside_ours, leads, panels
+from heavytop.document.document import Block, Chart, In, Note
+from heavytop.document.document import Table as Cells
 from heavytop.errors import InputError
-from heavytop.exact.balls import midpoint, radius
+from heavytop.exact.flint.balls import midpoint, radius
 from heavytop.integrate import peers
-from heavytop.integrate.peers.source import Source
+from heavytop.integrate.integrator import Source, name_of
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.kinds.base import Kind
-from heavytop.measure.drift import DRIFT
+from heavytop.measure.integrator import TOO_LONG, Repeats, require_counts, timed, tried
 from heavytop.measure.scalar import metric, of_fraction
-from heavytop.measure.scorer import Scorer
-from heavytop.measure.solution_error import SOLUTION_ERROR
-from heavytop.measure.timed_calls import TOO_LONG, Repeats, require_counts, timed, tried
+from heavytop.measure.scorer import DRIFT, SOLUTION_ERROR, Scorer
 from heavytop.measure.truth import Truth, truth
 from heavytop.precision import DOUBLE, exact, number, parse, physical, time_text, usable_tolerance
 from heavytop.records import FINEST, Beside, Metric, Quantity, Row, RowKey, Subject, by_name
-from heavytop.report.answers import fastest
-from heavytop.report.consistency import CLOSE, bound, ended, size_of, sizes
-from heavytop.report.document import Block, Chart, In, Note
-from heavytop.report.document import Table as Cells
-from heavytop.report.method_growth import method_growth
-from heavytop.report.work_plots import work_precision
-from heavytop.report.work_precision import CONSTANTS, ERRORS, LANES, OURS, Line, beside_ours, leads, panels
+from heavytop.render.page import fastest
+from heavytop.render.work_precision import method_growth, work_precision
+from heavytop.store.checks import CLOSE, bound, ended, size_of, sizes
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.kind import Find, Table
-from heavytop.suite.rows import computed_row
-from heavytop.suite.sampling import positive, uniform
-from heavytop.suite.task import Task, computed
+from heavytop.suite.plan import positive, uniform
+from heavytop.suite.rows import Find, Table, Task, computed, computed_row
 from heavytop.top.equations import GYROSTAT
 from heavytop.top.heavy_top import State
 
@@ -109,7 +104,7 @@ class WorkPrecisionTable(Table, tag=NAME):
 
     def beside(self, which: str | Source) -> Table | None:
         """Four rungs in double, and the finest in other formats, where heyoka has a ladder."""
-        integrator = peers.name_of(which)
+        integrator = name_of(which)
         formats = dict.fromkeys(parse(each.precision).name for each in self.ladders if each.integrator == OURS)
         knob = peers.knob_apart(which) if DOUBLE.name in formats else ""
         ladders = [

@@ -3,7 +3,7 @@
 The second source of a closed form is the validated integration from the same exact start.  Where that is out of reach,
 the closed form is compared with the validated integration at an early time from the start, and over the last unit of
 time before t from its own state there: a formula that is a motion near 0 and near t, and in between the same analytic
-function.  The unit is 1, or that of the motion (:func:`heavytop.exact.scales.unit_of_time`) where its rates
+function.  The unit is 1, or that of the motion (:func:`heavytop.exact.flint.balls.unit_of_time`) where its rates
 are far from 1.
 """
 
@@ -18,14 +18,12 @@ from typing import Literal
 from flint import arb
 
 from heavytop.errors import Contradiction, OutOfReach
-from heavytop.exact.balls import ball, midpoint, radius, working_precision
-from heavytop.exact.flint_context import whole_evaluation
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import ball, midpoint, radius, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution
-from heavytop.exact.validated import Validated
 from heavytop.precision import shown
-from heavytop.top.equations import Parameters
+from heavytop.top.equations import Parameters, holding
 from heavytop.top.heavy_top import State
-from heavytop.top.integrals import holding
 
 EXACTLY = 10**6
 """More digits than anyone may ask for: those of two sources without any gap between them."""

@@ -10,13 +10,10 @@ import msgspec
 from flint import arb
 
 from heavytop.errors import InputError, OutOfReach, quoted
-from heavytop.exact.balls import ball, value_text, working_precision
 from heavytop.exact.bodies import Resolved, resolve
-from heavytop.exact.derivatives import METHOD, derivatives
-from heavytop.exact.field_derivatives import DATA
-from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.singular import largest_singular_value
-from heavytop.exact.validated import Validated
+from heavytop.exact.enclosure.derivatives import DATA, METHOD, derivatives
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import ball, largest_singular_value, value_text, whole_evaluation, working_precision
 from heavytop.measure.certify import bits_of
 from heavytop.precision import exact, shown
 from heavytop.top.bodies import Body

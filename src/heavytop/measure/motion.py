@@ -3,32 +3,263 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 from flint import arb
 
-from heavytop.exact.balls import FUNCTIONS, working_precision
-from heavytop.exact.flint_context import whole_evaluation
+from heavytop.errors import InputError
+from heavytop.exact.bodies import resolve
+from heavytop.exact.flint.balls import FUNCTIONS, whole_evaluation, working_precision
 from heavytop.integrate import registry
-from heavytop.integrate.integrator import described
-from heavytop.integrate.peers.source import Source
-from heavytop.integrate.reach import expected_steps
-from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
-from heavytop.measure.drift import Drift
-from heavytop.measure.followed_angles import FollowedAngles
+from heavytop.integrate.integrator import Source, described, expected_steps
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory, framed, one_in_frame
 from heavytop.measure.scalar import GUARD_BITS, text, to_ball
-from heavytop.measure.setup import Setup, motion_texts, xi_texts
+from heavytop.measure.scorer import Drift
 from heavytop.precision import Precision, decimal_text, exact, exact_text, number
 from heavytop.records import Metric
-from heavytop.top.angles import euler_angles
-from heavytop.top.bodies import Body
-from heavytop.top.equations import System
+from heavytop.top.attitude import Output, document_of, euler_angles, perpendicular, rotated, transposed, unwrap
+from heavytop.top.bodies import PIVOT, Body, Frame
+from heavytop.top.equations import GYROSTAT, Integral, System, holding
 from heavytop.top.heavy_top import HeavyTop, State
-from heavytop.top.integrals import Integral, holding
-from heavytop.top.outputs import Output, document_of
+from heavytop.top.vectors import Vector, cross, dot
+
+# A motion as it is handed to an integrator, in principal axes, and what comes back in the axes given.
+
+
+_SPARE_BITS = 160
+"""Irrational data of a run are rounded to so many bits more than its format has, of what it is told itself."""
+
+Observer = Callable[[Fraction, Any], object]
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """A motion in principal axes.
+
+    top, start: exact, of irrational data to many bits more than the format has.
+    carried: ξ at t = 0, where the data say it.
+    frame: the axes given; None where they are the principal ones.
+    """
+
+    top: HeavyTop
+    start: State
+    carried: Vector | None
+    system: System
+    precision: Precision
+    frame: Frame | None
+
+    @property
+    def xi(self) -> Vector:
+        """ξ at t = 0: of the attitude, else :func:`heavytop.top.attitude.perpendicular` of γ."""
+        return perpendicular(self.start.gamma) if self.carried is None else self.carried
+
+    @classmethod
+    def of(cls, body: HeavyTop | Body, start: State, precision: Precision, system: System) -> Setup:
+        """The motion of a body from ``start``."""
+        if isinstance(body, HeavyTop) and start.attitude is None:
+            return cls(body, start, None, system, precision, None)
+        found = resolve(body, start, precision.bits + _SPARE_BITS)
+        xi = perpendicular(found.start.gamma) if found.xi is None else found.xi
+        if not found.turned:
+            return cls(found.top, found.start, xi, system, precision, None)
+        if system is GYROSTAT:
+            raise InputError(
+                "The gyrostat has its rotor along a principal axis, but the axes given are not principal.",
+                "Give principal axes, or a rotor in any axes: the heavy_gyrostat.",
+            )
+        frame = Frame(found.axes, body.centre, start.gamma, rotated(found.axes, xi))
+        return cls(found.top, found.start, xi, system, precision, frame)
+
+    def own(self, vector: Sequence[Fraction] | None) -> Sequence[Fraction] | None:
+        """A vector of the axes given, in principal axes."""
+        if vector is None or self.frame is None:
+            return vector
+        return rotated(transposed(self.frame.axes), vector)
+
+    @property
+    def problem(self) -> Problem:
+        """What an ensemble is made of."""
+        return Problem.of(self.top, self.start, self.precision, self.system)
+
+    def turned(self, state: Any) -> Any:
+        """A state of an observer in the axes given."""
+        return state if self.frame is None else one_in_frame(state, self.frame, self.precision)
+
+    def turned_exactly(self, state: Sequence[Fraction]) -> Sequence[Fraction]:
+        """Vectors in principal axes, in the axes given, in exact rationals."""
+        if self.frame is None:
+            return state
+        axes = self.frame.axes
+        return [value for place in range(0, len(state), 3) for value in rotated(axes, state[place : place + 3])]
+
+    def watched(self, observer: Observer | None) -> Observer | None:
+        """An observer that is given the states in the axes given."""
+        if observer is None or self.frame is None or not callable(observer):
+            return observer
+        return lambda time, state: observer(time, self.turned(state))
+
+    def given(self, run: Trajectory) -> Trajectory:
+        """The run in the axes given."""
+        return run if self.frame is None else framed(run, self.frame)
+
+
+def motion_texts(body: HeavyTop | Body, start: State, digits: int) -> dict[str, Any]:
+    """A body and its start as exact text, by the keys of every file and document.
+
+    digits: of γ, and of Ω that was given in space axes, where the attitude is irrational.
+    """
+    found: dict[str, Any] = {}
+    if isinstance(body, HeavyTop):
+        found |= {"inertia": _texts(body.inertia), "weight": exact_text(body.weight)}
+    else:
+        tensor = [value for row in body.tensor for value in row]
+        found |= {"mass": exact_text(body.mass), "gravity": exact_text(body.gravity)}
+        found |= {"inertia": _texts(tensor), "about": PIVOT}
+    found["centre"] = _texts(body.centre)
+    if body.rotor is not None:
+        found["rotor"] = _texts(body.rotor)
+    attitude = start.attitude
+    exact = attitude is None or attitude.exact_rows() is not None
+
+    def rounded(values: Sequence[Fraction], known: bool) -> list[str]:
+        return _texts(values) if known else [decimal_text(value, digits + 1) for value in values]
+
+    found["omega"] = rounded(start.omega, exact or start.omega_space is None)
+    found["gamma"] = rounded(start.gamma, exact)
+    if attitude is not None and attitude.kind in ("quaternion", "matrix"):
+        found[f"start_{attitude.kind}"] = _texts(attitude.numbers)
+    elif attitude is not None:
+        # read back by score, which takes it for the rotation next to it
+        near = attitude.rational_rows(8 * digits + 128)
+        found["start_matrix"] = [decimal_text(value, 2 * digits + 20) for row in near for value in row]
+        found["start_attitude"] = f"{attitude.kind} {attitude}"
+    return found
+
+
+def _texts(values: Sequence[Fraction]) -> list[str]:
+    return [exact_text(value) for value in values]
+
+
+def xi_texts(start: State, digits: int) -> list[str] | None:
+    """ξ at t = 0 in the axes given: of the attitude, else of γ alone; exact where it is rational.
+
+    None for |γ| ≠ 1 without an attitude.
+    """
+    if start.attitude is not None:
+        rows = start.attitude.exact_rows()
+        if rows is not None:
+            return _texts(rows[0])
+        near = start.attitude.rational_rows(4 * digits + 64)
+        return [decimal_text(value, digits + 1) for value in near[0]]
+    if dot(start.gamma, start.gamma) != 1:
+        return None
+    return _texts(perpendicular(start.gamma))
+
+
+# Euler angles φ and ψ without jumps by whole turns, from samples of the attitude in between.
+#
+# φ is an azimuth about e3 in the body, ψ one in space; both turn about the poles of θ.  From one sample to the next a
+# path of length L ends within half a turn of where it began if L < d1 + d2 for the distances d1, d2 of both ends from
+# either pole, for a path that goes round on the other side is not shorter.  With the speed v at both ends and a bound a
+# of the acceleration L <= τ (v1 + v2)/2 + a τ²/4.  Where that is too long there are more samples in between, until
+# |ω| τ < 2^-14, or 50,000 samples in all: then the path goes through a pole as far as anybody can tell.
+
+
+Angles = tuple[float, float, float]
+
+_LONGEST = Fraction(1, 2)
+_SHORTEST = Fraction(1, 1 << 14)
+_ANGLE_PARTS = 16
+_MOST = 50_000
+
+
+class _Seen(NamedTuple):
+    """(φ, θ, ψ) of one sample in rad, and the larger speed of γ in the body and of e3 in space, in rad/time unit."""
+
+    angles: Angles
+    speed: float
+
+
+class FollowedAngles:
+    """(φ, θ, ψ) in rad at the samples that were seen, in any order.
+
+    problem: of the run.  start: (Ω, γ, ξ) at t = 0, in the axes whose angles these are, as are all states seen.
+    """
+
+    def __init__(self, problem: Problem, start: Sequence[Fraction]) -> None:
+        self._problem = problem
+        self._rate = _fastest(problem)
+        inertia = problem.parameters.inertia
+        self._bend = 2 + max(inertia) / min(inertia)
+        self._seen: dict[Fraction, _Seen] = {}
+        self.see(Fraction(0), start)
+
+    def see(self, time: Fraction, state: Any) -> None:
+        """Keep the angles of a state (Ω, γ, ξ)."""
+        values = [float(value) for value in state]
+        omega, gamma = self._problem.system.angular_velocity(self._problem.parameters, values[:6]), values[3:6]
+        turning = [math.hypot(*map(float, cross(fixed, omega))) for fixed in (gamma, (0, 0, 1))]
+        self._seen[time] = _Seen(euler_angles(gamma, values[6:9], math), max(turning))
+
+    def samples(self, times: Sequence[Fraction]) -> list[Fraction]:
+        """``times`` with others in between, the body turning by at most 1/2 rad from one to the next.
+
+        Where these would be more than 50,000 there are none in between, and angles may jump by whole turns.
+        """
+        count = math.ceil(self._rate * abs(times[-1]) / _LONGEST)
+        between = set(self._parts(Fraction(0), times[-1], count) if count <= _MOST else ())
+        return sorted({*times, *between.difference(map(self._held, times))}, key=abs)
+
+    def complete(self, follow: Callable[[Sequence[Fraction]], Any]) -> dict[Fraction, Angles]:
+        """The angles at every sample, by time.  follow: makes :meth:`see` see the states at more times, in order."""
+        while more := [time for pair in pairwise(self._times()) for time in self._missing(*pair)]:
+            if len(more) + len(self._seen) > _MOST:
+                break
+            follow(more)
+        times = self._times()
+        phi, theta, psi = zip(*(self._seen[time].angles for time in times), strict=True)
+        followed = zip(unwrap(phi, math.tau), theta, unwrap(psi, math.tau), strict=True)
+        return dict(zip(times, followed, strict=True))
+
+    def _times(self) -> list[Fraction]:
+        return sorted(self._seen, key=abs)
+
+    def _missing(self, first: Fraction, last: Fraction) -> Iterable[Fraction]:
+        """Times in between that are needed; none where both ends are at a pole and there is nothing to follow."""
+        turned = self._rate * abs(last - first)
+        ends = self._seen[first], self._seen[last]
+        apart = sum(end.angles[1] for end in ends)
+        if turned < _SHORTEST or turned > _LONGEST + 1 or apart in (0, math.tau):
+            return ()
+        speed = sum(Fraction(end.speed) for end in ends) / (2 * self._rate)
+        length = min(turned, turned * speed + self._bend * turned**2 / 4)
+        return () if length < min(apart, math.tau - apart) else self._parts(first, last, _ANGLE_PARTS)
+
+    def _parts(self, first: Fraction, last: Fraction, count: int) -> Iterable[Fraction]:
+        """The times in between that divide the way into equal parts, as the format holds them."""
+        inner = {self._held(first + (last - first) * i / count) for i in range(1, count)}
+        return sorted(inner - {first, last}, key=abs)
+
+    def _held(self, time: Fraction) -> Fraction:
+        return exact(number(time, self._problem.precision))
+
+
+def _fastest(problem: Problem) -> Fraction:
+    """Not less than |ω| at any time: |Ω|² <= (Ω·IΩ + 4 |P r|)/min I by the energy (heavy top and heavy gyrostat), or by
+    |M| (gyrostat).  The rotor is added: |λ|, or |k|/min I, by which it bends the path.
+    """
+    p, omega = problem.parameters, problem.start.omega
+    least, most = min(p.inertia), max(p.inertia)
+    twice = sum((i * w * w for i, w in zip(p.inertia, omega, strict=True)), Fraction(0))
+    square = (twice + 4 * sum(map(abs, p.moment))) * most / least**2
+    root = Fraction(math.isqrt(square.numerator * square.denominator << 40) + 1, square.denominator << 20)
+    rotor = sum(abs(Fraction(part)) for part in p.rotors)
+    return root + (rotor if problem.system is GYROSTAT else rotor / least)
+
 
 Reached = Callable[[Fraction], None]
 _PARTS = 50
@@ -134,7 +365,7 @@ def compute(
 ) -> Motion:
     """The motion at ``times`` (exact, checked), with the drift of every integral that holds.
 
-    attitude: ξ starts at the exact vector of :func:`heavytop.top.angles.perpendicular`; φ, θ, ψ are followed through
+    attitude: ξ starts at the exact vector of :func:`heavytop.top.attitude.perpendicular`; φ, θ, ψ are followed through
     samples in between, which change no bit of the states, and so are continuous but for jumps by π at the poles.
     integrator: a name that `heavytop list` shows, or a source; options: of it, checked.
     outputs: told beside the states; written: the times as they were given, none for their exact text.

@@ -5,34 +5,252 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast, overload
 
 import msgspec
+from flint import arb
 
 from heavytop.display import Table, Tabular, path_picture
 from heavytop.errors import InputError, OutOfReach, quoted
-from heavytop.exact.balls import radius_text, value_text, working_precision
 from heavytop.exact.bodies import BodyMotion
 from heavytop.exact.catalogue import find
-from heavytop.exact.flint_context import whole_evaluation
-from heavytop.exact.motion import initial_xi
-from heavytop.exact.scales import require_handy
+from heavytop.exact.closed_form import initial_xi
+from heavytop.exact.flint.balls import (
+    FUNCTIONS,
+    ball,
+    midpoint,
+    radius,
+    radius_text,
+    require_handy,
+    value_text,
+    whole_evaluation,
+    working_precision,
+)
 from heavytop.exact.solution import ExactSolution
-from heavytop.measure import reference_outputs as outputs_of
 from heavytop.measure.certify import bits_of
 from heavytop.measure.derivatives import DerivativeBall, Derivatives, known_derivatives
-from heavytop.measure.reference_outputs import GUARD_BITS, KnownMotion
-from heavytop.measure.setup import motion_texts, xi_texts
+from heavytop.measure.motion import motion_texts, xi_texts
 from heavytop.precision import decimal_text, exact, shown
+from heavytop.top.attitude import Output, document_of, euler_terms, first_sign, output, rows_of, shaped, signs
 from heavytop.top.bodies import Body
 from heavytop.top.equations import HEAVY_TOP, NAMES, System
-from heavytop.top.heavy_top import HeavyTop, State, Vector
-from heavytop.top.outputs import Output, document_of, output, shaped
+from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import TimeText
+from heavytop.top.vectors import Vector, dot, vector
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+
+# What a reference tells of the attitude, as balls: each to the digits asked, from a state of some more bits.
+
+
+Whole = Callable[[Fraction, int], Sequence[Any]]
+"""Ω, γ and ξ at (time, bits): nine balls."""
+GUARD_BITS = 32
+"""Bits of a state beyond those asked for: no output loses so many but Euler angles near gimbal lock."""
+_WORKING_BITS = 32
+_ATTEMPTS = 5
+_SMALL = Fraction(1, 10**290)
+UNDEFINED = "nan", "inf"
+"""Value and radius of an Euler angle at gimbal lock."""
+
+
+class KnownMotion:
+    """A known motion at the times of a reference, to be asked for outputs; it keeps the balls that were evaluated.
+
+    whole: Ω, γ, ξ.  times: exact.  digits: of each output.  centre: of mass.  gamma: at t = 0.  method: for errors.
+    as_written: the balls are those that were printed, and no others are to be had; outputs are as wide as they make
+    them.
+    """
+
+    def __init__(
+        self,
+        whole: Whole,
+        times: Sequence[Fraction],
+        digits: int,
+        centre: Vector,
+        gamma: Vector,
+        method: str,
+        as_written: bool = False,
+    ) -> None:
+        self.whole, self.times, self.digits, self.method = whole, times, digits, method
+        self.centre, self.gamma, self.as_written = centre, gamma, as_written
+        self._unit = dot(gamma, gamma) == 1
+        self._kept: dict[int, Sequence[arb]] = {}
+        self._signs: list[int] | None = None
+
+    def at(self, place: int, extra: int = GUARD_BITS) -> Sequence[arb]:
+        """Ω, γ and ξ at the time of that place, of ``extra`` bits more than the digits take."""
+        if extra != GUARD_BITS:
+            return self.whole(self.times[place], bits_of(self.digits) + extra)
+        if place not in self._kept:
+            self._kept[place] = self.whole(self.times[place], bits_of(self.digits) + extra)
+        return self._kept[place]
+
+    def balls(self, output: Output) -> list[list[arb | None]]:
+        """The output at every time, flat, each to the digits asked; None for an Euler angle that is not defined.
+
+        A position is right to the digits relative to |p|, any other number relative to a size above 1.
+        Raises OutOfReach where the digits cannot be proven.
+        """
+        narrow = self._narrow(output)
+        found = [self._value(place, output, narrow) for place in range(len(self.times))]
+        if output.name == "quaternion" and found:
+            turns = self.signs(found)
+            # a ball is negated exactly: the minus sign would round it to FLINT's precision of the moment
+            return [
+                [part.neg(exact=True) if part is not None and sign < 0 else part for part in q]
+                for q, sign in zip(found, turns, strict=True)
+            ]
+        return found
+
+    def signs(self, quaternions: Sequence[Sequence[Any]]) -> list[int]:
+        """±1 for each quaternion, in the order of the times: continuous from t = 0 forwards and from it backwards."""
+        if self._signs is None:
+            import numpy
+
+            start, found = self._start(), [1] * len(self.times)
+            floats = numpy.array([[float(part) for part in q] for q in quaternions])
+            for side in (1, -1):
+                places = [p for p, time in enumerate(self.times) if (time >= 0) == (side > 0)]
+                places.sort(key=lambda p: abs(self.times[p]))
+                for place, sign in zip(places, signs(start, floats[places]) if places else (), strict=True):
+                    found[place] = int(sign)
+            self._signs = found
+        return self._signs
+
+    @whole_evaluation
+    def _start(self) -> list[float]:
+        bits = bits_of(self.digits) + GUARD_BITS
+        q = [midpoint(part) for part in self._evaluated(self.whole(Fraction(0), bits), bits, Output("quaternion"))]
+        sign = first_sign(q, Fraction(1, 1 << bits_of(self.digits)))
+        return [sign * float(part) for part in q]
+
+    def _value(self, place: int, output: Output, narrow: float) -> list[arb | None]:
+        asked, extra = bits_of(self.digits), GUARD_BITS
+        most = 2 * asked + 2 * GUARD_BITS if output.name == "euler" else math.inf
+        whole = self.at(place)
+        for _ in range(_ATTEMPTS):
+            values = self._evaluated(whole, asked + extra, output)
+            lacking = max(self._lacking(value, output, narrow) for value in values)
+            if lacking <= 0:
+                return list(values)
+            if extra >= most or (output.name == "euler" and self._locked(whole, output)):
+                break
+            extra += int(lacking) + GUARD_BITS if lacking < math.inf else asked + GUARD_BITS
+            try:
+                whole = self.at(place, extra)
+            except OutOfReach:
+                if output.name != "euler":
+                    raise
+                break
+        if output.name == "euler":
+            return [None if self._lacking(value, output, narrow) > 0 else value for value in values]
+        raise OutOfReach(
+            f"The {output.name} at t = {shown(self.times[place])} is not known to {self.digits} digits, by "
+            f"{self.method}.",
+            "Ask for fewer digits.",
+        )
+
+    @whole_evaluation
+    def _locked(self, whole: Sequence[arb], output: Output) -> bool:
+        """Whether two Euler angles turn about one axis, exactly."""
+        return bool(euler_terms(rows_of(whole[3:6], whole[6:]), output.sequence)[1][0].is_zero())
+
+    @whole_evaluation
+    def _evaluated(self, whole: Sequence[arb], bits: int, output: Output) -> list[arb]:
+        with working_precision(bits + _WORKING_BITS):
+            omega, gamma, xi = whole[:3], whole[3:6], whole[6:]
+            if not self._unit:
+                length = ball(dot(self.gamma, self.gamma)).sqrt()
+                gamma = [part / length for part in gamma]
+            return list(output.at(omega, gamma, xi, self.centre, _BALLS, ball))
+
+    def _narrow(self, output: Output) -> float:
+        """A radius of a position that is small enough at any rate; 0 where doubles do not tell, and of others."""
+        if output.name != "position":
+            return 0.0
+        size = max(abs(part) for part in (*output.point_of(self.centre), *output.pivot))
+        tenth = Fraction(8, 10 ** (self.digits + 1))
+        return float(size * tenth) if _SMALL < size * tenth < 1 else 0.0
+
+    def _lacking(self, value: arb, output: Output, narrow: float) -> float:
+        """Bits by which a ball is too wide; inf where it is not finite.  narrow: of :meth:`_narrow`."""
+        if not value.is_finite():
+            return math.inf
+        if self.as_written:
+            return 0
+        if output.name != "position":
+            if value.rel_one_accuracy_bits() >= bits_of(self.digits):
+                return 0
+        elif float(value.rad()) < narrow:
+            return 0
+        scale = max(Fraction(1), abs(midpoint(value)))
+        if output.name == "position":
+            scale = max(abs(part) for part in (*output.point_of(self.centre), *output.pivot))
+        # the printed value is rounded to one digit more than was asked for, by at most half a unit of it
+        most, wide = scale * Fraction(9, 10 ** (self.digits + 1)), radius(value)
+        if wide <= most:
+            return 0
+        return (wide / most).__ceil__().bit_length() if most else math.inf
+
+
+def _root(value: arb) -> arb:
+    """√ of a number that is not negative, whose ball may reach below 0."""
+    if value >= 0:
+        return arb.sqrt(value)
+    return arb(0).union(value.abs_upper().sqrt())
+
+
+def _atan2(y: arb, x: arb) -> arb:
+    """atan2 in (−π, π], but that a ball which reaches over the cut lies around π."""
+    if x < 0 and not (y > 0 or y < 0):
+        return arb.pi() + arb.atan2(-y, -x)
+    return arb.atan2(y, x) if not (y.contains(0) and x.contains(0)) else arb("nan")
+
+
+_BALLS = SimpleNamespace(**vars(FUNCTIONS) | {"sqrt": _root, "atan2": _atan2})
+
+
+def text(value: arb | None, digits: int) -> tuple[str, str]:
+    """(value, radius) as decimal text, of one digit more than is proven; ``nan`` and ``inf`` for what is undefined."""
+    return UNDEFINED if value is None else value_text(value, digits + 1)
+
+
+def nearest(value: arb | None) -> float:
+    """The double nearest to the middle of a ball; nan for what is undefined."""
+    return math.nan if value is None else float(midpoint(value))
+
+
+@whole_evaluation
+def as_written(
+    states: Sequence[Sequence[Any]],
+    attitude: Sequence[Sequence[Any]],
+    times: Sequence[str],
+    digits: int,
+    centre: Sequence[str],
+    gamma: Sequence[str],
+    start_xi: Sequence[str],
+) -> KnownMotion:
+    """A known motion out of printed balls: what has a ``value`` and a ``radius`` as text."""
+    with working_precision(bits_of(digits) + 2 * GUARD_BITS):
+        lines = [
+            [ball(exact(each.value)) + arb(0, ball(exact(each.radius))) for each in (*y, *xi)]
+            for y, xi in zip(states, attitude, strict=True)
+        ]
+        start = vector(gamma, "gamma")
+        at_start = [ball(value) for value in (*start, *start, *vector(start_xi, "xi"))]
+    instants = [exact(str(time)) for time in times]
+    found = {Fraction(0): at_start, **dict(zip(instants, lines, strict=True))}
+
+    def whole(time: Fraction, bits: int) -> Sequence[Any]:
+        return found[time]
+
+    return KnownMotion(whole, instants, digits, vector(centre, "centre"), start, "the printed balls", as_written=True)
+
 
 DIGITS = range(1, 20001)
 _SHOWN = 15
@@ -56,7 +274,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
 
     written_times: ``times`` in JSON, as they were given.  states: Ω1 Ω2 Ω3 γ1 γ2 γ3 at each.
     attitude: on request, ξ1 ξ2 ξ3 at each; a unit vector fixed in space and ⟂ γ, in body components, which starts at
-    :func:`heavytop.top.angles.perpendicular` of γ; attitude_method: how it is known; xi: ξ at t = 0.
+    :func:`heavytop.top.attitude.perpendicular` of γ; attitude_method: how it is known; xi: ξ at t = 0.
     inertia, weight, centre, rotor, omega, gamma: the data, exactly.
     derivatives: on request, with respect to the start and the data.
     """
@@ -105,7 +323,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
         Raises InputError for another output, and for a reference without attitude.
         """
         if of is not None:
-            return self._outputs(output(of, point, pivot), lambda value: outputs_of.text(value, self.digits)[0])
+            return self._outputs(output(of, point, pivot), lambda value: text(value, self.digits)[0])
         return [[ball.value for ball in state] for state in self.states]
 
     def balls(self, of: str | Output, *, point: Any = None, pivot: Any = None) -> list[Any]:
@@ -114,7 +332,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
         of, point, pivot: as in :meth:`texts`.  Each number is proven to ``digits``, relative to a size above 1; a
         position relative to |p|.
         """
-        return self._outputs(output(of, point, pivot), lambda value: Ball(*outputs_of.text(value, self.digits)))
+        return self._outputs(output(of, point, pivot), lambda value: Ball(*text(value, self.digits)))
 
     def document(self, outputs: Sequence[Output] = ()) -> dict[str, Any]:
         """The document of `reference --json`, with these outputs in it."""
@@ -129,7 +347,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     def quaternions(self) -> NDArray[np.float64]:
         """(w, x, y, z) at every time, body to space, of length 1, rounded to double, shape (n, 4).
 
-        The sign is continuous from one time to the next and w ≥ 0 at t = 0 (:mod:`heavytop.top.outputs`).
+        The sign is continuous from one time to the next and w ≥ 0 at t = 0 (:mod:`heavytop.top.attitude`).
         Raises InputError for a reference without attitude.
         """
         return self._in_double(output("quaternion"))
@@ -166,7 +384,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
     def _in_double(self, what: Output) -> NDArray[np.float64]:
         import numpy
 
-        found = numpy.array(self._outputs(what, outputs_of.nearest), dtype=float)
+        found = numpy.array(self._outputs(what, nearest), dtype=float)
         return found.reshape(-1, *what.shape)
 
     def _outputs(self, what: Output, write: Callable[[Any], Any]) -> list[Any]:
@@ -184,7 +402,7 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
                     "Give attitude=True: xi then starts where docs/outputs.md says.",
                 )
             start = self.centre, self.gamma, self.xi
-            found = outputs_of.as_written(self.states, self.attitude, self.times, self.digits, *start)
+            found = as_written(self.states, self.attitude, self.times, self.digits, *start)
             self.__dict__["_motion"] = found
         return found
 
@@ -252,10 +470,10 @@ class Reference(Tabular, msgspec.Struct, frozen=True, omit_defaults=True, dict=T
             if count > 2 * _ENDS and _ENDS <= place < count - _ENDS:
                 rows += [[f"... {count - 2 * _ENDS} more", "", "", ""]] if place == _ENDS else []
                 continue
-            for name, ball in zip(NAMES, state, strict=True):
-                parts = [ball.value[i : i + _WIDE] for i in range(0, len(ball.value), _WIDE)]
+            for name, each in zip(NAMES, state, strict=True):
+                parts = [each.value[i : i + _WIDE] for i in range(0, len(each.value), _WIDE)]
                 rows.append(
-                    [time if name == NAMES[0] else "", name, parts[0].ljust(_WIDE * (len(parts) > 1)), ball.radius]
+                    [time if name == NAMES[0] else "", name, parts[0].ljust(_WIDE * (len(parts) > 1)), each.radius]
                 )
                 rows += [["", "", part.ljust(_WIDE), ""] for part in parts[1:]]
         return rows
@@ -337,10 +555,10 @@ def ball_texts(evaluate: Evaluate, method: str, time: Fraction, digits: int) -> 
 def known_texts(values: Sequence[Any], method: str, time: Fraction, digits: int) -> list[Ball]:
     """:func:`ball_texts` of balls that are known already."""
     found = [Ball(*value_text(value, digits + 1)) for value in values]
-    for component, ball in enumerate(found, 1):
-        if exact(ball.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(ball.value))):
+    for component, each in enumerate(found, 1):
+        if exact(each.radius) > Fraction(1, 10**digits) * max(Fraction(1), abs(exact(each.value))):
             raise OutOfReach(
-                f"Component {component} at t = {shown(time)} is known within {ball.radius} only, not to {digits} "
+                f"Component {component} at t = {shown(time)} is known within {each.radius} only, not to {digits} "
                 f"digits, by {method}.",
                 "Ask for fewer digits.",
             )

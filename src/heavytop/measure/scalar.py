@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
 from math import isfinite
-from typing import Any
+from sys import float_info
+from typing import Any, Protocol
 
+import numpy
 from flint import arb
+from numpy.typing import NDArray
 
 from heavytop.errors import InputError
-from heavytop.exact.balls import ball, midpoint, radius, radius_text
-from heavytop.precision import decimal_text, exact, log10
-from heavytop.records import Metric, MetricKind
+from heavytop.exact.flint.balls import ball, midpoint, radius, radius_text
+from heavytop.precision import Precision, decimal_text, exact, log10, round_to
+from heavytop.records import Against, Metric, MetricKind, Quantity
 
 DIGITS = 8
 UNRESOLVED = "unresolved"
@@ -97,3 +102,134 @@ def root(value: arb) -> arb:
 def largest(values: Iterable[arb]) -> arb:
     """The ball around max |value|."""
     return reduce(larger, map(abs, values), _ZERO)
+
+
+# How many digits of a motion are right: one definition, for every table, page and document.
+
+
+RELATIVE = Quantity("solution_error", "relative", "max")
+"""The metric behind the digits right: the largest |error|/max(1, |true value|) of a component of Ω or γ over the
+samples."""
+
+_ONE = arb(1)
+
+
+def relative_error(errors: Sequence[arb], truth: Sequence[arb]) -> arb:
+    """The largest |error|/max(1, |true value|) over the components of one state, at the working precision."""
+    sizes = map(abs, truth)
+    return largest(error if size < _ONE else error / size.max(_ONE) for error, size in zip(errors, sizes, strict=True))
+
+
+class Measured(Protocol):
+    """A row, as far as its digits are concerned."""
+
+    @property
+    def bits(self) -> int: ...
+
+    @property
+    def metrics(self) -> dict[str, Metric]: ...
+
+    @property
+    def reference(self) -> Against: ...
+
+
+def digits_kept(row: Measured) -> float | None:
+    """−log10 of the largest |error|/max(1, |true value|) over the samples and the components of Ω and γ.
+
+    Rounded to two places; :func:`digits_right` has all.
+    """
+    found = digits_right(row)
+    return None if found is None else round(found, 2)
+
+
+def digits_right(row: Measured) -> float | None:
+    """−log10 of the largest |error|/max(1, |true value|) over the samples and the components of Ω and γ.
+
+    At most the digits that the format has.  Where the reference does not resolve the error, the digits that are proven.
+    Of an ensemble: from the root mean square over its starts of each start's largest.
+    0 where the format has no digit left before the end.
+    None without a reference, without a sample, and for a value that is not finite.
+    """
+    metric = row.metrics.get(RELATIVE.text)
+    if metric is None or (metric.log10 is None and metric.bound is None and metric.value != "0"):
+        return None
+    if row.reference.until:
+        return 0.0
+    size = metric.log10 if metric.bound is None else log10(exact(metric.bound))
+    most = row.bits * math.log10(2)
+    return most if size is None else min(most, -size)
+
+
+def digits_text(kept: float) -> str:
+    """Digits right, for people: to one place, and none where the error is larger than the value."""
+    return f"{max(0.0, kept):.1f}"
+
+
+def digits_of(bits: int) -> int:
+    """Decimal digits of a format with so many bits: 16 in double, 34 in quad."""
+    return round(bits * math.log10(2))
+
+
+# How many digits the states are written with, read off the numbers themselves.
+
+
+_SPARE = 3
+"""Digits that the format must have beyond those written, or nothing was rounded."""
+_LEAST = 12
+"""Numbers that must agree."""
+_SINGLE = 24
+EXPLAINS = 1.5
+"""An error is that of rounding if it is at most so many times the largest rounding, ..."""
+_PART = 0.01
+"""... and at least that part of it: of a short number that is right nothing was rounded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rounding:
+    """What all states are rounded to.
+
+    kind: "significant" digits, "decimals" after the point, or "single" precision.  digits: how many, 24 bits for the
+    last.  error: the largest rounding of a component, relative to max(1, |value|).
+    """
+
+    kind: str
+    digits: int
+    error: float
+
+    def spacing(self, values: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
+        """Between neighbours of each value among the numbers that are so rounded."""
+        if self.kind == "decimals":
+            return numpy.full_like(values, 10.0**-self.digits)
+        base = 2.0 if self.kind == "single" else 10.0
+        size = numpy.maximum(numpy.abs(values), float_info.min)
+        return numpy.where(values == 0, 0.0, base ** (numpy.floor(numpy.log(size) / numpy.log(base)) + 1 - self.digits))
+
+
+def rounding(states: Sequence[Sequence[Fraction]], precision: Precision, least: int = _LEAST) -> Rounding | None:
+    """The coarsest rounding that all numbers have; None where they are written in full, or fewer than ``least``."""
+    numbers = [value for state in states for value in state if value]
+    if len(numbers) < least:
+        return None
+    return min(_all(numbers, precision), key=lambda each: -each.error, default=None)
+
+
+def explains(found: Rounding, error: float) -> bool:
+    """Whether an error, relative to max(1, |value|), is of the size that the rounding makes it."""
+    return _PART * found.error <= error <= EXPLAINS * found.error
+
+
+def _all(numbers: Sequence[Fraction], precision: Precision) -> Iterator[Rounding]:
+    most = precision.digits - _SPARE
+    for digits in range(1, most):
+        unit = Fraction(1, 10**digits)
+        if all(round_to(round(value / unit) * unit, precision.bits) == value for value in numbers):
+            yield Rounding("decimals", digits, 0.5 * 10.0**-digits)
+            break
+    for digits in range(1, most):
+        if all(round_to(Fraction(decimal_text(value, digits)), precision.bits) == value for value in numbers):
+            worst = max(abs(value) / max(Fraction(1), abs(value)) for value in numbers)
+            yield Rounding("significant", digits, float(worst) * 0.5 * 10.0 ** (1 - digits))
+            break
+    if precision.bits > _SINGLE and all(round_to(value, _SINGLE) == value for value in numbers):
+        worst = max(abs(value) / max(Fraction(1), abs(value)) for value in numbers)
+        yield Rounding("single", _SINGLE, float(worst) * 2.0**-_SINGLE)

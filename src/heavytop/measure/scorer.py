@@ -7,14 +7,308 @@ from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
-from heavytop.exact.balls import working_precision
-from heavytop.exact.flint_context import whole_evaluation
+from flint import arb
+
+from heavytop.exact.flint.balls import ball, ball_from, ball_text, rational, whole_evaluation, working_precision
 from heavytop.integrate.trajectory import Problem
-from heavytop.measure.drift import Drift, Running, Sums
-from heavytop.measure.scalar import to_ball
-from heavytop.measure.solution_error import SOLUTION_ERROR, Errors, SolutionError
+from heavytop.measure.scalar import GUARD_BITS, larger, largest, metric, relative_error, resolved, root, text, to_ball
 from heavytop.measure.truth import Truth
-from heavytop.records import Against, Metric, Quantity, Series
+from heavytop.precision import log10
+from heavytop.records import Against, Metric, Quantity, Series, by_name
+from heavytop.top.equations import Integral, Parameters
+from heavytop.top.vectors import dot
+
+# Drift of first integrals along a computed motion, in one pass and constant memory.
+
+
+Sums = tuple[arb, arb, arb]
+STATISTICS = ("max", "rms", "final")
+DRIFT = "drift"
+"""The name of the quantity; its components are the first integrals."""
+
+
+def drift_of(integral: str) -> Quantity:
+    """The drift of the first integral of that name."""
+    return Quantity(DRIFT, integral)
+
+
+class Running:
+    """Maximum, mean square and last of a stream of balls, and its values at chosen times."""
+
+    def __init__(self) -> None:
+        self.maximum = arb(0)
+        self.squares = arb(0)
+        self.final = arb(0)
+        self.count = 0
+        self.kept: dict[Fraction, arb] = {}
+
+    def following(self, value: arb) -> Sums:
+        """Maximum, sum of squares and last with |value| too; evaluated at the working precision, nothing taken in."""
+        size = abs(value)
+        return larger(self.maximum, size), self.squares + size * size, size
+
+    def take(self, time: Fraction, sums: Sums, keep: bool) -> None:
+        """Take in a value at ``time`` by its :meth:`following`; remember it for the series if ``keep``."""
+        self.maximum, self.squares, self.final = sums
+        self.count += 1
+        self.remember(time, sums, keep)
+
+    def remember(self, time: Fraction, sums: Sums, keep: bool) -> None:
+        """Remember a value for the series if ``keep``, and count it for nothing else."""
+        if keep:
+            self.kept[time] = sums[2]
+
+    def metrics(self, quantity: Quantity) -> dict[Quantity, Metric]:
+        """Its ``max``, ``rms`` and ``final``; ``missing`` without a sample."""
+        if not self.count:
+            return {quantity.over(part): Metric("missing", None) for part in STATISTICS}
+        found = (self.maximum, root(self.squares / self.count), self.final)
+        return {quantity.over(part): metric(value) for part, value in zip(STATISTICS, found, strict=True)}
+
+    def series(self, quantity: Quantity, time_text: Callable[[Fraction], str]) -> Series:
+        """The kept values."""
+        return Series([time_text(t) for t in self.kept], [text(v) for v in self.kept.values()], quantity)
+
+    def content(self) -> dict[str, Any]:
+        """As plain text and integers, exact."""
+        return {
+            "maximum": ball_text(self.maximum),
+            "squares": ball_text(self.squares),
+            "final": ball_text(self.final),
+            "count": self.count,
+            "kept": {str(time): ball_text(value) for time, value in self.kept.items()},
+        }
+
+    def restore(self, content: dict[str, Any]) -> None:
+        """Become what had that :meth:`content`."""
+        self.maximum, self.squares, self.final = (ball_from(content[k]) for k in ("maximum", "squares", "final"))
+        self.count = content["count"]
+        if type(self.count) is not int or self.count < 0:
+            raise ValueError(f"{self.count!r} samples")
+        self.kept = {Fraction(time): ball_from(value) for time, value in content["kept"].items()}
+
+
+class Drift:
+    """|I(t) − I(0)| of each integral, absolute, from the rounded start; evaluated with 64 guard bits.
+
+    problem: what the integrator was given.  integrals: those that hold for the exact top and start.
+    keep: the times whose values go into the series.
+    With an attitude riding along, |ξ|² and ξ·γ are watched as well.
+    """
+
+    def __init__(self, problem: Problem, integrals: Sequence[Integral], keep: Sequence[Fraction] = ()) -> None:
+        self.bits = problem.precision.bits + GUARD_BITS
+        self.keep = frozenset(keep)
+        self.functions: dict[str, Callable[[Parameters, Any], Any]] = {i.name: i.value for i in integrals}
+        if problem.xi is not None:
+            self.functions |= {"xi_squared": _xi_squared, "xi_dot_gamma": _xi_dot_gamma}
+        self.parameters = parameter_balls(problem, self.bits)
+        self.initial = self._values((*problem.start.flat, *(problem.xi or ())))
+        self.running = {name: Running() for name in self.functions}
+
+    def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
+        """Take in one native state."""
+        self.take(time, self.following(state))
+
+    def take(self, time: Fraction, sums: Sequence[Sums]) -> None:
+        """Take in one state by its :meth:`following`."""
+        keep = bool(self.keep) and time in self.keep  # a Fraction's hash takes as long as an operation on balls
+        for running, each in zip(self.running.values(), sums, strict=True):
+            running.take(time, each, keep)
+
+    @whole_evaluation
+    def _values(self, state: Sequence[Fraction]) -> dict[str, arb]:
+        with working_precision(self.bits):
+            y = [ball(value) for value in state]
+            return {name: value(self.parameters, y) for name, value in self.functions.items()}
+
+    @whole_evaluation
+    def following(self, state: Sequence[Any]) -> list[Sums]:
+        """What the drifts add up to with this native state; nothing is taken in."""
+        with working_precision(self.bits):
+            return self.sums([to_ball(value) for value in state])
+
+    def sums(self, y: Sequence[arb]) -> list[Sums]:
+        """The same with a state of balls, at a working precision of ``bits``."""
+        return [
+            self.running[name].following(value(self.parameters, y) - self.initial[name])
+            for name, value in self.functions.items()
+        ]
+
+    @whole_evaluation
+    def metrics(self) -> dict[str, Metric]:
+        """``drift_NAME_max``, ``_rms``, ``_final`` for every integral."""
+        with working_precision(self.bits):
+            return by_name({q: m for each, run in self.quantities().items() for q, m in run.metrics(each).items()})
+
+    def series(self, time_text: Callable[[Fraction], str]) -> dict[str, Series]:
+        """``drift_NAME`` over the kept times."""
+        return {quantity.text: run.series(quantity, time_text) for quantity, run in self.quantities().items()}
+
+    def quantities(self) -> dict[Quantity, Running]:
+        """The running values by what they are of."""
+        return {drift_of(name): values for name, values in self.running.items()}
+
+    def content(self) -> dict[str, Any]:
+        """What was taken in so far, as plain text and integers, exact."""
+        return {name: run.content() for name, run in self.running.items()}
+
+    def restore(self, content: dict[str, Any]) -> None:
+        """Go on from that :meth:`content`."""
+        for name, run in self.running.items():
+            run.restore(content[name])
+
+
+@whole_evaluation
+def parameter_balls(problem: Problem, bits: int) -> Parameters:
+    """I, P r and the rotor of a problem as balls of ``bits`` bits."""
+    with working_precision(bits):
+        return problem.parameters.mapped(ball)
+
+
+def _xi_squared(_: Parameters, y: Any) -> Any:
+    return dot(y[6:9], y[6:9])
+
+
+def _xi_dot_gamma(_: Parameters, y: Any) -> Any:
+    return dot(y[6:9], y[3:6])
+
+
+# Distance of a computed motion from a known one that starts from the same rounded data.
+
+
+SOLUTION_ERROR = "solution_error"
+COMPONENTS = ("omega", "gamma", "along", "across")
+_RELATIVE = "relative"
+
+Errors = tuple[list[Sums], bool]
+"""What :meth:`SolutionError.following` finds."""
+
+
+class SolutionError:
+    """Error of Ω and of γ (largest component), of the state along the flow (phase) and across it (Euclidean), and
+    relative: the largest |error|/max(1, |true value|) of a component, which says how many digits are kept.
+
+    truth: the true motion from the start and top of ``problem``, rounded, so no input rounding is charged; what it does
+    not cover is not compared.
+    threshold: the error of Ω, in units of Ω, whose first crossing is the escape time.
+    until: the |t| up to which errors count; later ones go into the series alone.
+    name: of the quantity, whose components are omega, gamma, along and across.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        truth: Truth,
+        keep: Sequence[Fraction] = (),
+        threshold: Fraction | None = None,
+        until: float = math.inf,
+        name: str = SOLUTION_ERROR,
+    ) -> None:
+        self.truth = truth
+        self.bits = problem.precision.bits + GUARD_BITS
+        self.keep = frozenset(keep)
+        self.threshold = threshold
+        self.until = until
+        self.name = name
+        self.escape: Fraction | None = None
+        self.running = {part: Running() for part in (*COMPONENTS, _RELATIVE)}
+        self.system = problem.system
+        self.parameters = parameter_balls(problem, self.bits)
+
+    def __call__(self, time: Fraction, state: Sequence[Any]) -> None:
+        """Take in one native state."""
+        self.take(time, self.following(time, state))
+
+    def take(self, time: Fraction, errors: Errors | None) -> None:
+        """Take in one state by its :meth:`following`."""
+        if errors is None:
+            return
+        sums, left = errors
+        keep = bool(self.keep) and time in self.keep
+        counts = math.isinf(self.until) or abs(float(time)) <= self.until
+        for running, part in zip(self.running.values(), sums, strict=True):
+            (running.take if counts else running.remember)(time, part, keep)
+        if left and self.escape is None:
+            self.escape = time
+
+    @whole_evaluation
+    def following(self, time: Fraction, state: Sequence[Any]) -> Errors | None:
+        """What the errors add up to with this native state, and whether Ω is off by more than the threshold; None where
+        there is no truth.  Nothing is taken in.
+        """
+        truth = self.known(time)
+        if truth is None:
+            return None
+        with working_precision(self.bits):
+            return self.errors([to_ball(value) for value in state[:6]], truth)
+
+    def known(self, time: Fraction) -> list[arb] | None:
+        """The true state; None where there is none."""
+        return self.truth.state(time, self.bits) if self.truth.covers(time) else None
+
+    def errors(self, y: Sequence[arb], truth: Sequence[arb]) -> Errors:
+        """:meth:`following` of a state of six balls, at a working precision of ``bits``."""
+        delta = [value - true for value, true in zip(y, truth, strict=True)]
+        flow = self.system.field(self.parameters, truth)
+        omega = largest(delta[:3])
+        values = omega, largest(delta[3:]), *split(delta, flow), relative_error(delta, truth)
+        sums = [running.following(value) for running, value in zip(self.running.values(), values, strict=True)]
+        return sums, self.threshold is not None and bool(omega > rational(self.threshold))
+
+    @whole_evaluation
+    def last(self, rate: Fraction) -> float:
+        """The error of the last state that was taken in, at most: of Ω over ``rate``, or of γ, the larger."""
+        with working_precision(self.bits):
+            omega, gamma = (self.running[part].final for part in ("omega", "gamma"))
+            return float(largest((omega / rational(rate), gamma)).abs_upper())
+
+    @whole_evaluation
+    def metrics(self) -> dict[str, Metric]:
+        """``NAME_omega_max``, ``_rms``, ``_final``; the same for gamma, along, across; ``NAME_relative_max``."""
+        with working_precision(self.bits):
+            found = {q: m for part in COMPONENTS for q, m in self.running[part].metrics(self._of(part)).items()}
+            largest_relative = self._of(_RELATIVE).over("max")
+            relative = self.running[_RELATIVE].metrics(largest_relative)[largest_relative]
+            return by_name(found | {largest_relative: relative})
+
+    def series(self, time_text: Callable[[Fraction], str]) -> dict[str, Series]:
+        """The same over the kept times, but for the relative error."""
+        return {self._of(part).text: self.running[part].series(self._of(part), time_text) for part in COMPONENTS}
+
+    def _of(self, component: str) -> Quantity:
+        return Quantity(self.name, component)
+
+    def quantities(self) -> dict[Quantity, Running]:
+        """The running values by what they are of."""
+        return {self._of(part): values for part, values in self.running.items()}
+
+    def content(self) -> dict[str, Any]:
+        """What was taken in so far, as plain text and integers, exact."""
+        running = {name: run.content() for name, run in self.running.items()}
+        return {"escape": None if self.escape is None else str(self.escape), **running}
+
+    def restore(self, content: dict[str, Any]) -> None:
+        """Go on from that :meth:`content`."""
+        self.escape = None if content["escape"] is None else Fraction(content["escape"])
+        for name, run in self.running.items():
+            run.restore(content[name])
+
+
+def split(delta: Sequence[arb], flow: Sequence[arb]) -> tuple[arb, arb]:
+    """|δ| along the unit vector of the flow, and the Euclidean rest across it; the whole across at an equilibrium."""
+    total = _product(delta, delta)
+    speed = _product(flow, flow)
+    if not resolved(speed) or speed == 0:
+        return arb(0), root(total)
+    projection = _product(delta, flow)
+    along = projection * projection / speed
+    return root(along), root(total - along)
+
+
+def _product(a: Sequence[arb], b: Sequence[arb]) -> Any:
+    return dot(a[:3], b[:3]) + dot(a[3:], b[3:])
+
 
 TimeText = Callable[[Fraction], str]
 
@@ -24,7 +318,7 @@ class Scorer:
 
     problem: what the integrator was given.  truth: the true motion, or why there is none.
     keep: the times whose values go into the series.
-    threshold, until, name: as in :class:`heavytop.measure.solution_error.SolutionError`.
+    threshold, until, name: as in :class:`heavytop.measure.scorer.SolutionError`.
     Drift is in the units of each integral, errors of Ω are in 1/time unit, of γ in none.
     """
 
@@ -92,3 +386,51 @@ class Scorer:
         self.drift.restore(content["drift"])
         if self.error is not None:
             self.error.restore(content["error"])
+
+
+# The error of a motion at each of its samples, and the drift of its integrals there, as decimal logarithms.
+
+
+Logs = list[float | None]
+"""log10 of a quantity at each sample; None where it is 0."""
+
+
+@whole_evaluation
+def sample_errors(
+    problem: Problem, states: Sequence[Sequence[Fraction]], known: Sequence[Sequence[Fraction]]
+) -> dict[str, Logs]:
+    """The error of each state, by ``relative`` (of the largest component), ``along`` and ``across`` the flow.
+
+    states, known: exact numbers, six each, at the same times.
+    """
+    found: dict[str, Logs] = {"relative": [], "along": [], "across": []}
+    # as many bits as tell a state of the format from one that is right to as many digits again
+    bits = 2 * problem.precision.bits + GUARD_BITS
+    parameters = parameter_balls(problem, bits)
+    with working_precision(bits):
+        for state, true in zip(states, known, strict=True):
+            truth = [ball(value) for value in true]
+            delta = [ball(value - other) for value, other in zip(state, true, strict=True)]
+            along, across = split(delta, problem.system.field(parameters, truth))
+            values = {"relative": relative_error(delta, truth), "along": along, "across": across}
+            for name, value in values.items():
+                found[name].append(_log10(value))
+    return found
+
+
+def _log10(value: Any) -> float | None:
+    """Of the middle of a ball; None where it may be 0."""
+    from heavytop.exact.flint.balls import midpoint, radius
+
+    middle = midpoint(value)
+    return None if middle <= radius(value) else log10(middle)
+
+
+def sample_drifts(problem: Problem, states: Sequence[Sequence[Fraction]]) -> dict[str, Logs]:
+    """|I(y(t)) − I(y(0))| at each state, of every first integral that holds for the exact start."""
+    start = problem.start.flat
+    found: dict[str, Logs] = {}
+    for integral in problem.integrals():
+        at_start = integral.value(problem.parameters, start)
+        found[integral.name] = [log10(integral.value(problem.parameters, state) - at_start) for state in states]
+    return found

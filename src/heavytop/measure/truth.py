@@ -12,24 +12,264 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
+from typing import Any
 
 from flint import arb
 from msgspec.structs import replace as replace_struct
 
-from heavytop.errors import HeavyTopError, InputError, OutOfReach
-from heavytop.exact.balls import radius_text
+from heavytop.errors import HeavyTopError, InputError, NotInClass, OutOfReach
+from heavytop.exact.cases.gyrostat import Gyrostat
 from heavytop.exact.catalogue import matches
-from heavytop.exact.gyrostat import Gyrostat
+from heavytop.exact.closed_form import state_and_attitude
+from heavytop.exact.enclosure.run import Validated
+from heavytop.exact.flint.balls import ball, midpoint, radius, radius_text, whole_evaluation, working_precision
 from heavytop.exact.solution import ExactSolution
-from heavytop.exact.validated import Validated
-from heavytop.integrate.trajectory import Problem
+from heavytop.integrate.multiword.engines import accuracy, choose
+from heavytop.integrate.multiword.lanes import propagate_words_ensemble
+from heavytop.integrate.multiword.motions import follow
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.measure.certify import EXACTLY, Certificate, certify, enclosure_of
-from heavytop.measure.computed_reference import of_rounded
 from heavytop.measure.scalar import GUARD_BITS
-from heavytop.precision import shown, time_text
+from heavytop.precision import Precision, decimal_text, exact, number, real, shown, time_text
 from heavytop.records import Against, Certified
+from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT
+from heavytop.top.times import check_times
+from heavytop.top.vectors import Vector, cross, dot
+
+# A reference where no proof is at hand: two runs in words of different length, trusted as far as they agree.
+#
+# Labelled computed, not proven: the radius is the difference of the two runs, which no theorem bounds.  The state is
+# that of the longer words, so the radius is the error of the shorter ones, and the state's own is smaller by as many
+# bits as the words differ by, on a chaotic motion too: what one loses the other loses.
+
+
+MORE_BITS = 30
+"""The words of the second run have at least so many more bits than those of the first."""
+EFFORT = 60.0
+"""Seconds of the model of the cost that each run may take; absurd starts and times would take for ever."""
+EFFORT_OF_MANY = 600.0
+"""The same for all the runs of an ensemble together."""
+_PILOT_STEPS = 1000
+"""A run that takes more is forecast from so many: what would take longer than its effort is refused at once."""
+_SEARCH = 8
+_WORD_BITS = 1032
+_DIGIT = 10
+"""An error leaves a digit where it is below the size of the state over this."""
+_STAGES = 6
+_PROBES = 12
+"""A truth that may end is computed to the horizon over 4^6 first, and then to four times as far, until it has ended;
+where that is before the first sample, to the horizon over 4^12, so that nothing runs to where no digit is left."""
+
+Given = Callable[[Precision], Problem]
+"""A motion to be computed, in any format."""
+
+
+def seconds_a_step(bits: int) -> float:
+    """A model of the cost of a step in so many bits, not a measurement: no result depends on a clock."""
+    return 3e-6 + 4e-12 * bits**3 if bits <= _WORD_BITS else 6e-8 * bits**2
+
+
+@dataclass(frozen=True, slots=True)
+class ComputedReference:
+    """States, with an attitude vector where the motion has one, at the times of two runs.
+
+    words: the bits of the words of both.  ends: the first time at which the format that is measured has no digit left;
+    None where it keeps one to the last.
+    """
+
+    words: tuple[int, int]
+    balls: dict[Fraction, list[arb]]
+    ends: Fraction | None = None
+
+    @property
+    def against(self) -> Against:
+        """What it is, how far the runs agree as long as the format has digits, and how long that is."""
+        return agreement([self])
+
+    def state(self, time: Fraction, bits: int = 0) -> list[arb]:
+        """Six balls, or nine with the attitude vector, at one of the times; ``bits`` are what they are."""
+        return self.balls[time]
+
+    def radius(self, time: Fraction) -> Fraction:
+        """The largest radius at one of the times, relative to a value above 1."""
+        return max(radius(value) / max(Fraction(1), abs(midpoint(value))) for value in self.balls[time])
+
+    def blur(self, time: Fraction) -> float:
+        """How far the state at one of the times may be off, absolute."""
+        return float(sum(map(radius, self.balls[time])))
+
+    def beyond(self, part: Fraction) -> set[Fraction]:
+        """The times at which Ω or γ is uncertain by more than this part of the largest that it becomes."""
+        found: set[Fraction] = set()
+        for group in (slice(0, 3), slice(3, 6)):
+            largest = max(abs(midpoint(value)) for state in self.balls.values() for value in state[group])
+            found |= {t for t, state in self.balls.items() if radius(state[group][0]) > part * largest}
+        return found
+
+
+def agreement(found: Sequence[ComputedReference]) -> Against:
+    """What the references of one ensemble are, all over the same times."""
+    (coarse, fine), ends = found[0].words, found[0].ends
+    radii = [each.radius(t) for each in found for t in each.balls if ends is None or abs(t) < abs(ends)]
+    agreed = radius_text(max(radii)) if radii else ""
+    until = "" if ends is None else time_text(ends)
+    return Against("computed", f"words of {coarse} and {fine} bits", agreed, until=until)
+
+
+def of_rounded(
+    problems: Sequence[Problem], times: Sequence[Fraction], least: int = 0, effort: float | None = None
+) -> list[ComputedReference]:
+    """The motions of problems of one format, from the very numbers that they are, in 30 bits more and 60 more.
+
+    least: bits of the first run at least.  effort: as in :func:`compute`.
+    All end where one has no digit left in the format, as laws of growth do.
+    Raises OutOfReach as :func:`compute` does, and InputError for more bits than there are.
+    """
+    bits = problems[0].precision.bits
+    given = [partial(_in_format, problem) for problem in problems]
+    return compute(given, times, max(least, bits + MORE_BITS), bits, effort)
+
+
+def _in_format(problem: Problem, precision: Precision) -> Problem:
+    return replace(problem, precision=precision)
+
+
+def compute(
+    given: Sequence[Given],
+    times: Sequence[Fraction],
+    bits: int,
+    format_bits: int | None = None,
+    effort: float | None = None,
+) -> list[ComputedReference]:
+    """The motions at ``times``, from runs in about ``bits`` bits and in at least :data:`MORE_BITS` more.
+
+    times: as for :func:`heavytop.integrate.multiword.motions.propagate_words`.
+    format_bits: those of the format that is measured, in which the motions may lose all digits; None for no format.
+    effort: seconds of the model of the cost that each run may take; None for 60, or the 600 of an ensemble shared out.
+    Raises OutOfReach if a run does not reach the last time within the effort.
+    """
+    first = [_Served.of(each, bits) for each in given]
+    finer = _finer(given, bits, first)
+    second = [_Served.of(each, finer) for each in given]
+    words = [(one.bits, two.bits) for one, two in zip(first, second, strict=True)]
+    balls: list[dict[Fraction, list[arb]]] = [{} for _ in given]
+    seconds = effort or (EFFORT if len(given) == 1 else EFFORT_OF_MANY / len(given))
+    for early in _stages(times, _STAGES if format_bits is not None else 0):
+        # no bit of a run depends on the samples taken: what a shorter stage had is not taken again
+        more = [time for time in early if time not in balls[0]]
+        for index, pair in enumerate(zip(_states(first, more, seconds), _states(second, more, seconds), strict=True)):
+            known = balls[index] | dict(zip(more, _around(*pair, bits), strict=True))
+            balls[index] = {time: known[time] for time in early}
+        found = [ComputedReference(*each) for each in zip(words, balls, strict=True)]
+        ends = None if format_bits is None else _last_digit(found, [each.accuracy - format_bits for each in first])
+        if ends is not None and ends not in times:
+            # lost on the way to the first sample
+            return [ComputedReference(each, {}, times[0]) for each in words]
+        if ends is not None:
+            break
+    return [replace(each, ends=ends) for each in found]
+
+
+@dataclass(frozen=True, slots=True)
+class _Served:
+    """A motion in a format, and the words that serve it.
+
+    bits: of the words.  accuracy: as in :func:`heavytop.integrate.multiword.engines.accuracy`.
+    """
+
+    problem: Problem
+    bits: int
+    accuracy: int
+
+    @classmethod
+    def of(cls, given: Given, bits: int) -> _Served:
+        problem = given(real(bits))
+        arithmetic, scaled = choose(problem, None)
+        return cls(problem, int(arithmetic.flags["bits"]), accuracy(arithmetic, scaled))
+
+
+def _finer(given: Sequence[Given], bits: int, first: Sequence[_Served]) -> int:
+    """The bits of a second format, whose words have 30 bits more at least.
+
+    Two formats may be served by the same words, and then differ by nothing.
+    """
+    finer = bits + MORE_BITS
+    for each, one in zip(given, first, strict=True):
+        while _Served.of(each, finer).bits < one.bits + MORE_BITS:
+            finer += _SEARCH
+    return finer
+
+
+def _stages(times: Sequence[Fraction], stages: int) -> list[Sequence[Fraction]]:
+    """Those of the times within the horizon over 4^n, each longer than the one before; where there is none, its end."""
+    ends = {n: times[-1] / 4**n for n in range(_PROBES if stages else 0, -1, -1)}
+    counts = {n: sum(abs(time) <= abs(end) for time in times) for n, end in ends.items()}
+    before = [[ends[n]] for n, count in counts.items() if not count]
+    return [*before, *(times[:count] for count in dict.fromkeys(counts[n] for n in range(stages, -1, -1)) if count)]
+
+
+def _last_digit(found: Sequence[ComputedReference], fewer: Sequence[int]) -> Fraction | None:
+    """The first time at which some motion has no digit left in a format of so many bits ``fewer`` than the words have.
+
+    Its error is that of the shorter words, times 2 to as many bits: both are amplified alike.
+    """
+    lost = [each.beyond(Fraction(1, _DIGIT) / 2 ** max(0, bits)) for each, bits in zip(found, fewer, strict=True)]
+    return next((time for time in found[0].balls if any(time in each for each in lost)), None)
+
+
+def _states(served: Sequence[_Served], times: Sequence[Fraction], effort: float) -> list[Sequence[Any]]:
+    """The states of each motion at ``times``."""
+    problems = [each.problem for each in served]
+    words = max(each.bits for each in served)
+    limit = int(effort / seconds_a_step(words))
+    runs = _followed(problems, times, min(limit, _PILOT_STEPS))
+    states: list[Sequence[Any]] = [run.states for run in runs]
+    if limit > _PILOT_STEPS and any(run.outcome is Outcome.STEP_LIMIT for run in runs):
+        reached = min(abs(run.time_reached) for run in runs if run.outcome is Outcome.STEP_LIMIT)
+        if abs(times[-1]) * _PILOT_STEPS > limit * reached:
+            raise OutOfReach(
+                f"A reference run in words of {words} bits to t = {decimal_text(times[-1], 6)} takes too long: its "
+                f"first {_PILOT_STEPS} steps end at t = {decimal_text(reached, 3)}.",
+                "Ask for an earlier time.",
+            )
+        done = min(map(len, states))
+        runs = _followed(problems, times[done:], limit)
+        states = [[*before[:done], *run.states] for before, run in zip(states, runs, strict=True)]
+    for run in runs:
+        if run.outcome is not Outcome.SUCCESS:
+            raise OutOfReach(
+                f"A reference run in words of {words} bits {run.outcome.message}.", "Ask for an earlier time."
+            )
+    return states
+
+
+def _followed(problems: Sequence[Problem], times: Sequence[Fraction], limit: int) -> list[Trajectory]:
+    """In words; one by itself is not put into lanes."""
+    targets = [number(time, problems[0].precision) for time in check_times(times)]
+    if len(problems) == 1:
+        return [follow(problems[0], targets, step_limit=limit)]
+    return propagate_words_ensemble(problems, targets, step_limit=limit)
+
+
+@whole_evaluation
+def _around(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[list[arb]]:
+    """The finer values; the radius of Ω, γ and ξ is the largest difference in it, and a rounding of the coarser."""
+    with working_precision(bits + 128):
+        return [_group_balls(one, two, bits) for one, two in zip(coarse, fine, strict=True)]
+
+
+def _group_balls(coarse: Sequence[Any], fine: Sequence[Any], bits: int) -> list[arb]:
+    one, two = ([exact(value) for value in state] for state in (coarse, fine))
+    found: list[arb] = []
+    for k in range(0, len(one), 3):
+        group = two[k : k + 3]
+        apart = max(abs(b - a) for a, b in zip(one[k : k + 3], group, strict=True))
+        apart += max(map(abs, group)) * Fraction(2) ** -bits
+        found += [ball(value) + arb(0, ball(apart).abs_upper()) for value in group]
+    return found
+
 
 CHEAP = 1.0
 """Seconds of the model of the cost that the enclosure of a row may take beyond |t| = 100."""
@@ -97,7 +337,7 @@ def truth(problem: Problem, times: Sequence[Fraction], effort: float | None = No
     """The true motion of a rounded problem at ``times``, exact numbers in the order of a run; why not, where it is
     neither proven nor computed.
 
-    effort: of a computed one, :func:`heavytop.measure.computed_reference.compute`.
+    effort: of a computed one, :func:`heavytop.measure.truth.compute`.
     Raises Contradiction where a second source excludes a proven one: then something is wrong with this program.
     """
     known = known_motion(problem, max(times, key=abs))
@@ -171,3 +411,157 @@ def known_motion(problem: Problem, horizon: Fraction) -> Known | str:
     except OutOfReach as error:
         return clause(error)
     return known or "certified to fewer digits than the format has"
+
+
+# The true motion of a rounded problem with its attitude, from the attitude vector that the problem begins with.
+
+
+_SPARE_BITS = 8
+
+
+def truth_with_attitude(problem: Problem, times: Sequence[Fraction], effort: float | None = None) -> Truth | str:
+    """As :func:`heavytop.measure.truth.truth`, of nine balls a time: Ω, γ and ξ; ξ begins at that of the problem.
+
+    Of a problem without ξ six balls, by that very function.
+    """
+    if problem.xi is None:
+        return truth(problem, times, effort)
+    known = known_motion(replace(problem, xi=None), max(times, key=abs))
+    if isinstance(known, Known):
+        nine = _nine(known.solution, problem, max(times, key=abs))
+        if nine is not None:
+            return Truth(known.against, nine)
+    try:
+        (found,) = of_rounded([problem], times, effort=effort)
+    except (InputError, OutOfReach) as error:
+        why = clause(error)
+        return f"{known}; {why}" if isinstance(known, str) else why
+    if found.ends == times[0]:
+        return f"no digit of the format is left at t = {time_text(found.ends)}, the first sample"
+    return Truth(found.against, found.state, found.ends)
+
+
+def _nine(solution: ExactSolution, problem: Problem, horizon: Fraction) -> Evaluate | None:
+    """Ω, γ and ξ of a known motion: ξ by its closed form where that reaches the horizon, else by the enclosure.
+
+    None where neither does.
+    """
+    bits = problem.precision.bits + GUARD_BITS
+    xi = problem.xi
+    assert xi is not None
+    start: Vector = (xi[0], xi[1], xi[2])
+    whole: Evaluate
+    if isinstance(solution, Validated):
+        whole = Validated(solution.top, solution.start, solution.system, xi=start).with_attitude
+    else:
+        known = state_and_attitude(solution, horizon, bits)[1]
+        whole = _turned(solution.start.gamma, start, lambda time, working: list(known(time, working)))
+    try:
+        whole(horizon, bits)
+    except (NotInClass, OutOfReach):
+        return None
+    return whole
+
+
+def _turned(gamma: Vector, xi: Vector, whole: Evaluate) -> Evaluate:
+    """Ω, γ and ξ with the attitude turned about γ by the constant angle with which it begins at ``xi``; |γ| = 1."""
+    began = perpendicular(gamma)
+    cosine, sine = dot(xi, began), dot(xi, cross(gamma, began))
+
+    @whole_evaluation
+    def evaluate(time: Fraction, bits: int) -> list[arb]:
+        known = list(whole(time, bits + _SPARE_BITS))
+        with working_precision(bits + _SPARE_BITS):
+            eta = cross(known[3:6], known[6:9])
+            along = [ball(cosine) * x + ball(sine) * y for x, y in zip(known[6:9], eta, strict=True)]
+        return [*known[:6], *along]
+
+    return evaluate
+
+
+# What the motions of an ensemble are compared with: closed forms, else runs in more bits.
+
+
+_CERTIFIED_AT = Fraction(2)
+"""|t| at which the closed form of every start is certified; that of the first start is at the horizon too."""
+_TOO_FEW = "the closed form is certified to too few digits"
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """What an ensemble is compared with: the truth of each start, or why there is none.
+
+    blur: how far each state may be off, absolute, for each start and time that is covered; shape (starts, samples).
+    """
+
+    against: Against
+    motions: list[Truth | str]
+    blur: list[list[float]]
+
+    @property
+    def samples(self) -> int:
+        """How many of the times are covered."""
+        return max(map(len, self.blur), default=0)
+
+
+@lru_cache(maxsize=2)
+def reference(problems: tuple[Problem, ...], times: tuple[Fraction, ...], least: int = 0) -> Reference:
+    """The closed forms where there are any, else runs in 30 bits more, or in ``least`` bits where that is more.
+
+    The rows of a plan that differ in flags share it, and every state that was worked out; so do problems that are one
+    motion.
+    """
+    of: dict[Any, ExactSolution | None] = {}
+    for problem in problems:
+        if (motion := _motion(problem)) not in of:
+            of[motion] = closed_form(problem)
+    forms = [form for problem in problems if (form := of[_motion(problem)]) is not None]
+    if len(forms) == len(problems):
+        return _certified(forms, times, problems[0].precision.bits + GUARD_BITS)
+    try:
+        found = of_rounded(problems, times, least)
+    except (InputError, OutOfReach) as error:
+        return _none(len(problems), f"no closed form; {error.cause}")
+    against = replace_struct(agreement(found), reason="no closed form")
+    motions = [Truth(against, each.state, each.ends) for each in found]
+    covered = [time for time in times if motions[0].covers(time)]
+    if not covered:
+        return _none(len(problems), f"no closed form; no digit of the format is left at t = {against.until}")
+    return Reference(against, list(motions), [list(map(each.blur, covered)) for each in found])
+
+
+def _motion(problem: Problem) -> tuple[Any, ...]:
+    """What the motion depends on: inertia and weight times a common factor are the same motion."""
+    p = problem.parameters
+    own = p.mapped(lambda value: value / p.inertia[0])
+    rotor = p.rotors if problem.system is GYROSTAT else own.rotors
+    return problem.system.name, *own.inertia, *own.moment, *rotor, problem.start
+
+
+def _none(starts: int, reason: str) -> Reference:
+    return Reference(Against("none", reason=reason), [reason] * starts, [])
+
+
+def _certified(forms: Sequence[ExactSolution], times: Sequence[Fraction], bits: int) -> Reference:
+    """Every closed form certified early, and the first at the horizon too."""
+    horizon = times[-1]
+    early = min(_CERTIFIED_AT, abs(horizon)) * (1 if horizon > 0 else -1)
+    proofs = {id(form): _proof(form, early, bits) for form in forms}
+    last = _proof(forms[0], horizon, bits)
+    done = [proof for proof in proofs.values() if proof]
+    if not done or last is None:
+        return _none(len(forms), _TOO_FEW)
+    least = min(done, key=lambda proof: proof.certificate.agreed_digits).certified
+    by = done[0].certificate
+    starts = sum(proofs[id(form)] is not None for form in forms)
+    every = replace_struct(least, source=by.second_source, proven=by.kind, starts=starts, of_starts=len(forms))
+    against = replace_struct(last.against, certificates=(last.certified, every))
+    truths = {key: _TOO_FEW if proof is None else proof.truth.remembered() for key, proof in proofs.items()}
+    return Reference(against, [truths[id(form)] for form in forms], [[2.0**-bits] * len(times)] * len(forms))
+
+
+def _proof(form: ExactSolution, time: Fraction, bits: int) -> Known | None:
+    try:
+        return certified(form, time, bits)
+    except OutOfReach:
+        return None

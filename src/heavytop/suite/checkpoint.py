@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import msgspec
 
-from heavytop import former_names
+from heavytop import records
 from heavytop.errors import InputError
+from heavytop.files import line, replace, verified
 from heavytop.records import Report, Row
-from heavytop.suite.files import line, replace, verified
 
 if TYPE_CHECKING:
     from filelock import FileLock
@@ -128,7 +128,7 @@ class Checkpoint:
                 raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.")
             try:
                 there = msgspec.json.decode(first, type=dict[str, str])
-                require_same(former_names.of_identity(there), self.identity, self.path)
+                require_same(records.of_identity(there), self.identity, self.path)
             except msgspec.MsgspecError:
                 raise InputError(f"{self.path} is damaged in its first line.", "Give another --out.") from None
             end = file.tell()
@@ -174,7 +174,7 @@ class Checkpoint:
                 if content is None:
                     raise InputError(f"{self.path} was changed while it was in use.", "Go on with --resume.")
                 try:
-                    yield former_names.of_row(msgspec.json.decode(content, type=tuple[int, Row])[1])
+                    yield records.of_row(msgspec.json.decode(content, type=tuple[int, Row])[1])
                 except msgspec.MsgspecError as error:
                     raise InputError(f"{self.path} has a line that is no row: {error}", "Give another --out.") from None
 

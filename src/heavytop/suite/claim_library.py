@@ -14,9 +14,9 @@ from typing import Any
 
 import msgspec
 
-from heavytop.claims.entry import FOLDER, Entry, Verdict, library
-from heavytop.claims.judge import Row
-from heavytop.claims.verdicts import audited
+from heavytop.claims.audit.audit import audited
+from heavytop.claims.audit.judge import Row
+from heavytop.claims.library.entry import FOLDER, Entry, Verdict, library
 
 VERSION = "1.0.0"
 """Of the form: a key that is added raises the second place, one that changes the first."""

@@ -15,16 +15,16 @@ from typing import Any, Literal
 
 import msgspec
 
+from heavytop.cases import CASES
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, Unsupported
 from heavytop.integrate import peers
+from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.integrator import Source
 from heavytop.integrate.peers.command import Command, Request, Session, begin_row, close_all, session
-from heavytop.integrate.peers.source import Source
-from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, parse, real, round_to, rounded
 from heavytop.processes import ChildContext
-from heavytop.suite.cases import CASES
-from heavytop.top.angles import perpendicular
+from heavytop.top.attitude import perpendicular
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System
 from heavytop.top.equations import system as system_named
 from heavytop.top.heavy_top import HeavyTop, State

@@ -23,10 +23,7 @@ from heavytop.errors import OutOfTime
 from heavytop.processes import ChildContext, Guard, lead_group, new_mark
 from heavytop.records import OUT_OF_TIME, Row
 from heavytop.suite.checkpoint import Saved
-from heavytop.suite.kind import Kind, Kinds
-from heavytop.suite.one_row import begin_worker, died, ended_its_process, measure
-from heavytop.suite.rows import failed
-from heavytop.suite.task import Task
+from heavytop.suite.rows import Kind, Kinds, Task, begin_worker, died, ended_its_process, failed, measure
 
 _BASE = 30.0
 """Seconds that every row may take."""

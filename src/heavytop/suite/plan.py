@@ -9,6 +9,7 @@ from bisect import bisect_right
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
+from fractions import Fraction
 from functools import partial, reduce
 from importlib import resources
 from itertools import accumulate
@@ -18,26 +19,25 @@ from typing import Any, cast, get_args
 
 import msgspec
 
-from heavytop import former_names
+from heavytop import records
+from heavytop.cases import CASES, Case, case, named_bodies, require_possible
 from heavytop.errors import InputError, quoted
 from heavytop.exact.bodies import resolve
+from heavytop.files import read_whole
+from heavytop.integrate.integrator import Source
 from heavytop.integrate.peers import is_third_party
 from heavytop.integrate.peers import known as known_integrators
 from heavytop.integrate.peers import require as require_integrator
-from heavytop.integrate.peers.source import Source, command_of, commands_in, named, seconds_of
+from heavytop.integrate.peers.source import command_of, commands_in, named, seconds_of
 from heavytop.integrate.trajectory import Problem
 from heavytop.measure.integrator import HEYOKA
 from heavytop.measure.rounding_noise import MOST_SEEDS
-from heavytop.precision import exact, number, require
+from heavytop.precision import exact, number, physical, require
 from heavytop.records import FINEST, RowKey
-from heavytop.suite.cases import CASES, Case, case, named_bodies, require_possible
-from heavytop.suite.files import read_whole
-from heavytop.suite.kind import Kinds, Table
+from heavytop.suite.rows import Kinds, Table, Task
 from heavytop.suite.sweeps import Lazy, Sweep
-from heavytop.suite.task import Task
-from heavytop.top.bodies import Body
+from heavytop.top.bodies import Body, motion_of
 from heavytop.top.equations import system_of
-from heavytop.top.given_motion import motion_of
 from heavytop.top.heavy_top import HeavyTop
 
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
@@ -147,7 +147,7 @@ def load(name: str, kinds: Kinds) -> tuple[Plan, str]:
 def former(name: str) -> set[str]:
     """The former names of integrators that the plan in that file gives; none of a plan that cannot be read twice."""
     try:
-        return former_names.in_document(tomllib.loads(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
+        return records.in_document(tomllib.loads(Path(name).read_text("utf-8"))) if Path(name).is_file() else set()
     except (OSError, ValueError, RecursionError):
         return set()
 
@@ -198,7 +198,7 @@ def of_document(document: dict[str, Any], kinds: Kinds) -> Plan:
     any_table = reduce(or_, tables.values())
     measure = ("measure", list[any_table])  # type: ignore[valid-type]
     whole = msgspec.defstruct("Plan", [measure], bases=(Plan,), kw_only=True)
-    plan: Plan = msgspec.convert(former_names.of_document(document), cast(type[Plan], whole))
+    plan: Plan = msgspec.convert(records.of_document(document), cast(type[Plan], whole))
     return plan
 
 
@@ -304,7 +304,7 @@ def _swept(plan: Plan) -> dict[str, Sequence[Case]]:
 
 def _chunked(plan: Plan, swept: Mapping[str, Sequence[Case]]) -> dict[str, Sequence[Case]]:
     """The chunks of each sweep, by the same names."""
-    from heavytop.suite.survey.drawn import chunks, number_of
+    from heavytop.suite.survey.measured import chunks, number_of
 
     return {
         name: Lazy(number_of(cases), partial(chunks, sweep, cases))
@@ -343,3 +343,45 @@ def _parts(table: Table, swept: dict[str, Sequence[Case]]) -> list[tuple[Table, 
     if not swept.keys() & set(names):
         return [(table, None)]
     return [(msgspec.structs.replace(table, cases=[name]), swept.get(name)) for name in names]
+
+
+# Lists of times in a plan, checked.
+
+
+_MAX_SAMPLES = 1_000_000
+
+
+def log_spaced(count: int, per_decade: int = 8) -> list[int]:
+    """About ``per_decade`` whole numbers a decade from 1 to ``count``, both included."""
+    wanted = {count}
+    i = 0
+    while (value := round(10 ** (i / per_decade))) < count:
+        wanted.add(value)
+        i += 1
+    return sorted(wanted)
+
+
+def positive(texts: list[str], what: str) -> list[Fraction]:
+    """Exact numbers; raises InputError unless they are positive and grow."""
+    values = [physical(exact(text), what) for text in texts]
+    if not values or values != sorted(set(values)) or values[0] <= 0:
+        raise InputError(f"{what} = {texts}", "Give positive numbers in growing order, each once.")
+    return values
+
+
+def samples(count: int) -> int:
+    """The count; raises InputError where it cannot be."""
+    if not 1 <= count <= _MAX_SAMPLES:
+        raise InputError(f"{count} samples cannot be taken.", f"Give a number from 1 to {_MAX_SAMPLES}.")
+    return count
+
+
+def signed(times: list[Fraction], direction: str) -> tuple[Fraction, ...]:
+    """The times forward or backward."""
+    return tuple(-time for time in times) if direction == "backward" else tuple(times)
+
+
+def uniform(horizon: Fraction, count: int) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
+    """``count`` uniform samples up to the horizon, and those of them that go into a series, about eight a decade."""
+    times = tuple(horizon * i / count for i in range(1, samples(count) + 1))
+    return times, tuple(times[i - 1] for i in log_spaced(count))

@@ -16,10 +16,10 @@ from typing import Any
 
 import msgspec
 
+from heavytop.cases import CASES, Case, named_bodies
+from heavytop.measure.motion import motion_texts
 from heavytop.measure.reference import Ball, Reference, reference
-from heavytop.measure.setup import motion_texts
 from heavytop.precision import exact, exact_text
-from heavytop.suite.cases import CASES, Case, named_bodies
 from heavytop.suite.reference_table import cases as table_cases
 from heavytop.top.attitude import Attitude
 from heavytop.top.bodies import PIVOT, Body

@@ -13,17 +13,15 @@ from pathlib import Path
 
 import msgspec
 
-from heavytop.exact.bobylev_steklov import bobylev_steklov_motion
+from heavytop.exact.cases.algebraic_starts import chaplygin_motion, goryachev_motion, kowalewski_motion
+from heavytop.exact.cases.bobylev_steklov import bobylev_steklov_motion
+from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.cases.grioli import grioli_motion
+from heavytop.exact.cases.staude import staude_motion
 from heavytop.exact.catalogue import find
-from heavytop.exact.chaplygin import chaplygin_motion
-from heavytop.exact.delone import DeloneHomoclinic
-from heavytop.exact.ershkov_partial import ErshkovPartial
-from heavytop.exact.goryachev import goryachev_motion
-from heavytop.exact.grioli import grioli_motion
-from heavytop.exact.kowalewski import kowalewski_motion
+from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.solution import ExactSolution
-from heavytop.exact.staude import staude_motion
-from heavytop.exact.validated import Validated
 from heavytop.measure.certify import Certificate, certify, enclosure_of
 from heavytop.measure.reference import Ball, ball_texts
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, System

@@ -12,11 +12,12 @@ from typing import Any, Literal, TypeVar, overload
 import msgspec
 import numpy
 
+from heavytop.cases import Case, require_possible
 from heavytop.errors import InputError
 from heavytop.precision import exact, shown
-from heavytop.suite.cases import Case, require_possible
 from heavytop.top.equations import GYROSTAT, HEAVY_TOP, system, system_of
-from heavytop.top.heavy_top import HeavyTop, State, vector
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import vector
 
 _MOST = 1_000_000
 _AXES = ("inertia", "weight", "centre", "omega", "gamma", "rotor")

@@ -10,7 +10,7 @@ Euler angles (a, b, c) of a sequence "IJK" are intrinsic: R = R_I(a) R_J(b) R_K(
 (3.2), are (ψ, θ, φ) in this order: its γ depends on φ, the last.
 
 Rows are three sequences of three numbers.  ``lib`` is a namespace with the elementary functions of the numbers at hand,
-as in :mod:`heavytop.top.angles`.
+as in :mod:`heavytop.top.attitude`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from itertools import product
 from typing import Any
 
 from heavytop.errors import InputError, quoted
-from heavytop.precision import decimal_text, exact, exact_text, round_to
+from heavytop.precision import decimal_text, exact, exact_text, physical, round_to
 from heavytop.top.vectors import Vector, cross, dot, ordered, vector
 
 Rows = Sequence[Sequence[Any]]
@@ -323,8 +323,8 @@ class Attitude:
     def rows(self, lib: Any, number: Number = lambda value: value) -> tuple[Any, Any, Any]:
         """The rows of R, as numbers of ``lib``.
 
-        number: what makes an exact rational one of them, such as :func:`heavytop.exact.balls.ball`; left as it is for
-        math.
+        number: what makes an exact rational one of them, such as :func:`heavytop.exact.flint.balls.ball`; left as it is
+        for math.
         """
         known = self.exact_rows()
         if known is not None:
@@ -379,3 +379,258 @@ def _square(rows: Iterable[Any]) -> tuple[Vector, Vector, Vector]:
 
 def _size(value: Fraction) -> str:
     return decimal_text(round_to(value, _SHOWN_BITS), 6)
+
+
+# Euler angles (3.2), 3-1-3, and the attitude vector that carries them through the poles.
+#
+# ξ is a second unit vector fixed in space, ξ ⟂ γ, in body components; η = γ × ξ.  In space γ = e_z, ξ = e_x, η = e_y.
+# The functions take ``lib``, a namespace with the elementary functions of the numbers at hand (math, mpmath, numpy,
+# sympy, or :data:`heavytop.exact.flint.balls.FUNCTIONS`).
+
+
+def gamma_from_angles(phi: Any, theta: Any, lib: Any) -> tuple[Any, Any, Any]:
+    """γ = (sinθ sinφ, sinθ cosφ, cosθ), (3.2)."""
+    return lib.sin(theta) * lib.sin(phi), lib.sin(theta) * lib.cos(phi), lib.cos(theta)
+
+
+def omega_from_angles(gamma: Any, phi: Any, rates: Any, lib: Any) -> tuple[Any, Any, Any]:
+    """(3.1): (ψ'γ1 + θ' cosφ, ψ'γ2 − θ' sinφ, ψ'γ3 + φ'), from ``rates`` = (φ', θ', ψ')."""
+    phi_rate, theta_rate, psi_rate = rates
+    return (
+        psi_rate * gamma[0] + theta_rate * lib.cos(phi),
+        psi_rate * gamma[1] - theta_rate * lib.sin(phi),
+        psi_rate * gamma[2] + phi_rate,
+    )
+
+
+def attitude_from_angles(phi: Any, theta: Any, psi: Any, lib: Any) -> tuple[Any, Any, Any]:
+    """ξ, the space axis e_x in body components, for any angles (θ of either sign)."""
+    sin_psi, cos_psi, cos_theta = lib.sin(psi), lib.cos(psi), lib.cos(theta)
+    return (
+        cos_psi * lib.cos(phi) - sin_psi * cos_theta * lib.sin(phi),
+        -cos_psi * lib.sin(phi) - sin_psi * cos_theta * lib.cos(phi),
+        sin_psi * lib.sin(theta),
+    )
+
+
+def euler_angles(gamma: Any, xi: Any, lib: Any) -> tuple[Any, Any, Any]:
+    """(φ, θ, ψ) with φ = atan2(γ1, γ2), θ = atan2(√(γ1² + γ2²), γ3) in [0, π], ψ = atan2(ξ3, −η3).
+
+    φ and ψ are undefined at the poles γ3 = ±1.
+    """
+    eta = cross(gamma, xi)
+    across = lib.sqrt(gamma[0] * gamma[0] + gamma[1] * gamma[1])
+    return lib.atan2(gamma[0], gamma[1]), lib.atan2(across, gamma[2]), lib.atan2(xi[2], -eta[2])
+
+
+def rotation_angle(first: tuple[Any, Any], second: tuple[Any, Any], lib: Any) -> Any:
+    """The angle in [0, π] of the rotation between two attitudes (γ, ξ), each of unit vectors.
+
+    Twice atan2(s, c) with s = |R − 1|/(2√2) and c² = 1 − s²: no digits are lost near 0.
+    """
+    (gamma, xi), (other_gamma, other_xi) = first, second
+    pairs = ((gamma, other_gamma), (xi, other_xi), (cross(gamma, xi), cross(other_gamma, other_xi)))
+    square = sum((a - b) * (a - b) for u, v in pairs for a, b in zip(u, v, strict=True)) / 8
+    cosine_squared = 1 - square
+    return 2 * lib.atan2(lib.sqrt(square), lib.sqrt(cosine_squared))
+
+
+def unwrap(angles: Iterable[Any], turn: Any) -> list[Any]:
+    """The same angles shifted by multiples of ``turn`` (2π) so that neighbours differ by at most half a turn.
+
+    Meaningful only where the samples are dense enough that the true angle moves less than half a turn between them.
+    """
+    result: list[Any] = []
+    for angle in angles:
+        if result:
+            angle = angle - turn * round(float((angle - result[-1]) / turn))
+        result.append(angle)
+    return result
+
+
+def perpendicular(gamma: Vector) -> Vector:
+    """An exact rational unit vector ⟂ γ (|γ| = 1 exactly): where an attitude that nobody gave starts.
+
+    The image of e1 under the reflection that takes e3 to γ; e1 itself for γ = e3.
+    """
+    v = (-gamma[0], -gamma[1], 1 - gamma[2])
+    if not any(v):
+        return Fraction(1), Fraction(0), Fraction(0)
+    factor = 2 * v[0] / (v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    return 1 - factor * v[0], -factor * v[1], -factor * v[2]
+
+
+# What is told of an attitude: quaternion, matrix, Euler angles, the position of a point, Ω in space axes.
+#
+# Each is a function of a state (Ω, γ) and of ξ over any ring; the conventions are those of
+# :mod:`heavytop.top.attitude`. A point p of the body, in body axes, stands at pivot + R p in space: the fixed point is
+# the origin unless a pivot is given, and p is the centre of mass unless a point is given.
+
+
+SHAPES: dict[str, tuple[int, ...]] = {
+    "quaternion": (4,),
+    "matrix": (3, 3),
+    "euler": (3,),
+    "position": (3,),
+    "omega-space": (3,),
+}
+"""Of each output, the shape of its value at one time."""
+_COLUMNS = {
+    "quaternion": ("qw", "qx", "qy", "qz"),
+    "matrix": tuple(f"R{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
+    "position": ("x", "y", "z"),
+    "omega-space": ("omega_space_x", "omega_space_y", "omega_space_z"),
+}
+_ORIGIN = (Fraction(0), Fraction(0), Fraction(0))
+_REMEDY = "Use quaternion, matrix, euler:ZXZ (or another sequence), position, omega-space."
+
+
+def key_of(name: str) -> str:
+    """The key of an output in a JSON document."""
+    return name.replace("-", "_")
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """One of :data:`SHAPES`; Euler angles with their sequence, a position with its point and pivot.
+
+    point: in body axes, None for the centre of mass.  pivot: where the fixed point stands in space.
+    """
+
+    name: str
+    sequence: str = ""
+    point: Vector | None = None
+    pivot: Vector = _ORIGIN
+
+    @property
+    def key(self) -> str:
+        """In a JSON document."""
+        return key_of(self.name)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the value at one time."""
+        return SHAPES[self.name]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """In a CSV file."""
+        return _COLUMNS.get(self.name) or tuple(f"euler{place}" for place in (1, 2, 3))
+
+    def at(
+        self, omega: Any, gamma: Any, xi: Any, centre: Vector, lib: Any, number: Callable[[Fraction], Any]
+    ) -> tuple[Any, ...]:
+        """The value at one time, flat: a matrix row by row; a quaternion of either sign.
+
+        omega, gamma, xi: three numbers of ``lib`` each, |γ| = |ξ| = 1.  centre: of mass, in the same axes.
+        number: what makes an exact rational one of them.
+        """
+        rows = rows_of(gamma, xi)
+        if self.name == "quaternion":
+            return quaternion_of_rows(rows, lib)
+        if self.name == "matrix":
+            return tuple(entry for row in rows for entry in row)
+        if self.name == "euler":
+            return euler_of_rows(rows, self.sequence, lib)
+        if self.name == "omega-space":
+            return rotated(rows, omega)
+        point = [number(value) for value in self.point_of(centre)]
+        shift = [number(value) for value in self.pivot]
+        return tuple(a + b for a, b in zip(shift, rotated(rows, point), strict=True))
+
+    def point_of(self, centre: Vector) -> Vector:
+        """The point whose position is told."""
+        return centre if self.point is None else self.point
+
+
+def output(text: str | Output, point: Any = None, pivot: Any = None) -> Output:
+    """The output of that name, "euler:ZXZ" with its sequence; one that was read before, as it is.
+
+    point, pivot: three exact numbers each, of a position alone.
+    Raises InputError for an unknown name or sequence, and for a point or pivot of another output.
+    """
+    if isinstance(text, Output) and point is None and pivot is None:
+        return text
+    name, colon, sequence = (text if isinstance(text, str) else "").strip().partition(":")
+    name = name.replace("_", "-").lower()
+    if name not in SHAPES or (colon and name != "euler"):
+        raise InputError(f"Unknown output {quoted(text)}.", _REMEDY)
+    if name == "euler":
+        if not sequence:
+            raise InputError("Euler angles need their sequence.", "Give it as in euler:ZXZ.")
+        sequence = require_sequence(sequence.strip())
+    if name != "position" and (point is not None or pivot is not None):
+        raise InputError(f"{name} has no point and no pivot.", "Ask for position, or leave them out.")
+    found = None if point is None else _place(point, "point")
+    return Output(name, sequence, found, _ORIGIN if pivot is None else _place(pivot, "pivot"))
+
+
+def _place(value: Any, what: str) -> Vector:
+    first, second, third = (physical(part, what) for part in vector(value, what))
+    return first, second, third
+
+
+def outputs(text: str, point: Any = None, pivot: Any = None) -> tuple[Output, ...]:
+    """The outputs of a text such as "quaternion,euler:ZXZ,position", each once.
+
+    Raises InputError as :func:`output`, for one that stands twice (two sequences of Euler angles included), and for a
+    point or pivot where no position is asked for.
+    """
+    parts = [part for part in text.split(",") if part.strip()]
+    names = [part.strip().partition(":")[0].replace("_", "-").lower() for part in parts]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"The output {quoted(name)} stands twice.", "Give each once; Euler angles of one sequence."
+            )
+    if "position" not in names and (point is not None or pivot is not None):
+        raise InputError("A point or a pivot is given, but no position is asked for.", "Add position to the outputs.")
+    if not parts:
+        raise InputError(f"{quoted(text)} names no output.", _REMEDY)
+    return tuple(
+        output(part, *((point, pivot) if name == "position" else ())) for part, name in zip(parts, names, strict=True)
+    )
+
+
+def shaped(values: Sequence[Any], shape: tuple[int, ...]) -> list[Any]:
+    """A flat list as nested lists of that shape."""
+    if len(shape) == 1:
+        return list(values)
+    size = len(values) // shape[0]
+    return [shaped(values[place : place + size], shape[1:]) for place in range(0, len(values), size)]
+
+
+def first_sign(q: Sequence[Any], slack: Fraction = Fraction(0)) -> int:
+    """±1, by which a quaternion (or a multiple of it) is multiplied at the start of a motion.
+
+    So that w > 0, or the first of x, y, z that is not 0 is positive where w = 0; what is within ``slack`` of 0 counts
+    as 0.  q: exact rationals.
+    """
+    return next((1 if value > 0 else -1 for value in q if abs(value) > slack), 1)
+
+
+def signs(start: Sequence[float], quaternions: Any) -> Any:
+    """±1 for each quaternion, an array: q goes on from ``start`` at t = 0 without a jump.
+
+    Each is the nearer to the one before of q and −q; the motion meant is that of the samples: where the body turns by
+    more than half a turn in between, the sign says nothing.
+    quaternions: doubles, shape (n, 4), in the order in which the motion passes them.
+    """
+    import numpy
+
+    chain = numpy.concatenate([[start], quaternions])
+    return numpy.cumprod(numpy.where((chain[1:] * chain[:-1]).sum(axis=1) < 0, -1.0, 1.0))
+
+
+def document_of(outputs: Sequence[Output], values: Callable[[Output], Any]) -> dict[str, Any]:
+    """The keys of a JSON document for these outputs."""
+    found: dict[str, Any] = {}
+    for output in outputs:
+        found[output.key] = values(output)
+        if output.name == "euler":
+            found["sequence"] = output.sequence
+        if output.point is not None:
+            found["point"] = [exact_text(value) for value in output.point]
+        if any(output.pivot):
+            found["pivot"] = [exact_text(value) for value in output.pivot]
+    return found

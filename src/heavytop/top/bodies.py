@@ -2,17 +2,201 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import permutations
+from math import isqrt, lcm
 from typing import Any
 
 from heavytop.errors import InputError, quoted
-from heavytop.precision import exact, exact_text, shown
-from heavytop.top.attitude import rotated, transposed
-from heavytop.top.heavy_top import HeavyTop
-from heavytop.top.principal import PrincipalAxes, principal_axes
-from heavytop.top.vectors import Vector, cross, dot, ordered, vector
+from heavytop.precision import exact, exact_text, round_to, shown
+from heavytop.top.attitude import Attitude, Rows, multiplied, perpendicular, rotated, rotation_of, transposed
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import Vector, cross, dot, ordered, rational_root, vector
+
+# Principal axes of a symmetric tensor: exact where they are rational, else a rational rotation all but theirs.
+#
+# A is a rotation in exact rationals whose columns are the principal axes, v_given = A v_principal.  Where the axes are
+# irrational Aᵀ J A keeps entries off its diagonal, of some 2^-bits relative to the largest: what is left of the tensor
+# is known exactly, and so is what a motion in these axes lacks.
+
+
+IDENTITY: tuple[Vector, Vector, Vector] = tuple(tuple(Fraction(i == j) for j in range(3)) for i in range(3))  # type: ignore[assignment]
+_GUARD_BITS = 64
+_MOST_SWEEPS = 60
+_MOST_SPREAD = 2048
+"""Bits; beyond it two moments differ by a factor of 2^1021 at least, more than any data may."""
+
+
+@dataclass(frozen=True, slots=True)
+class PrincipalAxes:
+    """axes: the rows of A, a rotation, v_given = A v_principal.  moments: the diagonal.
+
+    left: Aᵀ J A − diag(moments), exact; all 0 where the axes are exact.
+    """
+
+    axes: tuple[Vector, Vector, Vector]
+    moments: Vector
+    left: tuple[Vector, Vector, Vector]
+
+    @property
+    def exact(self) -> bool:
+        """Whether these are the principal axes, with no rest."""
+        return not any(value for row in self.left for value in row)
+
+
+def principal_axes(tensor: Rows, bits: int) -> PrincipalAxes:
+    """The principal axes of a symmetric tensor of exact rationals.
+
+    A diagonal tensor keeps its axes.  bits: where they are irrational, what is left is within some 2^-bits of the
+    smallest moment.  Raises InputError where moments of a tensor that is not diagonal differ by a factor above 1e300.
+    """
+    if not any(tensor[i][j] for i in range(3) for j in range(i)):
+        return _with_rest(tensor, IDENTITY, (tensor[0][0], tensor[1][1], tensor[2][2]))
+    bits += _spread(tensor)
+    near = _near(tensor, bits)
+    found = _rational(tensor, near)
+    if found is not None:
+        return found
+    turned = multiplied(transposed(near), multiplied(tensor, near))
+    first, second, third = (round_to(turned[i][i], bits + _GUARD_BITS) for i in range(3))
+    return _with_rest(tensor, near, _exact_moments(tensor, (first, second, third)))
+
+
+def _with_rest(tensor: Rows, axes: Any, moments: Vector) -> PrincipalAxes:
+    turned = multiplied(transposed(axes), multiplied(tensor, axes))
+    first, second, third = (tuple(turned[i][j] - (moments[i] if i == j else 0) for j in range(3)) for i in range(3))
+    return PrincipalAxes(axes, moments, (first, second, third))
+
+
+def _spread(tensor: Rows) -> int:
+    """Bits by which the smallest moment may be below the largest entry, in whole words: det/trace² is a bound of it.
+
+    0 for ordinary bodies, whose guard bits do, and for a tensor that has a moment below 0.
+    """
+    trace, determinant = tensor[0][0] + tensor[1][1] + tensor[2][2], _determinant(tensor)
+    if determinant <= 0:
+        return 0
+    ratio = Fraction(trace**3 / determinant)
+    spread = ratio.numerator.bit_length() - ratio.denominator.bit_length()
+    if spread > _MOST_SPREAD:
+        raise InputError(
+            "Two principal moments of the inertia tensor differ by a factor above 1e300.",
+            "Check its entries and their units: no body that can be computed has such moments.",
+        )
+    return spread // _GUARD_BITS * _GUARD_BITS
+
+
+def _determinant(rows: Rows) -> Any:
+    return dot(rows[0], cross(rows[1], rows[2]))
+
+
+def _less(tensor: Rows, moment: Fraction) -> tuple[Any, Any, Any]:
+    """J − moment."""
+    first, second, third = (tuple(tensor[i][j] - (moment if i == j else 0) for j in range(3)) for i in range(3))
+    return first, second, third
+
+
+def _exact_moments(tensor: Rows, near: Vector) -> Vector:
+    """Each moment that is rational in place of the number near it: over the common denominator it is an integer."""
+    common = lcm(*(value.denominator for row in tensor for value in row))
+    found = []
+    for value in near:
+        candidate = Fraction(round(value * common), common)
+        found.append(candidate if _determinant(_less(tensor, candidate)) == 0 else value)
+    return found[0], found[1], found[2]
+
+
+def _rational(tensor: Rows, near: Rows) -> PrincipalAxes | None:
+    """The principal axes where all moments and unit vectors are rational, ordered as the axes near them; else None."""
+    turned = multiplied(transposed(near), multiplied(tensor, near))
+    guess = (turned[0][0], turned[1][1], turned[2][2])
+    moments = _exact_moments(tensor, guess)
+    if any(_determinant(_less(tensor, moment)) for moment in moments):
+        return None
+    vectors = _unit_vectors(tensor, moments)
+    if vectors is None:
+        return None
+    order = max(
+        permutations(range(3)),
+        key=lambda chosen: sum(abs(dot(vectors[chosen[i]], transposed(near)[i])) for i in range(3)),
+    )
+    columns = [vectors[place] for place in order]
+    columns = [v if dot(v, u) >= 0 else (-v[0], -v[1], -v[2]) for v, u in zip(columns, transposed(near), strict=True)]
+    if _determinant(columns) < 0:
+        columns[2] = (-columns[2][0], -columns[2][1], -columns[2][2])
+    axes = transposed(columns)
+    turned = multiplied(transposed(axes), multiplied(tensor, axes))
+    return _with_rest(tensor, axes, (turned[0][0], turned[1][1], turned[2][2]))
+
+
+def _unit_vectors(tensor: Rows, moments: Vector) -> list[Vector] | None:
+    """Three rational unit vectors along principal axes; None where there are none."""
+    single = [moment for moment in moments if moments.count(moment) == 1]
+    found = []
+    for moment in single:
+        rows = _less(tensor, moment)
+        v = max((cross(rows[i], rows[j]) for i, j in ((0, 1), (1, 2), (2, 0))), key=lambda v: dot(v, v))
+        length = rational_root(dot(v, v))
+        if length is None:
+            return None
+        found.append((v[0] / length, v[1] / length, v[2] / length))
+    if len(found) == 1:  # the other two moments are equal: any axes across
+        across = perpendicular(found[0])
+        found += [across, cross(found[0], across)]
+    return found
+
+
+def _near(tensor: Rows, bits: int) -> tuple[Vector, Vector, Vector]:
+    """A rotation that all but diagonalizes the tensor: Jacobi's method, each of its rotations a rational one.
+
+    A sweep squares what is off the diagonal; it is computed from the tensor itself again after each.
+    """
+    size = max(abs(value) for row in tensor for value in row)
+    working = bits + _GUARD_BITS
+    q: tuple[Fraction, ...] = (Fraction(1), Fraction(0), Fraction(0), Fraction(0))
+    for _ in range(_MOST_SWEEPS):
+        axes = rotation_of(q)
+        turned = multiplied(transposed(axes), multiplied(tensor, axes))
+        off = max(abs(turned[i][j]) for i in range(3) for j in range(i))
+        if off <= size / 2**working:
+            break
+        present = [[round_to(value / size, working + _GUARD_BITS) for value in row] for row in turned]
+        for axis in range(3):
+            i, j = (axis + 1) % 3, (axis + 2) % 3
+            u = _half_angle(present, i, j, working + _GUARD_BITS)
+            turn = [Fraction(1), Fraction(0), Fraction(0), Fraction(0)]
+            turn[1 + axis] = u
+            step = rotation_of(turn)
+            present = [
+                [round_to(value, working + _GUARD_BITS) for value in row]
+                for row in multiplied(transposed(step), multiplied(present, step))
+            ]
+            q = tuple(round_to(value, working + _GUARD_BITS) for value in _product(q, turn))
+    return rotation_of(q)
+
+
+def _half_angle(rows: Sequence[Sequence[Fraction]], i: int, j: int, bits: int) -> Fraction:
+    """tan of half the angle about the third axis by which the entry (i, j) vanishes, in [−tan π/8, tan π/8]."""
+    if rows[i][j] == 0:
+        return Fraction(0)
+    # tan 2φ = −2 J_ij/(J_jj − J_ii) for the rotation R_k(φ), i j k cyclic, of Jᵢⱼ' = 0
+    theta = (rows[j][j] - rows[i][i]) / (2 * rows[i][j])
+    t = -1 / (abs(theta) + _root(theta * theta + 1, bits)) * (1 if theta >= 0 else -1)
+    return round_to(t / (1 + _root(1 + t * t, bits)), bits)
+
+
+def _root(value: Fraction, bits: int) -> Fraction:
+    """√value for value ≥ 1, within 2^-bits of it relatively."""
+    return Fraction(isqrt((value.numerator << 2 * bits) // value.denominator), 1 << bits)
+
+
+def _product(p: Sequence[Fraction], q: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    """The product of two quaternions: the rotation of q first."""
+    w = cross(p[1:], q[1:])
+    return (p[0] * q[0] - dot(p[1:], q[1:]), *(p[0] * q[i + 1] + q[0] * p[i + 1] + w[i] for i in range(3)))
+
 
 Tensor = tuple[Vector, Vector, Vector]
 PIVOT, CENTRE = "pivot", "centre of mass"
@@ -219,3 +403,86 @@ def _require_positive(tensor: Tensor) -> None:
                 "so that some moment is not positive.",
                 "Check its entries, and the signs of the products of inertia: I12 is minus the integral of x y dm.",
             )
+
+
+# A body and its start out of texts: options of the command line, the tables of a plan.
+
+
+BODY = ("inertia", "weight", "centre", "mass", "gravity", "about", "rotor")
+START = ("omega", "omega_space", "gamma", "quaternion", "euler", "matrix", "axis_angle")
+"""The keys of a body and of a start."""
+_ATTITUDES = ("gamma", "quaternion", "euler", "matrix", "axis_angle")
+
+
+def motion_of(values: Mapping[str, Any], normalize: bool = False) -> tuple[HeavyTop | Body, State]:
+    """The top, or the body, and the start that these texts give; what is None or missing was not given.
+
+    values: by the keys of :data:`BODY` and :data:`START`; lists of texts, or one text for a number.  With mass and
+    gravity it is a body in any axes, with weight a top in principal axes.
+    normalize: move γ, or a quaternion or matrix, to a rotation in exact rationals near it.
+    Raises InputError for what is missing, contradicts another, or is no body or start.
+    """
+    given = {key: value for key, value in values.items() if value is not None and value != []}
+    for key in ("inertia", "centre"):
+        _require(given, key)
+    return _body(given), _start(given, normalize)
+
+
+def _require(given: Mapping[str, Any], key: str) -> Any:
+    if key not in given:
+        raise InputError(f"{key} is missing.", f"Give {key}, or the name of a case that has it.")
+    return given[key]
+
+
+def _body(given: Mapping[str, Any]) -> HeavyTop | Body:
+    described = [key for key in ("mass", "gravity", "about") if key in given]
+    rotor = given.get("rotor")
+    if "weight" in given:
+        if described:
+            raise InputError(
+                f"weight and {described[0]} were given.",
+                "Give weight with principal moments about the pivot, or mass and gravity with a tensor in any axes.",
+            )
+        if len(given["inertia"]) in (6, 9):
+            raise InputError(
+                f"inertia has {len(given['inertia'])} numbers, and a weight stands beside it.",
+                "A tensor in any axes needs mass and gravity in place of weight; with weight give 3 principal moments.",
+            )
+        return HeavyTop(given["inertia"], given["weight"], given["centre"], rotor)
+    if not described:
+        raise InputError("Neither weight nor mass and gravity were given.", "Give weight, or mass and gravity.")
+    for key in ("mass", "gravity"):
+        _require(given, key)
+    return Body(given["mass"], given["gravity"], given["centre"], given["inertia"], given.get("about"), rotor)
+
+
+def _start(given: Mapping[str, Any], normalize: bool) -> State:
+    named = [key for key in _ATTITUDES[1:] if key in given]
+    if len(named) > 1:
+        raise InputError(f"{named[0]} and {named[1]} were given.", "Give the attitude once.")
+    if not named and "gamma" not in given:
+        raise InputError("No attitude was given.", f"Give one of {', '.join(_ATTITUDES)}.")
+    spin = {key: given.get(key) for key in ("omega", "omega_space")}
+    if not named:
+        start = State(gamma=given["gamma"], **spin)
+        return start.normalized() if normalize else start
+    return State(gamma=given.get("gamma"), attitude=_attitude(named[0], given[named[0]], normalize), **spin)
+
+
+def _attitude(kind: str, value: Any, normalize: bool) -> Attitude:
+    if kind == "matrix":
+        return Attitude.matrix(value, normalize=normalize)
+    if kind == "quaternion":
+        if len(value) != 4:
+            raise InputError(f"quaternion has {len(value)} numbers.", "Give four, the scalar first: w,x,y,z.")
+        return Attitude.quaternion(*value, normalize=normalize)
+    if kind == "axis_angle":
+        axis, colon, angle = value.partition(":") if isinstance(value, str) else ("", "", "")
+        if not colon:
+            raise InputError(f"axis_angle = {quoted(value)} is not an axis and an angle.", "Give it as x,y,z:angle.")
+        return Attitude.axis_angle(axis.split(","), angle)
+    sequence, colon, angles = value.partition(":") if isinstance(value, str) else ("", "", "")
+    parts = angles.split(",")
+    if not colon or len(parts) != 3:
+        raise InputError(f"euler = {quoted(value)} is not a sequence and three angles.", "Give it as ZXZ:a,b,c.")
+    return Attitude.euler(sequence.strip(), *parts)

@@ -9,14 +9,9 @@ from math import isqrt
 from typing import Any
 
 from heavytop.errors import InputError, quoted
-from heavytop.last_call import last_call
-from heavytop.precision import decimal_text, exact, exact_text, physical, round_to, shown
+from heavytop.precision import decimal_text, exact, exact_text, last_call, physical, round_to, shown
 from heavytop.top.attitude import Attitude, rotated, transposed
-from heavytop.top.vectors import Vector as Vector
-from heavytop.top.vectors import cross as cross
-from heavytop.top.vectors import dot as dot
-from heavytop.top.vectors import ordered as ordered
-from heavytop.top.vectors import vector as vector
+from heavytop.top.vectors import Vector, dot, vector
 
 _SHOWN_BITS = 64
 _ATTITUDE_BITS = 256

@@ -4,9 +4,9 @@ A peer is a callable
 
     peer(top, start, times, precision, *, system, tolerance) -> Trajectory
 
-with the arguments of :func:`heavytop.integrate.taylor.propagate`; ``tolerance`` is exact, relative and absolute, None
-for the best that the peer offers; a peer with fixed steps takes ``step`` in its place.  A run that does not reach the
-last time is a Trajectory whose outcome says so; InputError is for what the peer cannot be asked at all.
+with the arguments of :func:`heavytop.integrate.heyoka.motions.propagate`; ``tolerance`` is exact, relative and
+absolute, None for the best that the peer offers; a peer with fixed steps takes ``step`` in its place.  A run that does
+not reach the last time is a Trajectory whose outcome says so; InputError is for what the peer cannot be asked at all.
 
 Other packages add theirs under the entry point ``heavytop.peers`` (see docs/peers.md).
 """
@@ -23,14 +23,13 @@ from pathlib import Path
 from typing import Any
 
 from heavytop.errors import InputError, PeerFailed, quoted
-from heavytop.former_names import INTEGRATORS as FORMER
-from heavytop.integrate.integrator import INTEGRATORS, Integrator, described, foreign, load
-from heavytop.integrate.integrator import name_of as name_of
+from heavytop.integrate.integrator import INTEGRATORS, Integrator, Source, described, foreign, load, name_of
 from heavytop.integrate.peers.command import Command, CommandIntegrator
 from heavytop.integrate.peers.contract import Contained, Declared, contained, quiet, said
-from heavytop.integrate.peers.source import PythonFile, Source
+from heavytop.integrate.peers.source import PythonFile
 from heavytop.integrate.trajectory import Outcome, Trajectory
 from heavytop.processes import ChildContext
+from heavytop.records import INTEGRATORS as FORMER
 
 GROUP = "heavytop.peers"
 _REMEDY = "Install the peers with: pip install 'heavytop[peers]'"

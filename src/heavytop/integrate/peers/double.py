@@ -16,7 +16,7 @@ from heavytop.errors import InputError, PeerFailed, quoted
 from heavytop.integrate.peers.contract import Declared, with_tolerance
 from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision, decimal_text, exact, number
-from heavytop.top import heavy_top
+from heavytop.top import vectors
 from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, System
 from heavytop.top.heavy_top import HeavyTop, State
 from heavytop.top.times import check_times
@@ -221,7 +221,7 @@ def compiler() -> Callable[[Any], Any]:
         from numba.extending import overload
     except ImportError:
         return lambda function: function
-    product = heavy_top.cross
+    product = vectors.cross
     overload(product, strict=False)(lambda a, b: product)
     return numba.njit
 

@@ -9,8 +9,8 @@ from time import perf_counter
 
 from heavytop.errors import InputError
 from heavytop.integrate.ensemble import propagate_ensemble
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.peers.contract import with_tolerance
-from heavytop.integrate.taylor import propagate
 from heavytop.integrate.trajectory import Problem, Trajectory
 from heavytop.precision import DOUBLE, Precision
 from heavytop.top.equations import HEAVY_TOP, System

@@ -20,13 +20,12 @@ from typing import Any
 import msgspec
 
 from heavytop.errors import HeavyTopError, InputError, PeerFailed, quoted
-from heavytop.former_names import INTEGRATORS as FORMER
-from heavytop.former_names import current
-from heavytop.integrate.integrator import INTEGRATORS
-from heavytop.integrate.integrator import Source as Source
+from heavytop.integrate.integrator import INTEGRATORS, Source
 from heavytop.integrate.peers.command import Command
 from heavytop.integrate.peers.contract import contained, quiet, said
 from heavytop.precision import exact, parse
+from heavytop.records import INTEGRATORS as FORMER
+from heavytop.records import current
 from heavytop.top.equations import system
 
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._:+-]{0,63}"

@@ -2,26 +2,149 @@
 
 from __future__ import annotations
 
+import io
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy
 
+from heavytop.cases import Case
+from heavytop.files import whole
 from heavytop.integrate.trajectory import Outcome
 from heavytop.measure.scalar import of_fraction
 from heavytop.precision import parse, time_text
-from heavytop.records import CellMap, Metric, Quantity, Row, Spread, Worst, by_name
+from heavytop.records import CellMap, Histogram, Metric, Quantity, Row, Spread, Worst, by_name
 from heavytop.suite.case_text import forms
-from heavytop.suite.cases import Case
-from heavytop.suite.rows import data_of
-from heavytop.suite.survey.drawn import Chunk
-from heavytop.suite.survey.spread import cell_map, histogram, two_of
-from heavytop.suite.survey.table import DATA, DRIFT_COLUMNS, read_chunk
-from heavytop.suite.task import Task
+from heavytop.suite.rows import Task, data_of
+from heavytop.suite.survey.measured import Chunk
+
+# The file of a survey: one Parquet row group a chunk, one row a motion.
+
+
+FILE = "survey.parquet"
+_TEXTS = ("sweep", "integrator", "precision", "horizon", "class", "outcome")
+_INTEGERS = ("index", "steps")
+_ERRORS = ("digits_right", "error_max", "error_time", "error_omega", "error_gamma", "error_scaled", "reference_radius")
+DRIFT_COLUMNS = ("drift_gamma_squared", "drift_area", "drift_energy", "drift_further")
+DATA = tuple(f"{name}{i}" for name in ("inertia", "moment", "rotor", "omega", "gamma") for i in (1, 2, 3))
+COLUMNS = ("sweep", "index", *_TEXTS[1:], *_ERRORS, *DRIFT_COLUMNS, "steps", *DATA)
+"""In the order of the file.  inertia1 to gamma3 are the rounded top and start, moment that of the weight, P r."""
+
+
+def _schema() -> Any:
+    import pyarrow
+
+    def kind(name: str) -> Any:
+        if name in _TEXTS:
+            return pyarrow.dictionary(pyarrow.int32(), pyarrow.string())
+        return pyarrow.int64() if name in _INTEGERS else pyarrow.float64()
+
+    return pyarrow.schema([(name, kind(name)) for name in COLUMNS])
+
+
+def chunk_bytes(columns: dict[str, Any]) -> bytes:
+    """A Parquet file of one row group; NaN becomes null."""
+    import pyarrow
+
+    schema, arrays = _schema(), []
+    for field in schema:
+        values = columns[field.name]
+        if field.name in _TEXTS:
+            arrays.append(pyarrow.array(values, pyarrow.string()).dictionary_encode())
+        else:
+            arrays.append(pyarrow.array(values, field.type, from_pandas=True))
+    stream = io.BytesIO()
+    with _writer(stream, schema) as writer:
+        writer.write_table(pyarrow.Table.from_arrays(arrays, schema=schema))
+    return stream.getvalue()
+
+
+def _writer(where: Any, schema: Any) -> Any:
+    from pyarrow.parquet import ParquetWriter
+
+    return ParquetWriter(where, schema, compression="zstd")
+
+
+def read_chunk(content: bytes) -> Any:
+    """The table of :func:`chunk_bytes`."""
+    from pyarrow.parquet import read_table
+
+    return read_table(io.BytesIO(content))
+
+
+def write(path: Path, chunks: Iterable[bytes]) -> None:
+    """All chunks into one file, a row group each, one at a time in memory; whole or not at all."""
+    schema = _schema()
+    with whole(path) as file, _writer(file, schema) as writer:
+        for content in chunks:
+            table = read_chunk(content).cast(schema)
+            writer.write_table(table, row_group_size=max(1, table.num_rows))
+
+
+# Distributions of the quantities of many motions, and the digits lost over two of their data.
+
+
+WIDTH = 0.25
+"""Of a bin, in decades."""
+_CELLS = 24
+_MOST_BINS = 2000
+_FIRST = ("omega", "gamma", "inertia", "moment", "rotor")
+
+
+def histogram(values: Any) -> Histogram | None:
+    """Of the values above 0; None without any."""
+    positive = values[values > 0]
+    if not len(positive):
+        return None
+    bins = numpy.floor(numpy.log10(positive) / WIDTH).astype(int)
+    bins = numpy.maximum(bins, bins.max() - _MOST_BINS + 1)
+    counts = numpy.bincount(bins - bins.min())
+    return Histogram(float(bins.min() * WIDTH), WIDTH, tuple(counts.tolist()))
+
+
+def two_of(columns: Mapping[str, Any]) -> tuple[str, ...]:
+    """The first two data that are not the same in all motions, Ω before γ before the top."""
+    ordered = sorted(DATA, key=lambda name: (_FIRST.index(name[:-1]), name))
+    return tuple(name for name in ordered if len(numpy.unique(columns[name])) > 1)[:2]
+
+
+def cell_map(x: tuple[str, Any], y: tuple[str, Any], lost: Any) -> CellMap | None:
+    """Medians over at most 24 by 24 cells; cells of single values where there are no more of them.  NaN is left out."""
+    kept = numpy.isfinite(lost) & numpy.isfinite(x[1]) & numpy.isfinite(y[1])
+    if not kept.any():
+        return None
+    edges = [_edges(values[kept]) for _, values in (x, y)]
+    across, up = (
+        numpy.clip(numpy.searchsorted(e, v[kept], "right") - 1, 0, len(e) - 2)
+        for e, (_, v) in zip(edges, (x, y), strict=True)
+    )
+    width, height = (len(e) - 1 for e in edges)
+    cell = up * width + across
+    order = numpy.lexsort((lost[kept], cell))
+    found: list[float | None] = [None] * (width * height)
+    counts = numpy.bincount(cell, minlength=width * height)
+    ends = numpy.cumsum(counts)
+    ordered = lost[kept][order]
+    for place in numpy.flatnonzero(counts).tolist():
+        found[place] = round(float(ordered[ends[place] - 1 - counts[place] // 2]), 3)
+    rows = tuple(tuple(found[k * width : (k + 1) * width]) for k in range(height))
+    return CellMap(x[0], y[0], tuple(edges[0].tolist()), tuple(edges[1].tolist()), rows)
+
+
+def _edges(values: Any) -> Any:
+    single = numpy.unique(values)
+    if len(single) > _CELLS:
+        return numpy.linspace(single[0], single[-1], _CELLS + 1)
+    middle = (single[1:] + single[:-1]) / 2
+    room = (single[1] - single[0]) / 2 if len(single) > 1 else math.ulp(1.0) + abs(single[0]) / 2
+    last = (single[-1] - single[-2]) / 2 if len(single) > 1 else room
+    return numpy.array([single[0] - room, *middle, single[-1] + last])
+
 
 MOST_WORST = 20
 QUANTILES = {"median": 0.5, "q90": 0.9, "q99": 0.99, "max": 1.0}

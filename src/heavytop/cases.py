@@ -1,0 +1,341 @@
+"""The built-in cases: a top, a start, and what is known or claimed about the motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cache
+
+from heavytop.claims.library.ershkov import PartialCase
+from heavytop.errors import InputError
+from heavytop.exact.bodies import resolve
+from heavytop.exact.cases.algebraic_starts import AlgebraicMotion, chaplygin_motion, goryachev_motion, kowalewski_motion
+from heavytop.exact.cases.delone import DeloneHomoclinic
+from heavytop.exact.cases.ershkov_partial import ErshkovPartial
+from heavytop.exact.cases.kovalevskaya import Kovalevskaya
+from heavytop.top.attitude import Attitude
+from heavytop.top.bodies import CENTRE, PIVOT, Body
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, HEAVY_TOP, System, system_of
+from heavytop.top.heavy_top import HeavyTop, State, require_physical
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A top with a start.
+
+    claim: the data of the paper's partial case where the case is one.
+    homoclinic: the closed form where the motion tends to a saddle, a permanent rotation or a periodic motion; its data
+    are dyadic, so that every format takes them exactly.
+    body, given_start: the body and the start as they were given, in other axes or with an attitude; ``top`` and
+    ``start`` are theirs in principal axes, to 256 bits where these are irrational.
+    source, units, horizon: of a named body: where its data are from, in which units, and a time up to which they are
+    used.
+    """
+
+    name: str
+    about: str
+    system: System
+    top: HeavyTop
+    start: State
+    claim: PartialCase | None = None
+    homoclinic: ErshkovPartial | DeloneHomoclinic | Kovalevskaya | None = None
+    body: Body | None = None
+    given_start: State | None = None
+    source: str = ""
+    units: str = ""
+    horizon: int = 0
+
+    @property
+    def alpha(self) -> Fraction:
+        """The unit of errors of Ω: the angular velocity α of the permanent rotation that a homoclinic case tends to.
+
+        For one that tends to a periodic motion, the largest component of Ω at the start.
+        """
+        if self.homoclinic is None:
+            raise InputError(f"The case {self.name} is not homoclinic.", "Use a case such as ershkov-partial-2.")
+        if isinstance(self.homoclinic, Kovalevskaya):
+            return max(map(abs, self.start.omega))
+        return self.homoclinic.alpha
+
+    @property
+    def rate(self) -> float:
+        """The exponent at which a homoclinic case approaches its saddle, and errors leave it."""
+        if isinstance(self.homoclinic, ErshkovPartial):
+            return float(self.homoclinic.rate) / 2
+        if isinstance(self.homoclinic, Kovalevskaya):
+            return float(self.homoclinic.exponent(64))
+        return float(self.alpha) / 2**0.5
+
+
+def _partial(ratio: int) -> Case:
+    claim = PartialCase(Fraction(1), Fraction(ratio), Fraction(1))
+    known = claim.solves
+    about = f"the paper's partial case (4.1)-(4.6), alpha = 1, I1/I3 = {ratio}"
+    return Case(f"ershkov-partial-{ratio}", about, GYROSTAT, known.top, known.start, claim, known)
+
+
+def _delone() -> Case:
+    known = DeloneHomoclinic(Fraction(5, 4), Fraction(3))
+    return Case(
+        "delone",
+        "homoclinic Delone motion of the Kovalevskaya top, alpha = 5/4",
+        HEAVY_TOP,
+        known.top,
+        known.start,
+        homoclinic=known,
+    )
+
+
+def _asymptotic() -> Case:
+    known = Kovalevskaya(HeavyTop((2, 2, 1), 1, (1, 0, 0)), State((-1, "1/4", "1/4"), (0, 0, 1)))
+    return Case(
+        "kovalevskaya-asymptotic",
+        "Kovalevskaya's top on a degenerate level: it tends to a periodic motion, a saddle",
+        HEAVY_TOP,
+        known.top,
+        known.start,
+        homoclinic=known,
+    )
+
+
+def _near(name: str, who: str, known: AlgebraicMotion) -> Case:
+    """Rational data within 2^-253 of a motion whose start is algebraic; their truth is the enclosure."""
+    return Case(name, f"rational data beside {who}'s motion", HEAVY_TOP, *known.rounded())
+
+
+CASES: dict[str, Case] = {
+    case.name: case
+    for case in (
+        _partial(2),
+        _partial(6),
+        _delone(),
+        Case(
+            "euler",
+            "torque-free asymmetric top",
+            HEAVY_TOP,
+            HeavyTop((2, 3, "9/2"), "3/2", (0, 0, 0)),
+            State(("2/5", "7/10", "-3/10"), ("2/7", "3/7", "6/7")),
+        ),
+        Case(
+            "lagrange",
+            "symmetric top, centre of mass on its axis",
+            HEAVY_TOP,
+            HeavyTop(("5/2", "5/2", "3/2"), 2, (0, 0, "3/4")),
+            State(("1/5", "-1/3", "7/4"), ("2/7", "3/7", "6/7")),
+        ),
+        Case(
+            "kovalevskaya",
+            "I1 = I2 = 2 I3, centre of mass across the axis",
+            HEAVY_TOP,
+            HeavyTop((3, 3, "3/2"), 2, ("1/3", "3/4", 0)),
+            State(("1/10", "1/5", "9/10"), ("3/5", 0, "4/5")),
+        ),
+        _asymptotic(),
+        Case(
+            "generic",
+            "asymmetric top without a further integral",
+            HEAVY_TOP,
+            HeavyTop((3, "5/2", "3/2"), "3/2", ("1/2", "1/3", "1/5")),
+            State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5")),
+        ),
+        Case(
+            "pendulum",
+            "physical pendulum about axis 1, turning over",
+            HEAVY_TOP,
+            HeavyTop((3, "5/2", "3/2"), "3/2", (0, "1/2", "1/5")),
+            State(("9/7", 0, 0), (0, "3/5", "4/5")),
+        ),
+        Case(
+            "goryachev-chaplygin",
+            "I1 = I2 = 4 I3, centre of mass across the axis, M·gamma = 0",
+            HEAVY_TOP,
+            HeavyTop((4, 4, 1), 1, (1, 0, 0)),
+            State(("3/4", "1/2", 0), (0, 0, 1)),
+        ),
+        Case(
+            "hess",
+            "Hess' top, M·gamma = 3: a hyperbolic linear system with the period of an elliptic height",
+            HEAVY_TOP,
+            HeavyTop((8, 6, 3), 1, (1, 0, 2)),
+            State(("3/4", "1/2", -1), (0, 1, 0)),
+        ),
+        Case(
+            "hess-pendulum",
+            "Hess' top, M·gamma = 0: a pendulum that tends to a rotation about axis 2",
+            HEAVY_TOP,
+            HeavyTop((8, 6, 3), 1, (1, 0, 2)),
+            State(("3/4", 0, -1), (0, 1, 0)),
+        ),
+        Case(
+            "steklov",
+            "Steklov's motion, periodic: Omega2^2 and Omega3^2 quadratic in Omega1",
+            HEAVY_TOP,
+            HeavyTop((1, "7/16", "3/4"), 1, ("45/32", 0, 0)),
+            State((0, 4, 2), (-1, 0, 0)),
+        ),
+        Case(
+            "dokshevich",
+            "Dokshevich's motion of a Hess top, periodic: M·gamma = 0, M·r not 0",
+            HEAVY_TOP,
+            HeavyTop(("3/10", "4/5", "1/2"), 1, ("25/18", "-25/24", 0)),
+            State(("8/7", "-17/14", "6/7"), ("23/49", "24/49", "36/49")),
+        ),
+        _near("goryachev", "Goryachev", goryachev_motion(Fraction(39, 64), Fraction(-1), Fraction(1, 4))),
+        _near("kowalewski", "N. Kowalewski", kowalewski_motion(Fraction(5, 8), Fraction(1))),
+        _near("chaplygin", "Chaplygin", chaplygin_motion(Fraction(49, 32), Fraction(1), Fraction(1, 2))),
+        Case(
+            "gyrostat",
+            "asymmetric gyrostat of (2.1)-(2.4), gamma = M/|M|",
+            GYROSTAT,
+            HeavyTop((2, 3, "5/2"), "3/2", (0, "2/3", 0)),
+            State(("3/10", "4/15", "24/25"), ("3/13", "4/13", "12/13")),
+        ),
+        Case(
+            "wheel",
+            "a spacecraft with a reaction wheel: no weight, any axis of the rotor",
+            HEAVY_GYROSTAT,
+            HeavyTop((350, 300, 400), 0, (0, 0, 0), (30, "-20", 60)),
+            State(("1/5", "-1/10", "3/20"), ("3/5", 0, "4/5")),
+        ),
+        Case(
+            "heavy-gyrostat",
+            "the generic top with a rotor: no closed form",
+            HEAVY_GYROSTAT,
+            HeavyTop((3, 2, 1), 1, ("1/2", "1/3", "1/5"), ("1/2", "-1/3", "3/4")),
+            State(("1/10", "2/5", "9/10"), ("3/5", 0, "4/5")),
+        ),
+    )
+}
+
+
+_UPRIGHT = Attitude.quaternion(1, 0, 0, 0)
+_SI = "kg, m, s"
+
+
+def _named(name: str, about: str, source: str, units: str, horizon: int, body: Body, start: State) -> Case:
+    found = resolve(body, start)
+    case = Case(name, about, system_of(None, body), found.top, found.start, body=body, given_start=start)
+    return replace(case, source=source, units=units, horizon=horizon)
+
+
+@cache
+def named_bodies() -> dict[str, Case]:
+    """The named bodies by name: standard tests of multibody codes and of integrators.
+
+    Their data are those printed or programmed in the source, in its units; nothing is rounded.
+    """
+    disc = Body(15, "9.81", (0, 1, 0), ("0.234375", "0.46875", "0.234375"), CENTRE)
+    spinning = State(("0", "150", "-4.61538"), attitude=_UPRIGHT)
+    found = (
+        _named(
+            "bruels-cardona-arnold",
+            "heavy top of Lie group integrators: a fast disc on a rod of 1 m, horizontal at t = 0",
+            "O. Brüls, A. Cardona, M. Arnold, Lie group generalized-alpha time integration of constrained flexible "
+            "multibody systems, Mechanism and Machine Theory 48 (2012) 121-137; data as in the test of Kynema-FMB",
+            _SI,
+            2,
+            disc,
+            spinning,
+        ),
+        _named(
+            "terze",
+            "the same top, as Exudyn tests it up to t = 0.2 s",
+            "Z. Terze, A. Müller, D. Zlatar, Singularity-free time integration of rotational quaternions using "
+            "non-redundant ordinary differential equations, Multibody System Dynamics 38 (2016) 201-225; data as in "
+            "Exudyn's TestModels/heavyTop.py",
+            _SI,
+            1,
+            disc,
+            spinning,
+        ),
+        _named(
+            "detest-b5",
+            "Euler's equations y' = (y2 y3, -y1 y3, -0.51 y1 y2), y(0) = (0, 1, 1), as a free body: Omega = "
+            "(33/32 y1, 141/160 y2, 5/4 y3)",
+            "T. E. Hull, W. H. Enright, B. M. Fellen, A. E. Sedgwick, Comparing numerical methods for ordinary "
+            "differential equations, SIAM J. Numer. Anal. 9 (1972) 603-637, problem B5",
+            "none",
+            20,
+            Body(1, 0, (0, 0, 0), (1, "25025/21761", "99/463"), PIVOT),
+            State((0, "141/160", "5/4"), attitude=_UPRIGHT),
+        ),
+        _named(
+            "simo-wong",
+            "heavy symmetrical top, tilted by 0.05 rad, spin 50",
+            "J. C. Simo, K. K. Wong, Unconditionally stable algorithms for rigid body dynamics that exactly preserve "
+            "energy and momentum, Int. J. Numer. Meth. Eng. 31 (1991) 19-52; data as restated in Parmes' validation",
+            "none",
+            10,
+            Body(20, 1, (0, 0, 1), (5, 5, 1), PIVOT),
+            State((0, 0, 50), attitude=Attitude.axis_angle((1, 0, 0), "0.05")),
+        ),
+        _named(
+            "hairer-vilmart",
+            "asymmetric body with the potential R33: the driver of DMV10, its external potential switched on",
+            "E. Hairer, G. Vilmart, Preprocessed discrete Moser-Veselov algorithm for the full dynamics of a rigid "
+            "body, J. Phys. A 39 (2006) 13225-13235; data of the driver of their program",
+            "none",
+            10,
+            Body(1, 1, (0, 0, 1), ("0.6", "0.8", 1), PIVOT),
+            State((3, "0.5", "-0.9"), attitude=_UPRIGHT),
+        ),
+        _named(
+            "drake-cylinder",
+            "free axisymmetric cylinder",
+            "Drake, multibody/benchmarks/free_body, after T. R. Kane, P. W. Likins, D. A. Levinson, Spacecraft "
+            "Dynamics, McGraw-Hill (1983), sections 1.13 and 3.1",
+            _SI,
+            10,
+            Body(1, "9.81", (0, 0, 0), ("0.04", "0.04", "0.02"), PIVOT),
+            State((2, 4, 6), attitude=_UPRIGHT),
+        ),
+        _named(
+            "kynema-precession",
+            "free axisymmetric body, regular precession",
+            "Kynema-FMB, tests/regression_tests/regression/test_precession.cpp",
+            "none",
+            5,
+            Body(1, 0, (0, 0, 0), (1, 1, "0.5"), PIVOT),
+            State(("0.5", "0.5", 1), attitude=_UPRIGHT),
+        ),
+        _named(
+            "t-handle",
+            "free T-handle turning about its middle axis (Dzhanibekov's effect); the unit of time is 10/pi s",
+            "V. Danchev, Intermediate_Axis, Code/Parameters_and_Constants.py and Test_Environment.py",
+            "kg, m, 10/pi s",
+            30,
+            Body(1, 0, (0, 0, 0), ("1.9", 2, "2.5"), PIVOT),
+            State((1, 5, 1), attitude=_UPRIGHT),
+        ),
+        _named(
+            "flywheel-gyroscope",
+            "spacecraft with a flywheel along its middle axis (dual spin); the unit of time is 30/pi s, Omega in rpm",
+            "dual_spin.m of a collection of simulations of torque-free bodies: I = diag(350, 300, 400), a wheel of "
+            "10 kg m^2 at 350 rpm, Omega = (61, 1, 1) rpm",
+            "kg, m, 30/pi s",
+            5,
+            Body(1, 0, (0, 0, 0), (350, 300, 400), PIVOT, rotor=(3500, 0, 0)),
+            State((61, 1, 1), attitude=_UPRIGHT),
+        ),
+    )
+    return {case.name: case for case in found}
+
+
+def case(name: str, more: dict[str, Case] | None = None) -> Case:
+    """The built-in case or named body of that name, or one of ``more``; raises InputError for any other."""
+    if name in CASES:
+        return CASES[name]
+    known = CASES | named_bodies() | (more or {})
+    if name not in known:
+        raise InputError(f"Unknown case {name[:60]!r}.", f"Known cases: {', '.join(known)}.")
+    return known[name]
+
+
+def require_possible(case: Case) -> Case:
+    """The case; raises InputError for data that are too large, a gamma that is no unit vector, and a start that the
+    system does not admit.
+    """
+    require_physical(case.top, case.start)
+    case.start.require_unit_gamma(remedy=case.start.unit_gamma_nearby())
+    case.system.parameters(case.top, case.start)
+    return case

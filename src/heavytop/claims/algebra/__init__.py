@@ -1,0 +1,1 @@
+"""The field of a claim's formulas: reading, rational functions, generators, signs, conditions, the prover."""

@@ -1,0 +1,348 @@
+"""A parser of formulas that people send: text in, sympy expression out; nothing is ever evaluated as code.
+
+    expression := term (("+" | "-") term)*          term  := factor (("*" | "/") factor)*
+    factor     := ("+" | "-") factor | power        power := atom (("^" | "**") factor)?
+    atom       := number | name | function "(" expression ("," expression)* ")" | "(" expression ")"
+
+Length, depth, number of nodes, size of numbers, degree and number of terms when expanded are bounded before anything
+is built, so that no formula can take more than its share of time and memory.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+from itertools import pairwise
+from math import comb
+from typing import Any, NamedTuple
+
+import sympy
+
+from heavytop.claims.algebra import structure
+from heavytop.claims.algebra.conditions import Kind, Need, condition
+from heavytop.claims.algebra.evaluate import WEIERSTRASS
+from heavytop.claims.algebra.structure import Defined
+from heavytop.errors import InputError
+from heavytop.precision import exact
+
+_OF_ONE = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "sech", "asin", "acos", "atan")
+FUNCTIONS: dict[str, tuple[Any, int]] = {
+    **{name: (getattr(sympy, name), 1) for name in _OF_ONE},
+    "atan2": (sympy.atan2, 2),
+    **{name: (getattr(structure, name), 2) for name in structure.NAMES},
+    **{name: (function, 3) for name, function in WEIERSTRASS.items()},
+}
+_MAX_LENGTH = 10_000
+_MAX_DEPTH = 60
+_MAX_NODES = 2_000
+_MAX_BITS = 4_096
+_MAX_EXPONENT = 64
+_MAX_DEGREE = 1_024
+_MAX_TERMS = 10**15
+_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_TOKEN = re.compile(rf"\s*(?:{_NUMBER}|[A-Za-z]\w*|\*\*|[-+*/^(),])", re.ASCII)
+
+
+class Size(NamedTuple):
+    """Bounds on what an expression can grow into: nodes, bits of its numbers, degree, terms when expanded."""
+
+    nodes: int
+    bits: int
+    degree: int
+    terms: int
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A parsed formula with the bounds on its size, and what it needs to be defined and real as it is written."""
+
+    expression: sympy.Expr
+    size: Size
+    needs: frozenset[Need] = frozenset()
+
+
+def symbol(expression: sympy.Expr) -> Formula:
+    """A name that formulas may use."""
+    return Formula(expression, Size(1, 0, 1, 1))
+
+
+class TooLarge(InputError):
+    """A formula that grows beyond the bounds on its size."""
+
+
+def parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
+    """The formula that ``text`` says in ``names``; ``where`` says in error texts which formula it is.
+
+    Definitions are put in; where the formula grows too large by that, they are kept as names with a meaning.
+    Raises InputError for anything else than the grammar above, and beyond the bounds on its size.
+    """
+    try:
+        return _parse(text, names, where)
+    except TooLarge:
+        kept = {name: _kept(name, formula) if formula.size.nodes > 1 else formula for name, formula in names.items()}
+        return _parse(text, kept, where)
+
+
+@lru_cache(maxsize=1_000)
+def _kept(name: str, formula: Formula) -> Formula:
+    """A definition as a name, always the same one for the same formula."""
+    return replace(symbol(Defined(name, formula.expression)), needs=formula.needs)
+
+
+def _parse(text: str, names: Mapping[str, Formula], where: str) -> Formula:
+    if len(text) > _MAX_LENGTH:
+        raise InputError(f"{where}: {len(text)} characters.", f"A formula has at most {_MAX_LENGTH}.")
+    parser = _Parser(_tokens(text, where), names, where)
+    result = parser.sum()
+    parser.end()
+    return result
+
+
+def _tokens(text: str, where: str) -> list[str]:
+    tokens, position = [], 0
+    text = text.rstrip()
+    while position < len(text):
+        match = _TOKEN.match(text, position)
+        if match is None:
+            raise InputError(
+                f"{where}: {text[position : position + 20].strip()!r} is not part of a formula.",
+                "Use numbers, names, + - * / ^ ( ) and the functions " + ", ".join(FUNCTIONS) + ".",
+            )
+        tokens.append(match[0].strip())
+        position = match.end()
+    return tokens
+
+
+class _Parser:
+    """Recursive descent over the tokens; the depth is counted."""
+
+    def __init__(self, tokens: list[str], names: Mapping[str, Formula], where: str) -> None:
+        self._tokens = tokens
+        self._names = names
+        self._where = where
+        self._position = 0
+        self._depth = 0
+
+    def _next(self) -> str:
+        return self._tokens[self._position] if self._position < len(self._tokens) else ""
+
+    def _take(self, *expected: str) -> str:
+        token = self._next()
+        if token and token in expected:
+            self._position += 1
+            return token
+        return ""
+
+    def _require(self, token: str) -> None:
+        if not self._take(token):
+            raise self._error(f"{token!r} expected before {self._next()[:20]!r}")
+
+    def _error(self, what: str) -> InputError:
+        return InputError(f"{self._where}: {what}.", "See docs/claims-in-toml.md for what a formula may hold.")
+
+    def end(self) -> None:
+        """Raises InputError if anything is left."""
+        if self._next():
+            raise self._error(f"{self._next()[:20]!r} was not expected")
+
+    def sum(self) -> Formula:
+        """The expression from here on."""
+        self._depth += 1
+        if self._depth > _MAX_DEPTH:
+            raise self._error(f"parentheses nested deeper than {_MAX_DEPTH}")
+        total = self._term()
+        while sign := self._take("+", "-"):
+            part = self._term()
+            total = self._checked(
+                total.expression + part.expression if sign == "+" else total.expression - part.expression,
+                _added(total.size, part.size),
+                total.needs | part.needs,
+            )
+        self._depth -= 1
+        return total
+
+    def _term(self) -> Formula:
+        total = self._factor()
+        while operator := self._take("*", "/"):
+            part = self._factor()
+            if operator == "/":
+                if part.expression == 0:
+                    raise self._error("a division by 0")
+                needs = part.needs | condition("/", (part.expression,))
+                part = Formula(1 / part.expression, part.size, needs)
+            size = _multiplied(total.size, part.size)
+            self._check(size)
+            total = Formula(total.expression * part.expression, size, total.needs | part.needs)
+        return total
+
+    def _factor(self) -> Formula:
+        negative = False
+        while sign := self._take("+", "-"):
+            negative ^= sign == "-"
+        value = self._power()
+        return Formula(-value.expression, value.size, value.needs) if negative else value
+
+    def _power(self) -> Formula:
+        base = self._atom()
+        if not self._take("^", "**"):
+            return base
+        self._depth += 1
+        if self._depth > _MAX_DEPTH:
+            raise self._error(f"powers nested deeper than {_MAX_DEPTH}")
+        power = self._factor()
+        exponent, needs = power.expression, base.needs | power.needs
+        self._depth -= 1
+        if not exponent.is_Rational or exponent.q > 2 or abs(exponent.p) > _MAX_EXPONENT:
+            raise self._error(
+                f"the exponent is no integer or half-integer up to {_MAX_EXPONENT}; write exp() for others"
+            )
+        if base.expression == 0 and exponent < 0:
+            raise self._error("a division by 0")
+        whole = (abs(int(exponent.p)) + 1) // int(exponent.q) or 1
+        n = base.size
+        size = Size(n.nodes + 1, n.bits * whole, n.degree * whole, comb(min(n.terms, _MAX_TERMS) + whole - 1, whole))
+        self._check(size)
+        if exponent.q == 2:
+            needs |= condition("sqrt", (base.expression,))
+        if exponent < 0:
+            needs |= condition("/", (base.expression,))
+        return self._checked(base.expression**exponent, size, needs)
+
+    def _atom(self) -> Formula:
+        token = self._next()
+        self._position += 1
+        if token == "(":
+            inside = self.sum()
+            self._require(")")
+            return inside
+        if token[:1].isdigit() or token[:1] == ".":
+            return self._number(token)
+        if token[:1].isalpha():
+            return self._function(token) if token in FUNCTIONS else self._name(token)
+        raise self._error(f"a number, a name or '(' expected, not {token[:20]!r}")
+
+    def _number(self, token: str) -> Formula:
+        exponent = re.search(r"[eE]([+-]?\d+)$", token)
+        if exponent and (len(exponent[1]) > 6 or abs(int(exponent[1])) > _MAX_BITS // 4):
+            raise self._error(f"the number {token[:20]!r} is too large or too small")
+        value = exact(token)
+        bits = value.numerator.bit_length() + value.denominator.bit_length()
+        return self._checked(sympy.Rational(value.numerator, value.denominator), Size(1, bits, 0, 1))
+
+    def _name(self, token: str) -> Formula:
+        if token not in self._names:
+            known = ", ".join(sorted(self._names))
+            remedy = f"Known here: {known[:400]}; functions: {', '.join(FUNCTIONS)}."
+            raise InputError(f"{self._where}: unknown name {token[:40]!r}.", remedy)
+        return self._names[token]
+
+    def _function(self, token: str) -> Formula:
+        function, count = FUNCTIONS[token]
+        self._require("(")
+        arguments = [self.sum()]
+        while self._take(","):
+            arguments.append(self.sum())
+        self._require(")")
+        if len(arguments) != count:
+            raise self._error(f"{token} takes {count} argument{'s' if count > 1 else ''}, not {len(arguments)}")
+        size = arguments[0].size
+        for argument in arguments[1:]:
+            size = _added(size, argument.size)
+        size = size._replace(nodes=size.nodes + 1)
+        inside = tuple(argument.expression for argument in arguments)
+        needs = condition(token, inside).union(*(argument.needs for argument in arguments))
+        return self._checked(function(*inside), size, needs)
+
+    def _checked(self, expression: sympy.Expr, size: Size, needs: frozenset[Need] = frozenset()) -> Formula:
+        self._check(size)
+        if expression.has(sympy.zoo, sympy.oo, -sympy.oo, sympy.nan, sympy.I):
+            raise self._error(f"{expression} is no real number")
+        return Formula(expression, size, needs)
+
+    def _check(self, size: Size) -> None:
+        limits = Size(_MAX_NODES, _MAX_BITS, _MAX_DEGREE, _MAX_TERMS)
+        for what, value, limit in zip(Size._fields, size, limits, strict=True):
+            if value > limit:
+                raise TooLarge(
+                    f"{self._where}: the formula grows beyond {limit} {what}.", "Name parts of it in [definitions]."
+                )
+
+
+def _added(a: Size, b: Size) -> Size:
+    return Size(a.nodes + b.nodes + 1, max(a.bits, b.bits) + 1, max(a.degree, b.degree), a.terms + b.terms)
+
+
+def _multiplied(a: Size, b: Size) -> Size:
+    return Size(a.nodes + b.nodes + 1, a.bits + b.bits, a.degree + b.degree, a.terms * b.terms)
+
+
+# What a file assumes of its parameters: ``assume = ["alpha > 0", "I1 > I3", "k < 1"]``.
+
+
+Bound = tuple[sympy.Expr, sympy.Expr]
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """The fields of :class:`~heavytop.claims.algebra.statement.Setting` of the same names."""
+
+    positive: tuple[sympy.Symbol, ...]
+    greater: tuple[tuple[sympy.Symbol, sympy.Expr], ...]
+    facts: tuple[sympy.Expr, ...]
+    ranges: tuple[tuple[sympy.Symbol, tuple[Fraction, Fraction]], ...]
+    weak: tuple[sympy.Expr, ...]
+
+
+def comparisons(text: str, where: str = "assume") -> list[tuple[str, str]]:
+    """(larger, smaller) of ``formula > formula``, and of each link of a chain such as ``0 < k < 1``.
+
+    Raises InputError for anything else.
+    """
+    sign = ">" if ">" in text else "<"
+    parts = [part.strip() for part in text.split(sign)]
+    if len(parts) < 2 or not all(parts) or {"<", ">", "="} & set("".join(parts)):
+        raise InputError(f"{where}: {text[:60]!r} is not understood.", "Write: formula > formula.")
+    links = list(pairwise(parts))
+    return links if sign == ">" else [(right, left) for left, right in links]
+
+
+def assume(
+    bounds: Sequence[Bound], needs: Iterable[Need], moments: Iterable[sympy.Expr], symbols: Iterable[sympy.Symbol]
+) -> Assumed:
+    """What follows from left > right of each bound, from what these need to be real, and from positive moments."""
+    symbols = list(symbols)
+    positive = tuple(symbol for symbol in symbols if symbol.is_positive)
+    greater: list[tuple[sympy.Symbol, sympy.Expr]] = []
+    facts: list[sympy.Expr] = []
+    below: dict[sympy.Symbol, set[sympy.Symbol]] = {}
+    for left, right in bounds:
+        if left in positive and right == 0:
+            continue
+        # one bound below becomes a form of the symbol; forms may not go round in a circle
+        reached = set(right.free_symbols).union(*(below.get(symbol, set()) for symbol in right.free_symbols))
+        if left in symbols and left not in below and left not in reached:
+            greater.append((left, right))
+            below[left] = reached
+            for others in below.values():
+                if left in others:
+                    others |= reached
+        else:
+            facts.append(left - right)
+    facts += [moment for moment in moments if not moment.is_positive]
+    asked = sorted(needs, key=lambda need: need.text)
+    facts += [need.expression for need in asked if need.kind is Kind.POSITIVE]
+    facts += [need.expression**2 for need in asked if need.kind is Kind.NONZERO]
+    weak = tuple(need.expression for need in asked if need.kind is Kind.NONNEGATIVE)
+    return Assumed(positive, tuple(greater), tuple(facts), tuple(_ranges(bounds)), weak)
+
+
+def _ranges(bounds: Sequence[Bound]) -> Iterable[tuple[sympy.Symbol, tuple[Fraction, Fraction]]]:
+    """Symbols between two fractions."""
+    lower = {left: right for left, right in bounds if left.is_Symbol and right.is_Rational}
+    upper = {right: left for left, right in bounds if right.is_Symbol and left.is_Rational}
+    for symbol in lower.keys() & upper.keys():
+        low, high = lower[symbol], upper[symbol]
+        yield symbol, (Fraction(int(low.p), int(low.q)), Fraction(int(high.p), int(high.q)))

@@ -1,0 +1,1 @@
+"""From a claim, of the paper or in a file, to a verdict for every equation."""

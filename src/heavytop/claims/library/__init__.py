@@ -1,0 +1,1 @@
+"""Published claims: the paper's formulas and the entries of the library."""

@@ -1,0 +1,133 @@
+"""An entry of the library of claims: what stands in its file beside the claim itself.
+
+Each entry is a TOML file `library/ID.toml`: a claim in the form of docs/claims-in-toml.md, with where it was published,
+how it was read, the verdict that is expected and what a reader should learn from it.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from heavytop.errors import InputError, quoted
+
+FOLDER = Path(__file__).parent
+_REMEDY = "See docs/library.md for the keys of an entry."
+_KEYS = ("id", "title", "source", "language", "read", "status", "aliases", "tags", "expects", "note", "corrects")
+_ID = r"^[a-z0-9]+(-[a-z0-9]+)*$"
+_READ = r"^(the text|an abstract|restated .+)$"
+_STATUS = r"^(as published|corrected here|superseded by [a-z0-9]+(-[a-z0-9]+)*)$"
+
+Verdict = Literal["holds", "refuted", "undecided"]
+Id = Annotated[str, msgspec.Meta(pattern=_ID, max_length=80)]
+Line = Annotated[str, msgspec.Meta(min_length=1, max_length=400, pattern=r"\S")]
+
+
+class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """[source]: where the claim was published.
+
+    equations: their numbers there, a section or a page.
+    """
+
+    authors: Annotated[list[Line], msgspec.Meta(min_length=1, max_length=40)]
+    year: Annotated[int, msgspec.Meta(ge=1600, le=2200)]
+    title: Line
+    journal: str = ""
+    doi: str = ""
+    equations: str = ""
+
+    @property
+    def text(self) -> str:
+        """The citation in one line."""
+        doi = f"doi:{self.doi}" if self.doi else ""
+        parts = (f"{', '.join(self.authors)} ({self.year})", self.title, self.journal, self.equations, doi)
+        return ", ".join(part for part in parts if part)
+
+
+class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What an entry says of its claim.
+
+    id: never given to another.  read: what of the source was read.  expects: the verdict that its audit has to have.
+    note: what a reader should learn.  corrects: the entries that this one is the right form of.
+    """
+
+    id: Id
+    title: Line
+    source: Source
+    language: Annotated[str, msgspec.Meta(pattern=r"^[a-z]{2,3}$")]
+    read: Annotated[str, msgspec.Meta(pattern=_READ, max_length=600)]
+    status: Annotated[str, msgspec.Meta(pattern=_STATUS)]
+    expects: Verdict
+    note: Annotated[str, msgspec.Meta(min_length=1, max_length=4_000)]
+    aliases: Annotated[list[Line], msgspec.Meta(max_length=20)] = []
+    tags: Annotated[list[Line], msgspec.Meta(max_length=20)] = []
+    corrects: Id | Annotated[list[Id], msgspec.Meta(max_length=20)] = []
+
+    @property
+    def corrected(self) -> list[str]:
+        """The ids in ``corrects``."""
+        return [self.corrects] if isinstance(self.corrects, str) else list(self.corrects)
+
+
+def split(table: Mapping[str, Any], where: str) -> tuple[Entry | None, dict[str, Any]]:
+    """The entry in a TOML table, None where it has no id, and the table of its claim alone.
+
+    Raises InputError for keys of an entry that are wrong or missing.
+    """
+    if "id" not in table:
+        return None, dict(table)
+    if "name" in table:
+        raise InputError(f"{where}: both name and id are given.", "An entry has an id and a title, and no name.")
+    try:
+        found = msgspec.convert({key: table[key] for key in _KEYS if key in table}, Entry)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise InputError(f"{where}: {error}.", _REMEDY) from None
+    claim = {key: value for key, value in table.items() if key not in _KEYS}
+    return found, claim | {"name": found.title[:80], "source": found.source.text[:2_000]}
+
+
+def read_entry(path: Path) -> Entry:
+    """The entry in a file of the library."""
+    entry, _ = split(tomllib.loads(path.read_text("utf-8")), path.name)
+    if entry is None or entry.id != path.stem:
+        raise InputError(f"{path.name}: id is not the name of the file.", _REMEDY)
+    return entry
+
+
+@cache
+def library() -> dict[str, Entry]:
+    """The entries by id, in order of the ids; raises InputError where two claim one name."""
+    found = {entry.id: entry for entry in map(read_entry, sorted(FOLDER.glob("*.toml")))}
+    names: dict[str, str] = {}
+    for entry in found.values():
+        for name in (entry.id, *entry.aliases):
+            if names.setdefault(name, entry.id) != entry.id:
+                raise InputError(f"{name} is the name of {names[name]} and of {entry.id}.", _REMEDY)
+        for name in entry.corrected:
+            if name not in found or found[name].expects == "holds":
+                raise InputError(f"{entry.id} corrects {name}, which is no entry that fails.", _REMEDY)
+    return found
+
+
+def file_of(name: str) -> Path | None:
+    """The file of the entry with that id or alias; None where there is none."""
+    for entry in _named(name):
+        return FOLDER / f"{entry.id}.toml"
+    return None
+
+
+def _named(name: str) -> Iterator[Entry]:
+    return (entry for entry in library().values() if name == entry.id or name in entry.aliases)
+
+
+def require_tag(tag: str) -> str:
+    """The tag; raises InputError for one that no entry has."""
+    known = sorted({each for entry in library().values() for each in entry.tags})
+    if tag not in known:
+        raise InputError(f"No claim has the tag {quoted(tag)}.", f"Tags: {', '.join(known)}.")
+    return tag

@@ -1,0 +1,1 @@
+"""Two reports, row by row and metric by metric."""

@@ -1,0 +1,279 @@
+"""Baseline against candidate, row by row and metric by metric."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from heavytop.compare.findings import RANK, Change, Changes, sentences
+from heavytop.compare.noise import Policy
+from heavytop.compare.rows import Finding, RowComparison
+from heavytop.compare.verdicts import Verdict
+from heavytop.document.kind import Kinds
+from heavytop.errors import InputError
+from heavytop.integrate.broken import FAULTS
+from heavytop.precision import exact, log10
+from heavytop.records import Identity, Row
+from heavytop.store.store import AnyReport, Brief
+
+__all__ = ["Comparison", "Finding", "compare"]
+
+_MACHINE = ("system", "machine", "processor", "simd_width_double", "cpu_features")
+_VERSIONS = ("python", "implementation", "flint", "llvm", "cpu_target")
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All findings, and the differences of the plans and environments.
+
+    same: how many metrics are the same, where these are not among the findings.  sentences: what changed, at most
+    eight, the most telling first.  rows: those that changed, the worst first.  changed: all findings but the same, the
+    worst first.
+    """
+
+    findings: list[Finding]
+    environment: list[tuple[str, str, str]]
+    same: int = 0
+    sentences: list[str] = field(default_factory=list)
+    rows: list[Change] = field(default_factory=list)
+    changed: list[Finding] = field(init=False)
+
+    def __post_init__(self) -> None:
+        changed = [finding for finding in self.findings if finding.verdict is not Verdict.SAME]
+        object.__setattr__(self, "changed", sorted(changed, key=lambda finding: RANK.index(finding.verdict)))
+
+    @property
+    def tally(self) -> dict[Verdict, int]:
+        """How many findings of each verdict, the worst first and the same last."""
+        verdicts = [finding.verdict for finding in self.changed]
+        same = self.same + len(self.findings) - len(self.changed)
+        counts = {verdict: verdicts.count(verdict) for verdict in RANK} | {Verdict.SAME: same}
+        return {verdict: count for verdict, count in counts.items() if count}
+
+    @property
+    def verdict(self) -> str:
+        """worse if anything is; else incomparable if anything is missing or incomparable; else better or same."""
+        seen = self.tally
+        if Verdict.WORSE in seen:
+            return "worse"
+        if Verdict.MISSING in seen or Verdict.INCOMPARABLE in seen:
+            return "incomparable"
+        return "better" if Verdict.BETTER in seen else "same"
+
+    @property
+    def exit_code(self) -> int:
+        """0, 1 or 3, as for every command."""
+        return {"worse": 1, "incomparable": 3}.get(self.verdict, 0)
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of `compare --json`."""
+        return {
+            "verdict": self.verdict,
+            "findings": self.sentences,
+            "rows": [finding.to_json() for finding in self.findings],
+            "environment": [{"name": n, "baseline": a, "candidate": b} for n, a, b in self.environment],
+        }
+
+
+def compare(
+    baseline: AnyReport, candidate: AnyReport, policy: Policy, kinds: Kinds, *, list_same: bool = True
+) -> Comparison:
+    """Every row of either report, in the baseline's order, new ones last.
+
+    list_same: False to count what plainly stayed the same in place of listing it.
+    Raises InputError where neither report has a row, or the policy leaves nothing to compare.
+    """
+    found: list[list[Finding]] = []
+    missing: list[tuple[int, Row]] = []
+    changes = Changes()
+    timed = _timed(policy, baseline.environment, candidate.environment)
+    repeated = _alike(baseline.environment, candidate.environment)
+    checked = isinstance(baseline, Brief), isinstance(candidate, Brief)
+    rows = RowComparison(policy, kinds, timed, list_same, checked, repeated)
+    others = _Others(candidate.rows)
+    for row in baseline.rows:
+        match = others.take(row.identity)
+        if match is not None:
+            found.append(changes.add(row, match, rows.compare(row, match)))
+        elif not rows.ignores(row):
+            missing.append((len(found), row))
+            found.append([Finding(row.identity, "", Verdict.MISSING, row.outcome, None, "the row is missing")])
+    for place, row in missing:
+        if (match := others.take_elsewhere(row.identity)) is not None:
+            found[place] = rows.compare(row, match)[:1]
+        changes.add(row, match, found[place])
+    for row in others.left():
+        if not rows.ignores(row):
+            new = Finding(row.identity, "", Verdict.NEW, None, row.outcome)
+            found.append(changes.add(None, row, [new]))
+    findings = [finding for each in found for finding in each]
+    if not findings and not rows.same:
+        raise InputError("There is nothing to compare.", "Compare reports of `heavytop run` that have rows.")
+    same = rows.same + sum(finding.verdict is Verdict.SAME for finding in findings)
+    return Comparison(
+        findings,
+        _differences({"plan": baseline.plan}, {"plan": candidate.plan})
+        + _differences(baseline.environment, candidate.environment),
+        rows.same,
+        sentences(changes, same, rows.failed),
+        changes.worst_first,
+    )
+
+
+class _Others:
+    """The rows of the candidate by their keys, taken as they come: two reports of one plan have the same order."""
+
+    def __init__(self, rows: Any) -> None:
+        self._rows = rows
+        self._coming = enumerate(rows)
+        self._passed: dict[Identity, int] = {}
+        self._elsewhere: dict[Identity, list[Identity]] | None = None
+
+    def take(self, identity: Identity) -> Row | None:
+        if identity in self._passed:
+            row: Row = self._rows[self._passed.pop(identity)]
+            return row
+        for number, row in self._coming:
+            if row.identity == identity:
+                return row
+            self._passed[row.identity] = number
+        return None
+
+    def take_elsewhere(self, identity: Identity) -> Row | None:
+        """The one row, of those that are left, that differs in its horizon alone; called when all are passed."""
+        if self._elsewhere is None:
+            self._elsewhere = {}
+            for each in self._passed:
+                self._elsewhere.setdefault(each.elsewhere, []).append(each)
+        near = self._elsewhere.get(identity.elsewhere, [])
+        return self.take(near.pop()) if len(near) == 1 else None
+
+    def left(self) -> Iterator[Row]:
+        """Those that were not taken."""
+        for number in self._passed.values():
+            yield self._rows[number]
+        for _, row in self._coming:
+            yield row
+
+
+def _timed(policy: Policy, old: dict[str, Any], new: dict[str, Any]) -> bool:
+    when = policy.timings.compare
+    return when == "always" or (
+        when == "same-machine" and all(name in old and old[name] == new.get(name) for name in _MACHINE)
+    )
+
+
+def _alike(old: dict[str, Any], new: dict[str, Any]) -> bool:
+    """Whether processor and versions agree, that of this program apart, which is what is compared."""
+    first, second = (
+        {name: version for name, version in each.get("packages", {}).items() if name != "heavytop"}
+        for each in (old, new)
+    )
+    known = (*_MACHINE, *_VERSIONS)
+    return first == second and all(name in old and old[name] == new.get(name) for name in known)
+
+
+def _differences(old: dict[str, Any], new: dict[str, Any]) -> list[tuple[str, str, str]]:
+    flat_old, flat_new = dict(flatten(old)), dict(flatten(new))
+    names = sorted(set(flat_old) | set(flat_new))
+    pairs = ((n, flat_old.get(n, "absent"), flat_new.get(n, "absent")) for n in names)
+    return [(name, *_apart(a, b)) for name, a, b in pairs if a != b]
+
+
+def _apart(old: Any, new: Any) -> tuple[str, str]:
+    """Two entries that differ; of two lists what only one of them holds."""
+    if isinstance(old, list) and isinstance(new, list):
+        only = ([part for part in one if part not in other] for one, other in ((old, new), (new, old)))
+        first, second = (" ".join(map(str, parts)) or "nothing else" for parts in only)
+        return first, second
+    first, second = (f"{len(entry)} known" if isinstance(entry, list) else str(entry) for entry in (old, new))
+    return first, second
+
+
+def flatten(block: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """The entries of an environment, those of inner blocks with the names before them."""
+    for name, value in block.items():
+        if isinstance(value, dict):
+            yield from flatten(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+# What a comparison says of a deliberately broken integrator: which metric catches which fault.
+
+
+CONTROL = "control"
+_ALARMS = (Verdict.WORSE, Verdict.INCOMPARABLE, Verdict.MISSING)
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """What the comparison said of one fault.
+
+    caught_by: measures and metrics that raised an alarm, with the cases where they did, strongest first.
+    shift: the metric that moved most without an alarm, improvements first, and by how many decades; None where one was
+    caught.
+    """
+
+    fault: str
+    about: str
+    detectable: bool
+    verdict: str
+    caught_by: list[tuple[str, list[str]]]
+    shift: tuple[str, float] | None
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the alarm is raised just where it should be."""
+        return self.detectable == bool(self.caught_by)
+
+    def to_json(self) -> dict[str, Any]:
+        """One entry of `selftest --json`."""
+        return {
+            "fault": self.fault,
+            "about": self.about,
+            "detectable": self.detectable,
+            "verdict": self.verdict,
+            "caught_by": [{"metric": metric, "cases": cases} for metric, cases in self.caught_by],
+            "largest_shift": None if self.shift is None else {"metric": self.shift[0], "decades": self.shift[1]},
+        }
+
+
+def trial(name: str, comparison: Comparison) -> Trial:
+    """What came of the control, or of the fault of that name."""
+    alarms: dict[str, list[tuple[float, str]]] = {}
+    quiet: list[tuple[bool, float, str]] = []
+    for finding in comparison.findings:
+        case = finding.row.case
+        label = f"{finding.row.key.kind}: {finding.metric or finding.reason}"
+        moved = _decades(finding)
+        if finding.verdict in _ALARMS:
+            alarms.setdefault(label, []).append((moved, case))
+        else:
+            quiet.append((finding.verdict is Verdict.BETTER, moved, f"{label} of {case}"))
+    strongest = sorted(alarms.items(), key=lambda item: -max(item[1])[0])
+    shift = max(quiet) if quiet and not alarms else None
+    if name == CONTROL:
+        about, detectable = "nothing; other roundings", False
+    else:
+        about, detectable = FAULTS[name].about, FAULTS[name].detectable
+    return Trial(
+        name,
+        about,
+        detectable,
+        comparison.verdict,
+        [(label, [case for _, case in cases]) for label, cases in strongest],
+        None if shift is None else (shift[2], shift[1]),
+    )
+
+
+def _decades(finding: Finding) -> float:
+    """How far the value moved; infinite where one of the two is no number, or only one of them is 0."""
+    try:
+        old, new = (log10(exact(value or "")) for value in (finding.baseline, finding.candidate))
+    except InputError:
+        return 0.0 if finding.baseline == finding.candidate else float("inf")
+    if old is None or new is None:
+        return 0.0 if old == new else float("inf")
+    return abs(new - old)

@@ -1,0 +1,403 @@
+"""What the columns of a file with attitudes may mean: one reading of its conventions, and its error beside a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from math import floor, isfinite, log10
+from types import SimpleNamespace
+
+import numpy
+from numpy.typing import NDArray
+
+from heavytop.errors import HeavyTopError
+from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.trajectory import Outcome
+from heavytop.measure.attitude_error import UPS, Convention
+from heavytop.precision import DOUBLE
+from heavytop.top.attitude import matrix_of_quaternion, rows_of_euler
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP
+from heavytop.top.heavy_top import HeavyTop, State
+
+# Motions of a body in double, quickly and many times over, for suppositions about the conventions of a file.
+#
+# Numbers are numpy arrays in the units of the file; a motion is computed in units in which its rates are about 1.
+
+
+Array = NDArray[numpy.float64]
+_STEPS = 50_000
+"""Of heyoka, for one supposed motion."""
+_LEAST = 1e-12
+"""A principal moment below this part of the largest is not that of a body."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodyData:
+    """A body as a file describes it, in its own axes.
+
+    inertia: the tensor, shape (3, 3), about the fixed point or, where ``about_centre``, about the centre of mass.
+    centre: from the fixed point.  mass: None where a weight alone is known.  gravity: acceleration, or the weight where
+    there is no mass.  rotor: its constant angular momentum, None for none.
+    """
+
+    inertia: Array
+    centre: Array
+    mass: float | None
+    gravity: float
+    about_centre: bool = False
+    rotor: Array | None = None
+
+    @property
+    def force(self) -> float:
+        """The weight."""
+        return self.gravity * (1.0 if self.mass is None else self.mass)
+
+    @property
+    def steiner(self) -> Array:
+        """What moving the tensor from the centre of mass to the fixed point adds to it."""
+        c = self.centre
+        found: Array = (self.mass or 0.0) * (float(c @ c) * numpy.eye(3) - numpy.outer(c, c))
+        return found
+
+    @property
+    def tensor(self) -> Array:
+        """About the fixed point."""
+        return self.inertia + self.steiner if self.about_centre else self.inertia
+
+
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """Where a motion begins: R in canonical axes of space, shape (3, 3), and Ω in body axes."""
+
+    rotation: Array
+    omega: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A motion at some times: R in canonical axes of space, shape (n, 3, 3), and Ω in body axes, shape (n, 3)."""
+
+    rotation: Array
+    omega: Array
+
+    @property
+    def omega_space(self) -> Array:
+        """R Ω."""
+        found: Array = numpy.einsum("nij,nj->ni", self.rotation, self.omega)
+        return found
+
+
+def nearest_rotation(matrix: Array) -> Array:
+    """The orthogonal matrix nearest to each of the last two axes; of determinant 1 where theirs is positive."""
+    left, _, right = numpy.linalg.svd(matrix)
+    found: Array = left @ right
+    return found
+
+
+def simulate(body: BodyData, start: Beginning, times: Sequence[Fraction]) -> Course | None:
+    """The motion at ``times`` of one sign, in their order; None for what is no body, or cannot be computed."""
+    tensor = body.tensor
+    if not (numpy.isfinite(tensor).all() and numpy.isfinite(body.centre).all() and isfinite(body.force)):
+        return None
+    if not (numpy.isfinite(start.rotation).all() and numpy.isfinite(start.omega).all()):
+        return None
+    moments, axes = _principal((tensor + tensor.T) / 2)
+    if not moments[0] > _LEAST * moments.max() or moments.min() <= 0:
+        return None
+    rows, omega, moment = start.rotation @ axes, axes.T @ start.omega, body.force * (axes.T @ body.centre)
+    rate, size = _power(_rate(moments, moment, omega)), _power(float(moments.max()))
+    try:
+        whirl = None if body.rotor is None or not body.rotor.any() else axes.T @ body.rotor / (size * rate)
+        top = HeavyTop(
+            [Fraction(m / size) for m in moments],
+            1,
+            [Fraction(n / size / rate / rate) for n in moment],
+            rotor=None if whirl is None else [Fraction(k) for k in whirl],
+        )
+        system = HEAVY_TOP if whirl is None else HEAVY_GYROSTAT
+        state = State([Fraction(w / rate) for w in omega], [Fraction(g) for g in rows[2]])
+        xi = (Fraction(rows[0, 0]), Fraction(rows[0, 1]), Fraction(rows[0, 2]))
+        scaled = [time * Fraction(rate) for time in times]
+        later = [t for t in scaled if t]
+        run = propagate(top, state, later, DOUBLE, system=system, xi=xi, step_limit=_STEPS) if later else None
+    except (HeavyTopError, OverflowError, ValueError):
+        return None
+    if run is not None and run.outcome is not Outcome.SUCCESS:
+        return None
+    first = [] if all(scaled) else [[*(omega / rate), *rows[2], *rows[0]]]
+    values = numpy.array([*first, *(run.states if run is not None else [])], dtype=float)
+    gamma, along = values[:, 3:6], values[:, 6:9]
+    rotation = numpy.stack([along, numpy.cross(gamma, along), gamma], axis=1) @ axes.T
+    return Course(rotation, values[:, :3] @ axes.T * rate)
+
+
+def _principal(tensor: Array) -> tuple[Array, Array]:
+    """Moments, and principal axes as the columns of a rotation: the axes given where the tensor is diagonal."""
+    if not (tensor - numpy.diag(numpy.diag(tensor))).any():
+        return numpy.diag(tensor), numpy.eye(3)
+    moments, axes = numpy.linalg.eigh(tensor)
+    if numpy.linalg.det(axes) < 0:
+        axes[:, 0] = -axes[:, 0]
+    return moments, axes
+
+
+def _rate(moments: Array, moment: Array, omega: Array) -> float:
+    fall = float(numpy.sqrt(numpy.linalg.norm(moment) / moments.max()))
+    return max(float(numpy.linalg.norm(omega)), fall)
+
+
+def _power(value: float) -> float:
+    """The power of two next to a positive number; 1 for others."""
+    return 2.0 ** floor(log10(value) / log10(2)) if value > 0 and isfinite(value) else 1.0
+
+
+def turning(body: BodyData, start: Beginning) -> float:
+    """Radians per time unit at which the motion turns, roughly."""
+    moments = numpy.linalg.eigvalsh(body.tensor)
+    return _rate(numpy.asarray(moments, dtype=numpy.float64), body.force * body.centre, start.omega) or 1.0
+
+
+def with_tensor(body: BodyData, inertia: Array) -> BodyData:
+    """The body with another tensor."""
+    return replace(body, inertia=inertia)
+
+
+_NUMPY = SimpleNamespace(sin=numpy.sin, cos=numpy.cos)
+_DEGREE = numpy.pi / 180
+_EYE = tuple(map(tuple, numpy.eye(3).tolist()))
+Square = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What the columns mean, or the start.
+
+    scalar_last, conjugate: of quaternions.  transposed: of matrices.  sequence, extrinsic, negated, degrees: of angles.
+    up: the axis that points up.  swapped: Ω said to be in body axes is in space axes, and the other way round.
+    omega, gamma: factors that the columns have beside Ω and γ.  momentum: M stands in place of Ω.
+    space, body: rotations Q, B so that the file's vectors are Q v and B v.  mirror: the axis, from 0, that is reversed;
+    pseudo: whether Ω is then turned over as well.
+    scale: a factor of positions.  displaced: from the first position.  offset: added to every position, in canonical
+    axes of space.  point: whose positions they are; None for the one that was said.
+    """
+
+    scalar_last: bool = False
+    conjugate: bool = False
+    transposed: bool = False
+    sequence: str = ""
+    extrinsic: bool = False
+    negated: bool = False
+    degrees: bool = False
+    up: str = "z"
+    swapped: bool = False
+    omega: float = 1.0
+    gamma: float = 1.0
+    momentum: bool = False
+    space: Square = _EYE
+    body: Square = _EYE
+    mirror: int | None = None
+    pseudo: bool = True
+    scale: float = 1.0
+    displaced: bool = False
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    point: tuple[float, float, float] | None = None
+
+    @classmethod
+    def of(cls, said: Convention) -> Reading:
+        """What a file says of itself."""
+        return cls(
+            scalar_last=said.quaternion_order == "xyzw",
+            conjugate=said.quaternion == "space_to_body",
+            transposed=said.matrix == "space_to_body",
+            sequence=said.sequence,
+            degrees=said.angles == "degrees",
+            up=said.up,
+        )
+
+    def rotation(self, form: str, values: Array) -> Array:
+        """R in canonical axes of space from the columns of ``form``, shape (n, 3, 3)."""
+        found = self._plain(form, values)
+        if self.mirror is not None:
+            signs = numpy.where(numpy.arange(3) == self.mirror, -1.0, 1.0)
+            found = found * signs[:, None] * signs
+        return upright(numpy.array(self.space).T @ found @ numpy.array(self.body), self.up)
+
+    def _plain(self, form: str, values: Array) -> Array:
+        if form == "quaternion":
+            unit = values / numpy.linalg.norm(values, axis=1)[:, None]
+            w, x, y, z = (unit[:, [3, 0, 1, 2]] if self.scalar_last else unit).T
+            found = _stacked(matrix_of_quaternion((w, x, y, z)), len(values))
+            return found.transpose(0, 2, 1) if self.conjugate else found
+        if form == "matrix":
+            found = values.reshape(-1, 3, 3)
+            return found.transpose(0, 2, 1) if self.transposed else found
+        angles = values * (-1 if self.negated else 1) * (_DEGREE if self.degrees else 1)
+        if self.extrinsic:
+            return _stacked(rows_of_euler(self.sequence[::-1], list(angles[:, ::-1].T), _NUMPY), len(values))
+        return _stacked(rows_of_euler(self.sequence, list(angles.T), _NUMPY), len(values))
+
+    def vectors(self, values: Array, axial: bool = False) -> Array:
+        """Vectors of space in canonical axes, shape (n, 3)."""
+        turned: Array = self._reflected(values, axial) @ numpy.array(self.space)
+        return upright_vectors(turned, self.up)
+
+    def body_vectors(self, values: Array, axial: bool = False) -> Array:
+        """Vectors of the body in the axes said, shape (n, 3)."""
+        found: Array = self._reflected(values, axial) @ numpy.array(self.body)
+        return found
+
+    def _reflected(self, values: Array, axial: bool) -> Array:
+        if self.mirror is None:
+            return values
+        signs = numpy.where(numpy.arange(3) == self.mirror, -1.0, 1.0)
+        return values * (-signs if axial and self.pseudo else signs)
+
+
+def _stacked(rows: object, count: int) -> Array:
+    """Rows of columns as an array of matrices."""
+    found = numpy.empty((count, 3, 3))
+    for i, row in enumerate(rows):  # type: ignore[arg-type,var-annotated]
+        for j, entry in enumerate(row):
+            found[:, i, j] = entry
+    return found
+
+
+def upright(matrices: Array, up: str) -> Array:
+    """Matrices whose rows are axes of space, with canonical ones in their place."""
+    places, signs = UPS[up]
+    found: Array = matrices[..., list(places), :] * numpy.array(signs, dtype=float)[:, None]
+    return found
+
+
+def upright_vectors(vectors: Array, up: str) -> Array:
+    """Vectors of space in canonical axes."""
+    places, signs = UPS[up]
+    found: Array = vectors[..., list(places)] * numpy.array(signs, dtype=float)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """The start as it was given.
+
+    form: of ``values``: quaternion, matrix, euler; "rows", R in canonical axes of space; or "plain", R in those of the
+    file, whatever its matrices are.  omega: in body axes, or those of space where ``in_space``.
+    """
+
+    form: str
+    values: Array
+    omega: Array
+    in_space: bool = False
+
+    def begin(self, reading: Reading, inertia: Array) -> Beginning:
+        """Where the motion begins if the start is to be read so."""
+        if self.form == "rows":
+            rotation = self.values.reshape(3, 3)
+            if reading.gamma < 0:
+                rotation = rotation * numpy.array([[1.0], [-1.0], [-1.0]])
+        elif self.form == "plain":
+            rotation = replace(reading, transposed=False).rotation("matrix", self.values[None, :])[0]
+        else:
+            rotation = reading.rotation(self.form, self.values[None, :])[0]
+        said = self.omega[None, :] / reading.omega
+        if self.in_space != reading.swapped:
+            omega = rotation.T @ reading.vectors(said, True)[0]
+        else:
+            omega = reading.body_vectors(said, True)[0]
+        return Beginning(rotation, numpy.linalg.solve(inertia, omega) if reading.momentum else omega)
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """The samples of a file that are looked at.
+
+    times: of one sign.  columns: by the name of the quantity, shape (n, width).  body, start, said: as the file says.
+    point, pivot: of positions.  of: how many samples the file has.
+    """
+
+    times: tuple[Fraction, ...]
+    columns: Mapping[str, Array]
+    body: BodyData
+    start: Start
+    said: Reading
+    point: Array
+    pivot: Array
+    of: int
+    rows: tuple[int, ...] = field(default=())
+
+    def at(self, rows: list[int]) -> Seen:
+        """The same at some of its samples."""
+        times = tuple(self.times[row] for row in rows)
+        return replace(self, times=times, columns={k: v[rows] for k, v in self.columns.items()}, rows=tuple(rows))
+
+
+def error(seen: Seen, course: Course | None, reading: Reading, body: BodyData) -> float:
+    """The largest error of the columns, read so, relative to the size of each quantity; infinite without a motion."""
+    if course is None:
+        return float("inf")
+    worst = max(_errors(seen, course, reading, body).values())
+    return worst if worst == worst else float("inf")
+
+
+def _errors(seen: Seen, course: Course, reading: Reading, body: BodyData) -> dict[str, float]:
+    found = {}
+    for name, values in seen.columns.items():
+        if name == "position":
+            found[name] = _position_error(seen, course, reading, values)
+            continue
+        if name == "gamma":
+            off = numpy.abs(reading.body_vectors(values) / reading.gamma - course.rotation[:, 2]).max()
+        elif name in ("omega", "omega_space"):
+            off = _omega_error(course, reading, body, name, values)
+        else:
+            off = numpy.abs(reading.rotation(name, values) - course.rotation).max()
+        found[name] = float(off)
+    return found
+
+
+def _omega_error(course: Course, reading: Reading, body: BodyData, name: str, values: Array) -> float:
+    omega = course.omega
+    if reading.momentum:
+        omega = omega @ body.tensor
+    if (name == "omega_space") != reading.swapped:
+        true = numpy.einsum("nij,nj->ni", course.rotation, omega)
+        given = reading.vectors(values, True)
+    else:
+        true, given = omega, reading.body_vectors(values, True)
+    size = float(numpy.linalg.norm(true, axis=1).max()) or 1.0
+    return float(numpy.abs(given / reading.omega - true).max()) / size
+
+
+def _position_error(seen: Seen, course: Course, reading: Reading, values: Array) -> float:
+    point = seen.point if reading.point is None else numpy.array(reading.point)
+    true = course.rotation @ point
+    if reading.displaced:
+        true = true - seen.start.begin(reading, numpy.eye(3)).rotation @ point
+    size = float(numpy.linalg.norm(point)) or 1.0
+    given = reading.vectors(values - seen.pivot)
+    return float(numpy.abs((given - numpy.array(reading.offset)) / reading.scale - true).max()) / size
+
+
+def disagreement(seen: Seen) -> dict[tuple[str, str], Array]:
+    """How far columns that say the same are apart in each sample, by their names; relative for Ω and positions."""
+    columns, said = seen.columns, seen.said
+    forms = [form for form in ("quaternion", "matrix", "euler") if form in columns]
+    rows = {form: said.rotation(form, columns[form]) for form in forms}
+    found: dict[tuple[str, str], Array] = {}
+    for other in forms[1:]:
+        found[forms[0], other] = numpy.abs(rows[forms[0]] - rows[other]).max(axis=(1, 2))
+    if not forms:
+        return found
+    first = rows[forms[0]]
+    if "gamma" in columns:
+        found[forms[0], "gamma"] = numpy.abs(first[:, 2] - columns["gamma"]).max(axis=1)
+    if "position" in columns:
+        size = float(numpy.linalg.norm(seen.point)) or 1.0
+        given = said.vectors(columns["position"] - seen.pivot)
+        found[forms[0], "position"] = numpy.abs(given - first @ seen.point).max(axis=1) / size
+    if {"omega", "omega_space"} <= columns.keys():
+        true = numpy.einsum("nij,nj->ni", first, columns["omega"])
+        size = float(numpy.abs(true).max()) or 1.0
+        found["omega", "omega_space"] = numpy.abs(said.vectors(columns["omega_space"]) - true).max(axis=1) / size
+    return found

@@ -1,0 +1,257 @@
+"""Samples of a motion in double, and how far a supposed motion is from them: what every diagnosis is tested with.
+
+Here a motion is compared with heyoka in double, quickly and many times over.  Errors are relative to the size of Ω and
+of γ along the supposed motion, so that units do not matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import floor
+
+import numpy
+from numpy.typing import NDArray
+
+from heavytop.errors import HeavyTopError
+from heavytop.integrate.heyoka.motions import propagate
+from heavytop.integrate.trajectory import Outcome
+from heavytop.precision import DOUBLE, decimal_text, log10
+from heavytop.top.equations import System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import dot
+
+Array = NDArray[numpy.float64]
+
+MOST_SAMPLES = 24
+_TURNS = 60.0
+"""Radians that the body turns until the last sample that is looked at, if there are a few samples before."""
+_FEW = 6
+_FEWEST = 3
+_STEPS = 50_000
+"""Of heyoka, for one supposed motion: a tenth of a second."""
+FARTHEST = 3000.0
+"""Radians that the body may turn until the last supposed time."""
+_OTHER_UNIT = Fraction(11, 10)
+"""Of time and of moments: all data are rounded otherwise in it."""
+_TRUSTED = 1e-11
+"""heyoka's states are trusted until those in other units part from them by so much, relative to their size."""
+_USUAL = 3.0
+"""Decades by which a unit may be off before another is taken."""
+MOST_AT_ONCE = 2000
+ALIKE = 30.0
+"""Of suppositions whose errors differ by less, the simplest is meant."""
+FLOOR = 1e-13
+"""Relative errors below it are heyoka's own."""
+_NOTABLE = 0.02
+"""A fitted number must be off by this part or be a short decimal: methods have small biases of their own."""
+SHORT = 4
+_DIGITS = range(1, SHORT + 1), range(SHORT + 1, 13)
+"""Digits of a short decimal, and of a longer one."""
+SMALL = 100
+"""Denominators of small fractions."""
+DROP = 100.0
+"""Errors must fall by so much for a supposition without a free number, and ..."""
+FITTED_DROP = 1000.0
+"""... by so much for one whose numbers were fitted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """Powers of ten in which times and moments of inertia are neither large nor small."""
+
+    time: Fraction = Fraction(1)
+    inertia: Fraction = Fraction(1)
+
+    @property
+    def moment(self) -> Fraction:
+        """The unit of P r and of energies."""
+        return self.inertia / self.time**2
+
+
+@dataclass(frozen=True, slots=True)
+class Suspect:
+    """A motion as it was given, at the samples that are looked at.
+
+    all_times, all_states: the whole of it.  rows: the places of those samples in it.
+    states: of these rows, shape (n, 6), in double.
+    units: everything else is in these.  rate: radians per time unit, roughly, at which the motion turns.
+    """
+
+    top: HeavyTop
+    start: State
+    system: System
+    all_times: tuple[Fraction, ...]
+    all_states: Array
+    rows: tuple[int, ...]
+    states: Array
+    rate: float
+    units: Units
+
+    @property
+    def times(self) -> list[Fraction]:
+        """Of the rows that are looked at."""
+        return [self.all_times[row] for row in self.rows]
+
+    def supposed(
+        self, times: Sequence[Fraction], top: HeavyTop | None = None, start: State | None = None
+    ) -> Array | None:
+        """The motion at any times, of both signs and in any order, with another top or start if given.
+
+        None where it cannot be computed, and beyond :data:`FARTHEST` radians.
+        """
+        if any(abs(float(time)) * self.rate > FARTHEST for time in times):
+            return None
+        return motion(top or self.top, start or self.start, self.system, times)
+
+    def at(self, rows: Sequence[int]) -> Suspect:
+        """The same at other samples."""
+        return replace(self, rows=tuple(rows), states=self.all_states[list(rows)])
+
+    def widened(self) -> Suspect:
+        """The same with as many as :data:`MOST_AT_ONCE` samples, which heyoka reaches and is trusted at."""
+        reached = [abs(float(time)) * self.rate <= FARTHEST for time in self.all_times[:MOST_AT_ONCE]]
+        return self.at(range(sum(reached))).trusted()
+
+    def trusted(self) -> Suspect:
+        """The same up to where the motion makes more of roundings than an error that is asked about."""
+        truth, unit = self.supposed(self.times) if self.rows else None, _OTHER_UNIT
+        if truth is None:
+            return self
+        top = HeavyTop([i * unit for i in self.top.inertia], self.top.weight / unit, self.top.centre, self.top.rotor)
+        start = State([w / unit for w in self.start.omega], self.start.gamma)
+        other = motion(top, start, self.system, [time * unit for time in self.times])
+        if other is None:
+            return self
+        states = other * ([float(unit)] * 3 + [1.0] * 3)
+        far = replace(self, states=states).errors(truth) > _TRUSTED
+        return self.at(self.rows[: int(numpy.argmax(far))]) if far.any() else self
+
+    def follows(self, row: int) -> Array | None:
+        """The state at the sample behind ``row`` that the motion through the state given there has; None for none."""
+        span = self.all_times[row + 1] - self.all_times[row]
+        if abs(float(span)) * self.rate > FARTHEST:
+            return None
+        values = [Fraction(value) for value in self.all_states[row]]
+        try:
+            found = motion(self.top, State(values[:3], values[3:]), self.system, [span])
+        except HeavyTopError:  # beyond the numbers that a start may have
+            return None
+        return None if found is None else found[0]
+
+    def errors(self, supposed: Array) -> Array:
+        """The error of each state relative to the size of Ω and γ in the supposed ones, shape (n,)."""
+        off = numpy.abs(self.states - supposed)
+        sizes = numpy.abs(supposed)
+        omega = max(sizes[:, :3].max(), 1e-3 * self.rate) or 1.0
+        gamma = sizes[:, 3:].max() or 1.0
+        found: Array = numpy.maximum(off[:, :3].max(axis=1) / omega, off[:, 3:].max(axis=1) / gamma)
+        return found
+
+    def error(self, supposed: Array | None) -> float:
+        """The largest of the errors; infinite for None."""
+        if supposed is None:
+            return float("inf")
+        worst = float(self.errors(supposed).max())
+        return worst if worst == worst else float("inf")
+
+
+def suspect(
+    top: HeavyTop,
+    start: State,
+    system: System,
+    times: Sequence[Fraction],
+    states: Sequence[Sequence[Fraction]],
+    worst: int | None = None,
+) -> Suspect | None:
+    """At most :data:`MOST_SAMPLES` samples, over the first turns of the body, and ``worst`` where it is among these.
+
+    Those where roundings of the start hide the motion are left out if enough remain.  None for numbers that no double
+    holds.
+    """
+    units = _units(top, start)
+    inertia, force = [i / units.inertia for i in top.inertia], units.inertia / units.time**2
+    rotor = None if top.rotor is None else [k * units.time / units.inertia for k in top.rotor]
+    top = HeavyTop(inertia, top.weight / force, top.centre, rotor)
+    start = State([w * units.time for w in start.omega], start.gamma)
+    times = [time / units.time for time in times]
+    scaled = [(*(w * units.time for w in state[:3]), *state[3:]) for state in states]
+    try:
+        array = numpy.array([[float(value) for value in state] for state in (start.flat, *scaled)])
+        ends = [float(time) for time in times]
+        moment = [float(value) for value in top.moment]
+    except OverflowError:
+        return None
+    if not len(states) or not numpy.isfinite(array).all():
+        return None
+    fall = (numpy.linalg.norm(moment) / float(max(inertia))) ** 0.5
+    carried = numpy.linalg.norm([float(k) for k in top.rotor or ()]) / float(max(inertia))
+    rate = float(max(numpy.linalg.norm(array[0, :3]), fall, carried)) or 1.0
+    early = sum(abs(time) * rate <= _TURNS for time in ends)
+    last = max(early, min(len(ends), _FEW))
+    some = {round(i) for i in numpy.linspace(0, last - 1, min(last, MOST_SAMPLES))}
+    rows = sorted(some if worst is None or worst >= last else some | {worst})
+    found = Suspect(top, start, system, tuple(times), array[1:], tuple(rows), array[1:][rows], rate, units)
+    trusted = found.trusted()
+    return trusted if len(trusted.rows) >= min(_FEWEST, len(rows)) else found
+
+
+def turning_rate(top: HeavyTop, start: State) -> Fraction:
+    """Radians per time unit at which the motion turns, roughly, to two digits: |Ω| at the start, or that of a fall."""
+    squares = Fraction(dot(start.omega, start.omega)), Fraction(dot(top.moment, top.moment)) / max(top.inertia) ** 2
+    powers = [
+        power / over for square, over in zip(squares, (2, 4), strict=True) if (power := log10(square)) is not None
+    ]
+    if not powers:
+        return Fraction(1)
+    whole = floor(max(powers))
+    return Fraction(round(100 * 10 ** (max(powers) - whole)), 100) * Fraction(10) ** whole
+
+
+def _units(top: HeavyTop, start: State) -> Units:
+    """1 where the numbers are of a usual size."""
+    largest = max(top.inertia)
+    squares = [w * w for w in start.omega] + [abs(n) / largest for n in top.moment]
+    squares += [(k / largest) ** 2 for k in top.rotor or ()]
+    rate, size = (log10(max(squares)) or 0.0) / 2, log10(largest) or 0.0
+    return Units(*(Fraction(10) ** round(power) if abs(power) > _USUAL else Fraction(1) for power in (-rate, size)))
+
+
+def motion(top: HeavyTop, start: State, system: System, times: Sequence[Fraction]) -> Array | None:
+    """States of heyoka in double at ``times``, shape (n, 6); None where it does not get there."""
+    found = numpy.empty((len(times), 6))
+    for sign in (1, -1):
+        asked = {time: [] for time in sorted({t for t in times if sign * t > 0}, key=abs)}  # type: dict[Fraction, list[int]]
+        if not asked:
+            continue
+        for row, time in enumerate(times):
+            if time in asked:
+                asked[time].append(row)
+        try:
+            run = propagate(top, start, list(asked), DOUBLE, system=system, step_limit=_STEPS)
+        except HeavyTopError:  # beyond the range of double, or a start that the system does not admit
+            return None
+        if run.outcome is not Outcome.SUCCESS:
+            return None
+        for rows, state in zip(asked.values(), run.states, strict=True):
+            found[rows] = state
+    found[[row for row, time in enumerate(times) if time == 0]] = [float(value) for value in start.flat]
+    return found
+
+
+def named(value: float, near: float) -> Fraction:
+    """0, a short decimal, a small fraction or the shortest decimal within ``near``, or the value itself."""
+    if abs(value) <= near:
+        return Fraction(0)
+    short, longer = ([Fraction(decimal_text(Fraction(value), digits)) for digits in some] for some in _DIGITS)
+    for candidate in (*short, Fraction(value).limit_denominator(SMALL), *longer):
+        if abs(float(candidate) - value) <= near:
+            return candidate
+    return Fraction(value)
+
+
+def notable(new: Fraction, old: Fraction) -> bool:
+    """Whether a number is off by much, or is a short decimal or a small fraction: neither is the bias of a method."""
+    off = abs(new - old) > Fraction(_NOTABLE) * max(abs(new), abs(old))
+    return off or new.denominator <= SMALL or new == Fraction(decimal_text(new, SHORT))

@@ -1,0 +1,1 @@
+"""The classical motions in closed form, a class in a file."""

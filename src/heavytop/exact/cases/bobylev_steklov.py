@@ -1,0 +1,259 @@
+"""Bobylev-Steklov: r on axis 1, I1 = 2 I3, any I2, Ω2 = 0 and Ω1 = p constant.
+
+With n1 = P a and x = Ω3 the equations for Ω1, Ω2 and γ hold with
+
+    γ3 = I3 p x/n1,   γ1 = (h − ½ I3 x²)/n1,   γ2 = −I3 x'/n1
+    x'² = ¼ (α − x²)(x² − β),   α, β = 2B ± 2√(B² + C),   B = h/I3 − p²,   C = (|γ|² n1² − h²)/I3²
+
+(h is I3 p² less than the constant of the same name in the energy.)  With σ the sign of x at t = 0, u = ω t + u0:
+
+    β ≤ 0:  x = σ √α cn(u|m),  ω² = (α − β)/4,  m = α/(α − β);     β > 0:  x = σ √α dn(u|m),  ω² = α/4,  m = 1 − β/α
+
+β = 0 (C = 0) is the separatrix.  p = 0 is a pendulum.
+Source: Leimanis, The General Problem of the Motion of Coupled Rigid Bodies about a Fixed Point; DLMF 22.13.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from flint import acb, arb
+
+from heavytop.errors import InputError
+from heavytop.exact.cases.lagrange import across
+from heavytop.exact.closed_form import (
+    ClosedForm,
+    balls,
+    half_angle,
+    initial_xi,
+    instant,
+    kept,
+    rotate,
+    sign,
+    taylor,
+    turned,
+)
+from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
+from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
+from heavytop.exact.elliptic.weierstrass import Winding
+from heavytop.exact.flint.balls import ball, coefficient, series_length, to_bits
+from heavytop.exact.solution import ON_AXIS_1, Condition
+from heavytop.precision import shown
+from heavytop.top.equations import HEAVY_TOP, Parameters, heavy_top
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import Vector, cross, dot
+
+# Attitude of the Bobylev-Steklov motions: axis 3 in space is a function of the second kind.
+#
+# p, h, x, B, C as in :mod:`heavytop.exact.cases.bobylev_steklov`, s = |γ|.  For Z = ξ + iη, ξ ⟂ γ fixed in space, η = γ
+# × ξ/s,
+#
+#     Z3' = −p Z2,    s Z1 = i (γ2 Z3 − γ3 Z2)    (from γ × Z = −i s Z),    |Z3|² = |ξ|² (1 − γ3²/s²)
+#
+# Where x has its simple poles, x ~ ±2i/τ, Z1 and Z2 have poles of order two and Z3 of order one: Z3 obeys the second
+# theorem of :mod:`heavytop.exact.elliptic.quartic` for x'² = C + B x² − x⁴/4.  Its azimuth Λ has Λ' = s p γ1/(s² −
+# γ3²), so that
+#
+#     Z3'/Z3 = −x x'/(y² − x²) + iΛ',    y = n1 s/(I3 p)
+#
+# has residue 1 at (x, x') = (y, X) and (−y, −X), X = ½ i (y² − 2h/I3), and −1 at both poles of x.  As a half-period
+# (where ℘ is −B/6) leads from the first zero to the second and from pole to pole, V = 2W, W from a pole to a zero, and
+#
+#     ℘(W) = −h/(6 I3) − p²/12,    ℘'(W) = i p s n1/(4 I3),    ℘''(W) = q = s² n1²/(8 I3²) + h p²/(4 I3)
+#     ℘(V) = −2 ℘(W) + m²/4,  ℘'(V) = −℘'(W) − m (℘(V) − ℘(W)),  m = q/℘'(W),    κ = n1 s/(4 I3 p) + h p/(2 n1 s)
+#
+# All rational but s.  Nothing is divided by what depends on the time: the poles γ = ±s e3 of Λ, turning points, M ∥ γ
+# and the separatrix are states like any other.  For p = 0 axis 3 rests in space. Source: derived here; Hermite's
+# theorem as in :mod:`heavytop.exact.elliptic.quartic`.
+
+
+def quartic_motion(top: HeavyTop, start: State) -> QuarticMotion:
+    """x = Ω3 on its quartic; ``top`` and ``start`` of the class."""
+    i3, n1, (p, _, x), gamma = top.inertia[2], top.moment[0], start.omega, start.gamma
+    h = n1 * gamma[0] + i3 * x * x / 2
+    constant = (dot(gamma, gamma) * n1 * n1 - h * h) / i3**2
+    zero = Fraction(0)
+    coefficients = (constant, zero, h / i3 - p * p, zero, Fraction(-1, 4))
+    return QuarticMotion(coefficients, x, -n1 * gamma[1] / i3)
+
+
+def axis_winding(top: HeavyTop, start: State) -> Winding:
+    """V and κ of Z3; p and γ not 0."""
+    i3, n1, (p, _, x), gamma = top.inertia[2], top.moment[0], start.omega, start.gamma
+    h, square = n1 * gamma[0] + i3 * x * x / 2, dot(gamma, gamma)
+    half = -h / (6 * i3) - p * p / 12
+    half_slope = p * n1 / (4 * i3)  # ℘'(W)/(i s)
+    tangent = -(square * n1 * n1 / (8 * i3**2) + h * p * p / (4 * i3)) / (half_slope * square)  # m/(i s)
+    value = -2 * half - square * tangent**2 / 4
+    slope = -half_slope - tangent * (value - half)
+    return Winding(value, slope, n1 / (4 * i3 * p) + h * p / (2 * n1 * square), square)
+
+
+def prepared_axis(top: HeavyTop, start: State, vector: Vector) -> tuple[PreparedMotion, Companions]:
+    """x, and Z3 of the exact ``vector`` ⟂ γ at the start, at the working precision; p and γ not 0."""
+    winding = axis_winding(top, start)
+    normal = tuple(c / winding.square for c in cross(start.gamma, vector))
+    parameters = HEAVY_TOP.parameters(top, start)
+    rows = [_third(parameters, start, fixed) for fixed in (vector, normal)]
+    motion = quartic_motion(top, start).prepared()
+    return motion, motion.companions(winding, turned(rows[0], rows[1], winding))
+
+
+def _third(parameters: Parameters, start: State, fixed: Sequence[Fraction]) -> list[Fraction]:
+    """The first four derivatives at 0 of the third component of a vector fixed in space."""
+
+    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
+        return (*heavy_top(p, y[:6]), *HEAVY_TOP.attitude(p, y[:6], y[6:]))
+
+    return taylor(field, parameters, (*start.flat, *fixed), 4)[8]
+
+
+def carried(
+    motion: PreparedMotion, axis: Companions, time: Fraction, rate: arb, gamma: Sequence[arb]
+) -> tuple[list[arb], list[arb]]:
+    """Re Z and Im Z in body components at ``time``; rate: p, not 0.  gamma: γ at the time."""
+    point = motion.lattice.point(time, 2)
+    (third,) = axis.at(point, 1 / motion.denominator(point))
+    z3, z2 = third[0], coefficient(third, 1) / -rate
+    z1 = acb(0, 1) * (z3 * gamma[1] - z2 * gamma[2]) / dot(gamma, gamma).sqrt()
+    found = [acb(z) for z in (z1, z2, z3)]
+    return [z.real for z in found], [z.imag for z in found]
+
+
+def _off(top: HeavyTop, start: State) -> tuple[Fraction]:
+    return (top.moment[0] * start.gamma[2] - top.inertia[2] * start.omega[0] * start.omega[2],)
+
+
+@dataclass(frozen=True, slots=True)
+class BobylevSteklov(ClosedForm):
+    """Every Bobylev-Steklov motion with r on axis 1 and I1 = 2 I3.  Raises NotInClass where an equality fails."""
+
+    method = "closed form: Bobylev-Steklov, Jacobi functions"
+    body = *ON_AXIS_1, Condition("I1 = 2 I3", "I1 - 2 I3", lambda top, _: (top.inertia[0] - 2 * top.inertia[2],))
+    starts = (
+        Condition("Omega2 = 0", "Omega2", lambda _, start: start.omega[1:2]),
+        Condition("P a gamma3 = I3 Omega1 Omega3", "P a gamma3 - I3 Omega1 Omega3", _off),
+    )
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        lattice = _lattice(self)
+        if lattice is None:
+            return balls(self.start.flat)
+        x, slope = lattice.motion(instant(time))
+        p, top, bend, side, up = lattice.shares
+        return [p, arb(0), x, top + bend * (x * x), side * slope, up * x]
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 ``initial_xi`` of γ.
+
+        Raises InputError for γ = 0.
+        """
+
+        def evaluate(_working: int) -> list[arb]:
+            start, gamma = initial_xi(self.start.gamma), self.start.gamma
+            basis = across(gamma)
+            exact, unit = balls(basis), [g / ball(dot(gamma, gamma)).sqrt() for g in balls(gamma)]
+            norm = ball(dot(basis, basis))
+            cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
+            first, second = self._carried(basis, time)
+            return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
+
+        return to_bits(evaluate, bits, time, 2)
+
+    def _carried(self, basis: Vector, time: Fraction) -> tuple[list[arb], list[arb]]:
+        """The vector :func:`across` γ, fixed in space, and γ × it/|γ| at ``time``."""
+        with series_length(1):
+            gamma = self.evaluate(time)[3:]
+        rate = self.start.omega[0]
+        if _lattice(self) is None or rate == 0:
+            first = rotate(balls(basis), self.start.omega, ball(time)) if rate else balls(basis)
+            size = dot(gamma, gamma).sqrt()
+            return first, list(cross([g / size for g in gamma], first))
+        return carried(*_axis(self), time, ball(rate), gamma)
+
+
+@dataclass(frozen=True, slots=True)
+class _Lattice:
+    """All that does not depend on the time.
+
+    amplitude: σ√α.  steep: the factor of x'.  crossing: where x goes through 0 (cn, not dn).
+    shares: p, and the constant and the factors of x², x' and x in γ.
+    """
+
+    functions: Jacobi
+    rate: arb
+    origin: arb
+    amplitude: arb
+    steep: arb
+    crossing: bool
+    shares: tuple[arb, arb, arb, arb, arb]
+
+    def motion(self, time: Any) -> tuple[Any, Any]:
+        """(x, x')."""
+        sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
+        if self.crossing:
+            return self.amplitude * cn, self.steep * (sn * dn)
+        return self.amplitude * dn, self.steep * (sn * cn)
+
+
+def _height(case: BobylevSteklov) -> Fraction:
+    """h = n1 γ1 + ½ I3 Ω3²."""
+    return case.top.moment[0] * case.start.gamma[0] + case.top.inertia[2] * case.start.omega[2] ** 2 / 2
+
+
+@kept
+def _lattice(case: BobylevSteklov) -> _Lattice | None:
+    """None where nothing moves."""
+    if not any(heavy_top(case.system.parameters(case.top, case.start), case.start.flat)):
+        return None
+    i3, n1, (p, _, x), gamma = case.top.inertia[2], case.top.moment[0], case.start.omega, case.start.gamma
+    h, speed, square = _height(case), -n1 * gamma[1] / i3, x * x
+    b, c = h / i3 - p * p, (dot(gamma, gamma) * n1 * n1 - h * h) / i3**2
+    spread = 2 * ball(b * b + c).sqrt()
+    larger = spread + ball(2 * abs(b))
+    # of two quantities with a known product, the one that cancels comes from the other
+    alpha, beta = (larger, ball(-4 * c) / larger) if b >= 0 else (ball(4 * c) / larger, -larger)
+    near = spread + ball(abs(square - 2 * b))
+    far = ball(4 * speed * speed) / near
+    below, above = (near, far) if square >= 2 * b else (far, near)
+    crossing = c >= 0
+    if crossing:
+        functions = jacobi(alpha / (2 * spread) if c else arb(1), -beta / (2 * spread))
+        rate = (spread / 2).sqrt()
+        origin = legendre_f(above / alpha, ball(square) / alpha, below / (2 * spread))
+    else:
+        functions = jacobi(2 * spread / alpha, beta / alpha)
+        rate = alpha.sqrt() / 2
+        origin = legendre_f(above / (2 * spread), below / (2 * spread), ball(square) / alpha)
+    side = sign(x)
+    amplitude = side * alpha.sqrt()
+    steep = -amplitude * rate * (1 if crossing else functions.parameter)
+    shares = ball(p), ball(h / n1), ball(-i3 / (2 * n1)), ball(-i3 / n1), ball(i3 * p / n1)
+    return _Lattice(functions, rate, sign(-speed) * side * origin, amplitude, steep, crossing, shares)
+
+
+@kept
+def _axis(case: BobylevSteklov) -> tuple[PreparedMotion, Companions]:
+    """What does not depend on the time in the attitude."""
+    return prepared_axis(case.top, case.start, across(case.start.gamma))
+
+
+def bobylev_steklov_motion(
+    inertia: tuple[Fraction, Fraction], moment: Fraction, rate: Fraction, tilt: Fraction, azimuth: Fraction
+) -> BobylevSteklov:
+    """A top of weight 1 with a Bobylev-Steklov motion and a start on it with |γ| = 1, all rational.
+
+    inertia: (I2, I3); I1 = 2 I3.  moment: a ≠ 0.  rate: Ω1 = p ≠ 0.  tilt, azimuth: tangents of half the angles in
+    γ = (cos tilt cos azimuth, cos tilt sin azimuth, sin tilt).  Raises InputError for a or p = 0.
+    """
+    if moment == 0 or rate == 0:
+        raise InputError(f"a = {shown(moment)}, p = {shown(rate)}.", "Give a centre of mass and a rate that are not 0.")
+    i2, i3 = inertia
+    (across, up), (cosine, sine) = half_angle(tilt), half_angle(azimuth)
+    gamma: Vector = (across * cosine, across * sine, up)
+    top = HeavyTop((2 * i3, i2, i3), 1, (moment, 0, 0))
+    return BobylevSteklov(top, State((rate, 0, moment * up / (i3 * rate)), gamma))

@@ -1,0 +1,412 @@
+"""Dokshevich's motions of 1966: a periodic motion of every Hess top, with M·γ = 0 and M·r not 0.
+
+The top is Hess': P b = 0, I1 (I2 − I3) a² = I3 (I1 − I2) c², so that one circular section of M·I⁻¹M holds axis 2 and is
+across r.  In axes e1 along n = P r, e3 along ± axis 2, e2 = e3 × e1
+
+    I⁻¹ = β [[a, 1, 0], [1, b, 0], [0, 0, b]],   β > 0 by the choice of e3
+
+and with S = √(a² − ab + b² + 3), A = (b − 2a − S)/3, κ = (a + b + 2S)/3, p = (ab + 3bA + 2)/(b² + 4),
+σ = (2p − bA − 1)/b, K = σ − A − 1/b, C2 = A² + (a − b)A − 1 − κσ and any B > 0, in units of momentum √B and of time
+1/(β√B), x = M·e1 and so on, Γ = −|n| γ/(β B):
+
+    y = A x + 1/x,   z² = C2 x² + K − 1/x²,   Γ = (−κ (p x² + 1/b), κ (σ x² − 1), −κ x z),   |Γ| = κ/b
+    x' = −z x:   v = |x| swings between the roots of f(v) = C2 v⁴ + K v² − 1 = v'²
+    v = √s1 dn(√(−C2 s1) t | (s1 − s2)/s1), s1 > s2 the roots of C2 s² + K s − 1:   Ω, γ have the period 2K/√(−C2 s1)
+
+M is level, |M|² = (1 + A² + C2) x² + 2A + K, and turns about γ at the rate |Γ| x/|M|².
+Source: A. I. Dokshevich (1966) has the frame; the formulas are derived here: the residuals of all six equations vanish.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from flint import acb, arb, arb_series
+
+from heavytop.errors import InputError
+from heavytop.exact.closed_form import ClosedForm, kept, sign
+from heavytop.exact.flint.balls import Undecided, ball, current_length, exponent, midpoint, to_bits, whole_evaluation
+from heavytop.exact.separable.abel import Inversion, decide
+from heavytop.exact.separable.oscillation import Azimuth, Bearing, Gap, Roots, WithBearing
+from heavytop.exact.solution import HESS, IN_PLANE_13, MOMENTS_1_3, NOT_ACROSS_CENTRE, OFF_AXES_13, Condition, positive
+from heavytop.precision import exact, round_to, shown
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import Vector, dot, rational_root, vector
+
+_TERMS = 1 << 14
+_REMEDY = "`dokshevich_motion` builds a top with such a motion."
+_ROUNDED_BITS = 256
+_LEAST = 128
+
+
+@dataclass(frozen=True, slots=True)
+class _Constants:
+    """a, b and what follows from them: Fractions, or balls."""
+
+    a: Any
+    b: Any
+    root: Any
+
+    @property
+    def slope(self) -> Any:
+        """A."""
+        return (self.b - 2 * self.a - self.root) / 3
+
+    @property
+    def size(self) -> Any:
+        """κ."""
+        return (self.a + self.b + 2 * self.root) / 3
+
+    @property
+    def first(self) -> Any:
+        """p."""
+        return (self.a * self.b + 3 * self.b * self.slope + 2) / (self.b * self.b + 4)
+
+    @property
+    def second(self) -> Any:
+        """σ."""
+        return (2 * self.first - self.b * self.slope - 1) / self.b
+
+    @property
+    def lead(self) -> Any:
+        """C2."""
+        return self.slope * self.slope + (self.a - self.b) * self.slope - 1 - self.size * self.second
+
+    @property
+    def middle(self) -> Any:
+        """K."""
+        return self.second - self.slope - 1 / self.b
+
+    def square(self, v: Any) -> Any:
+        """z² at v, in units of B."""
+        return self.lead * v * v + self.middle - 1 / (v * v)
+
+
+class _Swing:
+    """The motion in x, in units of √B and 1/(β√B), at one working precision: v from its place and the sign of z there.
+
+    side: the sign of x.
+    """
+
+    def __init__(self, constants: _Constants, v: arb, z: arb, side: int) -> None:
+        self.constants, self.side = constants, side
+        lead, middle = constants.lead, constants.middle
+        spread = (middle * middle / 4 + lead).sqrt()
+        # the product of both squares is −1/C2: neither cancels
+        low, high = (1 / (middle / 2 + spread)).sqrt(), ((middle / 2 + spread) / -lead).sqrt()
+        if not (low.is_finite() and high.is_finite() and low < high):
+            raise Undecided
+        self.ends = [(acb(-low), 1), (acb(-high), 1)]
+        self.gap = Gap(low, high, Roots.of(-lead, self.ends), count=1, most=_TERMS)
+        self.origin = self.gap.integrals(self.gap.phase(v, -z * v * self.gap.density(v)))[0]
+
+    def phase(self, time: arb) -> tuple[arb, int]:
+        """θ and whole turns at a time in own units; raises Undecided where the working precision does not prove it."""
+        (phase,), (turns,) = Inversion((self.gap,), (1,)).phases([self.origin + time])
+        if not phase.is_finite():
+            raise Undecided
+        return phase, turns
+
+    def state(self, phase: Any) -> tuple[list[Any], list[Any]]:
+        """M and −Γ along e1, e2, e3."""
+        c = self.constants
+        v = self.gap.position(phase)
+        x, z = self.side * v, self.gap.reach * phase.sin() / (self.gap.density(v) * v)
+        momentum = [x, c.slope * x + 1 / x, z]
+        return momentum, [c.size * (c.first * v * v + 1 / c.b), c.size * (1 - c.second * v * v), c.size * x * z]
+
+    def azimuth(self) -> Azimuth:
+        """That of M about γ."""
+        c = self.constants
+        lead, rest = 1 + c.slope * c.slope + c.lead, 2 * c.slope + c.middle
+        roots, scale = list(self.ends), -c.lead
+        if not lead.is_zero():
+            far = acb(-rest / lead).sqrt()
+            if far.imag.contains(0) and far.real.contains(0):
+                raise Undecided
+            far = acb(0, far.imag) if rest / lead > 0 else acb(far.real)
+            roots, scale = [*roots, (far, 2), (-far, 2)], scale * lead * lead
+        gap = Gap(*self._stops(), Roots.of(scale, roots), count=2, most=_TERMS)
+        return Azimuth(gap, (arb(0), self.side * sign_of(lead * self.gap.middle**2 + rest) * c.size / c.b))
+
+    def _stops(self) -> tuple[arb, arb]:
+        return self.gap.middle - self.gap.reach, self.gap.middle + self.gap.reach
+
+
+def sign_of(value: arb) -> int:
+    """The sign of a ball; raises Undecided where it holds 0."""
+    if value.contains(0):
+        raise Undecided
+    return 1 if value > 0 else -1
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """e1, e2, e3 and the units, as balls: columns of the rotation, β√B, √B, and β B/|n|."""
+
+    axes: tuple[tuple[arb, arb, arb], ...]
+    rate: arb
+    momentum: arb
+    gamma: arb
+
+    def body(self, along: Sequence[Any]) -> list[Any]:
+        """Components along e1, e2, e3 in body axes."""
+        return [sum((a * e[i] for a, e in zip(along, self.axes, strict=True)), arb(0)) for i in range(3)]
+
+
+class _Moving(WithBearing):
+    """What the exact and the algebraic motions share."""
+
+    __slots__ = ()
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.Evaluated`."""
+        swing, frame = _swing(self), _frame(self)
+        phase: Any = swing.phase(frame.rate * ball(time))[0]
+        for _ in range(current_length() - 1):
+            moving: Any = arb_series([phase], prec=current_length()) if isinstance(phase, arb) else phase
+            density = swing.gap.density(swing.gap.position(moving))
+            phase = arb_series([moving[0]], prec=current_length()) + (frame.rate / density).integral()
+        momentum, up = swing.state(phase)
+        body, gamma = frame.body(momentum), frame.body(up)
+        moments = map(ball, _data(self)[0])
+        return [
+            *(m * frame.momentum / moment for m, moment in zip(body, moments, strict=True)),
+            *(g * frame.gamma for g in gamma),
+        ]
+
+    def bearing(self, time: Fraction) -> Bearing:
+        """M, level, and its azimuth."""
+        swing, frame = _swing(self), _frame(self)
+        phase, turns = swing.phase(frame.rate * ball(time))
+        momentum, up = swing.state(phase)
+        return Bearing.of(frame.body(up), frame.body(momentum), _azimuth(self).at(phase, turns))
+
+    def own_time(self, time: Fraction) -> Fraction:
+        """``time`` in units of about 1/(β√B)."""
+        return time * Fraction(2) ** (exponent(_data(self)[3]) // 2)
+
+
+Data = tuple[Vector, Fraction, _Constants, Fraction]
+"""(I1, I2, I3), n1²/|n|², the constants, and β² B: exact where S is rational, else the last two are not used."""
+
+
+def _numbers(top: HeavyTop) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
+    """(|n|², β, a, b, ε): e3 = ε times axis 2."""
+    (i1, i2, i3), (n1, _, n3) = top.inertia, top.moment
+    square = n1 * n1 + n3 * n3
+    skew = n1 * n3 * (1 / i1 - 1 / i3) / square
+    along = (n1 * n1 / i1 + n3 * n3 / i3) / square
+    return square, abs(skew), along / abs(skew), 1 / (i2 * abs(skew)), Fraction(sign(skew))
+
+
+def _root_square(top: HeavyTop, _start: State) -> tuple[Fraction]:
+    """S²."""
+    _, _, a, b, _ = _numbers(top)
+    return (a * a - a * b + b * b + 3,)
+
+
+def _has_root(values: Sequence[Fraction]) -> bool:
+    return rational_root(values[0]) is not None
+
+
+def _constants(top: HeavyTop) -> _Constants:
+    """Of a top with rational S."""
+    _, _, a, b, _ = _numbers(top)
+    return _Constants(a, b, rational_root(_root_square(top, State((0, 0, 0), (0, 0, 0)))[0]))
+
+
+def _components(top: HeavyTop, start: State) -> tuple[Fraction, Fraction, Fraction]:
+    """B, and M·n and M·e3 at the start."""
+    square, _, _, _, turned = _numbers(top)
+    momentum, n = top.angular_momentum(start.omega), top.moment
+    x, y, z = dot(momentum, n), turned * (momentum[0] * n[2] - momentum[2] * n[0]), turned * momentum[1]
+    return (x * y - _constants(top).slope * x * x) / square, x, z
+
+
+def _levels_off(top: HeavyTop, start: State) -> list[Fraction]:
+    """What z² and the three components of γ lack, in units of B."""
+    square, skew, _, b, turned = _numbers(top)
+    (unit, x, z), c, n, gamma = _components(top, start), _constants(top), top.moment, start.gamma
+    v2 = x * x / (square * unit)
+    return [
+        z * z / unit - (c.lead * v2 + c.middle - 1 / v2),
+        dot(gamma, n) / (skew * unit) - c.size * (c.first * v2 + 1 / b),
+        turned * (gamma[0] * n[2] - gamma[2] * n[0]) / (skew * unit) - c.size * (1 - c.second * v2),
+        turned * gamma[1] * square / skew - c.size * x * z,
+    ]
+
+
+def _exact(top: HeavyTop, start: State) -> tuple[Data, Fraction, Fraction, Fraction]:
+    """The data, and |n|², X = M·n and Z = M·e3 at the start."""
+    (square, skew, *_), (unit, x, z) = _numbers(top), _components(top, start)
+    return (top.inertia, top.moment[0] ** 2 / square, _constants(top), skew * skew * unit), square, x, z
+
+
+@dataclass(frozen=True, slots=True)
+class Dokshevich(_Moving, ClosedForm):
+    """A motion of Dokshevich with exact data; S is rational then.
+
+    Raises NotInClass unless top and start satisfy the equalities above exactly.
+    """
+
+    method = "closed form: Dokshevich, inversion of an elliptic integral"
+    body = (
+        IN_PLANE_13,
+        OFF_AXES_13,
+        MOMENTS_1_3,
+        HESS,
+        Condition("S^2 = a^2 - ab + b^2 + 3 the square of a rational number", "S^2", _root_square, _has_root),
+        Condition("C2 < 0", "-C2", lambda top, _: (-_constants(top).lead,), positive),
+    )
+    starts = (
+        NOT_ACROSS_CENTRE,
+        Condition("B = x y - A x^2 > 0", "B", lambda top, start: (_components(top, start)[0],), positive),
+        Condition("z^2 and gamma as they follow from x", "z^2, gamma along r, across r, gamma2", _levels_off),
+    )
+
+    def __post_init__(self) -> None:
+        ClosedForm.__post_init__(self)
+        _require_reach(self)
+
+
+def _all(motion: Dokshevich) -> tuple[Data, Fraction, Fraction, Fraction]:
+    """:func:`_exact`, once."""
+    if "exact" not in motion.made:
+        motion.made["exact"] = _exact(motion.top, motion.start)
+    found: tuple[Data, Fraction, Fraction, Fraction] = motion.made["exact"]
+    return found
+
+
+def _data(motion: Any) -> Data:
+    data: Data = motion.data if isinstance(motion, AlgebraicDokshevich) else _all(motion)[0]
+    return data
+
+
+@kept
+def _swing(motion: Any) -> _Swing:
+    if isinstance(motion, AlgebraicDokshevich):
+        return motion.swing()
+    (_, _, c, scale), square, x, z = _all(motion)
+    _, skew, *_ = _numbers(motion.top)
+    unit = scale / skew**2
+    balls = _Constants(ball(c.a), ball(c.b), ball(c.root))
+    return _Swing(balls, ball(x * x / (square * unit)).sqrt(), ball(z) / ball(unit).sqrt(), sign(x))
+
+
+@kept
+def _frame(motion: Any) -> _Frame:
+    if isinstance(motion, AlgebraicDokshevich):
+        return motion.frame()
+    square, skew, _, _, turned = _numbers(motion.top)
+    size, n = ball(square).sqrt(), [ball(part) for part in motion.top.moment]
+    unit = ball(_data(motion)[3] / skew**2)
+    zero, up = arb(0), ball(turned)
+    axes = ((n[0] / size, zero, n[2] / size), (up * n[2] / size, zero, -up * n[0] / size), (zero, up, zero))
+    return _Frame(axes, ball(skew) * unit.sqrt(), unit.sqrt(), ball(skew) * unit / size)
+
+
+@kept
+def _azimuth(motion: Any) -> Azimuth:
+    return _swing(motion).azimuth()
+
+
+@whole_evaluation
+def _require_reach(motion: Any) -> None:
+    """Raises LevelNotDone where x all but rests, and where the Fourier series of the integral is too long."""
+    decide(lambda: _swing(motion), "The range of M·r is a point", _LEAST)
+
+
+@dataclass(frozen=True, slots=True)
+class AlgebraicDokshevich(_Moving):
+    """A motion of Dokshevich of a top with given moments: n and the start are algebraic numbers, B = 1, |γ| = 1.
+
+    inertia: I1, I2, I3, I2 between the others.  place: where M·r/|r| stands at t = 0 in its range, from 0 to 1; a
+    negative number for the range of negative M·r.  Raises InputError for moments that no such body has.
+    """
+
+    inertia: Vector
+    place: Fraction
+    method: str = "algebraic: Dokshevich's motion, inversion of an elliptic integral"
+    system: System = HEAVY_TOP
+    made: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        i1, i2, i3 = self.inertia
+        if min(self.inertia) <= 0 or not (i1 - i2) * (i2 - i3) > 0:
+            raise InputError(
+                f"No Hess top has the moments {', '.join(map(shown, self.inertia))}.",
+                "Give positive moments, the second between the others.",
+            )
+        if not 0 < abs(self.place) < 1:
+            raise InputError(f"place = {shown(self.place)}.", "Give a number between 0 and 1, or its negative.")
+
+    @property
+    def data(self) -> Data:
+        """See :data:`Data`; β² alone in place of β² B."""
+        i1, i2, i3 = self.inertia
+        first = i3 * (i1 - i2) / (i3 * (i1 - i2) + i1 * (i2 - i3))
+        return self.inertia, first, _Constants(0, 0, 0), first * (1 - first) * (1 / i1 - 1 / i3) ** 2
+
+    def frame(self) -> _Frame:
+        """At the working precision."""
+        (i1, _, i3), first, _, square = self.data
+        skew, cosine, sine = ball(square).sqrt(), ball(first).sqrt(), ball(1 - first).sqrt()
+        zero, up = arb(0), ball(Fraction(sign(1 / i1 - 1 / i3)))
+        axes = ((cosine, zero, sine), (up * sine, zero, -up * cosine), (zero, up, zero))
+        c = self._constants()
+        return _Frame(axes, skew, arb(1), c.b / c.size)
+
+    def _constants(self) -> _Constants:
+        (i1, i2, i3), first, _, square = self.data
+        skew = ball(square).sqrt()
+        a, b = ball(first / i1 + (1 - first) / i3) / skew, ball(1 / i2) / skew
+        return _Constants(a, b, (a * a - a * b + b * b + 3).sqrt())
+
+    def swing(self) -> _Swing:
+        """At the working precision."""
+        c = self._constants()
+        half = c.middle / 2 + (c.middle * c.middle / 4 + c.lead).sqrt()
+        low, high = (1 / half).sqrt(), (half / -c.lead).sqrt()
+        v = low + (high - low) * ball(abs(self.place))
+        return _Swing(c, v, c.square(v).sqrt(), sign(self.place))
+
+    def moment(self, bits: int) -> list[arb]:
+        """P r = |n| e1 with |n| = β κ/b, with at least so many bits."""
+
+        def evaluate(_working: int) -> list[arb]:
+            frame, c = _frame(self), self._constants()
+            return [part * frame.rate * c.size / c.b for part in frame.axes[0]]
+
+        return to_bits(evaluate, bits)
+
+    def start(self, bits: int) -> list[arb]:
+        """The state at t = 0."""
+        return self.state(Fraction(0), bits)
+
+    def rounded(self, bits: int = _ROUNDED_BITS) -> tuple[HeavyTop, State]:
+        """A top of weight 1 and a start, exact, within 2^(3 − bits) of this one's, relative to sizes above 1; |γ| = 1.
+
+        Their own motion is that of any top, as :mod:`heavytop.exact.cases.algebraic_starts` says.
+        """
+        values = [round_to(midpoint(x), bits) for x in self.start(bits + 8)]
+        centre = [round_to(midpoint(x), bits) for x in self.moment(bits + 8)]
+        return HeavyTop(self.inertia, 1, centre), State(values[:3], values[3:]).normalized(bits)
+
+
+def dokshevich_motion(inertia: Iterable[Any], place: Any = Fraction(1, 2)) -> AlgebraicDokshevich:
+    """Dokshevich's motion of the Hess top with these moments, I2 between I1 and I3.
+
+    place: where M·r/|r| stands at t = 0, see :class:`AlgebraicDokshevich`.  Both are read by
+    :func:`heavytop.precision.exact`.
+    Raises InputError where there is no such top, and for a place out of range.
+    """
+    try:
+        where = exact(place)
+    except InputError as error:
+        raise InputError(f"place: {error.cause}", error.remedy) from None
+    return AlgebraicDokshevich(vector(inertia, "inertia"), where)

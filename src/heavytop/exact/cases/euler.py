@@ -1,0 +1,180 @@
+"""Euler-Poinsot: no moment of the weight, P r = 0, from every start.
+
+Write L² = |M|², 2E = Ω·M, both constant, and e_i = (L² I_i + 2E I_j I_k)/(I1 I2 I3).  Sort the axes so that
+e_a ≥ e_b ≥ e_c; then c is the axis of the middle moment, a the axis that M circles, and with p² = e_a − e_c,
+m = (e_b − e_c)/p², u = p t + u0
+
+    Ω_a = A_a dn(u|m),   Ω_b = A_b cn(u|m),   Ω_c = A_c sn(u|m)
+    A_a² = (L² − 2E I_b)/(I_a (I_a − I_b)),
+    A_b² = (L² − 2E I_a)/(I_b (I_b − I_a)),   A_c² = (L² − 2E I_a)/(I_c (I_c − I_a))
+
+with A_a A_b A_c of the sign that the equation for Ω_c asks for.  m = 0 is the symmetric top, m = 1 the separatrix.
+
+Attitude (Jacobi): the projection of e_b across M, which never vanishes, turns about M in space through ψ,
+
+    ψ' = L (2E − I_b Ω_b²)/(L² − I_b² Ω_b²),   e^{iψ} = e^{iμt} θ1(u + iy)/|θ1(u + iy)| up to a constant,
+    cn(iy) = L/(I_b |A_b|), that is |y| = F(φ|1 − m) with cos²φ = I_b² A_b²/L²; y has the sign of I_a − I_c
+
+and μ from ψ' at u = 0.  Every vector fixed in space, γ among them, keeps its components on M, on that projection
+turned back by ψ, and across both.  Where Ω × M = 0 the rotation is steady and space turns about Ω at the rate |Ω|.
+
+Sources: Whittaker, Analytical Dynamics, chapter VI; Landau and Lifshitz, Mechanics, §37; DLMF 22.19.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from flint import acb, arb
+
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, kept, rotate, sign, unit
+from heavytop.exact.elliptic.jacobi import Jacobi, Wave, jacobi, legendre_f, wave
+from heavytop.exact.elliptic.weierstrass import imag, real
+from heavytop.exact.flint.balls import ball
+from heavytop.exact.solution import NO_TORQUE
+from heavytop.top.vectors import cross, dot
+
+_EVEN = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Euler(WithAttitude):
+    """Every motion of a top without moment of the weight.  Raises NotInClass unless P r = 0 exactly."""
+
+    method = "closed form: Euler-Poinsot, Jacobi functions"
+    body = (NO_TORQUE,)
+
+    @property
+    def steady(self) -> bool:
+        """Ω × M = 0: Ω stays what it is."""
+        omega = self.start.omega
+        return not any(cross(omega, self.top.angular_momentum(omega)))
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        lattice = _lattice(self)
+        if lattice is None:
+            return WithAttitude.evaluate(self, time)
+        omega, place = lattice.motion(instant(time))
+        return [*omega, *place(lattice.gamma)]
+
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        lattice = _lattice(self)
+        if lattice is not None:
+            omega, place = lattice.motion(time)
+            return omega, lambda vector: place(lattice.held(vector))
+        return balls(self.start.omega), lambda vector: rotate(vector, self.start.omega, time)
+
+
+@dataclass(frozen=True, slots=True)
+class _Lattice:
+    """All that does not depend on the time, at one working precision.
+
+    axes: (a, b, c).  shares: I/L.  amplitudes: A by axis.  rate: p.  origin: u0.  wave: the theta quotient of e^{iψ}.
+    drift: μ, per unit of time.  frame: M/L, the projection of e_b across it and their cross product at t = 0.
+    turn: the length of that projection over the wave at t = 0.  gamma: what :meth:`held` says of γ.
+    """
+
+    axes: tuple[int, int, int]
+    shares: list[arb]
+    amplitudes: dict[int, arb]
+    functions: Jacobi
+    rate: arb
+    origin: arb
+    wave: Wave
+    drift: arb
+    frame: tuple[Sequence[Any], ...]
+    turn: acb
+    gamma: tuple[arb, acb]
+
+    def motion(self, time: Any) -> tuple[list[Any], Callable[[tuple[arb, acb]], list[Any]]]:
+        """Ω, and what takes :meth:`held` of a vector to its components."""
+        a, b, c = self.axes
+        u = self.rate * time + self.origin
+        sn, cn, dn = self.functions.functions(u)
+        by_axis = {a: self.amplitudes[a] * dn, b: self.amplitudes[b] * cn, c: self.amplitudes[c] * sn}
+        omega = [by_axis[axis] for axis in range(3)]
+        value, angle = self.wave.at(u)
+        turning = value * unit(self.drift * time + angle)
+        i, j = (b + 1) % 3, (b + 2) % 3
+        along = [share * w for share, w in zip(self.shares, omega, strict=True)]
+        square = along[i] * along[i] + along[j] * along[j]
+
+        def place(held: tuple[arb, acb]) -> list[Any]:
+            part, across = held
+            turned = across * turning
+            x, y = real(turned), imag(turned) / square
+            rest = part - x * along[b] / square
+            result = [x + part * along[b]] * 3
+            result[i], result[j] = along[i] * rest - along[j] * y, along[j] * rest + along[i] * y
+            return result
+
+        return omega, place
+
+    def held(self, vector: Sequence[Any]) -> tuple[arb, acb]:
+        """What stays of a vector fixed in space: its part along M, and the one across as a factor of the wave."""
+        along, projection, across = (dot(vector, axis) for axis in self.frame)
+        return along, acb(projection, -across) * self.turn
+
+
+@kept
+def _lattice(case: Euler) -> _Lattice | None:
+    """None for a steady rotation."""
+    if case.steady:
+        return None
+    inertia, omega = case.top.inertia, case.start.omega
+    momentum = case.top.angular_momentum(omega)
+    square, energy = dot(momentum, momentum), dot(omega, momentum)
+    roots = [(square * i + energy * j * k) / (i * j * k) for i, j, k in (_rotate(inertia, axis) for axis in range(3))]
+    a, b, c = axes = tuple(sorted(range(3), key=lambda axis: -roots[axis]))
+    ia, ib, ic = (inertia[axis] for axis in axes)
+    rate2 = roots[a] - roots[c]
+    functions = jacobi(ball((roots[b] - roots[c]) / rate2), ball((roots[a] - roots[b]) / rate2))
+    aa = (square - energy * ib) / (ia * (ia - ib))
+    ab = (square - energy * ia) / (ib * (ib - ia))
+    ac = (square - energy * ia) / (ic * (ic - ia))
+    sign_a, sign_b = sign(omega[a]), sign(omega[b])
+    sign_c = sign_a * sign_b * sign(ia - ib) * (1 if (c, a, b) in _EVEN else -1)
+    ratios = (omega[c] ** 2 / ac, omega[b] ** 2 / ab, omega[a] ** 2 / aa)
+    origin = sign(omega[c]) * sign_c * legendre_f(*balls(ratios))
+    sine2 = ia * ia * aa / square
+    complement = (roots[a] - roots[b]) / rate2
+    # y is measured in u: the pole of ψ' nearest to the real line
+    pole = sign(ia - ic) * legendre_f(*balls((sine2, ib * ib * ab / square, 1 - complement * sine2)))
+    waved = wave(functions, pole)
+    length, rate = ball(square).sqrt(), ball(rate2).sqrt()
+    drift = length * ball((energy - ib * ab) / (square - ib * ib * ab)) - rate * waved.rate()
+    frame = _frame(balls(momentum), length, b)
+    value, angle = waved.at(origin)
+    made = _Lattice(
+        axes=(a, b, c),
+        shares=[i / length for i in balls(inertia)],
+        amplitudes={a: sign_a * ball(aa).sqrt(), b: sign_b * ball(ab).sqrt(), c: sign_c * ball(ac).sqrt()},
+        functions=functions,
+        rate=rate,
+        origin=origin,
+        wave=waved,
+        drift=drift,
+        frame=frame,
+        turn=frame[1][b] / (value * unit(angle)),
+        gamma=(arb(0), acb(0)),
+    )
+    return replace(made, gamma=made.held(balls(case.start.gamma)))
+
+
+def _rotate(values: Sequence[Fraction], axis: int) -> tuple[Fraction, Fraction, Fraction]:
+    return values[axis], values[(axis + 1) % 3], values[(axis + 2) % 3]
+
+
+def _frame(momentum: Sequence[Any], length: arb, axis: int) -> tuple[Sequence[Any], ...]:
+    """M/L, the unit vector along the projection of the axis across M, and their cross product."""
+    along = [component / length for component in momentum]
+    first, second = along[(axis + 1) % 3], along[(axis + 2) % 3]
+    across = (first * first + second * second).sqrt()
+    projection = [-along[axis] * component / across for component in along]
+    projection[axis] = across
+    return along, projection, cross(along, projection)

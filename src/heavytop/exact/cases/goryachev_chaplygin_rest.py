@@ -1,0 +1,368 @@
+"""Goryachev's motions, which pass through rest: I1 = I2 = 4 I3, c = 0, M·γ = 0 and G = 0, by Jacobi functions.
+
+In the notation of :mod:`heavytop.exact.cases.goryachev_chaplygin`, with G = 0, |h| < a and κ² = a² − h²,
+
+    f(u) = u² (a + h − u²/2)(a − h + u²/2):   both variables leave the double root 0 at one time, the body at rest
+
+In the time τ, dτ = dt/(u1 − u2), each moves by itself and log u grows by ± κτ there.  With p_k = tan(φ_k/2) of
+
+    u1 = (2κ/√a) p1/w1,   u2 = −(2κ/√a) p2/w2,   w_k² = 1 + p_k⁴ − 2 (h/a) p_k² = (p_k² − h/a)² + κ²/a²
+
+p_k ∝ e^(κτ), so that p1/p2 is constant, and t = ∫ (u1 − u2) dτ = (F(φ1|m) + F(φ2|m))/√a, m = (a + h)/(2a).  Euler's
+addition theorem solves these two equations: with γ = (·, γ2, γ3) at rest in the turned frame, e² = γ2² + γ3² = (κ/c)²
+and s, k, δ = sn, cn, dn of √a t/2, t from the rest,
+
+    p1 = (e − γ2) sδ/(B + A),   p2 = (e + γ2) sδ/(B + A),   A = k √(γ2² + γ3²δ²),   B = √(e²k² + (1 − m) γ3²s²)
+
+B² − A² = γ3²s²δ².  Where k < 0, 1/p1 and 1/p2 are the numbers (e + γ2) sδ/(B − A), (e − γ2) sδ/(B − A): with these the
+same formulas hold but for the sign of Ω1, γ2 and γ3.  With x = sδ/(B ± A), V = (w1w2)^(3/2) and o = (e − γ2)/w1 +
+(e + γ2)/w2
+
+    p = −κ² γ3 x (p2² − p1²)/(a^(3/2) V)      q = κ γ3 x (a (1 + p1²p2²) − h (p1² + p2²))/(a^(3/2) V)     r = u1 + u2
+    γ1 = (2h − u1² − u1u2 − u2²)/(2c)         γ2 = −κ ((e − γ2)(1 − p1⁴)/w1³ − (e + γ2)(1 − p2⁴)/w2³)/(c o)
+    γ3 = 2 κ γ3 (1 − p1²p2²)/(c V o)
+
+The body comes to rest again at √a t = 4 K(m) and goes back the way that it came.  A start that is not at rest is some
+time after the rest: two elliptic integrals, from u1 and u2.
+
+*Attitude.*  M is level, and its azimuth Λ about γ has Λ' = |γ| n·M/|M|².  With y = x²
+
+    dΛ/dy = −4 e γ2 γ3/(√(w1w2) ((e − γ2) w2 + (e + γ2) w1))
+
+which is integrated as it stands, from the rest on, by FLINT's validated quadrature; γ3² y runs from 0 to 1 and back.
+
+*h = a.*  Then rest is reached at the upright equilibrium only, in infinite time, and all of it is elementary:
+u1 = 2√a sech v1, u2 = −2√a sech v2, with s_k = sech v_k, v1 + v2 = √a t + const and a constant
+
+    Δ = sinh v1 − sinh v2 = 2 cosh ½(v1 + v2) sinh ½(v1 − v2)
+    p = −σ√a (s1s2)^(3/2) Δ      q = −σ√a (s1s2)^(3/2) (1 + sinh v1 sinh v2)      r = 2√a (s1 − s2)
+    cγ1 = a − 2a (s1² − s1s2 + s2²)      cγ2 = 2a (s1³ sinh v1 − s2³ sinh v2)/(s1 + s2)
+    cγ3 = 2aσ (s1s2)^(3/2) (sinh v1 + sinh v2)/(s1 + s2)
+
+Source: D. N. Goryachev, Mat. sbornik 21 (1900) 431; derived here from the separated variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import count
+from typing import Any, TypeVar
+
+from flint import acb, arb
+
+from heavytop.errors import OutOfReach
+from heavytop.exact.cases.goryachev_chaplygin import Level, separated_start, size_of
+from heavytop.exact.cases.one_interval import in_units
+from heavytop.exact.closed_form import ClosedForm, constant, instant, kept
+from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
+from heavytop.exact.flint.balls import Undecided, ball, series_length
+from heavytop.exact.separable.oscillation import Bearing, WithBearing
+from heavytop.exact.solution import GAMMA, LEVEL_MOMENTUM, Condition, plane_top
+from heavytop.top.heavy_top import HeavyTop, State
+
+_MOST_VALUES = 1 << 14
+
+
+def _room_of(top: HeavyTop, start: State) -> tuple[Fraction]:
+    return (_room(Level.of(top, start)),)
+
+
+def _not_negative(values: Sequence[Fraction]) -> bool:
+    return values[0] >= 0
+
+
+def _off_axis(_top: HeavyTop, start: State) -> Sequence[Fraction]:
+    """Ω1, Ω2, and γ3 at rest."""
+    return (*start.omega[:2], Fraction(0) if start.omega[2] else start.gamma[2])
+
+
+@dataclass(frozen=True, slots=True)
+class GoryachevChaplyginRest(WithBearing, ClosedForm):
+    """A motion of the Goryachev-Chaplygin top, the small moment on axis 3, that starts at rest, comes to it or tends
+    to it.
+
+    Raises NotInClass unless I1 = I2 = 4 I3, P c = 0, P r ≠ 0, M·γ = 0, G = 0 and h² ≤ a², all exactly, and for
+    rotations about axis 3 and equilibria.
+    """
+
+    method = "closed form: Goryachev, through rest, Jacobi functions"
+    body = plane_top(4)
+    starts = (
+        GAMMA,
+        LEVEL_MOMENTUM,
+        Condition("G = 0", "G", lambda top, start: (Level.of(top, start).third,)),
+        Condition("h^2 <= |P r|^2 |gamma|^2", "the right side less the left", _room_of, _not_negative),
+        Condition("M or the torque off axis 3", "one of these", _off_axis, any),
+    )
+
+    def own_time(self, time: Fraction) -> Fraction:
+        """In the level's unit."""
+        return Level.of(self.top, self.start).rate * time
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        motion = _motion(self)
+        level = motion.level
+        found = motion.state(instant(level.rate * time))
+        return in_units([*level.in_body(found[:3]), *level.in_body(found[3:])], level.rate, level.size)
+
+    def bearing(self, time: Fraction) -> Bearing:
+        """See :class:`heavytop.exact.separable.oscillation.WithBearing`: M, along γ × n at rest; not for h = a."""
+        motion = _motion(self)
+        if isinstance(motion, UprightMotion):
+            raise OutOfReach("The azimuth of M is not known for h = a.", "Integrate the attitude along with it.")
+        with series_length(1):
+            place = motion.at(ball(motion.level.rate * time))
+            gamma, momentum = (motion.level.in_body(v) for v in (place.state()[3:], place.momentum()))
+        return Bearing.of(gamma, momentum, place.azimuth())
+
+
+@kept
+def _motion(case: GoryachevChaplyginRest) -> RestMotion | UprightMotion:
+    level = Level.of(case.top, case.start)
+    return RestMotion.of(level) if _room(level) else UprightMotion.of(level)
+
+
+def _room(level: Level) -> Fraction:
+    """κ² = a² − h²."""
+    return level.moment_square * level.gamma_square - level.energy**2
+
+
+def _speeds(level: Level) -> list[tuple[arb, arb]]:
+    """(|u_k|, y_k) at the start."""
+    (_, w2, _, _, g2, g3), c = level.turned(), ball(level.moment_square).sqrt()
+    return [(abs(u), c * (2 * w2 * g3 - g2 * u)) for u in separated_start(level)]
+
+
+def _the_one(level: Level, possible: Sequence[Signed]) -> Signed:
+    """The motion, of two that differ in σ, that starts as the level says; raises Undecided where balls do not tell."""
+    with series_length(1):
+        turned = level.turned()
+        found = [
+            motion
+            for motion in possible
+            if all(one.overlaps(other) for one, other in zip(motion.state(arb(0)), turned, strict=True))
+        ]
+    if len(found) != 1:
+        raise Undecided
+    return found[0]
+
+
+@dataclass(frozen=True, slots=True)
+class RestMotion:
+    """A level at one working precision.
+
+    energy, size, moment: h, a and c.  speed: κ.  tilt, across, upright: e, γ2 and γ3 at rest.  shares: e − γ2, e + γ2.
+    functions: of parameter m.  origin: √a t/2 at the start.
+    """
+
+    level: Level
+    energy: arb
+    size: arb
+    moment: arb
+    speed: arb
+    tilt: arb
+    across: arb
+    upright: arb
+    shares: tuple[arb, arb]
+    functions: Jacobi
+    origin: arb
+
+    @classmethod
+    def of(cls, level: Level) -> RestMotion:
+        """At the working precision; raises Undecided where it does not suffice."""
+        a, c, h = size_of(level), ball(level.moment_square).sqrt(), ball(level.energy)
+        room = ball(_room(level))
+        speed = room.sqrt()
+        # a − h or a + h, whichever cancels, from their product
+        above, below = (a + h, room / (a + h)) if level.energy > 0 else (room / (a - h), a - h)
+        functions = jacobi(above / (2 * a), below / (2 * a))
+        tilt, turned = speed / c, level.turned()
+        at_rest = cls(level, h, a, c, speed, tilt, turned[4], turned[5], (tilt, tilt), functions, arb(0))
+        if not any(level.omega):
+            return at_rest._with_shares(*_parted(tilt, turned[4], turned[5]))
+        tangents, origin = at_rest._passed(above, below)
+        shares = [2 * tilt * p / (tangents[0] + tangents[1]) for p in tangents]
+        upright = (shares[0] * shares[1]).sqrt()
+        moving = replace(at_rest, across=(shares[1] - shares[0]) / 2, origin=origin)._with_shares(*shares)
+        return _the_one(level, [replace(moving, upright=sign * upright) for sign in (1, -1)])
+
+    def _with_shares(self, first: arb, second: arb) -> RestMotion:
+        return replace(self, shares=(first, second))
+
+    def _passed(self, above: arb, below: arb) -> tuple[list[arb], arb]:
+        """p1 and p2 at the start, and √a t/2 since the rest; above, below: a + h and a − h."""
+        tangents, origin = [], arb(0)
+        for u, slope in _speeds(self.level):
+            # (a − h + u²/2)(a + h), sin²φ and cos φ
+            scale = (below + u * u / 2) * above
+            square = self.size * u * u / scale
+            cosine = slope * self.speed / (u * scale)
+            delta = (below * above / scale).sqrt()
+            if cosine > 0:
+                less, more = square / (1 + cosine), 1 + cosine
+                both = delta + cosine
+            else:
+                less = 1 - cosine
+                more = square / less
+                both = below / (2 * self.size) * square / (delta - cosine)
+            tangents.append((less / more).sqrt())
+            # half of F(φ|m) has sn² = (1 − cos φ)/(1 + Δ), Δ² = 1 − m sin²φ
+            origin += legendre_f(less / (1 + delta), both / (1 + delta), both / more)
+        return tangents, origin
+
+    def state(self, time: Any) -> list[Any]:
+        """The six components in the turned frame at a number or series."""
+        return self.at(time).state()
+
+    def at(self, time: Any) -> Place:
+        """The place at a number or series."""
+        root = self.size.sqrt()
+        s, k, delta = self.functions.functions(time * (root / 2) + self.origin)
+        g2, g3 = self.across * self.across, self.upright * self.upright
+        far = (self.tilt * self.tilt * k * k + self.functions.complement * g3 * s * s).sqrt()
+        near = (g2 + g3 * delta * delta).sqrt() * k
+        side = -1 if constant(k) < 0 else 1
+        return Place(self, s * delta / (far + side * near), side, root)
+
+    def swept(self, end: arb) -> arb:
+        """The integral of dΛ/dy from 0 to ``end``; raises OutOfReach where the quadrature takes too long."""
+        (one, two), cosine, sine = self.shares, self.energy / self.size, self.speed / self.size
+
+        def width(square: acb, analytic: bool) -> acb:
+            return ((square - cosine) ** 2 + sine * sine).sqrt(analytic=analytic)
+
+        taken = count()
+
+        def slope(y: acb, analytic: bool) -> acb:
+            if next(taken) > _MOST_VALUES:
+                return acb("nan")
+            w1, w2 = width(y * one * one, analytic), width(y * two * two, analytic)
+            return 1 / (w1.sqrt(analytic=analytic) * w2.sqrt(analytic=analytic) * (one * w2 + two * w1))
+
+        middle = acb(end.mid())
+        # FLINT integrates to exact ends; the rest by the mean value theorem
+        total = (acb(end) - middle) * slope(acb(end), False) + acb.integral(slope, acb(0), middle)
+        if next(taken) > _MOST_VALUES:
+            raise OutOfReach(
+                f"The azimuth of M takes more than {_MOST_VALUES} values of its integrand: gamma at rest is all but "
+                "in line with the centre of mass, or all but level beside it.",
+                "Integrate the attitude along with it.",
+            )
+        return -4 * self.tilt * self.across * self.upright * total.real
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """One place of a motion, a number or series.
+
+    lift: x.  side: −1 where 1/p1 and 1/p2 are in the place of p1 and p2.
+    """
+
+    motion: RestMotion
+    lift: Any
+    side: int
+    root: arb
+
+    def _tangents(self) -> tuple[list[Any], list[Any], list[arb]]:
+        """p_k, w_k and e ∓ γ2."""
+        shares = list(self.motion.shares[:: self.side])
+        tangents = [share * self.lift for share in shares]
+        return tangents, [self._width(p * p) for p in tangents], shares
+
+    def _width(self, square: Any) -> Any:
+        off, sine = square - self.motion.energy / self.motion.size, self.motion.speed / self.motion.size
+        return (off * off + sine * sine).sqrt()
+
+    def state(self) -> list[Any]:
+        """The six components in the turned frame."""
+        motion, side = self.motion, self.side
+        (p1, p2), (w1, w2), shares = self._tangents()
+        lead = 2 * motion.speed / self.root
+        u1, u2 = p1 * (lead / w1), p2 * (-lead / w2)
+        o1, o2 = shares[0] / w1, shares[1] / w2
+        product = w1 * w2
+        across = motion.speed / (motion.moment * (o1 + o2))
+        squares = u1 * u1 + u1 * u2 + u2 * u2
+        gamma = [
+            (2 * motion.energy - squares) / (2 * motion.moment),
+            -side * across * (o1 * (1 - p1**4) / (w1 * w1) - o2 * (1 - p2**4) / (w2 * w2)),
+            2 * side * motion.upright * across * (1 - p1 * p1 * p2 * p2) / (product * product.sqrt()),
+        ]
+        return [*(self.lift * m / i for m, i in zip(self.momentum(), (4, 4, 1), strict=True)), *gamma]
+
+    def momentum(self) -> list[Any]:
+        """M/x, not 0, in the turned frame."""
+        motion = self.motion
+        (p1, p2), (w1, w2), shares = self._tangents()
+        product, speed = w1 * w2, motion.speed
+        one, two = p1 * p1, p2 * p2
+        share = 4 * speed * motion.upright / (motion.size * self.root * product * product.sqrt())
+        return [
+            -self.side * speed * share * (two - one),
+            share * (motion.size * (1 + one * two) - motion.energy * (one + two)),
+            (shares[0] / w1 - shares[1] / w2) * (2 * speed / self.root),
+        ]
+
+    def azimuth(self) -> arb:
+        """Λ."""
+        motion = self.motion
+        here = motion.swept(self.lift * self.lift)
+        return here if self.side > 0 else 2 * motion.swept(1 / (motion.upright * motion.upright)) - here
+
+
+@dataclass(frozen=True, slots=True)
+class UprightMotion:
+    """A level with h = a at one working precision.
+
+    size, moment: a and c.  sum, difference: v1 + v2 at the start, and Δ.  sign: σ.
+    """
+
+    level: Level
+    size: arb
+    moment: arb
+    sum: arb
+    difference: arb
+    sign: int
+
+    @classmethod
+    def of(cls, level: Level) -> UprightMotion:
+        """At the working precision; raises Undecided where it does not suffice."""
+        # sinh v = −2y/|u|³
+        one, two = (-2 * y / u**3 for u, y in _speeds(level))
+        c, total = ball(level.moment_square).sqrt(), one.asinh() + two.asinh()
+        return _the_one(level, [cls(level, size_of(level), c, total, one - two, sign) for sign in (1, -1)])
+
+    def state(self, time: Any) -> list[Any]:
+        """The six components in the turned frame at a number or series."""
+        a, root = self.size, self.size.sqrt()
+        half = (time * root + self.sum) / 2
+        up, down = half.exp(), (-half).exp()
+        # sinh and cosh of (v1 − v2)/2
+        sine = self.difference / (up + down)
+        cosine = (sine * sine + 1).sqrt()
+        sinh, cosh = (up - down) / 2, (up + down) / 2
+        one, two = sinh * cosine + cosh * sine, sinh * cosine - cosh * sine
+        s1, s2 = (1 / (x * x + 1).sqrt() for x in (one, two))
+        product = s1 * s2
+        power, across = self.sign * product * product.sqrt(), 2 * a / (self.moment * (s1 + s2))
+        return [
+            -root * power * self.difference,
+            -root * power * (1 + one * two),
+            2 * root * (s1 - s2),
+            (a - 2 * a * (s1 * s1 - product + s2 * s2)) / self.moment,
+            across * (s1**3 * one - s2**3 * two),
+            across * power * (one + two),
+        ]
+
+
+Signed = TypeVar("Signed", RestMotion, UprightMotion)
+
+
+def _parted(tilt: arb, across: arb, upright: arb) -> tuple[arb, arb]:
+    """(e − γ2, e + γ2) of e² = γ2² + γ3², without cancellation."""
+    larger = tilt + abs(across)
+    smaller = upright * upright / larger
+    return (larger, smaller) if across < 0 else (smaller, larger)

@@ -1,0 +1,119 @@
+"""Grioli's regular precession of an asymmetric top, about an axis that is not vertical.
+
+The top: b = 0, (I2 − I3) a² = (I1 − I2) c², I1 ≠ I3: r stands across a circular section of the gyration ellipsoid.
+With n = P r, r̂ = n/|n|, D = I1 − I2 + I3, κ = n1 n3 (I1 − I3)/|n|², the body spins about r̂ and precesses about a
+unit vector u ⟂ r̂ fixed in space, both at the rate ν:
+
+    Ω = ν (r̂ + u),   u' = ν w,   w = u × r̂,   u(t) = u cos νt + w sin νt
+    γ = (ν²/|n|) ( D u − κ (u·e2) w + κ (u·(r̂ × e2)) r̂ )
+
+γ is at rest in space, since u, w cos νt + r̂ sin νt and r̂ cos νt − w sin νt are; (1.1) then fixes ν² and the phase.
+All of it is rational in the start, so that membership is an exact test.
+Source: G. Grioli, Ann. Mat. Pura Appl. 26 (1947) 271; Borisov and Mamaev, Rigid Body Dynamics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, half_angle
+from heavytop.exact.flint.balls import ball
+from heavytop.exact.solution import IN_PLANE_13, MOMENTS_1_3, TORQUE, Condition
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import Vector, cross, dot
+
+
+def _section(top: HeavyTop, _start: State) -> tuple[Fraction]:
+    (i1, i2, i3), n = top.inertia, top.moment
+    return ((i2 - i3) * n[0] ** 2 - (i1 - i2) * n[2] ** 2,)
+
+
+def _rates(top: HeavyTop, start: State) -> tuple[Fraction]:
+    omega, n = start.omega, top.moment
+    return (Fraction(dot(omega, omega) * dot(n, n) - 2 * dot(omega, n) ** 2),)
+
+
+def _gamma_off(top: HeavyTop, start: State) -> list[Fraction]:
+    return [g - wanted for g, wanted in zip(start.gamma, _gamma(top, start.omega), strict=True)]
+
+
+@dataclass(frozen=True, slots=True)
+class Grioli(WithAttitude):
+    """Every Grioli precession of a top with b = 0.  Raises NotInClass where the top, Ω or γ is not one's exactly."""
+
+    method = "closed form: Grioli regular precession"
+    body = (
+        IN_PLANE_13,
+        TORQUE,
+        MOMENTS_1_3,
+        Condition("(I2 - I3) a^2 = (I1 - I2) c^2", "P^2 times the difference", _section),
+    )
+    starts = (
+        Condition("Omega != 0", "Omega", lambda _, start: start.omega, any),
+        Condition("|Omega|^2 |P r|^2 = 2 (Omega·P r)^2", "the difference of spin and precession", _rates),
+        Condition("gamma as it follows from Omega", "the difference", _gamma_off),
+    )
+
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        n = self.top.moment
+        length = ball(dot(n, n)).sqrt()
+        axis = [component / length for component in balls(n)]
+        rate = ball(dot(self.start.omega, n)) / length
+        u0 = [w / rate - r for w, r in zip(balls(self.start.omega), axis, strict=True)]
+        w0 = cross(u0, axis)
+        sine, cosine = (rate * time).sin_cos()
+        u = [cosine * a + sine * b for a, b in zip(u0, w0, strict=True)]
+        w = [cosine * b - sine * a for a, b in zip(u0, w0, strict=True)]
+        space = (
+            u,
+            [cosine * b + sine * r for b, r in zip(w, axis, strict=True)],
+            [cosine * r - sine * b for b, r in zip(w, axis, strict=True)],
+        )
+
+        def carry(vector: Sequence[Any]) -> list[Any]:
+            parts = dot(vector, u0), dot(vector, w0), dot(vector, axis)
+            return [sum(part * e[k] for part, e in zip(parts, space, strict=True)) for k in range(3)]
+
+        return [rate * (a + r) for a, r in zip(u, axis, strict=True)], carry
+
+
+def _gamma(top: HeavyTop, omega: Vector) -> list[Fraction]:
+    """The γ that goes with Ω, times nothing: every root has cancelled."""
+    (i1, i2, i3), n = top.inertia, top.moment
+    square, spin = dot(n, n), dot(omega, n)
+    kappa = n[0] * n[2] * (i1 - i3) / square
+    phase = dot(omega, cross(n, (0, 1, 0)))
+    across = cross(omega, n)
+    return [
+        ((i1 - i2 + i3) * spin * (w - spin * e / square) - kappa * omega[1] * x + kappa * spin * phase * e / square)
+        / square
+        for w, e, x in zip(omega, n, across, strict=True)
+    ]
+
+
+def grioli_motion(
+    direction: Fraction, shape: Fraction, phase: Fraction, rate: Fraction, size: Fraction = Fraction(1)
+) -> Grioli:
+    """A top of weight 1 with a Grioli precession, and a start on it with |γ| = 1, all rational.
+
+    direction, shape, phase: tangents of half the angles (r̂1, r̂3) = (cos, sin), (I1 r̂1, I3 r̂3) = size (cos, sin) and
+    u = e2 cos + (r̂ × e2) sin.  rate: ν.  size: √(D² + κ²), a moment of inertia.
+    Raises InputError where a moment would not be positive, or I1 = I3, or ν = 0.
+    """
+    (a, c), (p1, p3), (u2, uz) = half_angle(direction), half_angle(shape), half_angle(phase)
+    if rate == 0 or size <= 0 or p1 * a <= 0 or p3 * c <= 0 or p1 * c == p3 * a:
+        raise InputError(
+            f"No Grioli top has direction {direction}, shape {shape}, rate {rate} and size {size}.",
+            "Give different direction and shape of one sign, both between 0 and 1, say; rate != 0, size > 0.",
+        )
+    i1, i3 = size * p1 / a, size * p3 / c
+    top = HeavyTop((i1, i1 * c * c + i3 * a * a, i3), 1, (rate**2 * size * a, 0, rate**2 * size * c))
+    # r̂ × e2 = (−c, 0, a)
+    omega = (rate * (a - uz * c), rate * u2, rate * (c + uz * a))
+    gamma = _gamma(top, State(omega, (0, 0, 0)).omega)
+    return Grioli(top, State(omega, gamma))

@@ -1,0 +1,436 @@
+"""Lagrange's top: I1 = I2, a = b = 0, for every start.
+
+Data: n = P c, L = I3 Ω3, C0 = M·γ, E = ½ I1 (Ω1² + Ω2²) + n γ3, s = |γ|.  x = γ3 moves on a cubic
+(Whittaker, Analytical Dynamics, chapter VI; Klein and Sommerfeld, The Theory of the Top, volume II; Hermite, Sur
+quelques applications des fonctions elliptiques):
+
+    x'² = (2/I1)(E − n x)(s² − x²) − ((C0 − L x)/I1)²,    x' = Ω2 γ1 − Ω1 γ2
+
+The horizontal parts g = γ1 + iγ2 and w = Ω1 + iΩ2 satisfy g' = −iΩ3 g + i x w, I1 w' = i (L − I1 Ω3) w − i n g, and
+share one function of the second kind:
+
+    ℘(V) = (4 I1 E − L²)/(12 I1²),    ℘'(V) = i (C0 n − E L)/(2 I1²),    κ = L/(2 I1) − Ω3
+
+All of it rational, whatever s is.  The axis of symmetry in space, e3·(ξ + iη), η = γ × ξ/s, ξ ⟂ γ, moves with
+
+    ℘(V) = (4 I1 E s² + 2 L² s² − 3 C0²)/(12 I1² s²),    κ = C0/(2 I1 s)
+    ℘'(V) = −i (C0³ − 2 C0 E I1 s² − C0 L² s² + 2 I1 L n s⁴)/(4 I1³ s³)
+
+and gives the attitude.  Sleeping tops, steady and regular precession, cusps, loops, passages through the poles, the
+spherical pendulum (L = 0) and the motions asymptotic to a sleeping top are starts like any other.
+
+*The axis of symmetry* need not be axis 3, nor its direction rational (:mod:`heavytop.exact.cases.lagrange`).  Let a be
+an exact vector along it, u and v = a × u exact vectors across it, A = |a|, and n = νa.  With x = a·γ in place of γ3 and
+g = γ·u + i γ·v/A, w likewise, L = a·M/A and Ω3 = a·Ω/A, all of the above but √(A²) stays rational:
+
+    x'² = (2/I1)(E − νx)(A²s² − x²) − (A²C0 − (a·M) x)²/(A I1)²,    κ and ℘'(V) of g and w are rational multiples of iA
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Self
+
+from flint import acb, arb, arb_series, fmpq_poly
+
+from heavytop.exact.closed_form import ClosedForm, balls, initial_xi, instant, kept, rotate, taylor, turned
+from heavytop.exact.elliptic.quartic import Companions, PreparedMotion, QuarticMotion
+from heavytop.exact.elliptic.weierstrass import Winding, imag, real
+from heavytop.exact.flint.balls import ball, coefficient, current_length, exponent, rational, series_length, to_bits
+from heavytop.exact.solution import AXIAL_ROTOR, SPHERICAL, SYMMETRIC, TORQUE
+from heavytop.top.equations import HEAVY_GYROSTAT, HEAVY_TOP, Parameters, heavy_top
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import Vector, cross, dot
+
+_ZERO, _ONE = Fraction(0), Fraction(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Lagrange(ClosedForm):
+    """The motion of Lagrange's top about axis 3 from any start, γ of any length.
+
+    Raises NotInClass unless I1 = I2 and P a = P b = 0.
+    """
+
+    method = "closed form: Lagrange, Weierstrass functions of gamma3"
+    body = SYMMETRIC
+
+    @property
+    def frame(self) -> tuple[Vector, Vector]:
+        """(u, a): a vector along the axis of symmetry and one across it."""
+        return (_ONE, _ZERO, _ZERO), (_ZERO, _ZERO, _ONE)
+
+    @property
+    def parameters(self) -> Parameters:
+        """The parameters of the field."""
+        return Parameters(self.top.inertia, self.top.moment, _ZERO)
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        prepared, length = _prepared(self), current_length()
+        point = prepared.motion.lattice.point(time, length if length > 1 else 0)
+        inverse = 1 / prepared.motion.denominator(point)
+        g, w = prepared.horizontal.at(point, inverse)
+        height = prepared.motion.position(point, inverse)
+        return [*prepared.composed(real(w), imag(w), prepared.spin), *prepared.composed(real(g), imag(g), height)]
+
+    @property
+    def constants(self) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction]:
+        """(ν, a·M, C0, E, s²)."""
+        omega, gamma, moment, axis = self.start.omega, self.start.gamma, self.top.moment, self.frame[1]
+        square = dot(axis, axis)
+        momentum = self.top.angular_momentum(omega)
+        energy = self.top.inertia[0] * (dot(omega, omega) - dot(omega, axis) ** 2 / square) / 2 + dot(moment, gamma)
+        return dot(moment, axis) / square, dot(axis, momentum), dot(momentum, gamma), energy, dot(gamma, gamma)
+
+    def quartic(self) -> QuarticMotion:
+        """x = a·γ on its cubic."""
+        n, spin, area, energy, square = self.constants
+        i1, axis = self.top.inertia[0], self.frame[1]
+        length = dot(axis, axis)
+        cubic = (
+            length * (2 * energy * square / i1 - area**2 / i1**2),
+            2 * area * spin / i1**2 - 2 * n * length * square / i1,
+            -2 * energy / i1 - spin**2 / (length * i1**2),
+            2 * n / i1,
+        )
+        speed = dot(axis, cross(self.start.gamma, self.start.omega))
+        return QuarticMotion(cubic, dot(axis, self.start.gamma), speed)
+
+    def winding(self) -> Winding:
+        """V and κ of g and w."""
+        n, spin, area, energy, _ = self.constants
+        i1, axis = self.top.inertia[0], self.frame[1]
+        length = dot(axis, axis)
+        slope = (area * n - energy * spin / length) / (2 * i1**2)
+        rate = (spin / (2 * i1) - dot(axis, self.start.omega)) / length
+        return Winding((4 * i1 * energy - spin**2 / length) / (12 * i1**2), slope, rate, length)
+
+    def axis_winding(self) -> Winding:
+        """V and κ of the axis of symmetry in space; needs γ != 0."""
+        n, spin, area, energy, square = self.constants
+        i1, axis = self.top.inertia[0], self.frame[1]
+        spin_square = spin**2 / dot(axis, axis)
+        value = (4 * i1 * energy * square + 2 * spin_square * square - 3 * area**2) / (12 * i1**2 * square)
+        cubic = area**3 - 2 * area * energy * i1 * square - area * spin_square * square + 2 * i1 * spin * n * square**2
+        return Winding(value, -cubic / (4 * i1**3 * square**2), area / (2 * i1 * square), square)
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components.
+
+        Raises OutOfReach where the axis has come so near to a sleeping top (a motion asymptotic to it, at large times)
+        that the angle about it is lost at any sensible precision.
+        """
+
+        def evaluate(_working: int) -> list[arb]:
+            start = initial_xi(self.start.gamma)
+            if time == 0:
+                return start
+            # ξ need not be rational: carry one exact vector ⟂ γ and its companion across it
+            basis = across(self.start.gamma)
+            exact, norm = balls(basis), ball(dot(basis, basis))
+            size = ball(dot(self.start.gamma, self.start.gamma)).sqrt()
+            with series_length(1):
+                now = self.evaluate(time)[3:]
+            unit, gamma = ([g / size for g in vector] for vector in (balls(self.start.gamma), now))
+            first = self._carried(basis, time)
+            second = cross(gamma, first)
+            cosine, sine = dot(start, exact) / norm, dot(start, cross(unit, exact)) / norm
+            return [cosine * a + sine * b for a, b in zip(first, second, strict=True)]
+
+        return to_bits(evaluate, bits, time, 2)
+
+    def _carried(self, basis: Vector, time: Fraction) -> list[arb]:
+        """The vector :func:`across` γ, fixed in space, at ``time``.
+
+        Z = ξ + iη, h = Z3 and Z± = Z1 ± iZ2 obey Z₊ ḡ = −h (x − s), Z₋ g = −h (x + s) and, as h' = (Z × Ω)3,
+        Z₋ w − Z₊ w̄ = 2i h'.
+        """
+        axis = self.frame[1]
+        if not any((*cross(self.start.omega, axis), *cross(self.start.gamma, axis))):
+            return rotate(balls(basis), self.start.omega, ball(time))
+        prepared = _prepared(self)
+        point = prepared.motion.lattice.point(time, 2)
+        inverse = 1 / prepared.motion.denominator(point)
+        (h,), (g, w) = (c.at(point, inverse) for c in (_axis(self), prepared.horizontal))
+        x, size = prepared.motion.position(point, inverse)[0], ball(self.constants[4]).sqrt()
+        length, across = prepared.axis, prepared.across
+        plus, minus = _sides(h[0] / length, coefficient(h, 1) / length, g[0] / across, w[0] / across, x / length, size)
+        found = ((plus + minus) / 2).real, ((plus - minus) / acb(0, 2)).real
+        return prepared.composed(found[0] * across, found[1] * across, h[0].real)
+
+
+def _sides(h: acb, slope: acb, g: acb, w: acb, x: arb, size: arb) -> tuple[acb, acb]:
+    """(Z₊, Z₋) from the three equations, without dividing by what vanishes at a pole."""
+    weight = abs(g) ** 2 + abs(w) ** 2
+    if x > 0:
+        plus = h * g / (x + size)
+        twist = acb(0, 2) * slope + plus * w.conjugate()
+        return plus, (twist * w.conjugate() - h * (x + size) * g.conjugate()) / weight
+    minus = h * g.conjugate() / (x - size)
+    twist = minus * w - acb(0, 2) * slope
+    return (twist * w - h * (x - size) * g) / weight, minus
+
+
+def across(gamma: Vector) -> Vector:
+    """An exact vector ⟂ γ, not 0."""
+    candidates = ((_ZERO, gamma[2], -gamma[1]), (-gamma[2], _ZERO, gamma[0]))
+    return candidates[0] if any(candidates[0]) else candidates[1]
+
+
+@dataclass(frozen=True, slots=True)
+class _Prepared:
+    """All that does not depend on the time.
+
+    spin: a·Ω.  axis, across: |a| and |u|.  directions: u, v and a over |u|², |u|²|a| and |a|²; None for axes 1, 2, 3.
+    """
+
+    motion: PreparedMotion
+    horizontal: Companions
+    spin: arb
+    axis: arb
+    across: arb
+    directions: tuple[list[arb], ...] | None
+
+    def composed(self, first: Any, second: Any, third: Any) -> list[Any]:
+        """The vector whose products with u, v/|a| and a are these numbers or series."""
+        if self.directions is None:
+            return [first, second, third]
+        parts = zip(*self.directions, strict=True)
+        return [first * u + second * v + third * a for u, v, a in parts]
+
+
+@kept
+def _prepared(motion: Lagrange) -> _Prepared:
+    prepared, winding, (across, axis) = motion.quartic().prepared(), motion.winding(), motion.frame
+    rows = taylor(heavy_top, motion.parameters, motion.start.flat, 4)
+    beside = cross(axis, across)
+    both = (
+        turned(_along(across, rows[k : k + 3]), [y / winding.square for y in _along(beside, rows[k : k + 3])], winding)
+        for k in (3, 0)
+    )
+    width, size, length = ball(dot(across, across)), ball(winding.square).sqrt(), ball(winding.square)
+    directions = (
+        [ball(u) / width for u in across],
+        [ball(v) / (width * size) for v in beside],
+        [ball(a) / length for a in axis],
+    )
+    companions = prepared.companions(winding, *both)
+    plain = motion.frame == ((_ONE, _ZERO, _ZERO), (_ZERO, _ZERO, _ONE))
+    spin = ball(dot(axis, motion.start.omega))
+    return _Prepared(prepared, companions, spin, size, width.sqrt(), None if plain else directions)
+
+
+def _along(direction: Vector, rows: Sequence[Sequence[Fraction]]) -> list[Fraction]:
+    """The derivatives of a vector's product with a fixed one, from those of its components."""
+    return [dot(direction, values) for values in zip(*rows, strict=True)]
+
+
+@kept
+def _axis(motion: Lagrange) -> Companions:
+    """h = a·Z of Z = ξ + iη, η = γ × ξ/s, for the vector ξ that is :func:`across` γ at t = 0, fixed in space."""
+    vector = across(motion.start.gamma)
+    winding, square = motion.axis_winding(), dot(motion.start.gamma, motion.start.gamma)
+    # s Z = s ξ + i γ × ξ, so Z = ξ + i s (γ × ξ/s²)
+    normal = tuple(c / square for c in cross(motion.start.gamma, vector))
+    first, second = (_derivatives(motion, fixed) for fixed in (vector, normal))
+    return _prepared(motion).motion.companions(winding, turned(first, second, winding))
+
+
+def _derivatives(motion: Lagrange, fixed: tuple[Fraction, ...]) -> list[Fraction]:
+    """The derivatives at 0 of a·ξ of a vector ξ fixed in space."""
+
+    def field(p: Parameters, y: Any) -> tuple[Any, ...]:
+        return (*heavy_top(p, y[:6]), *HEAVY_TOP.attitude(p, y[:6], y[6:]))
+
+    return _along(motion.frame[1], taylor(field, motion.parameters, (*motion.start.flat, *fixed), 4)[6:])
+
+
+# The spherical top, I1 = I2 = I3 with its centre of mass anywhere: Lagrange's top about r.
+#
+# Every axis of it is one of symmetry.  The direction of r is irrational in general, but the equalities that define the
+# class, the cubic of n·γ and both functions of the second kind are rational in the exact data
+# (:mod:`heavytop.exact.cases.lagrange`): the class is tested exactly, and any motion is known at any time.
+
+
+@dataclass(frozen=True, slots=True)
+class SphericalTop(Lagrange):
+    """The motion of a spherical top from any start, its centre of mass anywhere but at the fixed point.
+
+    Raises NotInClass unless I1 = I2 = I3 and P r ≠ 0.
+    """
+
+    method = "closed form: spherical top, Weierstrass functions of n·gamma"
+    body = SPHERICAL, TORQUE
+
+    @property
+    def frame(self) -> tuple[Vector, Vector]:
+        """(u, a): a = n in a unit in which it is of ordinary size, and a vector across it."""
+        unit = Fraction(2) ** exponent(max(map(abs, self.top.moment)))
+        first, second, third = (n / unit for n in self.top.moment)
+        axis = first, second, third
+        return across(axis), axis
+
+
+# Lagrange's gyrostat: I1 = I2, n and k along axis 3: a Lagrange top seen from axes that turn about its axis.
+#
+# M3 = I3 Ω3 + k3 is constant.  The top with the same moments and weight and the spin Ω3 + k3/I3 has the same M, so that
+# its axis and γ move in space as those of the gyrostat do, and its body turns ahead by the angle (k3/I3) t: with Rz the
+# rotation about axis 3,
+#
+#     Ω = Rz(k3 t/I3) Ω* − (k3/I3) e3,   γ = Rz(k3 t/I3) γ*,   ξ = Rz(k3 t/I3) ξ*
+
+
+_ATTITUDE_BITS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class LagrangeGyrostat(ClosedForm):
+    """The motion of Lagrange's gyrostat from any start, γ of any length.
+
+    Raises NotInClass unless I1 = I2, P a = P b = 0 and k1 = k2 = 0.
+    """
+
+    method = "closed form: Lagrange's gyrostat, Weierstrass functions of gamma3"
+    system = HEAVY_GYROSTAT
+    body = *SYMMETRIC, AXIAL_ROTOR
+
+    def __post_init__(self) -> None:
+        ClosedForm.__post_init__(self)
+        self.made["top"] = self._top()
+
+    def _top(self) -> Lagrange:
+        first, second, third = self.start.omega
+        plain = HeavyTop(self.top.inertia, self.top.weight, self.top.centre)
+        return Lagrange(plain, State((first, second, third + self._ahead), self.start.gamma))
+
+    @property
+    def _ahead(self) -> Fraction:
+        """k3/I3."""
+        return Fraction(self.top.rotor[2] / self.top.inertia[2]) if self.top.rotor else Fraction(0)
+
+    @property
+    def lagrange(self) -> Lagrange:
+        """The motion of the top."""
+        found: Lagrange = self.made["top"]
+        return found
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        turned = self._turned(self.lagrange.evaluate(time), instant(time))
+        return [*turned[:2], turned[2] - ball(self._ahead), *turned[3:]]
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components."""
+
+        def evaluate(working: int) -> list[arb]:
+            known = self.lagrange.attitude(time, working + _ATTITUDE_BITS)
+            with series_length(1):
+                return self._turned(known, ball(time))
+
+        return to_bits(evaluate, bits, time)
+
+    def _turned(self, vectors: Sequence[Any], time: Any) -> list[Any]:
+        """Rz(k3 t/I3) of each three components."""
+        sine, cosine = (time * ball(self._ahead)).sin_cos()
+        found: list[Any] = []
+        for place in range(0, len(vectors), 3):
+            x, y, z = vectors[place : place + 3]
+            found += [cosine * x - sine * y, sine * x + cosine * y, z]
+        return found
+
+
+# A top with I1 = I2 and P c = 0, in sizes of about 1 and turned so that its moment of weight is (c, 0, 0).
+#
+# Divided by I3 the equations hold for n/I3, and for λ = k3/I3 of a rotor along axis 3.  With exact powers of two
+# Ω = rate Ω', γ = size γ', t = t'/rate they hold for n' = n size/(I3 rate²) and λ' = λ/rate; and a turn about axis 3,
+# the axis of symmetry, takes n' to (c, 0, 0).
+
+
+@dataclass(frozen=True, slots=True)
+class Reduced:
+    """The exact data of a start in the units of ``rate`` and ``size``; moment: n' on axes 1 and 2; rotor: λ'."""
+
+    rate: Fraction
+    size: Fraction
+    moment: tuple[Fraction, Fraction]
+    omega: tuple[Fraction, Fraction, Fraction]
+    gamma: tuple[Fraction, Fraction, Fraction]
+    rotor: Fraction
+
+    @classmethod
+    def of(cls, top: HeavyTop, start: State) -> Self:
+        """From a top with I1 = I2 and P c = 0; a rotor lies along axis 3."""
+        i3 = top.inertia[2]
+        n1, n2 = (n / i3 for n in top.moment[:2])
+        size = _power_of_two(max(map(abs, start.gamma)))
+        rotor = top.rotor[2] / i3 if top.rotor else Fraction(0)
+        rate = _power_of_two(max(*map(abs, start.omega), abs(rotor), _root_of_two(max(abs(n1), abs(n2)) * size)))
+        (o1, o2, o3), (g1, g2, g3) = start.omega, start.gamma
+        lift = size / rate**2
+        return cls(
+            rate,
+            size,
+            (n1 * lift, n2 * lift),
+            (o1 / rate, o2 / rate, o3 / rate),
+            (g1 / size, g2 / size, g3 / size),
+            rotor / rate,
+        )
+
+    @property
+    def moment_square(self) -> Fraction:
+        """c²."""
+        n1, n2 = self.moment
+        return n1 * n1 + n2 * n2
+
+    @property
+    def gamma_square(self) -> Fraction:
+        """|γ|²."""
+        g1, g2, g3 = self.gamma
+        return g1 * g1 + g2 * g2 + g3 * g3
+
+    def along(self, vector: Sequence[Fraction]) -> Fraction:
+        """c times the first component in the turned frame."""
+        return self.moment[0] * vector[0] + self.moment[1] * vector[1]
+
+    def across(self, vector: Sequence[Fraction]) -> Fraction:
+        """c times the second component in the turned frame."""
+        return self.moment[0] * vector[1] - self.moment[1] * vector[0]
+
+    def turned(self) -> list[arb]:
+        """The six components of the start in the turned frame, as balls."""
+        c, found = ball(self.moment_square).sqrt(), []
+        for vector in (self.omega, self.gamma):
+            found += [ball(self.along(vector)) / c, ball(self.across(vector)) / c, ball(vector[2])]
+        return found
+
+    def in_body(self, vector: Sequence[Any]) -> list[Any]:
+        """A vector of the turned frame in the top's own axes."""
+        c = ball(self.moment_square).sqrt()
+        cosine, sine = (ball(n) / c for n in self.moment)
+        x, y, z = vector
+        return [cosine * x - sine * y, sine * x + cosine * y, z]
+
+    def restored(self, motion: Sequence[Any], length: int) -> list[Any]:
+        """Six series in t', in the turned frame, as numbers or series in t of that length, in the top's own units."""
+        rate, size = ball(self.rate), ball(self.size)
+        omega, gamma = self.in_body(motion[:3]), self.in_body(motion[3:])
+        rows = [[rate ** (n + 1) * x[n] for x in omega] + [rate**n * size * x[n] for x in gamma] for n in range(length)]
+        return rows[0] if length == 1 else [arb_series(list(row), prec=length) for row in zip(*rows, strict=True)]
+
+
+def polynomial(*coefficients: Fraction) -> fmpq_poly:
+    """The polynomial with these coefficients of 1, w, w², ..."""
+    return fmpq_poly([rational(c) for c in coefficients])
+
+
+def _power_of_two(value: Fraction) -> Fraction:
+    """A power of two of about the size of ``value`` ≥ 0; 1 for 0."""
+    return Fraction(2) ** exponent(value) if value else Fraction(1)
+
+
+def _root_of_two(value: Fraction) -> Fraction:
+    """A power of two of about the size of √value; 0 for 0."""
+    return Fraction(2) ** (exponent(value) // 2) if value else Fraction(0)

@@ -1,0 +1,201 @@
+"""The physical pendulum: rotation about a principal axis held level, centre of mass in the plane across it.
+
+The axis e, a unit vector, is principal where I e = K e: one of the three, any equatorial axis of a symmetric top, any
+axis at all of a spherical one.  Ω = w e stays along it only if the torque does: γ × n ∥ e, n = P r.  While w is not 0
+the part of γ across e turns, so that asks n·e = 0 and γ·e = 0, unless γ ∥ e ∥ n, which is a steady rotation.
+With N = |n||γ| and x the angle of γ from −n in the plane across e, x' = −w:
+
+    x'' = −(N/K) sin x,   h = ½ K w² + n·γ = ½ K x'² − N cos x
+
+    h ≤ N:  sin(x/2) = σ √m sn u,  cos(x/2) = dn u,  x' = 2σ √m ω cn u,  m = (h + N)/(2N),  ω² = N/K
+    h > N:  sin(x/2) = σ sn u,     cos(x/2) = cn u,  x' = 2σ ω dn u,     m = 2N/(h + N),    ω² = (h + N)/(2K)
+
+u = ω t + u0, and σ is the sign of x' at t = 0; h = N is the separatrix, m = 1.  Every vector fixed in space turns
+about e through x(t) − x(0).  The direction of e is that of Ω, or of γ × n at rest: rational, though its length need
+not be, so that the conditions are tested exactly.
+Source: Whittaker, Analytical Dynamics, chapter IV; DLMF 22.19.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from flint import arb
+
+from heavytop.exact.closed_form import Carry, WithAttitude, balls, instant, kept, sign
+from heavytop.exact.elliptic.jacobi import Jacobi, jacobi, legendre_f
+from heavytop.exact.flint.balls import ball, whole
+from heavytop.exact.solution import GAMMA, TORQUE, Condition
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import Vector, cross, dot
+
+_REMEDY = "It turns about a principal axis, with P r and gamma across it."
+
+
+def _axis(top: HeavyTop, start: State) -> Vector:
+    """Ω, or γ × n at rest, in units of its largest component; 0 in equilibrium."""
+    direction = start.omega if any(start.omega) else cross(start.gamma, top.moment)
+    largest = max(map(abs, direction)) or Fraction(1)
+    first, second, third = (component / largest for component in direction)
+    return first, second, third
+
+
+def _off_principal(top: HeavyTop, start: State) -> Vector:
+    axis = _axis(top, start)
+    return cross(top.angular_momentum(axis), axis)
+
+
+def _off_plane(top: HeavyTop, start: State) -> tuple[Fraction, Fraction]:
+    axis = _axis(top, start)
+    return dot(top.moment, axis), dot(start.gamma, axis)
+
+
+@dataclass(frozen=True, slots=True)
+class Pendulum(WithAttitude):
+    """Libration, rotation, separatrix and equilibria about any principal axis, |γ| as it is.
+
+    Raises NotInClass unless, exactly, Ω, or γ × P r at rest, lies along a principal axis with P r and γ in the plane
+    across it, P r ≠ 0 and γ ≠ 0.
+    """
+
+    method = "closed form: physical pendulum, Jacobi functions"
+    body = (TORQUE,)
+    starts = (
+        GAMMA,
+        Condition("Omega, or the torque at rest, along a principal axis", "I e x e", _off_principal),
+        Condition("P r and gamma across this axis", "P r·e, gamma·e", _off_plane),
+    )
+
+    @property
+    def axis(self) -> Vector:
+        """A vector along the axis it turns about, its largest component ± 1; 0 where it is in equilibrium."""
+        return _axis(self.top, self.start)
+
+    @property
+    def steady(self) -> bool:
+        """It stands still: at rest where no torque acts."""
+        return not any(self.axis)
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        lattice = _lattice(self)
+        if lattice is None:
+            return WithAttitude.evaluate(self, time)
+        omega, carry = lattice.motion(instant(time))
+        return [*omega, *carry(lattice.gamma)]
+
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        lattice = _lattice(self)
+        return ([arb(0)] * 3, list) if lattice is None else lattice.motion(time)
+
+
+@dataclass(frozen=True, slots=True)
+class Swing:
+    """The angle x(t) at one working precision.
+
+    amplitude: σ√m (libration) or σ.  speed: 2ω times it.
+    """
+
+    functions: Jacobi
+    rate: arb
+    origin: arb
+    amplitude: arb
+    speed: arb
+    rotating: bool
+
+    def at(self, time: Any) -> tuple[Any, Any, Any]:
+        """(sin(x/2), cos(x/2), x') at a number or series."""
+        sn, cn, dn = self.functions.functions(self.rate * time + self.origin)
+        cosine, speed = (cn, dn) if self.rotating else (dn, cn)
+        return self.amplitude * sn, cosine, self.speed * speed
+
+    def half(self, time: arb) -> arb:
+        """x/2, continuous for all times: it grows by π with every turn of a rotation."""
+        sine, cosine, _ = self.at(time)
+        quarter = self.functions.quarter
+        if not self.rotating or quarter is None:
+            return arb.atan2(sine, cosine)
+        turns = whole((self.rate * time + self.origin) / (2 * quarter))
+        side = -1 if turns % 2 else 1
+        return arb.atan2(side * sine, side * cosine) + self.amplitude * turns * arb.pi()
+
+
+def swing(
+    inertia: Fraction, kinetic: Fraction, height: Fraction, square: Fraction, direction: int, side: int
+) -> tuple[Swing, tuple[arb, arb]]:
+    """The motion of a pendulum, and (cos, sin) of x(0)/2.
+
+    kinetic: ½ I x'².  height: n·γ = −N cos x.  square: N².  direction, side: the signs of x' and sin x at t = 0, +1
+    for 0.  Raises ZeroDivisionError for a pendulum at rest in equilibrium.
+    """
+    energy, torque_square = kinetic + height, square - height**2
+    largest = ball(square).sqrt()
+    rotating = energy > 0 and energy**2 > square
+    side *= direction
+    # 1 - cos x and 1 + cos x, times N; N² - height² = torque²
+    below, above = _sum(square, height, torque_square), _sum(square, -height, torque_square)
+    over, under = _sum(square, energy, square - energy**2), _sum(square, -energy, square - energy**2)
+    sine, cosine = (below / (2 * largest)).sqrt(), (above / (2 * largest)).sqrt()
+    if rotating:
+        functions = jacobi(2 * largest / over, -under / over)
+        origin = legendre_f(below / (2 * largest), above / (2 * largest), ball(kinetic) / over)
+        rate, amplitude = (over / (2 * ball(inertia))).sqrt(), arb(direction)
+    else:
+        parameter = arb(1) if under.is_zero() else over / (2 * largest)
+        functions = jacobi(parameter, under / (2 * largest))
+        origin = legendre_f(below / over, ball(kinetic) / over, above / (2 * largest))
+        rate, amplitude = (largest / ball(inertia)).sqrt(), direction * parameter.sqrt()
+    moving = Swing(functions, rate, side * origin, amplitude, 2 * rate * amplitude, rotating)
+    return moving, (cosine, side * direction * sine)
+
+
+@dataclass(frozen=True, slots=True)
+class _Lattice:
+    """All that does not depend on the time.  axis: e.  half: (cos, sin) of x(0)/2."""
+
+    axis: list[arb]
+    swing: Swing
+    half: tuple[arb, arb]
+    gamma: list[arb]
+
+    def motion(self, time: Any) -> tuple[list[Any], Carry]:
+        sine, cosine, speed = self.swing.at(time)
+        cosine0, sine0 = self.half
+        c, s = cosine * cosine0 + sine * sine0, sine * cosine0 - cosine * sine0
+        cosine, sine = c * c - s * s, 2 * c * s
+
+        def carry(vector: Sequence[Any]) -> list[Any]:
+            along, across = dot(self.axis, vector), cross(self.axis, vector)
+            return [
+                along * e + cosine * (v - along * e) + sine * w
+                for e, v, w in zip(self.axis, vector, across, strict=True)
+            ]
+
+        return [-speed * e for e in self.axis], carry
+
+
+@kept
+def _lattice(case: Pendulum) -> _Lattice | None:
+    """None where it stands still."""
+    if case.steady:
+        return None
+    n, gamma, axis = case.top.moment, case.start.gamma, case.axis
+    length = dot(axis, axis)
+    inertia = dot(axis, case.top.angular_momentum(axis)) / length
+    rate = dot(case.start.omega, axis)
+    kinetic = inertia * rate**2 / length / 2
+    torque = dot(cross(gamma, n), axis)
+    square = dot(n, n) * dot(gamma, gamma)
+    moving, half = swing(inertia, kinetic, dot(n, gamma), square, sign(-rate), sign(torque))
+    size = ball(length).sqrt()
+    return _Lattice([ball(component) / size for component in axis], moving, half, balls(gamma))
+
+
+def _sum(square: Fraction, value: Fraction, product: Fraction) -> arb:
+    """√square + value, without cancellation: product = square − value²; an exact 0 where it is 0."""
+    root = ball(square).sqrt()
+    return root + ball(value) if value >= 0 else ball(product) / (root - ball(value))

@@ -1,0 +1,403 @@
+"""Zhukovsky and Volterra's gyrostat: n = 0, any inertia, any rotor k, any start: M' = M × Ω, M = IΩ + k.
+
+M moves on the curve |M|² = G², ½ Ω·IΩ = h.  With the homogeneous forms S = |M|² − G² w² and E = (M − kw)·I⁻¹(M − kw) −
+2h w² of both quadrics, f(λ) = det(λS + E) = a0λ⁴ + 4a1λ³ + 6a2λ² + 4a3λ + a4 is a quartic whose invariants are those of
+the lattice of M(t), a0 = −G².  The four poles of M(t) and one more point, less five times t = 0, are the zeros and the
+pole of one function D, so that
+
+    D(t) and D(t) Mi(t) are combinations of 1, ℘, ℘', ℘², ℘℘',
+
+over the rational numbers: t = 0 is a rational point of the curve.  They follow from the Taylor series of M(t) by linear
+equations: D Mi has no residue at t = 0 and goes on as its principal part says, up to t^5; an elliptic function with at
+most four poles that vanishes so often is 0.
+
+A vector Z = u + i M × u/G fixed in space, u ⟂ M, has in body axes components with the same poles.  Their zeros are
+those of two lines on the sphere of one of its two rulings; so they are functions of the second kind with V the
+difference of both rulings, which are the two points of y² = f(λ) at λ = ∞:
+
+    ℘(V) = (a1² − a0a2)/a0,   ℘'(V) = i G (a0²a3 − 3a0a1a2 + 2a1³)/a0²,   κ = G a1/a0
+    Zj D = e^(iκt) (c0 Φ + c1 Φ' + c2 Φ'' + c3 Φ''' + c4 Φ''''),   Φ as in :mod:`heavytop.exact.elliptic.weierstrass`
+
+with c from the principal part of e^(−iκt) Zj D.  Nothing is divided by what depends on the time but D.
+Sources: N. E. Zhukovsky (1885), V. Volterra, Acta Math. 22 (1899) 201; the formulas are derived here, and proven by
+their residuals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import factorial
+from typing import Any
+
+from flint import arb, arb_mat, fmpq_mat
+
+from heavytop.errors import LevelNotDone
+from heavytop.exact.closed_form import ClosedForm, balls, initial_xi, instant, kept, rotate, taylor
+from heavytop.exact.elliptic.quartic import lift
+from heavytop.exact.elliptic.weierstrass import (
+    Lattice,
+    Point,
+    SecondKind,
+    Winding,
+    from_invariants,
+    imag,
+    real,
+    second_kind,
+)
+from heavytop.exact.flint.balls import ball, current_length, rational, to_bits, unit_of_time
+from heavytop.exact.solution import NO_TORQUE
+from heavytop.top.equations import HEAVY_GYROSTAT
+from heavytop.top.vectors import Vector, cross, dot
+
+_POLE, _LAST = 5, 5
+"""D and D Mi have a pole of that order at t = 0, and are compared up to that power of t."""
+_UNITS: tuple[Vector, ...] = tuple(tuple(Fraction(int(i == j)) for j in range(3)) for i in range(3))  # type: ignore[misc]
+
+
+@dataclass(frozen=True, slots=True)
+class ZhukovskyVolterra(ClosedForm):
+    """The motion of a gyrostat without weight, γ of any length and direction.
+
+    Raises NotInClass where n is not 0, LevelNotDone where M(t) is no elliptic function but a limit of some.
+    """
+
+    method = "closed form: Zhukovsky-Volterra, Weierstrass functions"
+    system = HEAVY_GYROSTAT
+    body = (NO_TORQUE,)
+
+    def __post_init__(self) -> None:
+        ClosedForm.__post_init__(self)
+        g2, g3 = self.invariants()
+        if not self.permanent and g2**3 == 27 * g3**2:
+            raise LevelNotDone(
+                "|M|^2 and the energy touch: the motion is aperiodic, or that of a symmetric top.",
+                "The enclosure proves such a motion, up to its reach.",
+            )
+        if not self.permanent:
+            _exact(self)
+
+    @property
+    def momentum(self) -> Vector:
+        """M = IΩ + k at t = 0."""
+        return self.top.angular_momentum(self.start.omega)
+
+    @property
+    def _rotor(self) -> Vector:
+        return self.top.rotor or (Fraction(0), Fraction(0), Fraction(0))
+
+    @property
+    def permanent(self) -> bool:
+        """Whether M is at rest in the body."""
+        if "permanent" not in self.made:
+            self.made["permanent"] = not any(cross(self.momentum, self.start.omega))
+        return bool(self.made["permanent"])
+
+    def coefficients(self) -> tuple[Fraction, ...]:
+        """a0, a1, a2, a3, a4 of f."""
+        rates = [1 / i for i in self.top.inertia]
+        square = dot(self.momentum, self.momentum)
+        shift = [k * a for k, a in zip(self._rotor, rates, strict=True)]
+        constant = Fraction(dot(shift, self._rotor))
+        constant -= sum((w * w * i for w, i in zip(self.start.omega, self.top.inertia, strict=True)), Fraction(0))
+        lines: list[list[Fraction]] = [[rate, Fraction(1)] for rate in rates]
+        found = _product([*lines, [constant, Fraction(-square)]])
+        for place, part in enumerate(shift):
+            others = _product([line for other, line in enumerate(lines) if other != place])
+            found = [f - part * part * g for f, g in zip(found, [*others, Fraction(0), Fraction(0)], strict=True)]
+        return tuple(c / weight for c, weight in zip(reversed(found), (1, 4, 6, 4, 1), strict=True))
+
+    def invariants(self) -> tuple[Fraction, Fraction]:
+        """(g2, g3)."""
+        a0, a1, a2, a3, a4 = self.coefficients()
+        g3 = a0 * a2 * a4 + 2 * a1 * a2 * a3 - a2**3 - a0 * a3 * a3 - a1 * a1 * a4
+        return a0 * a4 - 4 * a1 * a3 + 3 * a2 * a2, g3
+
+    def winding(self) -> Winding:
+        """V and κ of Z."""
+        a0, a1, a2, a3, _ = self.coefficients()
+        slope = (a0 * a0 * a3 - 3 * a0 * a1 * a2 + 2 * a1**3) / a0**2
+        return Winding((a1 * a1 - a0 * a2) / a0, slope, a1 / a0, -a0)
+
+    def evaluate(self, time: Fraction) -> list[Any]:
+        """See :class:`heavytop.exact.closed_form.ClosedForm`."""
+        if self.permanent:
+            return [*balls(self.start.omega), *rotate(balls(self.start.gamma), self.start.omega, instant(time))]
+        momentum, point, inverse = self._momentum(time)
+        omega = [(m - ball(k)) * ball(1 / i) for m, k, i in zip(momentum, self._rotor, self.top.inertia, strict=True)]
+        return [*omega, *_gamma(self).at(momentum, point, inverse)]
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components."""
+
+        def evaluate(_working: int) -> list[arb]:
+            xi = initial_xi(self.start.gamma)
+            if self.permanent:
+                return rotate(xi, self.start.omega, ball(time))
+            momentum, point, inverse = self._momentum(time)
+            images = [unit.at(momentum, point, inverse) for unit in _axes(self)]
+            return [dot(xi, components) for components in zip(*images, strict=True)]
+
+        return to_bits(evaluate, bits, self.own_time(time))
+
+    def own_time(self, time: Fraction) -> Fraction:
+        """See :class:`heavytop.exact.closed_form.Evaluated`."""
+        if "unit" not in self.made:
+            parameters = HEAVY_GYROSTAT.parameters(self.top, self.start)
+            self.made["unit"] = Fraction(2) ** unit_of_time(parameters, self.start.flat)
+        return Fraction(time * self.made["unit"])
+
+    def _momentum(self, time: Fraction) -> tuple[list[Any], Point, Any]:
+        """M, the point of the lattice, and 1/(D T^5)."""
+        curve, length = _curve(self), current_length()
+        point = _lattice(self).point(time, length if length > 1 else 0)
+        below, *above = _combined(curve.rows, _terms(point, curve.order))
+        inverse = 1 / below
+        return [part * inverse for part in above], point, inverse
+
+
+def _product(factors: Sequence[Sequence[Fraction]]) -> list[Fraction]:
+    """The product of polynomials, lowest coefficient first."""
+    found = [Fraction(1)]
+    for factor in factors:
+        row = [Fraction(0)] * (len(found) + len(factor) - 1)
+        for i, a in enumerate(found):
+            for j, b in enumerate(factor):
+                row[i + j] += a * b
+        found = row
+    return found
+
+
+def _terms(point: Point, order: int) -> list[Any]:
+    """1, ℘, ℘', ℘² and ℘℘', each times T^order."""
+    t, wp, slope = point.scale, point.above(Fraction(0)), point.slope
+    powers = [point.square * 0 + 1]
+    for _ in range(order):
+        powers.append(powers[-1] * t)
+    found = [powers[order], wp * powers[order - 2], slope * powers[order - 3], wp * wp * powers[order - 4]]
+    return [*found, wp * slope] if order == _POLE else found
+
+
+def _combined(rows: arb_mat, terms: Sequence[Any]) -> list[Any]:
+    """The combinations of the terms with the factors in each row: of numbers, or of real series."""
+    if isinstance(terms[0], arb):
+        return list((rows * arb_mat(len(terms), 1, list(terms))).entries())
+    table: Any = rows.table()
+    return [sum((t * c for t, c in zip(terms[1:], row[1:], strict=True)), terms[0] * row[0]) for row in table]
+
+
+@dataclass(frozen=True, slots=True)
+class _Exact:
+    """D and D Mi as combinations of 1, ℘, ℘', ℘², ℘℘', and the Laurent series of D from t^−5 on."""
+
+    denominator: tuple[Fraction, ...]
+    numerators: tuple[tuple[Fraction, ...], ...]
+    series: tuple[Fraction, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Curve:
+    """The same in balls: D in the first row, D Mi below it; order: of the pole of D at t = 0; body: k and 1/I."""
+
+    rows: arb_mat
+    order: int
+    body: tuple[tuple[arb, arb], ...]
+
+
+def _basis(g2: Fraction, g3: Fraction) -> list[list[Fraction]]:
+    """The Laurent series of 1, ℘, ℘', ℘², ℘℘' from t^−5 to t^5."""
+    zero = Fraction(0)
+    size = _POLE + _LAST + 1
+    wide = size + 4
+    wp = [zero] * wide  # from t^-5
+    wp[3], wp[7], wp[9] = Fraction(1), g2 / 20, g3 / 28
+    for n in range(4, (wide - 4) // 2 + 1):
+        parts = sum((wp[2 * j + 3] * wp[2 * (n - j) + 3] for j in range(2, n - 1)), zero)
+        if 2 * n + 3 < wide:
+            wp[2 * n + 3] = Fraction(3, (2 * n + 1) * (n - 3)) * parts
+    slope = [(place + 1 - _POLE) * wp[place + 1] if place + 1 < wide else zero for place in range(wide)]
+
+    def times(one: list[Fraction], other: list[Fraction]) -> list[Fraction]:
+        return [
+            sum((one[i] * other[place + _POLE - i] for i in range(wide) if 0 <= place + _POLE - i < wide), zero)
+            for place in range(size)
+        ]
+
+    one = [zero] * size
+    one[_POLE] = Fraction(1)
+    return [one, wp[:size], slope[:size], times(wp, wp), times(wp, slope)]
+
+
+def _momentum_series(case: ZhukovskyVolterra) -> list[list[Fraction]]:
+    """The Taylor coefficients of M at t = 0, up to t^10."""
+    rows = taylor(HEAVY_GYROSTAT.field, _parameters(case), case.start.flat, _POLE + _LAST + 1)
+    found = []
+    for moment, own, row in zip(case.top.inertia, case._rotor, rows[:3], strict=True):
+        series = [moment * c / factorial(n) for n, c in enumerate(row)]
+        found.append([series[0] + own, *series[1:]])
+    return found
+
+
+def _parameters(case: ZhukovskyVolterra) -> Any:
+    return HEAVY_GYROSTAT.parameters(case.top, case.start)
+
+
+def _exact(case: ZhukovskyVolterra) -> _Exact:
+    """By linear equations, once."""
+    if "exact" in case.made:
+        kept_one: _Exact = case.made["exact"]
+        return kept_one
+    basis, momentum = _basis(*case.invariants()), _momentum_series(case)
+    size = len(basis[0])
+    equations = []
+    for place, series in enumerate(momentum):
+        moved = [_times_taylor(row, series) for row in basis]
+        for power in range(size):
+            line = [row[power] for row in moved] + [Fraction(0)] * 15
+            for j, row in enumerate(basis):
+                line[5 + 5 * place + j] = -row[power]
+            equations.append(line)
+    solution = _kernel(equations)
+    groups = [tuple(solution[start : start + 5]) for start in (0, 5, 10, 15)]
+    whole = tuple(
+        sum((d * row[power] for d, row in zip(groups[0], basis, strict=True)), Fraction(0)) for power in range(size)
+    )
+    found = _Exact(groups[0], tuple(groups[1:]), whole)
+    case.made["exact"] = found
+    return found
+
+
+def _times_taylor(laurent: Sequence[Fraction], series: Sequence[Fraction]) -> list[Fraction]:
+    return [
+        sum((laurent[place - n] * series[n] for n in range(min(place + 1, len(series)))), Fraction(0))
+        for place in range(len(laurent))
+    ]
+
+
+def _kernel(equations: Sequence[Sequence[Fraction]]) -> list[Fraction]:
+    """The one solution of homogeneous equations, up to a factor; raises LevelNotDone where there are more."""
+    width = len(equations[0])
+    matrix: Any = fmpq_mat(len(equations), width, [rational(value) for line in equations for value in line])
+    reduced, rank = matrix.rref()
+    if rank != width - 1:
+        raise LevelNotDone("The curve of M is degenerate.", "The enclosure proves such a motion, up to its reach.")
+    pivots = [next(j for j in range(width) if reduced[i, j] != 0) for i in range(rank)]
+    (free,) = set(range(width)) - set(pivots)
+    found = [Fraction(0)] * width
+    found[free] = Fraction(1)
+    for i, j in enumerate(pivots):
+        entry = reduced[i, free]
+        found[j] = -Fraction(int(entry.p), int(entry.q))
+    return found
+
+
+@kept
+def _curve(case: ZhukovskyVolterra) -> _Curve:
+    exact = _exact(case)
+    order = _POLE if exact.denominator[4] else _POLE - 1
+    rows: Any = [[ball(c) for c in row[:order]] for row in (exact.denominator, *exact.numerators)]
+    body = tuple((ball(k), ball(1 / i)) for k, i in zip(case._rotor, case.top.inertia, strict=True))
+    return _Curve(arb_mat(rows), order, body)
+
+
+@kept
+def _lattice(case: ZhukovskyVolterra) -> Lattice:
+    found = from_invariants(*case.invariants())
+    assert isinstance(found, Lattice)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Fixed:
+    """A vector fixed in space: share M + Re Z.
+
+    factors: Re c0 .. Re c4, −Im c0 .. −Im c4 of each component of Z, a row each; None where the vector is along M.
+    """
+
+    share: arb
+    wave: SecondKind | None
+    factors: arb_mat | None
+    invariant: arb
+    order: int
+
+    def at(self, momentum: list[Any], point: Point, inverse: Any) -> list[Any]:
+        """In body components at the point."""
+        along = [m * self.share for m in momentum]
+        if self.wave is None or self.factors is None:
+            return along
+        terms = self._terms(self.wave, point)
+        waves = _combined(self.factors, [*map(real, terms), *map(imag, terms)])
+        return [a + part * inverse for a, part in zip(along, waves, strict=True)]
+
+    def _terms(self, wave: SecondKind, point: Point) -> list[Any]:
+        """Φ .. Φ'''' times e^(iκt) T^order, by Lamé's equation."""
+        phi, slope = map(lift, wave.at(point))
+        t, square = lift(point.scale), lift(point.square)
+        wp, steep = lift(point.above(Fraction(0))), lift(point.slope)
+        lame = 2 * wp + wave.value * square if isinstance(wave.value, arb) else 2 * wp + ball(wave.value) * square
+        powers = [square * 0 + 1]
+        for _ in range(self.order - 1):
+            powers.append(powers[-1] * t)
+        found = [
+            phi * powers[self.order - 1],
+            slope * powers[self.order - 2],
+            lame * phi * powers[self.order - 3],
+            (2 * steep * phi + lame * slope) * powers[self.order - 4],
+        ]
+        if self.order == _POLE:
+            found.append((12 * wp * wp - self.invariant * square * square + lame * lame) * phi + 4 * steep * slope)
+        return found
+
+
+@kept
+def _gamma(case: ZhukovskyVolterra) -> _Fixed:
+    return _fixed(case, case.start.gamma)
+
+
+@kept
+def _axes(case: ZhukovskyVolterra) -> list[_Fixed]:
+    """The axes of the body at t = 0."""
+    return [_fixed(case, unit) for unit in _UNITS]
+
+
+def _fixed(case: ZhukovskyVolterra, vector: Vector) -> _Fixed:
+    momentum, exact = case.momentum, _exact(case)
+    square = dot(momentum, momentum)
+    share = dot(vector, momentum) / square
+    across: Any = tuple(v - share * m for v, m in zip(vector, momentum, strict=True))
+    order, invariant = _curve(case).order, ball(case.invariants()[0])
+    if not any(across):
+        return _Fixed(ball(share), None, None, invariant, order)
+    winding = case.winding()
+    beside: Any = tuple(c / square for c in cross(momentum, across))
+    root = ball(winding.square).sqrt()
+    factors: Any = []
+    for real_part, imaginary in zip(_body_series(case, across), _body_series(case, beside), strict=True):
+        rows = [_times_taylor(exact.series, part) for part in (real_part, imaginary)]
+        # Φ^(k) begins with (−1)^k k!/t^(k + 1)
+        parts = enumerate(reversed(_without_turning(rows[0], rows[1], winding)[:_POLE]))
+        scaled = [(a * (-1) ** k / factorial(k), b * (-1) ** k / factorial(k)) for k, (a, b) in parts]
+        factors.append([*(ball(a) for a, _ in scaled[:order]), *(ball(-b) * root for _, b in scaled[:order])])
+    return _Fixed(ball(share), second_kind(_lattice(case), winding), arb_mat(factors), invariant, order)
+
+
+def _body_series(case: ZhukovskyVolterra, fixed: Vector) -> list[list[Fraction]]:
+    """The Taylor coefficients of a vector fixed in space in body axes, up to t^4."""
+    rows = taylor(HEAVY_GYROSTAT.field, _parameters(case), (*case.start.omega, *fixed), _POLE)[3:]
+    return [[c / factorial(n) for n, c in enumerate(row)] for row in rows]
+
+
+def _without_turning(
+    one: Sequence[Fraction], other: Sequence[Fraction], winding: Winding
+) -> list[tuple[Fraction, Fraction]]:
+    """e^(−iκt) (one + i √square other), coefficient by coefficient as (real, imaginary/√square)."""
+    found = []
+    for place in range(len(one)):
+        a = b = Fraction(0)
+        for n in range(place + 1):
+            weight = (-winding.rate) ** n * (-winding.square) ** (n // 2) / factorial(n)
+            u, v = one[place - n], other[place - n]
+            a, b = (a + weight * u, b + weight * v) if n % 2 == 0 else (a - weight * winding.square * v, b + weight * u)
+        found.append((a, b))
+    return found

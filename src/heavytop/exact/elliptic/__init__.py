@@ -1,0 +1,1 @@
+"""Elliptic functions as balls: Jacobi's, Weierstrass', theta functions, and x'² = quartic."""

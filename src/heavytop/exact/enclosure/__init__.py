@@ -1,0 +1,1 @@
+"""Validated enclosures: any motion by Taylor series with a proven remainder, and its derivatives."""

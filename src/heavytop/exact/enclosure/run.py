@@ -1,0 +1,604 @@
+"""Enclosure of any motion of either system, by Taylor series with a proven tail: no closed form is needed.
+
+A motion is enclosed in its own units, powers of two, in which |ω| ≤ 4 at all times
+(:class:`heavytop.multiword.problem.Scaled`).
+
+The step and its theorem are in :mod:`heavytop.exact.enclosure.step`.  Its coefficients are computed in words
+(:mod:`heavytop.multiword.fixed_point.certified_series`), as far as there are words, or in exact integers where a few
+steps would not be worth the machine code.  Here the working precision is chosen so that the asked bits come out: the
+bits that the motion loses are measured on a pilot run, and carried on linearly to the time asked for; where the pilot's
+bits do, it is the run asked for.  Precisions come from a ladder and steps depend on the node that they start from
+alone, so a ball does not depend on what was asked before; what was computed before is only found faster.
+
+Reach on the generic top of the tests (I = (3, 2, 1), P r = (1/2, 1/3, 1/5)), seconds of one core that was shared:
+60 digits at t = 8 in 0.02 s; 30 digits at t = 100 in 0.1 s, at t = 1000 in 1.5 s; about 0.17 bits are lost a unit of
+time, so that t = 10,000 would need some 1,900 bits, more than there are words for, and is refused by default.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from math import ceil, inf, log2, log10
+from threading import Lock
+from typing import Any, NamedTuple
+
+from flint import arb, arb_series
+from gmpy2 import mpq
+
+from heavytop.errors import Contradiction, OutOfReach
+from heavytop.exact.enclosure.step import (
+    Matrix,
+    Node,
+    Quadratic,
+    Step,
+    coefficient_bound,
+    lacking,
+    quadratic,
+    start_node,
+    step,
+)
+from heavytop.exact.flint.balls import (
+    ball,
+    exponent,
+    relative_bits,
+    require_handy,
+    unit_of_time,
+    whole_evaluation,
+    working_precision,
+)
+from heavytop.multiword.codegen.recurrence import coefficients, rates
+from heavytop.multiword.fixed_point import fixed_point_run
+from heavytop.multiword.fixed_point.arithmetic import Grid, grid_of
+from heavytop.multiword.fixed_point.certified_series import Carrier
+from heavytop.multiword.problem import Scaled
+from heavytop.precision import decimal_text
+from heavytop.top.attitude import perpendicular
+from heavytop.top.equations import GYROSTAT, HEAVY_TOP, Parameters, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.vectors import Vector
+
+# Steps of an enclosure one after another, and the pilot that tells how many bits a motion loses.
+
+
+FAR = Fraction(10**12)
+"""More times as far is not asked of a forecast."""
+_PILOT_STEPS = 1000
+_KEPT_NODES = 512
+_TRIED = 100
+_one_writer = Lock()
+
+
+@dataclass(slots=True)
+class Run:
+    """Nodes of one motion at one working precision, from time 0 on as far as they were asked for.
+
+    Any thread may ask: a node depends on its time alone, and what is remembered is replaced, never changed in place.
+    """
+
+    motion: Quadratic
+    precision: int
+    nodes: tuple[Node, ...]
+    carrier: Carrier | None = None
+    stride: int = 1
+    lost_at: Fraction | None = None
+    _last: Step | None = None
+    _skipped: int = 0
+
+    def at(self, time: Fraction) -> tuple[Step, Fraction] | None:
+        """The step that covers ``time`` ≥ 0, and τ in it; None if the errors grew too large before it."""
+        found, node = self._nearest(time)
+        while True:
+            if self.lost_at is not None and node.time >= self.lost_at:
+                return None
+            if found is None:
+                found = self._last = step(self.motion, node, self.precision, self.carrier)
+            if found is None:
+                self.lost_at = node.time
+                return None
+            if node.time + found.length >= time:
+                return found, (time - node.time) / found.length
+            node, found = found.end(), None
+            self.keep(node)
+
+    def _nearest(self, time: Fraction) -> tuple[Step | None, Node]:
+        """The last node known before ``time``, and the step from it where that is known too."""
+        last, nodes = self._last, self.nodes
+        node = nodes[bisect_right(nodes, time, key=lambda node: node.time) - 1]
+        if last is not None and node.time <= last.node.time <= time:
+            return last, last.node
+        return None, node
+
+    def keep(self, node: Node) -> None:
+        """Remember every ``stride``-th node: constant memory at any horizon."""
+        nodes = self.nodes
+        if node.time <= nodes[-1].time:
+            return
+        self._skipped += 1
+        if self._skipped >= self.stride:
+            self._skipped = 0
+            nodes = (*nodes, node)
+        if len(nodes) > _KEPT_NODES:
+            nodes = nodes[::2]
+            self.stride *= 2
+        self.nodes = nodes
+
+
+class Ahead(NamedTuple):
+    """How far a pilot came: the node at its end, and the time and the bits lost after each of its steps."""
+
+    node: Node
+    times: tuple[Fraction, ...] = ()
+    losses: tuple[float, ...] = ()
+
+
+@dataclass(slots=True)
+class Pilot:
+    """The run in the fewest bits that may do: it tells how many bits the motion loses and how many steps it takes.
+
+    Where those bits do, its nodes are those of the enclosure.  Any thread may ask: ``ahead`` is replaced as a whole by
+    one that goes further, and does not depend on who came how far.
+    """
+
+    run: Run
+    ahead: Ahead
+
+    def forecast(self, span: Fraction, most_steps: float) -> tuple[float, float]:
+        """(bits lost, steps taken) up to ``span``, carried on linearly where the pilot does not go.
+
+        The pilot is given up after a hundred steps where, steps as long as these, ``most_steps`` would not do.
+        """
+        times, losses = self._ahead(span, most_steps)
+        if not times:
+            return float(self.run.precision), 64 * float(min(span, FAR))
+        index = min(bisect_left(times, span), len(times) - 1)
+        return 16 + _carried_on(times, losses, index, span), (index + 1) * _times_as_far(span, times[index])
+
+    def _ahead(self, span: Fraction, most_steps: float) -> tuple[Sequence[Fraction], Sequence[float]]:
+        """The times and the bits lost as far as ``span``, where the pilot comes so far."""
+        node, known, bits = self.ahead
+        if known and known[-1] >= span:
+            return known, bits
+        times, losses, run = list(known), list(bits), self.run
+        while (not times or times[-1] < span) and len(times) < _PILOT_STEPS:
+            if len(times) >= _TRIED and len(times) * _times_as_far(span, times[-1]) > most_steps:
+                break
+            found = step(run.motion, node, run.precision, run.carrier)
+            if found is None:
+                break
+            node = found.end()
+            run.keep(node)
+            times.append(node.time)
+            losses.append(node.errors.exponent + log2(float(node.errors.sizes().max()) + 1))
+        with _one_writer:
+            if len(times) > len(self.ahead.times):
+                self.ahead = Ahead(node, tuple(times), tuple(losses))
+        return times, losses
+
+    def reaches(self, span: Fraction, bits: int) -> bool:
+        """Whether it has come as far and has as many bits left there."""
+        _, times, losses = self.ahead
+        index = bisect_left(times, span)
+        return index < len(times) and self.run.precision - losses[index] >= bits
+
+
+def _carried_on(times: Sequence[Fraction], losses: Sequence[float], index: int, span: Fraction) -> float:
+    """The bits lost by ``span``: by the step ``index``, and from there as by the later half of the steps before it."""
+    later = min(span, FAR * times[index]) - times[index]
+    if later <= 0:
+        return losses[index]
+    middle = index // 2
+    slope = (losses[index] - losses[middle]) / float(times[index] - times[middle]) if index else 1.0
+    return losses[index] + max(0.0, slope) * float(later)
+
+
+def _times_as_far(span: Fraction, reached: Fraction) -> float:
+    """span/reached, at least 1 and at most 10^12."""
+    return max(1.0, float(min(span / reached, FAR)))
+
+
+# A motion in units in which it is of ordinary size, and the arithmetic that carries its Taylor coefficients.
+
+
+_GRIDS = tuple(grid_of(words, whole=True) for words in (3, 4, 6, 7, 8, 10, 12, 16, 24))
+"""Few of those that there are: each is compiled at its first use."""
+_STEPS_A_WORD = 2
+"""Fewer steps than that are not worth the machine code."""
+_LARGEST_EXCESS = 8
+_seen_right: set[tuple[Grid, str, int]] = set()
+
+
+@dataclass(slots=True)
+class ScaledMotion:
+    """A motion from exact data in one direction of time.
+
+    field: of the scaled state, backwards in time with its sign changed.  in_words: whether the lanes of
+    :mod:`heavytop.multiword.codegen.recurrence` compute this field, proven over the rationals, with coefficients of
+    ordinary size; a state that stays is cheaper in integers.
+    """
+
+    scaled: Scaled
+    field: Quadratic
+    forwards: bool
+    in_words: bool
+    _carriers: dict[int, Carrier] = dataclasses.field(default_factory=dict)
+
+    @classmethod
+    def of(cls, system: System, p: Parameters, y: tuple[Fraction, ...], forwards: bool) -> ScaledMotion:
+        """The motion of (Ω, γ), or of (Ω, γ, ξ), from ``y``."""
+        return cls._in_units(Scaled.of(system, p, y, bounded=True), p, forwards)
+
+    def with_parameters(self, p: Parameters) -> ScaledMotion:
+        """Of the same state in the same units, another field's."""
+        scaled = self.scaled
+        given = coefficients(scaled.system, p, len(scaled.state) == 9)
+        unit, gamma = scaled.rate, scaled.sizes[3]
+        linear = given.with_linear(gamma / unit**2, 1 / unit)
+        return self._in_units(dataclasses.replace(scaled, coefficients=linear), p, self.forwards)
+
+    @classmethod
+    def _in_units(cls, scaled: Scaled, p: Parameters, forwards: bool) -> ScaledMotion:
+        system, size = scaled.system, len(scaled.state)
+        own = own_parameters(scaled, p).mapped(mpq)
+        sign = 1 if forwards else -1
+
+        def given(state: tuple[Any, ...]) -> list[Any]:
+            found = [*system.field(own, state[:6])]
+            if len(state) == 9:
+                found += system.attitude(own, state[:6], state[6:])
+            return [sign * rate for rate in found]
+
+        def by_lanes(state: tuple[Any, ...]) -> list[Any]:
+            return [sign * rate for rate in rates(system, scaled.coefficients, state)]
+
+        motion = quadratic(given, size)
+        in_words = not scaled.rest and fixed_point_run.excess(scaled) <= _LARGEST_EXCESS
+        if in_words:
+            planned = quadratic(by_lanes, size)
+            in_words = (planned.pairs, planned.rows) == (motion.pairs, motion.rows)
+        return cls(scaled, motion, forwards, in_words)
+
+    def precision(self, bits: float, steps: float) -> tuple[int, bool]:
+        """The working precision at or above ``bits`` for so many steps, and whether it is that of words."""
+        if self.in_words:
+            for grid in _GRIDS:
+                if grid.total >= bits:
+                    if steps < _STEPS_A_WORD * grid.words:
+                        break
+                    return grid.total, True
+        return _ladder(bits), False
+
+    def carrier(self, precision: int) -> Carrier:
+        """The Taylor coefficients in ``precision`` bits, one of those that words have."""
+        if precision not in self._carriers:
+            grid = next(grid for grid in _GRIDS if grid.total == precision)
+            carrier = Carrier(self.scaled, grid, self.forwards)
+            self._require_right(carrier)
+            self._carriers[precision] = carrier
+        return self._carriers[precision]
+
+    def _require_right(self, carrier: Carrier) -> None:
+        """The first step that machine code takes in this process is compared with exact integers."""
+        grid, size = carrier.grid, len(self.scaled.state)
+        key = (grid, self.scaled.system.name, size)
+        if key in _seen_right:
+            return
+        centre = [round(value * 2**grid.total) for value in self.scaled.state]
+        for halvings in range(2, 64):
+            series = carrier.series(centre, halvings)
+            if series is not None:
+                if sum(lacking(self.field, series, grid.total, halvings)) > Fraction(series.rounding):
+                    raise Contradiction(
+                        f"Machine code in {grid.total} bits gives Taylor coefficients that are further from the truth "
+                        "than they can be.",
+                        "It is damaged: run again; if it stays, this machine or LLVM is faulty.",
+                    )
+                _seen_right.add(key)
+                return
+
+
+def own_parameters(scaled: Scaled, p: Parameters) -> Parameters:
+    """``p`` in the units of a scaled motion."""
+    unit, gamma = scaled.rate, scaled.sizes[3]
+    return p.mapped(lambda value: Fraction(value) / unit)._replace(
+        inertia=p.inertia, moment=tuple(gamma * n / unit**2 for n in p.moment)
+    )
+
+
+def _ladder(bits: float) -> int:
+    """Multiples of an eighth of the power of two below."""
+    whole = max(64, ceil(bits))
+    unit = 1 << max(4, whole.bit_length() - 4)
+    return -(-whole // unit) * unit
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """How far the true motion is from the rational data that stand for it.
+
+    start: of each component of (Ω, γ, ξ) at t = 0.  rate: of each component of Ω', at any time of the true motion.
+    """
+
+    start: tuple[Fraction, ...]
+    rate: Fraction
+
+
+_PILOT_BITS = 128
+_PILOT_ROOM = 72
+"""The forecast for a motion such as the generic top of the tests to t = 100: its pilot is the enclosure itself."""
+_MOST_PILOT_BITS = 352
+_HOPELESS, _SURELY = 8, 1.25
+"""Times the effort, and times what a cost may be, beyond which a pilot is given up after its first hundred steps."""
+_LARGEST_RATE = 2**100
+_ATTEMPTS = 6
+
+
+def seconds_a_step(precision: int, in_words: bool) -> float:
+    """A model of the cost, not a measurement: what is refused must not depend on how busy the machine is."""
+    return 4e-4 + 1.2e-11 * precision**3 if in_words else 1e-3 + 6e-8 * precision**2
+
+
+@dataclass(frozen=True, slots=True)
+class Validated:
+    """The motion from ``start``, enclosed.
+
+    top, start, system: any.  rotor: λ of the gyrostat where the start is rounded and (2.1) no longer holds exactly;
+    None for P b/(M·γ).  xi: the attitude vector at time 0; None for :func:`heavytop.top.attitude.perpendicular`.
+    uncertainty: what the data lack; the motion enclosed is the true one.  None for exact data.
+    effort: what a request may cost, in seconds of the cost model; beyond it the request is refused.
+    unit: the motion changes at about the rate 2^unit (:func:`heavytop.exact.flint.balls.unit_of_time`).
+    Raises InputError where the system does not admit the top and start, OutOfReach where they are too large.
+    """
+
+    top: HeavyTop
+    start: State
+    system: System = HEAVY_TOP
+    rotor: Fraction | None = None
+    xi: Vector | None = None
+    effort: float = 900.0
+    method: str = "validated: Taylor enclosure"
+    uncertainty: Uncertainty | None = None
+    unit: int = field(default=0, init=False, repr=False, compare=False)
+    _runs: dict[tuple[int, int, bool, int], Run] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _pilots: dict[tuple[int, int, bool, int], Pilot] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+    _motions: dict[tuple[int, int], ScaledMotion] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        require_handy(self.top, self.start)
+        object.__setattr__(self, "unit", unit_of_time(self.parameters, self.start.flat))
+        motion = self._motion(1, self.start.flat)
+        rate = coefficient_bound(motion.field, max(map(abs, motion.scaled.state)))
+        if rate > _LARGEST_RATE:
+            raise OutOfReach(
+                f"The motion may change 2^{exponent(rate)} times as fast as it turns.",
+                "Validated integration needs moments, weight and rates of less different size.",
+            )
+
+    @property
+    def parameters(self) -> Parameters:
+        """I, P r and the rotor, exactly."""
+        if self.rotor is not None and self.system is GYROSTAT:
+            return Parameters(self.top.inertia, self.top.moment, self.rotor)
+        return self.system.parameters(self.top, self.start)
+
+    def state(self, time: Fraction, bits: int) -> list[arb]:
+        """See :class:`heavytop.exact.solution.ExactSolution`; ``time`` of either sign.
+
+        Raises OutOfReach, with the digits that could be reached, where the model of the cost exceeds ``effort``.
+        """
+        return self._enclosure(time, bits, self.start.flat)
+
+    def cost(self, time: Fraction, bits: int, most: float | None = None) -> float:
+        """Seconds of the model of the cost that the state at ``time`` takes: steps times bits, by no clock.
+
+        most: where it is a quarter more than this, the first hundred steps may tell; None for eight times the effort.
+        """
+        return 0.0 if time == 0 else self._cost(time, bits, self.start.flat, most=most)
+
+    def reached(self) -> Fraction:
+        """The |t| up to which the latest enclosure has come, for those who wait; any thread may ask."""
+        latest = next(reversed(list(self._runs.values())), None)
+        return Fraction(0) if latest is None else latest.nodes[-1].time / Fraction(2) ** self.unit
+
+    def walk(self, time: Fraction, bits: int) -> tuple[ScaledMotion, Iterator[Step]]:
+        """The units of the motion, and its proven steps from t = 0 until one covers ``time``, which is not 0.
+
+        Their working precision is that at which ``bits`` bits are expected to be left at ``time``; they end before it
+        where the errors grow too large.  Raises OutOfReach as :meth:`state` does.
+        """
+        direction = 1 if time > 0 else -1
+        motion = self._motion(direction, self.start.flat)
+        span = abs(time) * motion.scaled.rate
+        loss, steps = self._forecast(direction, span, self.start.flat, bits)
+        planned = motion.precision(bits + loss, steps)
+        if steps * seconds_a_step(*planned) > self.effort:
+            raise self._refusal(time, self._reachable(time, bits, loss, self.start.flat))
+        run = self._run(direction, self.start.flat, *planned)
+        return motion, _steps_of(run, span)
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ: three balls.  Raises InputError where |γ| is not 1 exactly and no ``xi`` was given."""
+        return self.with_attitude(time, bits)[6:]
+
+    def with_attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """Ω, γ and ξ of one enclosure: nine balls; raises as :meth:`attitude`."""
+        xi = self.xi
+        if xi is None:
+            self.start.require_unit_gamma()
+            xi = perpendicular(self.start.gamma)
+        return self._enclosure(time, bits, (*self.start.flat, *xi))
+
+    def series(self, time: Fraction, length: int, bits: int) -> list[arb_series]:
+        """See :class:`heavytop.exact.solution.ExactSolution`: the recurrence of Taylor's series on the enclosure."""
+        return self._extended(self.state(time, bits + 4 * length), length, bits)
+
+    @whole_evaluation
+    def _extended(self, values: list[arb], length: int, bits: int) -> list[arb_series]:
+        motion = self._motion(1, self.start.flat)
+        pairs, rows, sizes, rate = motion.field.pairs, motion.field.rows, motion.scaled.sizes, motion.scaled.rate
+        with working_precision(bits + 4 * length + 32 + abs(exponent(rate)), length):
+            y = [[value / ball(size)] for value, size in zip(values, sizes, strict=True)]
+            for n in range(length - 1):
+                sums = [sum((y[j][m] * y[k][n - m] for m in range(n + 1)), arb(0)) for j, k in pairs]
+                last = [component[n] for component in y]
+                for component, row in zip(y, rows, strict=True):
+                    total = sum((c * sums[pair] for c, pair in row.products), arb(0))
+                    total += sum((c * last[j] for c, j in row.linear), arb(0))
+                    component.append(total / (row.denominator * (n + 1)))
+            # in the unit of time given, ε^n counts rate^n
+            unit = ball(rate)
+            return [
+                arb_series([c * ball(size) * unit**n for n, c in enumerate(component)], prec=length)
+                for component, size in zip(y, sizes, strict=True)
+            ]
+
+    def motion(self, direction: int) -> ScaledMotion:
+        """That of (Ω, γ) in units of its own, forwards or backwards in time."""
+        return self._motion(direction, self.start.flat)
+
+    def forecast(self, time: Fraction, bits: int) -> tuple[float, float]:
+        """(bits that will be lost, steps that will be taken) up to ``time``, where ``bits`` are to be left."""
+        direction = 1 if time > 0 else -1
+        span = abs(time) * self.motion(direction).scaled.rate
+        return self._forecast(direction, span, self.start.flat, bits)
+
+    def _motion(self, direction: int, start: tuple[Fraction, ...]) -> ScaledMotion:
+        """That of ``start``: of y, or of y and ξ."""
+        key = (direction, len(start))
+        if key not in self._motions:
+            motion = ScaledMotion.of(self.system, self.parameters, start, direction > 0)
+            if self.uncertainty is not None:
+                motion.field = replace(motion.field, slack=_rounded_up(self.uncertainty.rate / motion.scaled.rate**2))
+            self._motions.setdefault(key, motion)
+        return self._motions[key]
+
+    def _run(self, direction: int, start: tuple[Fraction, ...], precision: int, in_words: bool) -> Run:
+        key = (direction, precision, in_words, len(start))
+        if key not in self._runs:
+            motion = self._motion(direction, start)
+            carrier = motion.carrier(precision) if in_words else None
+            off = () if self.uncertainty is None else self.uncertainty.start[: len(start)]
+            lacking = [value / size for value, size in zip(off, motion.scaled.sizes[: len(off)], strict=True)]
+            node = start_node(motion.field, motion.scaled.state, precision, lacking)
+            self._runs.setdefault(key, Run(motion.field, precision, (node,), carrier))
+        return self._runs[key]
+
+    def _enclosure(self, time: Fraction, bits: int, start: tuple[Fraction, ...]) -> list[arb]:
+        if time == 0:
+            return _rounded(start, bits + 8, () if self.uncertainty is None else self.uncertainty.start)
+        direction = 1 if time > 0 else -1
+        motion = self._motion(direction, start)
+        span, sizes = abs(time) * motion.scaled.rate, motion.scaled.sizes
+        loss, steps = self._forecast(direction, span, start, bits)
+        pilot = self._pilot(direction, start, bits)
+        run = pilot.run if pilot.reaches(span, bits) else None
+        for _ in range(_ATTEMPTS):
+            planned = motion.precision(bits + loss, steps)
+            if steps * seconds_a_step(*planned) > self.effort:
+                raise self._refusal(time, self._reachable(time, bits, loss, start))
+            run = run or self._run(direction, start, *planned)
+            found = run.at(span)
+            if found is not None:
+                values = _evaluated(*found, found[0].radii(found[1]), run.precision + 64, sizes)
+                reached = min(map(relative_bits, values))
+                if reached >= bits:
+                    return values
+                loss = run.precision - reached + 16
+            else:
+                loss = run.precision * (1.25 * float(min(span / run.lost_at, FAR)) if run.lost_at else 2.0)
+            run = None
+        raise self._refusal(time, 0)
+
+    def _pilot(self, direction: int, start: tuple[Fraction, ...], bits: int) -> Pilot:
+        """In as many bits as short motions take, where they are not many."""
+        motion = self._motion(direction, start)
+        precision, in_words = motion.precision(bits + _PILOT_ROOM, inf)
+        if not in_words or precision > _MOST_PILOT_BITS:
+            precision, in_words = motion.precision(_PILOT_BITS, inf)
+        key = (direction, precision, in_words, len(start))
+        if key not in self._pilots:
+            run = self._run(direction, start, precision, in_words)
+            # threads that come at once take the same one
+            self._pilots.setdefault(key, Pilot(run, Ahead(run.nodes[0])))
+        return self._pilots[key]
+
+    def _forecast(
+        self, direction: int, span: Fraction, start: tuple[Fraction, ...], bits: int, most: float | None = None
+    ) -> tuple[float, float]:
+        """(bits that will be lost, steps that will be taken) up to ``span``, where ``bits`` are to be left."""
+        pilot = self._pilot(direction, start, bits)
+        if most is None:
+            a_step = seconds_a_step(pilot.run.precision, pilot.run.carrier is not None)
+            return pilot.forecast(span, _HOPELESS * self.effort / a_step)
+        # the enclosure may take fewer bits than its pilot
+        fewest = self._motion(direction, start).precision(bits, inf)
+        return pilot.forecast(span, _SURELY * most / seconds_a_step(*fewest))
+
+    def _cost(
+        self, time: Fraction, bits: int, start: tuple[Fraction, ...], loss: float = 0.0, most: float | None = None
+    ) -> float:
+        """loss: bits that are lost at least."""
+        direction = 1 if time > 0 else -1
+        motion = self._motion(direction, start)
+        forecast, steps = self._forecast(direction, abs(time) * motion.scaled.rate, start, bits, most)
+        return steps * seconds_a_step(*motion.precision(bits + max(loss, forecast), steps))
+
+    def _reachable(self, time: Fraction, bits: int, loss: float, start: tuple[Fraction, ...]) -> int:
+        """Fewer bits than ``bits``, within the effort."""
+        reachable = bits * 15 // 16
+        while reachable > 0 and self._cost(time, reachable, start, loss) > self.effort:
+            reachable = reachable * 15 // 16
+        return reachable
+
+    def _refusal(self, time: Fraction, reachable: int) -> OutOfReach:
+        at, digits = decimal_text(time, 6), int((reachable - 5) * log10(2))  # rounded up they take up to 5 bits more
+        if digits < 1:
+            return OutOfReach(
+                f"No digit at t = {at} is within reach of a validated integration.", "Ask for an earlier time."
+            )
+        return OutOfReach(
+            f"So many digits at t = {at} are out of reach of a validated integration.",
+            f"About {digits} digits could be proven there: ask for fewer, or for an earlier time.",
+        )
+
+
+def _steps_of(run: Run, span: Fraction) -> Iterator[Step]:
+    node = run.nodes[0]
+    while node.time < span:
+        found = step(run.motion, node, run.precision, run.carrier)
+        if found is None:
+            return
+        yield found
+        node = found.end()
+        run.keep(node)
+
+
+@whole_evaluation
+def _rounded(start: tuple[Fraction, ...], bits: int, off: tuple[Fraction, ...]) -> list[arb]:
+    with working_precision(bits):
+        if not off:
+            return [ball(value) for value in start]
+        wide = [arb(0, ball(value).abs_upper()) for value in off[: len(start)]]
+        return [ball(value) + more for value, more in zip(start, wide, strict=True)]
+
+
+def _rounded_up(value: Fraction) -> tuple[float, int]:
+    """(a, b) with value ≤ a 2^b, a below 4."""
+    if value == 0:
+        return 0.0, 0
+    power = exponent(value)
+    return float(value / Fraction(2) ** power) * (1 + 2.0**-50), power
+
+
+@whole_evaluation
+def _evaluated(found: Step, tau: Fraction, radii: Matrix, bits: int, sizes: tuple[Fraction, ...]) -> list[arb]:
+    """The state at ``tau`` in the units given."""
+    # numpy would let other threads in amid the balls: the radii are there already
+    with working_precision(bits):
+        values = found.around(tau, radii)
+        return [value * ball(size) for value, size in zip(values, sizes, strict=True)]

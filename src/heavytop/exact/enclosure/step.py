@@ -1,0 +1,525 @@
+"""One proven step of a quadratic field y' = Q(y, y) + L y: Taylor polynomial, defect, and the set of possible errors.
+
+All norms are maximum norms, and time is scaled so that a step goes over 0 ≤ τ ≤ 1: y' = h f(y).
+
+*The polynomial* p(τ) = Σ b_n τⁿ has whole numbers in units of 2^-p ("ulps") as coefficients, exactly:
+b_{n+1} is h f_n/(n + 1) within ρ_n, f_n the coefficient of τⁿ in f(p): ρ_n is half an ulp where they are made of
+exact integers, and what :mod:`heavytop.multiword.fixed_point.certified_series` proves where they are made of words.
+What p lacks to be a motion is its defect p' − h f(p) = Σ E_n τⁿ, and that is known.  For n < N, |E_n| ≤ (n + 1) ρ_n;
+for n ≥ N, E_n = −h f_n with |f_n| ≤ q Σ_{j+k=n} β_j β_k + l β_n, β_j = |b_j|.  Hence the integral of |defect| from 0 to
+τ is at most
+
+    D = Σ_{n < N} ρ_n + Σ_{n ≥ N} h (q Σ_{j+k=n} β_j β_k + l β_n)/(n + 1).                                        (a)
+
+*Theorem (tail).*  The motion y that starts at y(0) with w0 = y(0) − p(0) differs from p by w with
+w' = J w + h Q(w, w) − defect, J(τ) = h Df(p(τ)).  With |J| ≤ Λ' = h (2q Σ β_j + l), Λ = Λ' + h q c and
+W = (|w0| + D) e^Λ < c, it follows that |w| ≤ W on the whole step.  Proof: as long as |w| ≤ c,
+|w(τ)| ≤ |w0| + D + ∫ Λ |w|, so |w| ≤ W by Gronwall; W < c and continuity exclude that c is ever reached.  The a priori
+form of the same induction, |y_n| ≤ R Kⁿ with K = q R + l for |y(0)| ≤ R, is :func:`coefficient_bound`; it chooses the
+first step.  The form with the defect uses the coefficients that are there and allows steps about six times longer.
+
+*The set of errors.*  With V' = J V, V(0) = 1, variation of constants gives w(τ) = V(τ) w0 + v,
+|v| ≤ e^Λ (D + h q W²).  Where the field is not known
+exactly, y' = f(y) + δ with |δ| ≤ s on the motion (:attr:`heavytop.exact.enclosure.step.Quadratic.slack`), D is h s
+more, and all of it holds.  V is computed as a polynomial in binary64; with E its own defect, |V − V̂| ≤ e^Λ ∫|E|.
+Errors are kept as w0 ∈ {Q x: |x_i| ≤ r_i} with Q nearly orthogonal; the next Q comes from a QR factorisation of V̂ Q
+diag(r) with its columns ordered by length (Lohner), and Q'^T Q' = 1 + F is paid for with |F|. binary64 is used here
+with round to nearest; every bound carries the rounding of its own evaluation (``_UP``).
+
+Measured on the generic top of the tests at 400 bits, bits lost by t = 8, 30, 100, 300:
+
+    ordered QR frames          19  28  41  74     kept
+    QR frames, not ordered     19  28  41  74
+    parallelepipeds (Q = V̂ Q)  18  22  34  lost: the columns become parallel
+    boxes (Q = 1)              24  60 186  lost
+    balls without V            23  74   –  –      about 2.4 bits a unit of time, and 50 times slower
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property, lru_cache
+from math import exp, inf, isfinite, lcm
+from typing import Any, Protocol
+
+import numpy as np
+from flint import arb, fmpz, fmpz_poly
+from gmpy2 import mpq, mpz
+from numpy.typing import NDArray
+
+from heavytop.multiword.fixed_point.certified_series import Carrier
+from heavytop.multiword.integers.integer_series import Row, coefficients
+from heavytop.multiword.problem import variation as variation_of
+
+# A vector field of degree two, taken apart into exact numbers.
+#
+# Both systems have fields f(y) = Q(y, y) + L y without a constant part.  The coefficients are not written down a second
+# time: they are read off the field itself by evaluating it at the basis vectors and their pairwise sums.
+
+
+Matrix = NDArray[np.float64]
+Field = Callable[[tuple[Any, ...]], Sequence[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Quadratic:
+    """A field Q(y, y) + L y.
+
+    pairs: the products y_j y_k that occur.  rows: the components.
+    q, l: the largest row sums of absolute coefficients of the two parts, so |f(y)| ≤ q |y|² + l |y| and the Jacobian
+    has |J(y)| ≤ 2 q |y| + l, in the maximum norm.
+    jacobian: J(y)_ij = Σ_k jacobian[i, j, k] y_k + slope[i, j], rounded to binary64; infinite where it has no such.
+    slack: (a, b): the true field differs from this one by at most a 2^b, in the maximum norm, wherever its motion goes.
+    """
+
+    pairs: tuple[tuple[int, int], ...]
+    rows: tuple[Row, ...]
+    q: Fraction
+    l: Fraction  # noqa: E741 - the letter of the theorem
+    jacobian: Matrix
+    slope: Matrix
+    slack: tuple[float, int] = (0.0, 0)
+
+    @property
+    def dimension(self) -> int:
+        """The number of components."""
+        return len(self.rows)
+
+
+def quadratic(field: Field, dimension: int) -> Quadratic:
+    """``field`` taken apart; it must be of degree two without a constant part."""
+    unit = [tuple(mpq(int(i == j)) for i in range(dimension)) for j in range(dimension)]
+    plus = [field(e) for e in unit]
+    minus = [field(tuple(-x for x in e)) for e in unit]
+    table: list[dict[tuple[int, int], Fraction]] = [{} for _ in range(dimension)]
+    lines: list[dict[int, Fraction]] = [{} for _ in range(dimension)]
+    for j in range(dimension):
+        for i in range(dimension):
+            _keep(table[i], (j, j), (plus[j][i] + minus[j][i]) / 2)
+            _keep(lines[i], j, (plus[j][i] - minus[j][i]) / 2)
+        for k in range(j + 1, dimension):
+            both = field(tuple(x + y for x, y in zip(unit[j], unit[k], strict=True)))
+            for i in range(dimension):
+                _keep(table[i], (j, k), both[i] - plus[j][i] - plus[k][i])
+    return _assemble(table, lines)
+
+
+def _keep(row: dict[Any, Fraction], key: Any, value: Any) -> None:
+    if value:
+        row[key] = Fraction(int(value.numerator), int(value.denominator))
+
+
+def _assemble(table: list[dict[tuple[int, int], Fraction]], lines: list[dict[int, Fraction]]) -> Quadratic:
+    dimension = len(lines)
+    pairs = tuple(sorted({pair for row in table for pair in row}))
+    rows = []
+    jacobian, slope = np.zeros((dimension,) * 3), np.zeros((dimension,) * 2)
+    for i, (products, linear) in enumerate(zip(table, lines, strict=True)):
+        common = lcm(*(c.denominator for c in (*products.values(), *linear.values())))
+        rows.append(
+            Row(
+                common,
+                tuple((int(c * common), pairs.index(pair)) for pair, c in products.items()),
+                tuple((int(c * common), j) for j, c in linear.items()),
+            )
+        )
+        for (j, k), c in products.items():
+            jacobian[i, j, k] += _rounded(c)
+            jacobian[i, k, j] += _rounded(c)
+        for j, c in linear.items():
+            slope[i, j] = _rounded(c)
+    q = max(sum((abs(c) for c in row.values()), Fraction(0)) for row in table)
+    l = max(sum((abs(c) for c in row.values()), Fraction(0)) for row in lines)  # noqa: E741
+    return Quadratic(pairs, tuple(rows), q, l, jacobian, slope)
+
+
+def _rounded(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return inf if value > 0 else -inf
+
+
+# The Taylor polynomial of a step: whole coefficients, with what its proof needs to know of them.
+
+
+# relative room for the rounding of a bound
+
+
+class StepSeries(Protocol):
+    """b_0, …, b_N of every component, in whole ulps.
+
+    Made of exact integers (:class:`Whole`) or on a grid of words
+    (:class:`heavytop.multiword.fixed_point.certified_series.Series`).
+    """
+
+    @property
+    def thrifty(self) -> tuple[float, float]:
+        """Orders a bit between which a unit of time costs least."""
+
+    @property
+    def order(self) -> int:
+        """N."""
+
+    @property
+    def rounding(self) -> float:
+        """A bound, in ulps, of Σ_(n < N) |b_(n+1) − h f_n/(n + 1)|, in the maximum norm."""
+
+    @property
+    def values(self) -> list[list[int]]:
+        """The coefficients of each component."""
+
+    @property
+    def total(self) -> Sequence[int]:
+        """Σ b_n, exactly: what the next step begins at, as it stands."""
+
+    @property
+    def sizes(self) -> Matrix:
+        """Upper bounds of β_n = |b_n|, as numbers; shape (N + 1,)."""
+
+    def scaled(self, rate: int) -> Matrix:
+        """Upper bounds of 2^(rate n) β_n, as numbers."""
+
+    def rounded(self, orders: int) -> Matrix:
+        """b_0 to b_orders in binary64, as many as there are, within 2^-50 of ``sizes`` plus 2^-199."""
+
+
+@dataclass(frozen=True)
+class Whole:
+    """Coefficients of :func:`heavytop.multiword.integers.integer_series.coefficients`, each rounded to nearest."""
+
+    values: list[list[int]]
+    precision: int
+
+    @property
+    def thrifty(self) -> tuple[float, float]:
+        """2.1 to 3.8 bits a power of τ, about e^-2: N² multiplications of a step 1/h."""
+        return 0.27, 0.45
+
+    @property
+    def order(self) -> int:
+        """N."""
+        return len(self.values[0]) - 1
+
+    @property
+    def rounding(self) -> float:
+        """Half an ulp an order."""
+        return self.order / 2
+
+    @property
+    def total(self) -> tuple[int, ...]:
+        """Σ b_n."""
+        return tuple(sum(component, mpz(0)) for component in self.values)
+
+    @cached_property
+    def _lengths(self) -> Matrix:
+        """Bits of β_n, in ulps."""
+        return np.array([max(map(abs, column)).bit_length() for column in zip(*self.values, strict=True)])
+
+    @property
+    def sizes(self) -> Matrix:
+        """The first in binary64, the others by their lengths."""
+        bounds = np.ldexp(1.0, np.maximum(self._lengths - self.precision, -200))
+        first = np.abs(self.rounded(32)).max(axis=1)
+        bounds[: first.size] = first * _UP + _TINY
+        return np.asarray(bounds)
+
+    def scaled(self, rate: int) -> Matrix:
+        """Powers of two, so that binary64 holds them at any precision."""
+        return np.ldexp(1.0, np.maximum(self._lengths - self.precision + rate * np.arange(self.order + 1), -900))
+
+    def rounded(self, orders: int) -> Matrix:
+        """Their leading 200 bits, rounded."""
+        shift = max(0, self.precision - 200)
+        short = [[float(value >> shift) for value in component[: orders + 1]] for component in self.values]
+        return np.asarray(np.ldexp(np.array(short).T, shift - self.precision))
+
+
+def lacking(motion: Quadratic, series: StepSeries, precision: int, halvings: int) -> list[Fraction]:
+    """|b_(n+1) − h f_n/(n + 1)| in the maximum norm, in ulps, for 0 ≤ n < N: exactly, from whole numbers."""
+    polynomials = [fmpz_poly([int(value) for value in component]) for component in series.values]
+    products = [polynomials[j] * polynomials[k] for j, k in motion.pairs]
+    found = [Fraction(0)] * series.order
+    for component, row in zip(series.values, motion.rows, strict=True):
+        quadratic = sum((c * products[pair] for c, pair in row.products), fmpz_poly([]))
+        linear = sum((c * polynomials[j] for c, j in row.linear), fmpz_poly([]))
+        for n in range(series.order):
+            rate = int(quadratic[n]) + (int(linear[n]) << precision)
+            step = Fraction(rate, row.denominator * (n + 1) << precision) / Fraction(2) ** halvings
+            found[n] = max(found[n], abs(int(component[n + 1]) - step))
+    return found
+
+
+_UNIT = 2.0**-53
+# relative room for the rounding of every bound below: each is a sum or product of a few hundred terms of one sign
+_UP = 1 + 2.0**-32
+_TINY = 2.0**-190
+_VARIATIONAL_ORDER = 32
+# the size c of an error beyond which an enclosure counts as lost
+CAP = 2.0**-16
+_LARGEST_SLOPE = 2.0
+_FAR_OFF = 2**900
+"""Ulps that no start may be off by: such an enclosure is lost at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """The set {Q x 2^exponent: |x_i| ≤ radii_i}, in ulps."""
+
+    frame: Matrix
+    radii: Matrix
+    exponent: int
+
+    def sizes(self, matrix: Matrix | None = None, slack: float = 0.0) -> Matrix:
+        """Upper bounds of the components of (matrix + anything of norm ``slack``) times the set, without 2^exponent."""
+        across = self.frame if matrix is None else matrix
+        return np.asarray((np.abs(across) @ self.radii + slack * self.radii.max()) * _UP + _TINY)
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """The motion at ``time``: centre in ulps plus the set of errors; ``halvings``: the next step is 2^-halvings."""
+
+    time: Fraction
+    centre: Sequence[int]
+    errors: Errors
+    halvings: int
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The motion from a node on, for 0 ≤ τ ≤ 1.
+
+    series: the polynomial, in whole ulps of 2^-precision.  variation: V̂ by powers of τ.
+    powers: an upper bound of Σ |V̂_n|.
+    variation_error: bound of |V − V̂|.  local: bound of |v| in ulps 2^errors.exponent.  widest: W, as a number;
+    widest_ulps: the same in ulps 2^errors.exponent.
+    """
+
+    node: Node
+    precision: int
+    series: StepSeries
+    variation: Matrix
+    powers: float
+    variation_error: float
+    local: float
+    widest: float
+    widest_ulps: float
+
+    @property
+    def length(self) -> Fraction:
+        """h."""
+        return Fraction(1, 2) ** self.node.halvings if self.node.halvings >= 0 else Fraction(2**-self.node.halvings)
+
+    @property
+    def order(self) -> int:
+        """N."""
+        return self.series.order
+
+    @property
+    def coefficients(self) -> list[list[int]]:
+        """b_n of each component."""
+        return self.series.values
+
+    @property
+    def summed_error(self) -> float:
+        """|V − V̂| with the rounding of the sum that V̂ is evaluated by."""
+        return self.variation_error + 8 * _VARIATIONAL_ORDER * _UNIT * self.powers
+
+    def at(self, tau: Fraction) -> list[arb]:
+        """The state at 0 ≤ τ ≤ 1, as balls."""
+        return self.around(tau, self.radii(tau))
+
+    def radii(self, tau: Fraction) -> Matrix:
+        """Bounds of the errors at 0 ≤ τ ≤ 1, in ulps 2^errors.exponent; in binary64, without FLINT."""
+        slack = self.summed_error
+        variation = sum(float(tau) ** n * matrix for n, matrix in enumerate(self.variation))
+        errors = self.node.errors
+        # the second term: the rounding of the product below
+        spread = (slack + 64 * _UNIT * self.powers) * norm(errors.frame) * _UP
+        return np.asarray(errors.sizes(variation @ errors.frame, spread) + self.local)
+
+    def around(self, tau: Fraction, radii: Matrix) -> list[arb]:
+        """The state at 0 ≤ τ ≤ 1 as balls, from its :meth:`radii`."""
+        # each of the N roundings of Horner's scheme is at most half an ulp
+        rounding = arb(self.order) / 2
+        unit = arb(2) ** -self.precision
+        scale = arb(2) ** self.node.errors.exponent
+        return [
+            arb(fmpz(int(horner(component, tau))) * unit, (arb(float(r * _UP)) * scale + rounding).upper() * unit)
+            for component, r in zip(self.coefficients, radii, strict=True)
+        ]
+
+    def transfer(self) -> tuple[Matrix, Matrix, float]:
+        """(Q', T, η): the frame at τ = 1, T = Q'^T V̂ Q and a bound of |Q'^-1 V Q − T|; η also bounds |Q'^-1 − Q'^T|."""
+        return _new_frame(self.variation.sum(axis=0), self.summed_error, self.node.errors)
+
+    def end(self, transfer: tuple[Matrix, Matrix, float] | None = None) -> Node:
+        """The node at τ = 1: Σ b_n exactly, and the set of errors in a new frame, that of :meth:`transfer`."""
+        errors = self.node.errors
+        frame, turned, slack = transfer or self.transfer()
+        radii = Errors(turned, errors.radii, 0).sizes(slack=slack)
+        reach = np.abs(frame.T).sum(axis=1) + slack
+        radii = (radii + reach * self.local) * _UP
+        exponent = errors.exponent
+        if radii.max() > 2.0**400:
+            radii, exponent = np.ldexp(radii, -400), exponent + 400
+        return Node(self.node.time + self.length, self.series.total, Errors(frame, radii, exponent), self._halvings())
+
+    def _halvings(self) -> int:
+        """The next step: where the orders a bit are few it is doubled, where they are many it is halved."""
+        (few, many), wanted = self.series.thrifty, self.order / (self.precision + 16)
+        if wanted > many:
+            return self.node.halvings + 1
+        return self.node.halvings - int(wanted < few and norm(self.variation[1]) < _LARGEST_SLOPE / 2)
+
+
+def horner(coefficients: list[int], tau: Fraction) -> mpz:
+    """The polynomial at 0 ≤ τ ≤ 1, within half a unit an order; exactly at 1."""
+    if tau == 1:
+        return mpz(sum(coefficients))
+    total = mpz(0)
+    numerator, denominator = mpz(tau.numerator), mpz(tau.denominator)
+    for value in reversed(coefficients):
+        total = value + (2 * total * numerator + denominator) // (2 * denominator)
+    return total
+
+
+def _new_frame(variation: Matrix, variation_error: float, errors: Errors) -> tuple[Matrix, Matrix, float]:
+    """(Q', T, η): the next frame, T = Q'^T V̂ Q and a bound of |Q'^-1 V Q − T|; η also bounds |Q'^-1 − Q'^T|."""
+    size = len(variation)
+    carried = variation @ errors.frame
+    order = np.argsort(-np.sqrt((carried * carried).sum(axis=0)) * errors.radii, kind="stable")
+    frame = np.linalg.qr(carried[:, order])[0]
+    rounding = 2 * (size + 4) * _UNIT
+    transposed, before = norm(frame.T), norm(errors.frame)
+    product = (norm(variation) + variation_error) * before
+    off = norm(frame.T @ frame - _identity(size)) + rounding * transposed * size
+    # (1 + F)^-1 differs from 1 by at most |F|/(1 − |F|)
+    inverse = off / (1 - off) * transposed if off < 1 else inf
+    slack = inverse * product + transposed * before * variation_error + 3 * rounding * transposed * product
+    return frame, frame.T @ carried, max(slack, inverse) * _UP
+
+
+@lru_cache(maxsize=4)
+def _identity(size: int) -> Matrix:
+    return np.eye(size)
+
+
+def norm(matrix: Matrix) -> float:
+    """The largest row sum of absolute values."""
+    return float(max(np.add.reduce(np.abs(matrix), 1).tolist()))
+
+
+def coefficient_bound(field: Quadratic, size: Fraction) -> Fraction:
+    """K = q R + l for R = ``size`` ≥ |y|: every Taylor coefficient of the motion has |y_n| ≤ R Kⁿ.
+
+    Induction: (n + 1) |y_{n+1}| ≤ q Σ_{j=0..n} R K^j R K^(n−j) + l R Kⁿ ≤ (n + 1) R Kⁿ (q R + l).
+    Hence the part beyond order N at a step h < 1/K is at most R (K h)^(N+1)/(1 − K h).
+    """
+    return field.q * size + field.l
+
+
+def start_node(field: Quadratic, start: tuple[Fraction, ...], precision: int, off: Sequence[Fraction] = ()) -> Node:
+    """The node at time 0 of the motion from ``start``, rounded to ulps of 2^-precision.
+
+    off: how far each component of the true start may be from it; none where it is exact.
+    """
+    scaled = [value * 2**precision for value in start]
+    centre = tuple(mpz(round(value)) for value in scaled)
+    radii = np.array([0.0 if value.denominator == 1 else 0.5 for value in scaled])
+    if any(off):
+        radii += np.array([float(min(value * 2**precision, _FAR_OFF)) * _UP + _TINY for value in off])
+    bound = coefficient_bound(field, max(map(abs, start)))
+    # the first step has K h < 1/4
+    halvings = 2 + int(bound).bit_length() if bound >= 1 else 2 - int(1 / (bound + Fraction(1, 16))).bit_length()
+    return Node(Fraction(0), centre, Errors(np.eye(field.dimension), radii, 0), halvings)
+
+
+def step(field: Quadratic, node: Node, precision: int, carrier: Carrier | None = None) -> Step | None:
+    """The proven step from ``node``; None where the errors have grown beyond what the theorem admits.
+
+    carrier: of this motion on the grid of ``precision`` bits; None for coefficients in exact integers.
+    """
+    halvings = node.halvings
+    while halvings < node.halvings + 64:
+        trial = Node(node.time, node.centre, node.errors, halvings)
+        series = taylor_series(field, trial, precision, carrier)
+        found = None if series is None else _prove(field, trial, series, precision)
+        if found is not None and isfinite(found.widest) and found.variation_error < CAP:
+            return found if found.widest < CAP else None
+        halvings += 1
+    return None
+
+
+def taylor_series(field: Quadratic, node: Node, precision: int, carrier: Carrier | None) -> StepSeries | None:
+    """The polynomial from a node, over its own step; None where that is too long for it."""
+    if carrier is not None:
+        return carrier.series(node.centre, node.halvings)
+    values = coefficients(field, node.centre, precision, node.halvings)
+    return None if values is None else Whole(values, precision)
+
+
+def _prove(field: Quadratic, node: Node, series: StepSeries, precision: int) -> Step | None:
+    """The step with its bounds from the theorem; None where they are not finite."""
+    h, q, slope = 2.0**-node.halvings, float(field.q) * _UP, float(field.l) * _UP
+    sizes = series.sizes
+    growth = h * (2 * q * float(sizes.sum()) + slope + q * CAP) * _UP
+    if not growth < 4 * _LARGEST_SLOPE:
+        return None
+    factor = exp(growth) * _UP
+    scale = node.errors.exponent
+    defect = defect_bound(series, precision, h * q, h * slope)
+    # what the field itself lacks: |y' − f(y)| on the true motion
+    lacking, exponent = field.slack
+    defect = np.ldexp(defect, -scale) + np.ldexp(h * lacking * _UP, exponent + precision - scale) + _TINY
+    variation, powers, variation_error = _variation(field, series, h, h * 2 * q * sizes)
+    bound = (float(node.errors.sizes().max()) + defect) * factor * _UP
+    square = np.ldexp(h * q * bound * bound, max(scale - precision, -2000)) + _TINY
+    local = float(factor * (defect + square) * _UP)
+    widest = float(np.ldexp(bound, min(scale - precision, 900)))
+    return Step(node, precision, series, variation, powers, factor * variation_error * _UP, local, widest, bound)
+
+
+def defect_bound(series: StepSeries, precision: int, quadratic: float, linear: float) -> float:
+    """D of (a) in ulps; ``quadratic`` and ``linear`` are h q and h l.
+
+    β_n is multiplied by 2^(rate n), so that binary64 holds it at any precision.
+    """
+    order = series.order
+    rate = precision // order
+    scaled = series.scaled(rate)
+    products = np.convolve(scaled, scaled)[order:]
+    # n ≥ N in the denominators
+    beyond = (quadratic * float(products @ _falling(rate, order)) + linear * float(scaled[-1])) / (order + 1)
+    return (series.rounding + float(np.ldexp(beyond, precision - rate * order))) * _UP
+
+
+@lru_cache(maxsize=512)
+def _falling(rate: int, order: int) -> Matrix:
+    """2^(−rate n) for n = 0 to ``order``."""
+    return np.ldexp(1.0, np.maximum(-rate * np.arange(order + 1), -1000))
+
+
+def _variation(field: Quadratic, series: StepSeries, h: float, slopes: Matrix) -> tuple[Matrix, float, float]:
+    """V̂ by powers of τ, a bound of Σ |V̂_n|, and one of the integral of its own defect over the step.
+
+    V̂_{n+1} = Σ_j J_j V̂_{n−j}/(n + 1), each a scalar product of at most ``terms`` numbers, wrong by at most terms
+    units in the last place of the sum of the absolute values.  ``slopes``: upper bounds of |J_n| without l.
+    """
+    size, top = field.dimension, _VARIATIONAL_ORDER
+    values = series.rounded(top - 1)
+    jacobians = np.zeros((top, size, size))
+    jacobians[: len(values)] = (values @ field.jacobian.reshape(size * size, size).T).reshape(-1, size, size)
+    jacobians[0] += field.slope
+    variation = variation_of(h * jacobians)
+    norms = np.maximum.reduce(np.add.reduce(np.abs(variation), 2), 1)
+    rates = slopes.copy()
+    rates[0] += h * float(field.l)
+    terms = size * (top + 2) + 16
+    rounding = (4 * terms * _UNIT * float(rates.sum()) + _TINY) * float(norms.sum())
+    # n ≥ top in the denominators
+    beyond = float(np.add.reduce(np.convolve(rates, norms)[top:])) / (top + 1)
+    return variation, float(norms.sum()) * _UP, (rounding + beyond) * _UP

@@ -1,0 +1,1 @@
+"""Balls: python-flint's arb, its context, and exact numbers in and out."""

@@ -1,0 +1,530 @@
+"""Balls (python-flint's arb): exact numbers in, enclosures out.
+
+The working precision of FLINT is one for the whole process, so every evaluation stands inside
+:class:`heavytop.exact.flint.balls.working_precision`, which is to be had from here too.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable
+from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Decimal
+from fractions import Fraction
+from functools import wraps
+from sys import getswitchinterval, setswitchinterval
+from threading import RLock, get_ident
+from types import SimpleNamespace
+from typing import Any, ParamSpec, SupportsInt, TypeVar
+
+from flint import acb_mat, arb, arb_mat, ctx, fmpq
+
+from heavytop.errors import HeavyTopError, OutOfReach
+from heavytop.precision import quotient_text, ratio_text
+from heavytop.top.equations import Parameters
+from heavytop.top.heavy_top import HeavyTop, State
+
+# Numbers of any size: how long exact data may be, and the unit of time in which a motion is of ordinary size.
+#
+# With Ω = s ω, τ = s t and P r = s² n the equations of ω, γ and n in τ are those of Ω, γ and P r in t.
+
+
+_LONGEST = 1 << 15
+"""Bits of a numerator or denominator: exact invariants have up to twenty times as many, and are made in seconds."""
+_ORDINARY = 16
+
+
+def require_handy(top: HeavyTop, start: State, times: Iterable[Fraction] = ()) -> None:
+    """Raises OutOfReach for numbers whose exact arithmetic would take longer than anyone waits."""
+    for value in (*top.inertia, *top.moment, *(top.rotor or ()), *start.flat, *times):
+        length = max(value.numerator.bit_length(), value.denominator.bit_length())
+        if length > _LONGEST:
+            raise OutOfReach(
+                f"A number of the top, the start or a time is a fraction of {length} bits.",
+                f"References are proven for fractions of up to {_LONGEST} bits, 1e-9000 to 1e9000: choose other units.",
+            )
+
+
+def unit_of_time(parameters: Parameters, start: tuple[Fraction, ...]) -> int:
+    """k such that the motion changes at about the rate 2^k; 0 for ordinary rates, from 2^-16 to 2^16.
+
+    The rates are |Ω|, |λ| or |k|/I, and the root of |P r||γ|/I, whichever is largest.
+    """
+    turning = max(*map(abs, start[:3]), parameters.rotor_rate)
+    weight = max(map(abs, parameters.moment)) * max(map(abs, start[3:6])) / min(parameters.inertia)
+    rates = [exponent(turning)] * (turning > 0) + [exponent(weight) // 2] * (weight > 0)
+    largest = max(rates, default=None)
+    return 0 if largest is None or -_ORDINARY <= largest <= _ORDINARY else largest
+
+
+def exponent(value: Fraction) -> int:
+    """e with 2^(e − 1) < value < 2^(e + 1), value > 0."""
+    return value.numerator.bit_length() - value.denominator.bit_length()
+
+
+# FLINT's context, its working precision and length of power series, one evaluation at a time.
+#
+# ``flint.ctx`` is one for the whole process.  So every evaluation of this program stands inside a block that sets it,
+# :class:`working_precision` or :class:`series_length`, and one re-entrant lock admits one thread at a time to them.
+#
+# That keeps the threads of this program apart.  A thread of the user may still set ``flint.ctx`` meanwhile.  So each
+# block looks on its way in and out whether the context is the one that it set; if not, :class:`ContextChanged` is
+# raised, and :func:`whole_evaluation`, the decorator of what evaluates from beginning to end, evaluates again.  From
+# the first such change on, other threads are let in less often during an evaluation, so that it comes through.  At the
+# end the context is what the user made it.
+#
+# Nothing of the user's (an observer, another package's integrator) may be called inside a block: it might wait for a
+# thread that waits for the lock.
+
+
+P = ParamSpec("P")
+Found = TypeVar("Found")
+
+_DEFAULTS = 53, 10
+"""FLINT's own precision and length: what an outermost block that does not set both finds, whatever the user's are."""
+_ATTEMPTS = 7
+_UNHURRIED = 0.05
+"""Seconds between two switches of threads in an evaluation that was disturbed before; four times as long each time."""
+
+
+class ContextChanged(HeavyTopError):
+    """Another thread set ``flint.ctx`` during an evaluation, each time that it was tried."""
+
+    exit_code = 3
+
+    def __init__(self) -> None:
+        super().__init__(
+            "Another thread of this process keeps changing flint.ctx while balls are evaluated.",
+            "Set flint.ctx once, before threads are started, or evaluate in a process of its own.",
+        )
+
+
+class _Held:
+    """Who evaluates now, and what the context is meant to be; changed by the thread that owns the lock alone.
+
+    thread: 0 for none.  context: the precision and length set by this program.  own: the user's, to be put back.
+    disturbed: whether the context was found changed since the outermost block began; ever: in this process.
+    """
+
+    __slots__ = ("context", "disturbed", "ever", "own", "thread")
+
+    def __init__(self) -> None:
+        self.thread = 0
+        self.context = self.own = _DEFAULTS
+        self.disturbed = self.ever = False
+
+
+_lock = RLock()
+_held = _Held()
+
+
+def _note() -> None:
+    """The context is not what it was set to: remember what the user wants from now on, and set it again."""
+    found, wanted, own = (ctx.prec, ctx.cap), _held.context, _held.own
+    _held.disturbed = _held.ever = True
+    _held.own = own[0] if found[0] == wanted[0] else found[0], own[1] if found[1] == wanted[1] else found[1]
+    ctx.prec, ctx.cap = wanted
+
+
+def _set(context: tuple[int, int]) -> None:
+    """Set what is not set already: FLINT's setter works out decimal digits each time."""
+    precision, length = context
+    if ctx.prec != precision:
+        ctx.prec = precision
+    if ctx.cap != length:
+        ctx.cap = length
+
+
+def current_precision() -> int:
+    """The precision of the block that this stands in, whatever another thread has made of ``flint.ctx`` meanwhile."""
+    return _held.context[0]
+
+
+def current_length() -> int:
+    """The length of power series of the block that this stands in, as :func:`current_precision`."""
+    return _held.context[1]
+
+
+def require_undisturbed() -> None:
+    """Raise ContextChanged if the context was changed since the evaluation began: before something is kept."""
+    if (ctx.prec, ctx.cap) != _held.context:
+        _note()
+    if _held.disturbed:
+        raise ContextChanged
+
+
+class _Block:
+    """What the two blocks share.  precision, length: None for the one that stays."""
+
+    __slots__ = ("before", "length", "outermost", "precision")
+    precision: int | None
+    length: int | None
+
+    def __enter__(self) -> None:
+        me = get_ident()
+        self.outermost = _held.thread != me
+        if self.outermost:
+            _lock.acquire()
+            _held.own = ctx.prec, ctx.cap
+            _held.thread, _held.context, _held.disturbed = me, _DEFAULTS, False
+        elif (ctx.prec, ctx.cap) != _held.context:
+            _note()
+        self.before = precision, length = _held.context
+        _held.context = (
+            precision if self.precision is None else self.precision,
+            length if self.length is None else self.length,
+        )
+        try:
+            _set(_held.context)
+        except BaseException:  # no precision: FLINT says what is wrong with it
+            ctx.prec, ctx.cap = _held.context = self.before
+            self.__exit__(BaseException)
+            raise
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if (ctx.prec, ctx.cap) != _held.context:
+            _note()
+        disturbed = _held.disturbed
+        if self.outermost:
+            _set(_held.own)
+            _held.thread = 0
+            _lock.release()
+        else:
+            _held.context = self.before
+            _set(self.before)
+        if disturbed and (kind is None or (self.outermost and issubclass(kind, Exception))):
+            raise ContextChanged
+
+
+class working_precision(_Block):  # noqa: N801 - reads as a verb
+    """FLINT's working precision set to ``bits`` ≥ 2 within the block, for this thread alone.
+
+    length: of power series, as :class:`series_length` sets it; None for the one around the block.
+    Raises ContextChanged at the end where another thread changed the context meanwhile.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, bits: int, length: int | None = None) -> None:
+        self.precision, self.length = bits, length
+
+
+class series_length(_Block):  # noqa: N801 - reads as a verb
+    """FLINT's cap on the length of power series set to ``length`` ≥ 1 within the block, for this thread alone.
+
+    Raises ContextChanged at the end where another thread changed the context meanwhile.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, length: int) -> None:
+        self.precision, self.length = None, length
+
+
+def at_precision(bits: int, length: int, evaluate: Callable[[int], Found]) -> Found:
+    """``evaluate(bits)`` as inside :class:`working_precision`, for the thread that evaluates already.
+
+    It spares the block that every state would make.  Raises ContextChanged as the block does.
+    """
+    before = _held.context
+    _held.context = ctx.prec, ctx.cap = bits, length
+    try:
+        found = evaluate(bits)
+    finally:
+        if (ctx.prec, ctx.cap) != _held.context:
+            _note()
+        _held.context = ctx.prec, ctx.cap = before
+    if _held.disturbed:
+        raise ContextChanged
+    return found
+
+
+def whole_evaluation(function: Callable[P, Found]) -> Callable[P, Found]:
+    """``function`` with the context for itself from beginning to end, and again where another thread changed it.
+
+    function: evaluates balls; gives the same when it is called again, and calls nothing of the user's.
+    The result raises ContextChanged after seven disturbed evaluations.
+    """
+
+    @wraps(function)
+    def alone(*args: P.args, **kwargs: P.kwargs) -> Found:
+        me = get_ident()
+        if _held.thread == me:
+            return function(*args, **kwargs)
+        for attempt in range(_ATTEMPTS):
+            # a statement, not calls: Ctrl-C cannot come between the lock and its block, nor between the last lines
+            with _lock:
+                _held.own = ctx.prec, ctx.cap
+                interval = None
+                try:
+                    _held.disturbed, _held.context = False, _DEFAULTS
+                    _held.thread = me
+                    if _held.own != _DEFAULTS:
+                        ctx.prec, ctx.cap = _DEFAULTS
+                    if _held.ever:
+                        interval = getswitchinterval()
+                        setswitchinterval(max(interval, _UNHURRIED * 4**attempt))
+                    found = function(*args, **kwargs)
+                    if _held.disturbed or (ctx.prec, ctx.cap) != _held.context:
+                        require_undisturbed()
+                    return found
+                except ContextChanged:
+                    _held.ever = True
+                except Exception:
+                    if (ctx.prec, ctx.cap) == _held.context and not _held.disturbed:
+                        raise
+                    _note()
+                finally:
+                    _held.thread = 0
+                    if (ctx.prec, ctx.cap) != _held.own:
+                        ctx.prec, ctx.cap = _held.own
+                    if interval is not None:
+                        setswitchinterval(interval)
+        raise ContextChanged
+
+    return alone
+
+
+def coefficient(series: Any, order: int) -> Any:
+    """The coefficient of ε^order of a power series; raises ContextChanged where it was cut off.
+
+    FLINT gives 0 for a coefficient that a changed ``ctx.cap`` cut off: a wrong number, where a changed precision gives
+    a wide ball only.
+    """
+    if order >= series.prec:
+        raise ContextChanged
+    return series[order]
+
+
+def _after_fork() -> None:
+    """A forked child has no other thread: none that could release the lock."""
+    global _lock
+    if _held.thread not in (0, get_ident()):
+        _lock = RLock()
+        ctx.prec, ctx.cap = _held.own
+        _held.thread = 0
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
+
+FUNCTIONS = SimpleNamespace(
+    sqrt=arb.sqrt,
+    exp=arb.exp,
+    log=arb.log,
+    sin=arb.sin,
+    cos=arb.cos,
+    tanh=arb.tanh,
+    cosh=arb.cosh,
+    arctan=arb.atan,
+    arccos=arb.acos,
+    atan2=lambda y, x: arb.atan2(y, x),
+)
+_MAX_BITS = 1 << 22
+_HALF = arb(0.5)
+_INTEGER = re.compile(r"-?[0-9]+")
+_GUARD, _STEP = 16, 64
+_RADIUS_BITS = 30
+_RADIUS_DIGITS = 3
+_ENOUGH = 1 << 15
+"""Working bits that are always tried: tops whose moments, weight and spin differ by a thousand decades need them."""
+_SERIES_DIVISION = ("leading term in denominator is not nonzero", "quotient would not be a power series")
+"""What python-flint says of a division by a power series whose first coefficient may be 0, instead of nan."""
+
+
+class Undecided(ArithmeticError):
+    """The working precision does not decide a discrete question."""
+
+
+def rational(value: Fraction | int) -> fmpq:
+    """``value`` as FLINT's fraction."""
+    return fmpq(value.numerator, value.denominator)
+
+
+def ball(value: Fraction | int) -> arb:
+    """``value`` as a ball at the working precision; of radius 0 where it is a binary number that fits."""
+    return arb(rational(value))
+
+
+def midpoint(value: arb) -> Fraction:
+    """The exact midpoint of a finite ball."""
+    return _fraction(*value.mid().man_exp())
+
+
+def radius(value: arb) -> Fraction:
+    """The exact radius of a finite ball."""
+    return _fraction(*value.rad().man_exp())
+
+
+def _fraction(mantissa: SupportsInt, exponent: SupportsInt) -> Fraction:
+    """mantissa · 2^exponent."""
+    m, e = int(mantissa), int(exponent)
+    return Fraction(m << e) if e >= 0 else Fraction(m, 1 << -e)
+
+
+def radius_text(value: Fraction) -> str:
+    """A radius as decimal text of three digits, rounded up: it stays an upper bound."""
+    return quotient_text(value, _RADIUS_DIGITS, ROUND_CEILING)
+
+
+def ball_text(value: arb) -> str:
+    """A ball as text that :func:`ball_from` makes the very same ball of: ``m e r s`` for m 2^e ± r 2^s, or ``nan``."""
+    if not value.is_finite():
+        return "nan"
+    # Decimal, as Python refuses to write or read an int of more than 4300 digits, or of what the process set
+    return " ".join(str(Decimal(int(part))) for part in (*value.mid().man_exp(), *value.rad().man_exp()))
+
+
+@whole_evaluation
+def ball_from(text: str) -> arb:
+    """The ball of :func:`ball_text`.  Raises ValueError for other text."""
+    if text == "nan":
+        return arb("nan")
+    m, e, r, s = (_integer(part) for part in text.split())
+    if not r:
+        return arb((m, e))
+    with working_precision(m.bit_length() + 64):
+        value = arb((m, e), (r, s))
+        if r.bit_length() == _RADIUS_BITS:
+            # FLINT rounds such a radius up on its way in, and takes an addition of next to nothing for one unit
+            value = arb((m, e), (r - 1, s)) + arb(0, (1, s - 100))
+    if ball_text(value) != text:
+        raise ValueError(f"no ball is {text[:60]!r}")
+    return value
+
+
+def _integer(text: str) -> int:
+    if not _INTEGER.fullmatch(text):
+        raise ValueError(f"no integer is {text[:60]!r}")
+    return int(Decimal(text))
+
+
+def value_text(value: arb, digits: int) -> tuple[str, str]:
+    """(value, radius) as decimal text: the radius encloses the ball and the rounding of the printed value."""
+    (m, e), (r, s) = ((int(part[0]), int(part[1])) for part in (value.mid().man_exp(), value.rad().man_exp()))
+    # over one denominator that need not be the least
+    unit = min(e, s, 0)
+    middle, wide = m << (e - unit), r << (s - unit)
+    text = ratio_text(middle, 1 << -unit, digits, ROUND_HALF_EVEN)
+    above, below = Decimal(text).as_integer_ratio()
+    off = wide * below + abs((above << -unit) - middle * below)
+    return text, ratio_text(off, below << -unit, _RADIUS_DIGITS, ROUND_CEILING)
+
+
+@whole_evaluation
+def whole(value: arb) -> int:
+    """The whole number nearest to the middle of a ball; 0 if it is not finite."""
+    found = (value + _HALF).mid().floor().unique_fmpz()
+    return 0 if found is None else int(found)
+
+
+def relative_bits(value: arb) -> int:
+    """Bits that a ball of size about 1 or larger has right; absolute below 1; -1 if it is not finite."""
+    return max(0, min(_MAX_BITS, value.rel_one_accuracy_bits())) if value.is_finite() else -1
+
+
+def _size(value: arb) -> int:
+    """The smallest e with |value| < 2^e, of an exact ball; a large negative number for 0."""
+    mantissa, exponent = value.man_exp()
+    return int(exponent) + int(mantissa).bit_length() if mantissa else -_MAX_BITS
+
+
+def _graspable(value: arb, smallest: int) -> arb:
+    """``value``, or a ball around 0 with it inside where it is smaller than 2^smallest.
+
+    Near a saddle components fall like e^(−t): at t = 10^6 their exact midpoints have a million bits.
+    """
+    if float(value) or value.is_zero() or max(_size(value.mid()), _size(value.rad())) > smallest:
+        return value
+    return arb(0, arb(2) ** (smallest + 1))
+
+
+@whole_evaluation
+def to_bits(
+    evaluate: Callable[[int], list[arb]], bits: int, time: Fraction | None = None, length: int = 1
+) -> list[arb]:
+    """``evaluate(working bits)`` repeated at growing working precision until every ball has ``bits`` bits.
+
+    Bits count relative to a value above 1 and absolutely below it; none are right where it raises Undecided.
+    time: what it is evaluated at; it costs its own bits, and the precision then comes in steps, so that lattices are
+    made once.  length: of power series meanwhile.
+    Raises OutOfReach where even a precision of 16 times the asked bits plus 4096, or of 32768, does not give them.
+    """
+    extra = -1 if time is None else _GUARD + (abs(time.numerator) // time.denominator).bit_length()
+    working, smallest = bits + 32, -16 * bits - 4096
+    most = max(-smallest, _ENOUGH)
+    while True:
+        inside = working if extra < 0 else -(-(working + extra) // _STEP) * _STEP
+        try:
+            values = at_precision(inside, length, evaluate)
+        except Undecided:
+            values = [arb("nan")]
+        except ValueError as error:
+            if str(error) not in _SERIES_DIVISION:
+                raise
+            values = [arb("nan")]
+        right = [value.rel_one_accuracy_bits() for value in values]
+        if min(right) >= bits:
+            # only exact, infinite and very small values have more bits right than that
+            if max(right) < -smallest:
+                return values
+            if all(value.is_finite() for value in values):
+                return [v if r < -smallest else _graspable(v, smallest) for v, r in zip(values, right, strict=True)]
+        reached = min(map(relative_bits, values))
+        if working >= most:
+            raise OutOfReach(
+                f"Only {max(reached, 0)} of {bits} bits could be proven at a working precision of {inside} bits.",
+                "Ask for fewer digits or an earlier time; moments, weights and rates of very different size cost most.",
+            )
+        working = min(most, working + (max(bits - reached, working // 2) if reached >= 0 else working))
+
+
+# The largest singular value of a real matrix of balls, enclosed.
+
+
+@whole_evaluation
+def largest_singular_value(matrix: list[list[arb]], bits: int) -> arb:
+    """σ ≥ 0 with σ² the largest eigenvalue of S = JᵀJ: a ball, as narrow as ``matrix`` allows to ``bits`` bits.
+
+    From below Rayleigh's quotient of any vector, here an approximate eigenvector, at most σ².  From above any μ such
+    that μ − S is positive definite, which Cholesky's factorisation in balls proves: μ is the quotient and a margin,
+    sixteen times as large as long as the factorisation does not exist.  So several equal singular values do no harm.
+    An infinite ball where neither comes to an end.
+    """
+    with working_precision(2 * bits + 64):
+        given = arb_mat(matrix)
+        square = given.transpose() * given
+        below = _quotient(square)
+        margin = below.abs_upper() * arb(2) ** -(bits + 8)
+        for _ in range(bits // 4 + 16):
+            above = (below + margin).upper()
+            if _positive_definite(above, square):
+                return below.lower().sqrt().union(above.sqrt())
+            margin = margin * 16
+        return arb(0, arb("inf"))
+
+
+def _quotient(square: arb_mat) -> arb:
+    """xᵀSx/xᵀx of the approximate eigenvector x of the largest eigenvalue."""
+    size = square.nrows()
+    middle = acb_mat([[square[i, j].mid() for j in range(size)] for i in range(size)])
+    values, vectors = middle.eig(right=True, algorithm="approx")
+    largest = max(range(size), key=lambda k: float(values[k].real.mid() / (1 + values[0].real.abs_upper())))
+    x = arb_mat([[vectors[i, largest].real.mid()] for i in range(size)])
+    numerator, denominator = (x.transpose() * square * x)[0, 0], (x.transpose() * x)[0, 0]
+    return numerator / denominator
+
+
+def _positive_definite(shift: arb, square: arb_mat) -> bool:
+    """Whether shift − S is: every pivot of its L D Lᵀ factorisation is proven to be positive."""
+    size = square.nrows()
+    rest = [[(shift if i == j else arb(0)) - square[i, j] for j in range(size)] for i in range(size)]
+    for k in range(size):
+        pivot = rest[k][k]
+        if not pivot > 0:
+            return False
+        for i in range(k + 1, size):
+            for j in range(k + 1, i + 1):
+                rest[i][j] = rest[j][i] = rest[i][j] - rest[i][k] * rest[j][k] / pivot
+    return True

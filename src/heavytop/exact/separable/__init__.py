@@ -1,0 +1,1 @@
+"""Motions with separated variables: Abel integrals, their inversion, oscillation intervals."""

@@ -1,0 +1,579 @@
+"""Real Abel inversion: the phases of one or two variables at any time, from their integrals, proven.
+
+Variables v_k that swing in gaps (:mod:`heavytop.exact.separable.oscillation`), with phases θ_k and integrals F_kj, j =
+0 .. n − 1, move along a straight line in
+
+    G_j(θ) = Σ_k ε_k F_kj(θ_k),   ε_k = ±1.
+
+G is one-to-one from R^n onto R^n: its Jacobian is ε1 ε2 (v2 − v1)/√(g1 g2) ≠ 0 for disjoint gaps, and it differs from
+a linear map by periodic functions (Hadamard's theorem).  :meth:`Inversion.phases` takes whole turns off, and proves
+what Newton's iteration found by Krawczyk's operator (Neumaier, Interval Methods for Systems of Equations, 5.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import ceil, expm1, log
+from typing import Any, NamedTuple, NoReturn, Protocol, Self
+
+import numpy as np
+from flint import arb, arb_mat, arb_series, fmpq
+from numpy.typing import NDArray
+
+from heavytop.errors import LevelNotDone, OutOfReach
+from heavytop.exact.flint.balls import Undecided, current_length, current_precision, whole, working_precision
+from heavytop.exact.separable.oscillation import Approach, Gap, Roots
+
+_FLOAT_BITS = 46
+_ITERATIONS, _SHORTEST, _SETTLED = 100, 1e-4, 1e-13
+_REPEATED = 6
+
+
+class Variable(Protocol):
+    """A variable of an :class:`Inversion`: swinging (:class:`heavytop.exact.separable.oscillation.Gap`), or tending to
+    a double root.
+
+    turn: its phase grows by this and its integrals by ``column`` with every turn; for a variable that never returns,
+    what its integrals grow by with every unit of the phase, at last.  periodic: which of both.  middle: of its gap.
+    """
+
+    turn: float
+    periodic: bool
+    middle: arb
+
+    @property
+    def column(self) -> list[arb]: ...
+
+    def position(self, phase: Any) -> Any:
+        """v at the phase, a number or series."""
+        ...
+
+    def density(self, v: Any) -> Any:
+        """dF_0 by dphase, > 0."""
+        ...
+
+    def ends(self, phase: Any) -> tuple[Any, Any]:
+        """√(v − lo) and √(hi − v), each with a sign that makes it analytic."""
+        ...
+
+    def bend(self, phase: Any) -> Any:
+        """−dv/dphase over the product of :meth:`ends`."""
+        ...
+
+    def phase(self, v: arb, slope: arb) -> arb:
+        """The phase where the variable is v and dv/dphase is ``slope``."""
+        ...
+
+    def integrals(self, phase: arb) -> list[arb]:
+        """F_j at the phase."""
+        ...
+
+    def estimates(self, phase: float) -> NDArray[np.float64]:
+        """F_j in floats."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Inversion:
+    """G of one or two variables; signs: ε."""
+
+    variables: tuple[Variable, ...]
+    signs: tuple[int, ...]
+
+    def values(self, phases: Sequence[arb]) -> list[arb]:
+        """G."""
+        shares = [v.integrals(phase) for v, phase in zip(self.variables, phases, strict=True)]
+        return [
+            sum((sign * part for sign, part in zip(self.signs, parts, strict=True)), arb(0))
+            for parts in zip(*shares, strict=True)
+        ]
+
+    def slopes(self, phases: Sequence[arb]) -> arb_mat:
+        """The Jacobian of G: a row for each j."""
+        columns = []
+        for variable, sign, phase in zip(self.variables, self.signs, phases, strict=True):
+            v = variable.position(phase)
+            columns.append([sign * variable.density(v)])
+            for _ in self.variables[1:]:
+                columns[-1].append(columns[-1][-1] * v)
+        return arb_mat(columns).transpose()
+
+    def _periods(self) -> arb_mat:
+        """What G grows by with a turn of each phase (a unit, where it never returns), a column for each."""
+        columns = [[sign * c for c in v.column] for v, sign in zip(self.variables, self.signs, strict=True)]
+        return arb_mat(columns).transpose()
+
+    def mean_rates(self, slopes: Sequence[arb]) -> list[arb]:
+        """Turns of each phase a unit of time (units, where it never returns), where G grows by ``slopes``."""
+        return self._periods().solve(arb_mat([[slope] for slope in slopes])).entries()
+
+    def phases(self, target: Sequence[arb]) -> tuple[list[arb], list[int]]:
+        """(θ in the first turns, whole turns n) with G(θ + 2πn) = target: balls that hold the only solution.
+
+        Not finite where the working precision does not prove it.
+        """
+        count, periods = len(self.variables), self._periods()
+        aim = arb_mat([[value] for value in target])
+        lost = [arb("nan")] * count, [0] * count
+        try:
+            cells = periods.solve(aim).entries()
+        except ZeroDivisionError:
+            return lost
+        turns = [whole(cell) if v.periodic else 0 for v, cell in zip(self.variables, cells, strict=True)]
+        rest = aim - periods * arb_mat([[n] for n in turns])
+        first = [float(c - n) * v.turn for v, c, n in zip(self.variables, cells, turns, strict=True)]
+        if not all(cell.is_finite() for cell in cells):
+            return lost
+        try:
+            with np.errstate(all="ignore"):
+                estimated = self._estimated(first, rest)
+            return self._refined(estimated, rest), turns
+        except (ZeroDivisionError, np.linalg.LinAlgError):
+            return lost
+
+    def _estimated(self, phases: list[float], rest: arb_mat) -> list[float]:
+        """Newton's iteration in floats, every step as short as it must be to come nearer."""
+        aim, signs = np.array([float(r) for r in rest.entries()]), np.array(self.signs, float)
+
+        def defect(at: NDArray[np.float64]) -> NDArray[np.float64]:
+            total = -aim
+            for sign, variable, phase in zip(signs, self.variables, at, strict=True):
+                total = total + sign * variable.estimates(float(phase))
+            return total
+
+        now = np.array(phases)
+        error = defect(now)
+        for _ in range(_ITERATIONS):
+            with working_precision(53):
+                slopes = np.array(self.slopes([arb(float(x)) for x in now]).entries(), float).reshape(len(now), -1)
+            step, share = np.linalg.solve(slopes, error), 1.0
+            following = defect(now - step)
+            while np.abs(following).sum() > np.abs(error).sum() and share > _SHORTEST:
+                share /= 2
+                following = defect(now - share * step)
+            now, error = now - share * step, following
+            if np.abs(share * step).max() < _SETTLED * (1 + np.abs(now).max()):
+                break
+        return [float(x) for x in now]
+
+    def _refined(self, phases: list[float], rest: arb_mat) -> list[arb]:
+        """Newton's iteration in balls at growing precision, and the proof at the last."""
+        needed, precisions = current_precision() // 2 + 8, []
+        while needed > _FLOAT_BITS:
+            precisions.append(needed)
+            needed = needed // 2 + 8
+        near = [arb(x) for x in phases]
+        for precision in reversed(precisions):
+            with working_precision(precision):
+                for _ in range(_REPEATED):
+                    step = (self._inverse(near) * (arb_mat([[v] for v in self.values(near)]) - rest)).entries()
+                    near = [(x - s).mid() for x, s in zip(near, step, strict=True)]
+                    # the next one would be of the size of its square
+                    if all(abs(s) < arb(2) ** (8 - precision // 2) for s in step):
+                        break
+        return self._proven(near, rest)
+
+    def _inverse(self, phases: list[arb]) -> arb_mat:
+        return self.slopes(phases).inv().mid()
+
+    def _proven(self, near: list[arb], rest: arb_mat) -> list[arb]:
+        """Krawczyk's image of a box around the phases, if it lies inside the box."""
+        inverse = self._inverse(near)
+        step = (inverse * (arb_mat([[v] for v in self.values(near)]) - rest)).entries()
+        floor = arb(2) ** (-current_precision())
+        for widening in (2, 16, 256):
+            off = [arb(0, (widening * (abs(s).upper() + floor)).upper()) for s in step]
+            box = [x + o for x, o in zip(near, off, strict=True)]
+            spread = -(inverse * self.slopes(box))
+            for i in range(len(near)):
+                spread[i, i] += 1
+            moved = (spread * arb_mat([[o] for o in off])).entries()
+            image = [x - s + m for x, s, m in zip(near, step, moved, strict=True)]
+            if all(wide.contains_interior(narrow) for wide, narrow in zip(box, image, strict=True)):
+                return image
+        return [arb("nan")] * len(near)
+
+
+# One of two variables rests at a double root of the polynomial: what is left of Abel's integrals for the other.
+#
+# Where v_o rests at a double root e the integrand v^j/√g of the other has a pole at e, and with G_j = ε F_j + (...) of
+# :mod:`heavytop.exact.separable.abel` only the combination without it moves,
+#
+#     H(θ) = F_1(θ) − e F_0(θ),   dH/dθ = (v − e)/√g,
+#
+# which is of one sign: an integral of a lower genus.
+
+
+class Rest:
+    """The variable at rest at ``place``; its phase is 0 for ever."""
+
+    turn = 1.0
+    periodic = False
+
+    def __init__(self, place: arb) -> None:
+        self.middle = place
+        self.column = [arb(0), arb(0)]
+
+    def position(self, phase: Any) -> Any:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        return phase * 0 + self.middle
+
+    def density(self, v: Any) -> Any:
+        """1: no phase depends on it."""
+        return v * 0 + 1
+
+    def ends(self, phase: Any) -> tuple[Any, Any]:
+        """√(v − e), at both ends, which are one."""
+        return phase * 0, phase * 0
+
+    def bend(self, phase: Any) -> Any:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        return phase * 0
+
+    def phase(self, v: arb, slope: arb) -> arb:
+        """0."""
+        return arb(0)
+
+    def integrals(self, phase: arb) -> list[arb]:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        return [arb(0), arb(0)]
+
+    def estimates(self, phase: float) -> NDArray[np.float64]:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        return np.zeros(2)
+
+
+class Beside:
+    """``variable`` with the one integral H for a variable at rest at ``place``, outside its gap."""
+
+    def __init__(self, variable: Variable, place: arb) -> None:
+        self.variable, self.place = variable, place
+        self.turn, self.periodic, self.middle = variable.turn, variable.periodic, variable.middle
+        self.position, self.ends = variable.position, variable.ends
+        self.bend, self.phase = variable.bend, variable.phase
+
+    def _combined(self, first: Any, second: Any) -> Any:
+        return second - first * self.place
+
+    @property
+    def column(self) -> list[arb]:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        return [self._combined(*self.variable.column)]
+
+    def density(self, v: Any) -> Any:
+        """dH by dphase, of either sign."""
+        return (v - self.place) * self.variable.density(v)
+
+    def integrals(self, phase: arb) -> list[arb]:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        return [self._combined(*self.variable.integrals(phase))]
+
+    def estimates(self, phase: float) -> NDArray[np.float64]:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        first, second = self.variable.estimates(phase)
+        return np.array([second - float(self.place) * first])
+
+
+# What Kovalevskaya's and Goryachev-Chaplygin's tops share: their tops, and two separated variables on a straight line.
+#
+# Both have I1 = I2, their centre of mass in that plane and two variables whose integrals G_0, G_1 of
+# :mod:`heavytop.exact.separable.abel` grow linearly with time.  One of the two may rest
+# (:mod:`heavytop.exact.separable.abel`); then one integral of the other is left, and grows linearly too.
+
+
+REMEDY = "The validated enclosure holds for every motion."
+_DECISIONS, _RIGHT = (64, 256, 1024, 4096), 10
+
+
+def decide(
+    test: Callable[[], object], name: str = "The level is degenerate but for less than about 1e-300", least: int = 64
+) -> None:
+    """``test`` at the first working precision that suffices for it, ``least`` bits or more.
+
+    Raises LevelNotDone where none does, and where the test raises OutOfReach.
+    """
+    for bits in _DECISIONS:
+        if bits < least:
+            continue
+        with working_precision(bits):
+            try:
+                test()
+            except Undecided:
+                continue
+            except OutOfReach as error:
+                raise LevelNotDone(f"{name}: {error.cause}", REMEDY) from error
+        return
+    raise LevelNotDone(f"{name}: {_DECISIONS[-1]} bits do not tell them apart.", REMEDY)
+
+
+def refuse(name: str, apart: arb, of: str) -> NoReturn:
+    """Raises LevelNotDone with the distance, Undecided where the working precision does not tell it."""
+    if apart.rel_accuracy_bits() < _RIGHT:
+        raise Undecided
+    raise LevelNotDone(f"{name} but for {apart.str(2, radius=False)}, the distance of {of}.", REMEDY)
+
+
+def variable_between(low: arb, high: arb, double: tuple[bool, bool], rest: Roots, most: int) -> Variable:
+    """The gap between two simple roots, or the way from a simple one to a double one and back.
+
+    double: whether the lower and the upper one are.  Raises Undecided where the working precision does not part them,
+    OutOfReach for Fourier series of more than ``most`` terms.
+    """
+    if not low < high:
+        raise Undecided
+    if double[0]:
+        return Approach(high, low, rest, most=most)
+    return Approach(low, high, rest, most=most) if double[1] else Gap(low, high, rest, most=most)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """Two variables, and what of their integrals grows linearly: from ``origin`` at the rates ``slopes``.
+
+    moving: the numbers of those that do not rest.
+    """
+
+    variables: tuple[Variable, ...]
+    moving: tuple[int, ...]
+    inversion: Inversion
+    origin: tuple[arb, ...]
+    slopes: tuple[arb, ...]
+
+    @classmethod
+    def of(
+        cls, variables: tuple[Variable, ...], signs: tuple[int, int], slopes: tuple[int, int], phases: Sequence[arb]
+    ) -> Line:
+        """From the phases at t = 0; signs: ε, slopes: of G_0 and G_1."""
+        moving = tuple(k for k in (0, 1) if not isinstance(variables[k], Rest))
+        inversion, rates = Inversion(variables, signs), tuple(map(arb, slopes))
+        for k in (0, 1):
+            if k not in moving:
+                # of ε_o (G_1 − e G_0), one number
+                place, other = variables[k].middle, 1 - k
+                inversion = Inversion((Beside(variables[other], place),), (1,))
+                rates = (signs[other] * (slopes[1] - place * slopes[0]),)
+        origin = inversion.values([phases[k] for k in moving])
+        return cls(variables, moving, inversion, tuple(origin), rates)
+
+    def phases(self, time: arb) -> tuple[list[arb], list[int]]:
+        """The phases in the first turns, 0 for a variable at rest, and whole turns.
+
+        Raises Undecided where the working precision does not prove them.
+        """
+        target = [value + slope * time for value, slope in zip(self.origin, self.slopes, strict=True)]
+        found, counts = self.inversion.phases(target)
+        if not all(phase.is_finite() for phase in found):
+            raise Undecided
+        phases, turns = [arb(0)] * 2, [0] * 2
+        for k, phase, count in zip(self.moving, found, counts, strict=True):
+            phases[k], turns[k] = phase, count
+        return phases, turns
+
+    def mean_rates(self) -> list[arb]:
+        """:meth:`Inversion.mean_rates` of the variables that move."""
+        return self.inversion.mean_rates(self.slopes)
+
+    def series(self, phases: Sequence[arb], rates: Callable[[Any, Any], Sequence[Any]]) -> list[Any]:
+        """The phases as power series in t, from their differential equations: rates of both at (v1, v2)."""
+        moving = [arb_series([phase], prec=current_length()) for phase in phases]
+        for _ in range(current_length() - 1):
+            v1, v2 = (variable.position(x) for variable, x in zip(self.variables, moving, strict=True))
+            moving = [phase + rate.integral() for phase, rate in zip(phases, rates(v1, v2), strict=True)]
+        return moving
+
+
+# The integral of a function on a torus along a straight line: Fourier series of two frequencies with a proven error.
+#
+# On the angles φ1, φ2, which grow at the rates ω1, ω2, let K = Σ a(φ1) D(φ1, φ2) b(φ2), where D is even in both angles
+# and a and b are even or odd, 2π-periodic or turned into their negatives by 2π.  With f, g of cos νφ and sin νφ, ν
+# whole or half whole, K is a sum of c f(φ1) g(φ2), and along the line
+#
+#     c f g = d/ds [c (f ġ − ḟ g)/(ω1²ν1² − ω2²ν2²)],   ḟ = ω1 df/dφ1,  ġ = ω2 dg/dφ2.
+#
+# Terms near a resonance, ω1ν1 = ω2ν2 but for 10^-7 of it, are integrated from the start of the line as they stand:
+#
+#     ∫_0^s cos(χ + xs') ds' = s cos(χ + xs/2) sin(xs/2)/(xs/2),   x = ω1ν1 ± ω2ν2,
+#
+# so that no divisor is small.  c comes from n1 × n2 values at φ = (i + ½) π/n.  Where |K| ≤ W on |Im φ_k| ≤ η_k, the
+# coefficients of e^(i(ν1φ1 + ν2φ2)) are at most W e^(−η1|ν1| − η2|ν2|); at these points every ν ≥ n takes the values of
+# one below, or vanishes, so that K is off by at most twice the sum of those left out,
+#
+#     4W Σ_k e^(−η_k n_k) (1 + e^(−η_o))/((1 − e^(−η1)) (1 − e^(−η2))),   o the other angle,
+#
+# and its integral by |s| times that, resonances or not.
+
+
+_RESONANT, _NARROWEST = 1e-7, 1e-9
+_MOST_WORK = 1 << 27
+"""Multiplications of the two transforms, n1 n2 (n1 + n2): some seconds."""
+
+
+class Symmetry(NamedTuple):
+    """Of a function of one angle: odd, and turned into its negative by 2π."""
+
+    odd: bool
+    half: bool
+
+    def orders(self, count: int) -> list[int]:
+        """The first 2ν."""
+        return [2 * m + (1 if self.half else 2 if self.odd else 0) for m in range(count)]
+
+    def values(self, twice: int, angle: arb) -> tuple[arb, arb]:
+        """f and df/dφ of the order ``twice``/2."""
+        sine, cosine = (angle * twice / 2).sin_cos()
+        return (sine, cosine * twice / 2) if self.odd else (cosine, -sine * twice / 2)
+
+
+class Factor(NamedTuple):
+    """a or b at the points."""
+
+    symmetry: Symmetry
+    values: Sequence[arb]
+
+    def transform(self) -> arb_mat:
+        """Takes the values of D at the points to the coefficients of the product."""
+        count = len(self.values)
+        cosines = [arb.cos_pi_fmpq(fmpq(k, 4 * count)) for k in range(8 * count)]
+        shift, rows = 2 * count if self.symmetry.odd else 0, []
+        for twice in self.symmetry.orders(count):
+            weight = arb(1 if twice in (0, 2 * count) else 2) / count
+            weights = [weight * value for value in self.values]
+            rows.append([w * cosines[(twice * (2 * i + 1) - shift) % (8 * count)] for i, w in enumerate(weights)])
+        return arb_mat(rows)
+
+
+def points(count: int) -> list[arb]:
+    """φ in (0, π)."""
+    return [arb.pi() * (2 * i + 1) / (2 * count) for i in range(count)]
+
+
+def counts(widths: Sequence[arb | None]) -> tuple[int, int]:
+    """n1, n2 with an error of K below W times the working precision; widths: η, None for an angle at rest.
+
+    Raises OutOfReach where they are too many.
+    """
+    floats = [None if width is None else max(float(width), _NARROWEST) for width in widths]
+    wanted = (current_precision() + 6) * log(2) - sum(log(-expm1(-width)) for width in floats if width)
+    first, second = (1 if width is None else max(4, ceil(wanted / width)) for width in floats)
+    if first * second * (first + second) > _MOST_WORK:
+        raise OutOfReach(
+            f"The azimuth needs {first} x {second} Fourier terms: the level is nearly degenerate.",
+            "Ask for fewer digits, or take a start farther from the degenerate motion.",
+        )
+    return first, second
+
+
+def error_of(largest: arb, widths: Sequence[arb | None], terms: Sequence[int]) -> arb:
+    """The bound on what K is off by; largest: W."""
+    sums, tails = [], []
+    for width, count in zip(widths, terms, strict=True):
+        decay = arb(0) if width is None else (-width).exp()
+        sums.append((1 + decay) / (1 - decay))
+        tails.append(arb(0) if width is None else 2 * (-width * count).exp() / (1 - decay))
+    return 2 * largest * (tails[0] * sums[1] + sums[0] * tails[1])
+
+
+class Resonance(NamedTuple):
+    """A term c f(φ1) g(φ2) that is integrated as it stands; twice: 2ν of both."""
+
+    coefficient: arb
+    twice: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """One a(φ1) D b(φ2).
+
+    matrix: c over ω1²ν1² − ω2²ν2², and 0 for ``resonances``.
+    """
+
+    symmetries: tuple[Symmetry, Symmetry]
+    matrix: arb_mat
+    resonances: tuple[Resonance, ...]
+
+    @classmethod
+    def of(cls, first: Factor, kernel: arb_mat, second: Factor, rates: Sequence[arb], largest: arb) -> tuple[Self, arb]:
+        """With a bound on the terms that are left out as too small; largest: W, rates: ω1, ω2."""
+        table = (first.transform() * kernel * second.transform().transpose()).tolist()
+        smallest, dropped = largest * arb(2) ** (8 - current_precision()), arb(0)
+        sizes = [[abs(c).upper() for c in row] for row in table]
+        tall = max((m for m, row in enumerate(sizes, 1) if any(size > smallest for size in row)), default=1)
+        wide = max((n for row in sizes for n, size in enumerate(row, 1) if size > smallest), default=1)
+        for m, row in enumerate(sizes):
+            dropped += sum(row[wide:] if m < tall else row, arb(0))
+        symmetries = first.symmetry, second.symmetry
+        orders = symmetries[0].orders(tall), symmetries[1].orders(wide)
+        speeds = [[rate * twice / 2 for twice in own] for rate, own in zip(rates, orders, strict=True)]
+        squares, floats = [[x * x for x in own] for own in speeds], [[float(x) for x in own] for own in speeds]
+        rows, resonances = [], []
+        for m, (square, size) in enumerate(zip(squares[0], floats[0], strict=True)):
+            row = []
+            for n, (other, length) in enumerate(zip(squares[1], floats[1], strict=True)):
+                if abs(size - length) > _RESONANT * (size + length):
+                    row.append(table[m][n] / (square - other))
+                else:
+                    row.append(arb(0))
+                    resonances.append(Resonance(table[m][n], (orders[0][m], orders[1][n])))
+            rows.append(row)
+        return cls(symmetries, arb_mat(rows), tuple(resonances)), dropped
+
+    def primitive(self, angles: Sequence[arb], rates: Sequence[arb]) -> arb:
+        """Σ c (f ġ − ḟ g)/(ω1²ν1² − ω2²ν2²)."""
+        pairs = []
+        for symmetry, angle, rate, count in zip(
+            self.symmetries, angles, rates, (self.matrix.nrows(), self.matrix.ncols()), strict=True
+        ):
+            values = [symmetry.values(twice, angle) for twice in symmetry.orders(count)]
+            pairs.append(([f for f, _ in values], [rate * slope for _, slope in values]))
+        (f, f_rate), (g, g_rate) = pairs
+        along = arb_mat([f, f_rate]) * self.matrix * arb_mat([g, g_rate]).transpose()
+        return along[0, 1] - along[1, 0]
+
+    def resonant(self, began: Sequence[arb], rates: Sequence[arb], length: arb) -> arb:
+        """The integral of the resonances over a line of that length that begins at the angles ``began``."""
+        total = arb(0)
+        for coefficient, twice in self.resonances:
+            phases = [
+                n * angle / 2 - (arb.pi() / 2 if symmetry.odd else 0)
+                for n, angle, symmetry in zip(twice, began, self.symmetries, strict=True)
+            ]
+            for side in (1, -1):
+                half = (rates[0] * twice[0] + side * rates[1] * twice[1]) * length / 4
+                total += coefficient / 2 * (phases[0] + side * phases[1] + half).cos() * half.sinc()
+        return total * length
+
+
+@dataclass(frozen=True, slots=True)
+class LineIntegral:
+    """∫ K along φ_k = φ_k(0) + ω_k s.
+
+    error: a bound on what K is off by.
+    """
+
+    products: tuple[Product, ...]
+    rates: Sequence[arb]
+    began: Sequence[arb]
+    error: arb
+
+    @classmethod
+    def of(
+        cls,
+        pairs: Sequence[tuple[Factor, Factor]],
+        kernel: arb_mat,
+        rates: Sequence[arb],
+        began: Sequence[arb],
+        largest: arb,
+        error: arb,
+    ) -> Self:
+        """From the pairs (a, b) and D at the points, W and the error of each pair."""
+        found = [Product.of(first, kernel, second, rates, largest) for first, second in pairs]
+        dropped = sum((part for _, part in found), arb(0))
+        return cls(tuple(product for product, _ in found), rates, began, dropped + len(found) * error)
+
+    def at(self, angles: Sequence[arb], length: arb) -> arb:
+        """The integral to the angles, which the line reaches after ``length``, but for a constant."""
+        total = arb(0, (self.error * abs(length)).upper())
+        for product in self.products:
+            total += product.primitive(angles, self.rates) + product.resonant(self.began, self.rates, length)
+        return total

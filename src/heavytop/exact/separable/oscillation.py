@@ -1,0 +1,493 @@
+"""A variable that swings between two simple real roots of a polynomial, and its Abel integrals with a proven error.
+
+    v = m + d cos θ,   m = (lo + hi)/2,   d = (hi − lo)/2,   f(v) = (v − lo)(hi − v) g(v),   g > 0 on [lo, hi]
+
+The phase θ of a motion in the gap is monotone and regular, turning points included.  Abel's integrals
+
+    F_j(θ) = ∫_0^θ v^j/√g dθ = c_0 θ + Σ (2c_n/n) sin nθ
+
+grow by a real period with every turn.  Their integrand h is even and 2π-periodic, and analytic on |Im θ| ≤ η as long as
+v, which runs through ellipses there, leaves every other root b outside: η < β = |Im arccos z|, z = (b − m)/d, and
+
+    |v − b| ≥ d (cosh β − cosh η),   cosh β = ½ (|z + 1| + |z − 1|),
+
+since cos θ − z is a product of two sines and |sin(x + iy)| ≥ sinh|y|.  That gives a bound W of |h|, and
+|c_n| ≤ W e^(−η|n|).  From N equidistant values come c_n, n < N/2, with an error of at most
+2W e^(−η(N − n))/(1 − e^(−ηN)) (aliasing); F, cut at n = N/2, is off by at most
+
+    (4/(1 − e^(−ηN)) + 2) W e^(−ηN/2)/(1 − e^(−η)),   the error of c_0 apart.
+
+Sums are products of matrices and vectors of cos jθ, sin jθ: Horner's rule at the ball e^(iθ) would lose a factor √2
+with every degree.  Source: Trefethen and Weideman, SIAM Review 56 (2014), theorem 3.1, for the error.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import atan, ceil, isfinite, isqrt, log, pi, tanh
+from typing import Any
+
+import numpy as np
+from flint import acb, arb, arb_mat, arb_poly, fmpq
+from numpy.typing import NDArray
+
+from heavytop.errors import OutOfReach
+from heavytop.exact.closed_form import Evaluated, constant, kept, tanh_sech
+from heavytop.exact.flint.balls import current_precision, to_bits, working_precision
+from heavytop.top.vectors import cross, dot
+
+MOST_TERMS = 1 << 17
+_WIDTH, _FARTHEST, _BOUND_BITS = 0.9, 100, 64
+
+
+@dataclass(frozen=True, slots=True)
+class Roots:
+    """g(v) = lead Π |v − b|^multiplicity.
+
+    lead: > 0.  real: (b, multiplicity).  pairs: (Re b, |Im b|, multiplicity), once for b and its conjugate.
+    """
+
+    lead: arb
+    real: tuple[tuple[arb, int], ...]
+    pairs: tuple[tuple[arb, arb, int], ...]
+
+    @classmethod
+    def of(cls, lead: arb, roots: Sequence[tuple[acb, int]]) -> Roots:
+        """From all roots of a real polynomial; a root is real where its imaginary part is exactly 0."""
+        real = tuple((b.real, many) for b, many in roots if b.imag.is_zero())
+        return cls(lead, real, tuple((b.real, b.imag, many) for b, many in roots if b.imag > 0))
+
+    def density(self, v: Any) -> Any:
+        """1/√g at a number or series v; not finite where g may vanish."""
+        product = self.lead
+        for b, many in self.real:
+            product = product * (v - b) ** many
+        for x, y, many in self.pairs:
+            product = product * ((v - x) * (v - x) + y * y) ** many
+        return (-product if constant(product) < 0 else product).rsqrt()
+
+    def with_line(self, slope: arb) -> Roots:
+        """(slope v − 1)² g; not finite where ``slope`` may be 0, and is not."""
+        if slope.is_zero():
+            return self
+        return replace(self, lead=self.lead * slope * slope, real=(*self.real, (1 / slope, 2)))
+
+    def scaled(self, factor: arb) -> Roots:
+        """factor · g."""
+        return replace(self, lead=self.lead * factor)
+
+    def polynomial(self, place: arb) -> arb_poly:
+        """g as a polynomial, with the sign that makes it positive at ``place``."""
+        found = arb_poly([self.lead])
+        for b, many in self.real:
+            found *= arb_poly([-b, 1]) ** many
+        for x, y, many in self.pairs:
+            found *= arb_poly([x * x + y * y, -2 * x, 1]) ** many
+        return -found if found(place) < 0 else found
+
+    def all(self) -> list[tuple[acb, int]]:
+        """Every b; of a pair the one above the real axis, with twice its multiplicity."""
+        return [(acb(b), many) for b, many in self.real] + [(acb(x, y), 2 * many) for x, y, many in self.pairs]
+
+
+class SineSums:
+    """Σ_n a_n sin nθ, n ≥ 1, for several rows of coefficients at once."""
+
+    def __init__(self, rows: Sequence[Sequence[arb]]) -> None:
+        length = len(rows[0]) + 1
+        self.small = max(1, isqrt(length))
+        self.large = -(-length // self.small)
+        size = self.small * self.large
+        padded = [[arb(0), *row, *[arb(0)] * (size - length)] for row in rows]
+        self.matrix = arb_mat([row[i : i + self.small] for row in padded for i in range(0, size, self.small)])
+
+    def at(self, angle: arb) -> list[arb]:
+        """Each sum at the angle: sin(l + j)θ = sin lθ cos jθ + cos lθ sin jθ."""
+        steps = [(angle * j).sin_cos() for j in range(self.small)]
+        inner = self.matrix * arb_mat([[cosine, sine] for sine, cosine in steps])
+        leaps = [(angle * (i * self.small)).sin_cos() for i in range(self.large)]
+        rows = arb_mat(inner.nrows() // self.large, 2 * self.large, inner.entries())
+        return (rows * arb_mat(2 * self.large, 1, [part for pair in leaps for part in pair])).entries()
+
+
+class Gap:
+    """A variable between two simple real roots ``lo`` < ``hi``.
+
+    rest: g.  count: how many integrals, j = 0 .. count − 1.  most: OutOfReach is raised where the Fourier series needs
+    more terms than this at the working precision.
+    """
+
+    turn = 2 * pi
+    periodic = True
+
+    def __init__(self, lo: arb, hi: arb, rest: Roots, count: int = 2, most: int = MOST_TERMS) -> None:
+        self.middle, self.reach, self.rest = (lo + hi) / 2, (hi - lo) / 2, rest
+        self.density = rest.density
+        bound = FourierBound(self.middle, self.reach, rest)
+        self.terms = bound.terms(most)
+        rows = fourier_rows(self.middle, self.reach, rest, self.terms, count)
+        self.means = [row[0] + bound.mean_error(self.terms, j) for j, row in enumerate(rows)]
+        self.errors = [bound.sum_error(self.terms, j) for j in range(count)]
+        sines = [[2 * c / n for n, c in enumerate(row[1:], 1)] for row in rows]
+        self.sums = SineSums(sines)
+        self._floats = significant(np.array([[float(a) for a in row] for row in sines]))
+        self._mean_floats = np.array([float(mean) for mean in self.means])
+        self._orders = np.arange(1, self._floats.shape[1] + 1)
+
+    @property
+    def column(self) -> list[arb]:
+        """The real periods."""
+        return [2 * arb.pi() * mean for mean in self.means]
+
+    def position(self, phase: Any) -> Any:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        return self.middle + self.reach * phase.cos()
+
+    def ends(self, phase: Any) -> tuple[Any, Any]:
+        """√(v − lo) and √(hi − v), each with a sign that makes it analytic: √(2d) cos(θ/2), √(2d) sin(θ/2)."""
+        sine, cosine = (phase / 2).sin_cos()
+        root = (2 * self.reach).sqrt()
+        return root * cosine, root * sine
+
+    def bend(self, phase: Any) -> Any:
+        """−dv/dθ over the product of :meth:`ends`."""
+        return phase * 0 + 1
+
+    def phase(self, v: arb, slope: arb) -> arb:
+        """θ in (−π/2, 3π/2) from v and dv/dθ."""
+        cosine, sine = v - self.middle, -slope
+        if cosine > 0:
+            return arb.atan2(sine, cosine)
+        return arb.pi() + arb.atan2(-sine, -cosine)
+
+    def integrals(self, phase: arb) -> list[arb]:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        sums = self.sums.at(phase)
+        return [c * phase + total + e for c, total, e in zip(self.means, sums, self.errors, strict=True)]
+
+    def estimates(self, phase: float) -> NDArray[np.float64]:
+        """See :class:`heavytop.exact.separable.abel.Variable`; raises OutOfReach where floats do not hold the
+        coefficients.
+        """
+        if not (np.isfinite(self._floats).all() and np.isfinite(self._mean_floats).all() and self._mean_floats.any()):
+            raise OutOfReach(
+                "The period of a separated variable is beyond the range of binary64: moments, weight and rates "
+                "differ by too many decades.",
+                "Choose numbers of less different size.",
+            )
+        found: NDArray[np.float64] = self._mean_floats * phase + self._floats @ np.sin(self._orders * phase)
+        return found
+
+
+class FourierBound:
+    """The error of the Fourier series of v^j/√g; see the head of this file.
+
+    divided: of (v^j/√g − its value at an end)/(1 − y²) (:mod:`heavytop.exact.separable.oscillation`).
+    """
+
+    def __init__(self, middle: arb, reach: arb, rest: Roots, divided: bool = False) -> None:
+        self.bits = current_precision()
+        with working_precision(_BOUND_BITS):
+            heights = [(_cosh((b - middle) / reach), many) for b, many in rest.all()]
+            nearest = min((height.lower() for height, _ in heights), default=arb(_FARTHEST))
+            self.distance = float(nearest - 1)
+            self.width = (nearest.acosh() * _WIDTH).lower()
+            square = rest.lead
+            for height, many in heights:
+                square = square * (reach * (height - self.width.cosh())) ** many
+            self.largest = square.rsqrt()
+            if divided:
+                self.largest *= 4 / (self.width.cosh() - 1)
+            self.farthest = abs(middle) + reach * self.width.cosh()
+            excess = 7 * self.largest / (rest.density(middle) * (1 - (-self.width).exp()))
+            self.wanted = float(2 * (excess.log() + self.bits * log(2)) / self.width)
+
+    def terms(self, most: int) -> int:
+        """N, 2^k or 3·2^k, with an error of the sums below the working precision."""
+        if not self.wanted <= most:
+            many = f"{self.wanted:.3g}" if isfinite(self.wanted) else "countless"
+            raise OutOfReach(
+                f"Abel's integrals need {many} Fourier terms, more than {most}: the level is degenerate but for "
+                f"{self.distance:.2g}, the distance of a root to a gap.",
+                "Ask for fewer digits, or take a start farther from the degenerate motion.",
+            )
+        power = max(32, 1 << ceil(self.wanted).bit_length())
+        return power // 4 * 3 if power // 4 * 3 >= self.wanted else power
+
+    def mean_error(self, terms: int, order: int) -> arb:
+        """The ball around 0 with the error of c_0."""
+        return self._ball(2 * (-self.width * terms).exp() / (1 - (-self.width * terms).exp()), order)
+
+    def sum_error(self, terms: int, order: int) -> arb:
+        """The ball around 0 with the error of F, c_0 apart."""
+        tail = (-self.width * terms / 2).exp() / (1 - (-self.width).exp())
+        return self._ball((4 / (1 - (-self.width * terms).exp()) + 2) * tail, order)
+
+    def _ball(self, factor: arb, order: int) -> arb:
+        return arb(0, (factor * self.largest * self.farthest**order).upper())
+
+
+def distance_of_others(points: Sequence[acb], ends: tuple[int, int]) -> arb:
+    """cosh β − 1 of the root nearest to the gap between two of the points; 0 for no gap."""
+    low, high = (points[i].real for i in ends)
+    if not low < high:
+        return arb(0)
+    scaled = [(2 * b - low - high) / (high - low) for i, b in enumerate(points) if i not in ends]
+    return min((_cosh(z) - 1 for z in scaled), key=arb.mid)
+
+
+def _cosh(z: acb) -> arb:
+    """cosh of |Im arccos z|, at least 1."""
+    return (abs(z + 1) + abs(z - 1)) / 2
+
+
+def fourier_rows(middle: arb, reach: arb, rest: Roots, terms: int, count: int) -> list[list[arb]]:
+    """c_n, n < N/2, of v^j/√g, j < count, from ``terms`` = N values: without the error of aliasing."""
+
+    def values(cosine: arb) -> list[arb]:
+        v = middle + reach * cosine
+        found = [rest.density(v)]
+        for _ in range(count - 1):
+            found.append(v * found[-1])
+        return found
+
+    return even_rows(values, terms)
+
+
+def even_rows(values: Callable[[arb], list[arb]], terms: int) -> list[list[arb]]:
+    """c_n, n < N/2, of several functions of cos θ, from ``terms`` = N values, 4 | N: without the error of aliasing."""
+    half = terms // 2
+    cosines = [arb.cos_pi_fmpq(fmpq(i, half)) for i in range(half + 1)]
+    samples = list(zip(*map(values, cosines), strict=True))
+    rows: list[list[arb]] = []
+    for even, odd in zip(samples[::2], [*samples[1::2], samples[-1]], strict=False):
+        # all coefficients are real, so two functions fit into one transform
+        found = _cosine_sums([acb(a, b) for a, b in zip(even, odd, strict=True)], cosines)
+        rows += [[c.real / terms for c in found], [c.imag / terms for c in found]]
+    return rows[: len(samples)]
+
+
+def _cosine_sums(values: list[acb], cosines: list[arb]) -> list[acb]:
+    """C_k = Σ_j x_j cos(2πjk/N), j < N, k < N/2, of an even x by a transform of half the length.
+
+    values: x_0 .. x_(N/2).  cosines: of 2πj/N.  With M = N/2, E_k and O_k the sums over even and odd j, C_k = E_k + O_k
+    and C_(M−k) = E_k − O_k; x_2i + i (x_(2i+1) − x_(2i−1)) has the transform E_k − 2 sin(2πk/N) O_k.
+    """
+    half = len(values) - 1
+    full = values + values[-2:0:-1]
+    found = acb.dft([full[2 * i] + acb(0, 1) * (full[2 * i + 1] - full[2 * i - 1]) for i in range(half)])
+    sums = [acb(0)] * (half + 1)
+    for k in range(half // 2 + 1):
+        mean, apart = (found[k] + found[-k]) / 2, (found[-k] - found[k]) / 2
+        odd = apart / (2 * cosines[half // 2 - k]) if k else sum(full[1::2], acb(0))
+        sums[k], sums[half - k] = mean + odd, mean - odd
+    return sums[:half]
+
+
+def significant(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The rows without the terms that no float sees; as they are where floats do not hold them."""
+    if not np.isfinite(rows).all():
+        return rows
+    sizes = np.abs(rows) / np.abs(rows).max(axis=1, keepdims=True).clip(min=np.finfo(float).tiny)
+    kept = np.flatnonzero(sizes.max(axis=0) > np.finfo(float).eps / 64)
+    return rows[:, : kept[-1] + 1] if kept.size else rows[:, :1]
+
+
+# A variable that leaves and approaches a double root of a polynomial, and its Abel integrals with a proven error.
+#
+# Between a simple root o and a double root e of f = |v − o| (v − e)² g, L = e − o,
+#
+#     v = o + L tanh² X = e − L sech² X,   dv/√f = ± h dX,   h = 2/√(|L| g) > 0
+#
+# X runs over all real numbers, monotone in t, and v goes from e to o, where X = 0, and back to e.  With y = tanh X
+#
+#     F_j(X) = ∫_0^X v^j h dX = φ_j X + ∫_0^y (v^j h − φ_j)/(1 − y²) dy,   φ_j = v^j h at v = e,
+#
+# where the last integrand is q_j = −L times the divided difference of v^j h at v and e: regular, and a function of
+# y² alone.  In y = sin χ, v = m − (L/2) cos 2χ is the map of :mod:`heavytop.exact.separable.oscillation`, so with q_j =
+# Σ b_n cos 2nχ
+#
+#     ∫ q_j dy = Σ ½ b_n (sin (2n + 1)χ/(2n + 1) + sin (2n − 1)χ/(2n − 1)),   χ = 2 atan tanh(X/2)
+#
+# and the error of b_n is that of a Fourier series there.  On |Im 2χ| = η, |e − v| ≥ ½ |L| (cosh η − 1), so that
+# |q_j| ≤ 4 W_j/(cosh η − 1) for a bound W_j of |v^j h|, inside too by the maximum principle.
+
+
+class Approach:
+    """A variable between a simple root ``turning`` and a double root ``limit``.
+
+    rest: g.  count: how many integrals.  most: as in :class:`heavytop.exact.separable.oscillation.Gap`.
+    """
+
+    turn = 1.0
+    periodic = False
+
+    def __init__(self, turning: arb, limit: arb, rest: Roots, count: int = 2, most: int = MOST_TERMS) -> None:
+        self.turning, self.limit, self.length = turning, limit, limit - turning
+        self.root = abs(self.length).sqrt()
+        self.rest = rest.scaled(abs(self.length) / 4)
+        self.density = self.rest.density
+        self.middle = (turning + limit) / 2
+        bound = FourierBound(self.middle, abs(self.length) / 2, self.rest, divided=True)
+        self.terms = bound.terms(most)
+        rates = [self.density(limit)]
+        for _ in range(count - 1):
+            rates.append(limit * rates[-1])
+        self.column = rates
+        sines = [_sines(row) for row in self._rows(count)]
+        self.errors = [bound.mean_error(self.terms, j) + bound.sum_error(self.terms, j) for j in range(count)]
+        self.sums = SineSums(sines)
+        self._floats = significant(np.array([[float(a) for a in row] for row in sines]))
+        self._orders = np.arange(1, self._floats.shape[1] + 1)
+        self._rate_floats = np.array([float(rate) for rate in rates])
+
+    def _rows(self, count: int) -> list[list[arb]]:
+        """Fourier coefficients of q_j, as means of q_j cos 2nχ."""
+        polynomial = self.rest.polynomial(self.limit)
+        quotient = _divided(polynomial, self.limit)
+        at_limit = self.column[0]
+
+        def values(v: arb) -> list[arb]:
+            here = self.density(v)
+            # 1/√a − 1/√b = (b − a)/(√a √b (√a + √b))
+            found = [-quotient(v) * here * at_limit / (1 / here + 1 / at_limit)]
+            value = at_limit
+            for _ in range(count - 1):
+                found.append(v * found[-1] + value)
+                value = value * self.limit
+            return [-self.length * part for part in found]
+
+        return even_rows(lambda cosine: values(self.turning + self.length * (1 - cosine) / 2), self.terms)
+
+    def position(self, phase: Any) -> Any:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        ratio, _ = tanh_sech(phase)
+        return self.turning + self.length * (ratio * ratio)
+
+    def ends(self, phase: Any) -> tuple[Any, Any]:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        ratio, rest = tanh_sech(phase)
+        turning, limit = self.root * ratio, self.root * rest
+        return (turning, limit) if self.length > 0 else (limit, turning)
+
+    def bend(self, phase: Any) -> Any:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        _, rest = tanh_sech(phase)
+        return rest * (-2 if self.length > 0 else 2)
+
+    def phase(self, v: arb, slope: arb) -> arb:
+        """X from v and dv/dX = 2L sech² X tanh X."""
+        left = self.limit - v
+        return (slope / (2 * left) * (self.length / left).sqrt()).asinh()
+
+    def integrals(self, phase: arb) -> list[arb]:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        sums = self.sums.at(2 * (phase / 2).tanh().atan())
+        return [c * phase + total + e for c, total, e in zip(self.column, sums, self.errors, strict=True)]
+
+    def estimates(self, phase: float) -> NDArray[np.float64]:
+        """See :class:`heavytop.exact.separable.abel.Variable`."""
+        angle = 2 * atan(tanh(phase / 2))
+        found: NDArray[np.float64] = self._rate_floats * phase + self._floats @ np.sin(self._orders * angle)
+        return found
+
+
+def _sines(means: list[arb]) -> list[arb]:
+    """The coefficients of sin χ, sin 2χ, ... of ∫ q dy, from the means of q cos 2nχ."""
+    cosines = [means[0], *(2 * mean for mean in means[1:])]
+    found = []
+    for k, (one, two) in enumerate(zip(cosines, [*cosines[1:], arb(0)], strict=True)):
+        found += [((2 * one if k == 0 else one) + two) / (2 * (2 * k + 1)), arb(0)]
+    return found
+
+
+def _divided(polynomial: arb_poly, place: arb) -> arb_poly:
+    """(g(v) − g(e))/(v − e) as a polynomial in v, by Horner's scheme."""
+    found: list[arb] = []
+    value = arb(0)
+    for coefficient in reversed(polynomial.coeffs()[1:]):
+        value = value * place + coefficient
+        found.append(value)
+    return arb_poly(found[::-1])
+
+
+# Attitude beside a variable that swings in one gap: the azimuth of a vector about the vertical is one more integral.
+#
+# Let h be the level part of a vector that the motion knows, and Λ its azimuth in space about γ.  Where Λ' = f(v) with a
+# rational f of the variable v, Λ is an Abel integral over its phase: a polynomial over √g times the denominator of f,
+# which counts as roots of multiplicity two (:mod:`heavytop.exact.separable.oscillation`).  It grows by a fixed angle
+# with every turn. The vector that is along h at t = 0 and fixed in space then stands at the angle Λ(0) − Λ from h
+# (:class:`WithBearing`).
+
+
+@dataclass(frozen=True, slots=True)
+class Azimuth:
+    """Λ = Σ weights_j F_j of a gap whose roots hold the denominator of Λ'."""
+
+    gap: Gap
+    weights: tuple[arb, ...]
+
+    def at(self, phase: arb, turns: int) -> arb:
+        """Λ at the phase, after so many whole turns."""
+        parts = zip(self.weights, self.gap.integrals(phase), self.gap.column, strict=True)
+        return sum((weight * (value + turns * period) for weight, value, period in parts), arb(0))
+
+
+@dataclass(frozen=True, slots=True)
+class Bearing:
+    """h and γ × h, unit vectors in body components, and Λ at one time."""
+
+    along: tuple[arb, ...]
+    across: tuple[arb, ...]
+    azimuth: arb
+
+    @classmethod
+    def of(cls, gamma: Sequence[arb], vector: Sequence[arb], azimuth: arb) -> Bearing:
+        """From γ of any length and a vector whose level part is not 0."""
+        square = dot(gamma, gamma)
+        share = dot(vector, gamma) / square
+        level = [v - share * g for v, g in zip(vector, gamma, strict=True)]
+        length = dot(level, level).sqrt()
+        along = [v / length for v in level]
+        return cls(tuple(along), cross([g / square.sqrt() for g in gamma], along), azimuth)
+
+    def carried(self, azimuth: arb) -> list[arb]:
+        """The body components here of the unit vector fixed in space that h had when Λ was ``azimuth``."""
+        sine, cosine = (self.azimuth - azimuth).sin_cos()
+        return [cosine * a - sine * b for a, b in zip(self.along, self.across, strict=True)]
+
+
+class WithBearing(Evaluated):
+    """A motion that knows the bearing of one vector, and so the attitude.
+
+    Mixed into the dataclass of each case, which brings ``made``.
+    """
+
+    __slots__ = ()
+
+    @abstractmethod
+    def bearing(self, time: Fraction) -> Bearing:
+        """At FLINT's working precision.
+
+        Raises Undecided where that does not suffice, OutOfReach where the azimuth is not known.
+        """
+
+    def attitude(self, time: Fraction, bits: int) -> list[arb]:
+        """ξ, a unit vector fixed in space and ⟂ γ, in body components; at t = 0 along the level part of
+        that vector.
+
+        Raises OutOfReach where it is not known.
+        """
+
+        def evaluate(working: int) -> list[arb]:
+            return self.bearing(time).carried(_began(self))
+
+        return to_bits(evaluate, bits, self.own_time(time))
+
+
+@kept
+def _began(case: WithBearing) -> arb:
+    return case.bearing(Fraction(0)).azimuth

@@ -1,0 +1,344 @@
+"""heyoka's Taylor integrators, compiled: the only file that builds its engines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from copy import deepcopy
+from dataclasses import dataclass, field
+from fractions import Fraction
+from math import comb, exp, factorial, log
+from threading import Lock, RLock
+from time import perf_counter
+from typing import Any
+
+import heyoka
+import numpy
+
+from heavytop.errors import Contradiction, InputError
+from heavytop.integrate.trajectory import Problem
+from heavytop.precision import DOUBLE, DOUBLE_DOUBLE, Precision, exact, last_call, number, require, usable_tolerance
+from heavytop.top.equations import HEAVY_GYROSTAT, VARIABLES, Parameters, System
+
+# A compiled integrator takes one step that is known before it takes any other.
+#
+# Machine code can be damaged on its way: in a cache on disk, in memory.  The known step starts from integers for which
+# every derivative of the motion is an integer again, so that it is known exactly, from the field alone.
+
+
+# Ω in multiples of I1 I2 I3 and γ in multiples of its square keep every division by a moment whole
+PARAMETERS = Parameters((3, 2, 1), (2, -1, 3), 6)
+OMEGA = (6, -12, 6)
+GAMMA = (36, 72, -36)
+XI = (1, 2, -5)
+_ROTOR = (6, -12, 18)
+_MOST_DERIVATIVES = 100
+_COEFFICIENT_EPS = 8
+_COEFFICIENT_EPS_AN_ORDER = Fraction(1, 4)
+_SUM_EPS = 4
+_STEP_ERROR = 1e-12
+Exact = int | Fraction
+
+
+class Derivatives:
+    """A quantity by its derivatives at t = 0, exact: a ring in which the fields can be evaluated.
+
+    at: the n-th derivative, for n in turn.
+    """
+
+    def __init__(self, at: Callable[[int], Exact]) -> None:
+        self.at = at
+
+    def __add__(self, other: Derivatives | Exact) -> Derivatives:
+        if not isinstance(other, Derivatives):
+            return Derivatives(lambda n: self.at(n) + (0 if n else other))
+        return Derivatives(lambda n: self.at(n) + other.at(n))
+
+    def __sub__(self, other: Derivatives) -> Derivatives:
+        return Derivatives(lambda n: self.at(n) - other.at(n))
+
+    def __mul__(self, other: Derivatives | Exact) -> Derivatives:
+        if not isinstance(other, Derivatives):
+            return Derivatives(lambda n: self.at(n) * other)
+        return Derivatives(lambda n: sum(comb(n, k) * self.at(k) * other.at(n - k) for k in range(n + 1)))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, divisor: Exact) -> Derivatives:
+        def at(n: int) -> Exact:
+            quotient = Fraction(self.at(n)) / divisor
+            return quotient.numerator if quotient.denominator == 1 else quotient
+
+        return Derivatives(at)
+
+
+def known_parameters(system: System) -> Parameters:
+    """Those of the known step."""
+    return PARAMETERS._replace(rotor=_ROTOR) if system is HEAVY_GYROSTAT else PARAMETERS
+
+
+def derivatives(system: System, attitude: bool, count: int, p: Parameters | None = None) -> Iterator[list[Exact]]:
+    """y, y', y'', ... at the known start, from the field: ``count`` lists of six exact numbers, or nine with ξ."""
+    values: list[list[Exact]] = [[first] for first in (*OMEGA, *GAMMA, *(XI if attitude else ()))]
+    y = [Derivatives(column.__getitem__) for column in values]
+    given = p or known_parameters(system)
+    rates = system.field(given, y[:6])
+    if attitude:
+        rates = (*rates, *system.attitude(given, y[:6], y[6:]))
+    for n in range(count):
+        yield [column[n] for column in values]
+        following = [rate.at(n) for rate in rates]
+        for column, value in zip(values, following, strict=True):
+            column.append(value)
+
+
+def check(engine: Any, system: System, precision: Precision, constants: Parameters | None = None) -> None:
+    """One step of a compiled integrator, scalar or batch, compared with what is known; its time and state are reset.
+
+    Taylor coefficients (the first 100) against the exact ones; the length of the step against Jorba and Zou's rule;
+    the new state and the dense output against the polynomial summed here.  Raises Contradiction.
+    constants: exact parameters that were compiled in; None where the engine takes any.
+    """
+    p = constants or known_parameters(system)
+    lanes = engine.state.shape[1:]
+    size = engine.state.shape[0]
+
+    def set_to(values: Any, target: Any) -> None:
+        for index, value in enumerate(values):
+            target[index] = number(Fraction(value), precision)
+
+    _reset(engine, precision)
+    if constants is None:
+        set_to(system.entering(p), engine.pars)
+    set_to((*OMEGA, *GAMMA, *XI)[:size], engine.state)
+    engine.step(write_tc=True)
+    eps, order = precision.eps, engine.order
+    known = list(derivatives(system, size == 9, min(order + 1, _MOST_DERIVATIVES), p))
+    half = number(Fraction(1, 2), precision)
+    steps = numpy.reshape(numpy.array(engine.last_h), (-1,))
+    dense = engine.update_d_output(engine.last_h * half)
+    for lane in range(len(steps)):
+        at = (..., lane) if lanes else ...
+        coefficients, h = engine.tc[at], steps[lane]
+        for n, column in enumerate(known):
+            limit = (
+                (_COEFFICIENT_EPS + n * _COEFFICIENT_EPS_AN_ORDER) * eps * max(abs(Fraction(value)) for value in column)
+            )
+            for computed, value in zip(coefficients[:, n], column, strict=True):
+                off = abs(_number(computed) * factorial(n) - value)
+                _require(off <= limit, f"Taylor coefficient {n}", precision)
+        expected = _length_of_step(coefficients, order)
+        _require(abs(float(h) / expected - 1) < max(_STEP_ERROR, 32 * float(eps)), "the length of the step", precision)
+        for what, result, time in (("the step", engine.state[at], h), ("the dense output", dense[at], h * half)):
+            total = coefficients[:, order]
+            for n in reversed(range(order)):
+                total = total * time + coefficients[:, n]
+            limit = _SUM_EPS * number(eps, precision) * max(abs(value) for value in total)
+            _require(all(abs(a - b) <= limit for a, b in zip(result, total, strict=True)), what, precision)
+    _reset(engine, precision)
+
+
+def _reset(engine: Any, precision: Precision) -> None:
+    zero = number(Fraction(0), precision)
+    engine.state[:] = numpy.full_like(engine.state, zero)
+    if engine.state.ndim == 1:
+        engine.time = zero
+    else:
+        engine.set_time(zero)
+
+
+def _number(value: Any) -> Fraction:
+    """Exact; what is not finite as a number that is wrong everywhere."""
+    return exact(value) if numpy.isfinite(value) else Fraction(10) ** 9999
+
+
+def _length_of_step(coefficients: Any, order: int) -> float:
+    """Jorba and Zou, Exp. Math. 14 (2005) 99: radius from the last two coefficients, over e², with a safety factor."""
+
+    def size(n: int) -> float:
+        # no float holds the coefficients of a high order
+        value = max(abs(_number(c)) for c in coefficients[:, n])
+        return log(value.numerator or 1) - log(value.denominator)
+
+    return exp(min((size(0) - size(n)) / n for n in (order - 1, order)) - 2 - 0.7 / (order - 1))
+
+
+def _require(fine: bool, what: str, precision: Precision) -> None:
+    if not fine:
+        raise Contradiction(
+            f"A compiled integrator for {precision.name} gives a wrong value in a step that is known: {what}.",
+            "Its machine code is damaged: run again; if it stays, this machine or heyoka is faulty.",
+        )
+
+
+# A machine-code cache on disk is not protected against corruption: a flipped bit there gives wrong numbers silently.
+heyoka.llvm_state.set_diskcache_enabled(False)
+
+_XI = ("xi1", "xi2", "xi3")
+
+
+@dataclass(slots=True)
+class Compiled:
+    """A compiled integrator of one system and format, used again for every top.
+
+    engine: never run, only copied, so that a copy can be made while others run.  spare: copies that nobody uses now.
+    """
+
+    engine: Any
+    seconds: float
+    flags: dict[str, str]
+    spare: list[Any] = field(default_factory=list)
+    copying: Lock = field(default_factory=Lock)
+
+    @contextmanager
+    def lent(self) -> Iterator[Any]:
+        """A copy of the engine for one run, given back at the end, also of a run that raises.
+
+        Whoever runs meanwhile, another thread or an observer of this very run, has another copy.
+        """
+        try:
+            engine = self.spare.pop()
+        except IndexError:
+            with self.copying:
+                engine = deepcopy(self.engine)
+        try:
+            yield engine
+        finally:
+            self.spare.append(engine)
+
+
+_compiled: dict[tuple[Any, ...], Compiled] = {}
+_compiling: dict[tuple[Any, ...], RLock] = {}
+"""One lock a key: what one thread compiles, another that needs the same waits for."""
+
+
+def expressions(system: System, attitude: bool, constants: Parameters | None = None) -> list[tuple[Any, Any]]:
+    """The field as heyoka expressions with par[0..2] = I and par[3..5] = P r, or par[3] = λ for the gyrostat; par[6..8]
+    = k for the heavy gyrostat.
+
+    constants: doubles in the place of all par[i].
+    """
+    names = VARIABLES + (_XI if attitude else ())
+    y = heyoka.make_vars(*names)
+    p = constants or system.taken_in([heyoka.par[i] for i in range(_count(system))])
+    rates = system.field(p, y[:6])
+    if attitude:
+        rates = (*rates, *system.attitude(p, y[:6], y[6:]))
+    return list(zip(y, rates, strict=True))
+
+
+def compiled(
+    system: System,
+    precision: Precision,
+    *,
+    attitude: bool = False,
+    tolerance: Fraction | None = None,
+    high_accuracy: bool = False,
+    compact_mode: bool | None = None,
+    lanes: int | None = None,
+    constants: Parameters | None = None,
+) -> Compiled:
+    """The integrator for this system and format, compiled at its first use.
+
+    constants: exact parameters of one top, compiled into the code, in double only (heyoka demotes all constants to it);
+    None for code that serves every top.
+
+    lanes: that many motions at once in SIMD lanes, in double only; None for a scalar integrator, whose bits differ.
+    tolerance: None for the format's eps.  compact_mode: None for off in double and extended (faster to run) and on in
+    quad and real (else they take minutes to compile).
+
+    Raises Contradiction where its first step, which is known, is wrong.
+    """
+    require(precision)
+    if precision == DOUBLE_DOUBLE:
+        raise InputError("heyoka has no double-double.", "Use the integrator multiword for it, or quad.")
+    compact = precision.family in ("quad", "real") if compact_mode is None else compact_mode
+    if constants is not None and precision != DOUBLE:
+        raise InputError(f"Constants cannot be compiled in for {precision.name}.", "Use double.")
+    key = (system.name, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
+    with _compiling.setdefault(key, RLock()):
+        if key not in _compiled:
+            engine, seconds = _built(system, precision, attitude, tolerance, high_accuracy, compact, lanes, constants)
+            check(engine, system, precision, constants)
+            _compiled[key] = Compiled(engine, seconds, _flags(engine))
+    return _compiled[key]
+
+
+def _built(
+    system: System,
+    precision: Precision,
+    attitude: bool,
+    tolerance: Fraction | None,
+    high_accuracy: bool,
+    compact: bool,
+    lanes: int | None,
+    constants: Parameters | None,
+) -> tuple[Any, float]:
+    """A new engine, and the seconds that compiling it took."""
+    one, zero = number(Fraction(1), precision), number(Fraction(0), precision)
+    size = 9 if attitude else 6
+    options: dict[str, Any] = {"compact_mode": compact, "high_accuracy": high_accuracy}
+    if tolerance is not None:
+        options["tol"] = number(usable_tolerance(tolerance, precision), precision)
+    if precision.family == "real":
+        options["prec"] = precision.bits
+    build, shape = (heyoka.taylor_adaptive, ()) if lanes is None else (heyoka.taylor_adaptive_batch, (lanes,))
+    if constants is None:
+        options["pars"] = numpy.full((_count(system), *shape), one)
+    before = perf_counter()
+    engine = build(
+        expressions(system, attitude, constants and _doubles(constants)),
+        numpy.full((size, *shape), zero),
+        fp_type=type(one),
+        **options,
+    )
+    return engine, perf_counter() - before
+
+
+def _count(system: System) -> int:
+    """How many numbers enter the field."""
+    return len(system.entering(Parameters((1, 1, 1), (0, 0, 0), (0, 0, 0) if system is HEAVY_GYROSTAT else 0)))
+
+
+def _doubles(p: Parameters) -> Parameters:
+    return p.mapped(float)
+
+
+def _flags(engine: Any) -> dict[str, str]:
+    """Everything that can change bits."""
+    code = engine.llvm_state
+    values = {
+        "tolerance": engine.tol,
+        "order": engine.order,
+        "compact_mode": engine.compact_mode,
+        "high_accuracy": engine.high_accuracy,
+        "opt_level": code.opt_level,
+        "fast_math": code.fast_math,
+        "force_avx512": code.force_avx512,
+        "slp_vectorize": code.slp_vectorize,
+        "code_cache": "none",
+        "coefficients": "par" if len(engine.pars) else "constants",
+    }
+    if hasattr(engine, "batch_size"):
+        values["batch_size"] = engine.batch_size
+    return {name: str(value).lower() for name, value in values.items()}
+
+
+def load(engine: Any, problem: Problem) -> None:
+    """Set an engine to the beginning of a problem."""
+    parameters, engine.state[:] = arrays(problem)
+    if len(engine.pars):
+        engine.pars[:] = parameters
+    engine.time = number(Fraction(0), problem.precision)
+
+
+@last_call
+def arrays(problem: Problem) -> tuple[Any, Any]:
+    """The parameters and the state that an engine is given, as native arrays."""
+    p = problem.parameters
+    numbers = list(problem.system.entering(p))
+    start = [*problem.start.flat, *(problem.xi or ())]
+    found = numpy.array(problem.native(numbers)), numpy.array(problem.native(start))
+    for array in found:
+        array.setflags(write=False)  # kept for the next who asks
+    return found

@@ -1,0 +1,429 @@
+"""Motions computed by heyoka: from a start to the times that are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import lru_cache
+from time import perf_counter
+from typing import Any
+
+import heyoka
+import numpy
+
+from heavytop.integrate.heyoka.engines import Compiled, compiled, load
+from heavytop.integrate.trajectory import Outcome, Place, Problem, TaylorStep, Trajectory
+from heavytop.precision import Precision, exact, number, numbers
+from heavytop.top.equations import HEAVY_TOP, Parameters, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.times import RoundedTimes, check_times
+
+# One run of a compiled integrator, step by step.
+#
+# Runs are cut by steps, never by times: a sample is taken from the Taylor polynomial of the step that covers it, so the
+# steps and all later bits do not depend on which samples were asked for, nor on how often the run gave way to Ctrl-C.
+
+
+CHUNK_SECONDS = 0.25
+_ON_A_GRID = ("double", "extended", "quad")
+_MANY, _CLOSE = 256, 20
+"""States at so many times, of which so many steps lie between two at most, are computed in one call of heyoka."""
+
+
+@dataclass(slots=True)
+class Stepper:
+    """One run of a compiled integrator, advanced step by step to wherever the next sample lies.
+
+    between: called between chunks; it may raise to give the run up.
+    """
+
+    engine: Any
+    forwards: bool
+    step_limit: int | None
+    far: Any
+    between: Callable[[], None] | None = None
+    steps: int = 0
+    time: Any = 0
+    _covers: bool = False
+    _largest_step: float = 0.0
+    _mean_step: float = 0.0
+    _part: float = 0.95
+    _seconds_per_step: float = field(default=CHUNK_SECONDS)
+    _one_by_one: bool = False
+    rest: Any = None
+    _before: Any = None
+
+    def reach(self, target: Any) -> Outcome:
+        """Step until the polynomial of the last step covers ``target``."""
+        while self.rest is None and not (self._covers and self._beyond(target)):
+            if self.step_limit is not None and self.steps >= self.step_limit:
+                return Outcome.STEP_LIMIT
+            if self.between is not None:
+                self.between()
+            count = self._steps_short_of(target)
+            outcome = self.single() if count < 2 else self._several(count, target)
+            if outcome is not Outcome.SUCCESS:
+                return outcome
+        return Outcome.SUCCESS
+
+    def at(self, target: Any) -> tuple[Outcome, Any]:
+        """The outcome of :meth:`reach` and, where that is success, the state there."""
+        if target == 0:
+            return Outcome.SUCCESS, self.engine.state.copy()
+        outcome = self.reach(target)
+        return outcome, self.sample(target) if outcome is Outcome.SUCCESS else None
+
+    def _beyond(self, target: Any) -> bool:
+        return bool(self.engine.time >= target if self.forwards else self.engine.time <= target)
+
+    def _steps_short_of(self, target: Any) -> int:
+        """How many steps can be taken at once, short of the target, the step limit and a quarter of a second."""
+        if self._one_by_one or not self._largest_step or self._beyond(target):
+            return 1
+        distance = abs(float(target - self.engine.time))
+        # many steps average out; each of a few may be as long as the longest so far
+        far = distance > 100 * self._largest_step
+        count = self._part * distance / self._mean_step if far else distance / self._largest_step
+        # a few steps say little of the mean of many
+        count = min(count, CHUNK_SECONDS / self._seconds_per_step, 16 * max(self.steps, 1))
+        if self.step_limit is not None:
+            count = min(count, self.step_limit - self.steps)
+        return int(count)
+
+    def single(self) -> Outcome:
+        """One step, whose polynomial is then at hand."""
+        before, state, began = self.engine.time, self.engine.state.copy(), perf_counter()
+        self._before = state, self.engine.dtime, self.steps
+        outcome, _ = (self.engine.step if self.forwards else self.engine.step_backward)(write_tc=True)
+        self._seconds_per_step = perf_counter() - began
+        self._covers = True
+        if outcome == heyoka.taylor_outcome.err_nf_state or not numpy.isfinite(self.engine.time):
+            if not at_rest(state, self.engine.tc):
+                return Outcome.NON_FINITE
+            self.rest = state
+            return Outcome.SUCCESS
+        if self.engine.time == before:
+            return Outcome.STEP_TOO_SMALL
+        self._went(1)
+        self._largest_step = max(self._largest_step, abs(float(self.engine.last_h)))
+        return Outcome.SUCCESS
+
+    def _several(self, count: int, target: Any) -> Outcome:
+        state, time = self.engine.state.copy(), self.engine.dtime
+        began = perf_counter()
+        outcome, _, largest, done, *_ = self.engine.propagate_until(self.far, max_steps=count)
+        self._seconds_per_step = (perf_counter() - began) / max(done, 1)
+        # a longest step that was ever taken seldom is too short; half as long again surely is enough soon
+        self._largest_step = max(self._largest_step, abs(float(largest)))
+        failed = outcome == heyoka.taylor_outcome.err_nf_state
+        if failed or self._beyond(target):
+            # what has been seen of the steps behind the target says how many lie before it
+            self._mean_step, self._part = abs(float(self.engine.time)) / (self.steps + done), self._part / 2
+            self.engine.state[:] = state
+            self.engine.dtime = time
+            if failed:
+                # over the same ground again, one by one, to find where
+                self._one_by_one = True
+            else:
+                self._largest_step *= 1.5
+            return Outcome.SUCCESS
+        self._went(done)
+        self._covers = False
+        return Outcome.SUCCESS
+
+    def _went(self, steps: int) -> None:
+        self.steps += steps
+        self.time = self.engine.time
+        self._mean_step, self._part = abs(float(self.time)) / self.steps, 0.95
+
+    def polynomial(self) -> Any:
+        """Taylor coefficients of the last step, a copy, shape (6 or 9, order + 1)."""
+        return self.engine.tc.copy()
+
+    def begin(self, place: Place) -> None:
+        """Go on from there; raises ValueError for a state of another length."""
+        if len(place.state) != len(self.engine.state):
+            raise ValueError(f"a state of {len(place.state)} numbers")
+        self.engine.state[:] = numpy.array(place.state)
+        self.engine.dtime = place.time
+        self.steps, self.time = place.steps, self.engine.time
+
+    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
+        """Where the last step began."""
+        state, time, steps = self._before
+        return Place(samples, tuple(state), time, steps, seconds, flags)
+
+    def sample(self, target: Any) -> Any:
+        """The state at ``target``, inside the last step; a copy, shape (6,) or (9,)."""
+        self._one_by_one = False
+        if self.rest is not None:
+            return self.rest.copy()
+        return self.engine.update_d_output(target).copy()
+
+
+def are_many(targets: Sequence[Any], precision: Precision) -> bool:
+    """Whether one call of heyoka may be worth its while."""
+    return len(targets) >= _MANY and precision.family in _ON_A_GRID
+
+
+def dense(engine: Any, targets: Sequence[Any], precision: Precision) -> bool:
+    """Whether there are few steps between :func:`are_many` targets; takes the first step of ``engine`` to see."""
+    engine.propagate_until(far(bool(targets[-1] >= 0), precision), max_steps=1)
+    return abs(float(targets[-1])) <= _CLOSE * len(targets) * abs(float(engine.time))
+
+
+def on_a_grid(engine: Any, targets: Sequence[Any], precision: Precision, most: int | None) -> tuple[int, Any] | None:
+    """Steps taken from t = 0 to the last of ``targets``, and the states at all of them, an array of shape (n, 6 or 9).
+
+    The same bits as :class:`Stepper`, in one call of heyoka.  The grid goes on to a time beyond every other, so that no
+    step is cut; the run is stopped behind the step that covers the last target.  None for a run that ends otherwise, or
+    takes more than ``most`` steps: then the engine is anywhere.
+    """
+    sign, end = (1 if targets[-1] >= 0 else -1), far(bool(targets[-1] >= 0), precision)
+    reached, last = sign * engine.time, sign * targets[-1]
+    if precision.family == "double":
+        last = float(last)  # compared at every step: numpy's numbers take longer
+
+    def goes_on(stepped: Any) -> bool:
+        nonlocal reached
+        before, reached = reached, sign * stepped.time
+        return bool(before < reached < last)
+
+    start = [] if targets[0] == 0 else [engine.time]
+    grid = numpy.concatenate([numpy.array([*start, targets[0]]), numpy.array(targets[1:]), numpy.array([end])])
+    _, _, _, steps, _, states = engine.propagate_grid(grid, callback=goes_on, max_steps=most or 0)
+    if len(states) != len(grid) - 1 or not numpy.isfinite(states[-1]).all():
+        return None
+    return steps, states[len(start) :]
+
+
+@lru_cache(maxsize=64)
+def far(forwards: bool, precision: Precision) -> Any:
+    """A time beyond every other."""
+    return number(Fraction(2) ** 1000 * (1 if forwards else -1), precision)
+
+
+def at_rest(state: Any, coefficients: Any) -> bool:
+    """Whether a motion is constant: at an equilibrium every Taylor coefficient is 0 and heyoka finds no step."""
+    return bool(numpy.isfinite(state).all()) and not coefficients[:, 1:].any()
+
+
+Observer = Callable[[Fraction, Any], None]
+
+
+def propagate(
+    top: HeavyTop,
+    start: State,
+    times: Sequence[Any],
+    precision: Precision,
+    *,
+    system: System = HEAVY_TOP,
+    xi: tuple[Fraction, ...] | None = None,
+    step_limit: int | None = None,
+    observer: Observer | None = None,
+    stepping: type[Stepper] = Stepper,
+    place: Place | None = None,
+    mark: Callable[[Place], None] | None = None,
+    tolerance: Fraction | None = None,
+    high_accuracy: bool = False,
+    compact_mode: bool | None = None,
+    constants: Parameters | None = None,
+) -> Trajectory:
+    """The motion from ``start`` at t = 0, at ``times``, computed by heyoka in ``precision``.
+
+    times: exact numbers of one sign, strictly monotone away from 0 (0 itself may come first).
+    xi: exact initial attitude vector, to ride along.
+    step_limit: stop after that many steps; the times reached until then are returned.
+    observer: called with (exact time, native state) at each sample in place of keeping the states.
+    stepping: how steps are taken; another than heyoka's own is for trying the detectors.
+    place: where an earlier run of the same problem stopped; goes on behind its samples, to the same bits.
+    mark: called after each sample with the place from which this run could go on.
+    tolerance, high_accuracy, compact_mode, constants: as in :func:`heavytop.integrate.heyoka.engines.compiled`.
+
+    Raises InputError for times out of order, a format that the platform lacks, data outside its exponent range, a
+    start that the system does not admit, and a place reached with other flags.  A failed run is an outcome, not an
+    exception.
+    """
+    problem = Problem.of(top, start, precision, system, xi)
+    targets = numbers(check_times(times), precision)
+    tool = compiled(
+        system,
+        precision,
+        attitude=xi is not None,
+        tolerance=tolerance,
+        high_accuracy=high_accuracy,
+        compact_mode=compact_mode,
+        constants=constants,
+    )
+    with tool.lent() as engine:
+        return follow(tool, engine, problem, targets, step_limit, observer, stepping=stepping, place=place, mark=mark)
+
+
+def follow(
+    tool: Compiled,
+    engine: Any,
+    problem: Problem,
+    targets: Sequence[Any],
+    step_limit: int | None,
+    observer: Observer | None,
+    between: Callable[[], None] | None = None,
+    *,
+    stepping: type[Stepper] = Stepper,
+    place: Place | None = None,
+    mark: Callable[[Place], None] | None = None,
+) -> Trajectory:
+    """The motion of ``problem`` at ``targets``, native numbers in order, computed by ``engine``, one of ``tool``'s."""
+    if stepping is Stepper and all(each is None for each in (observer, between, place, mark)):
+        found = _in_one_call(tool, engine, problem, targets, step_limit)
+        if found is not None:
+            return found
+    load(engine, problem)
+    forwards = bool(targets[-1] >= 0)
+    stepper = stepping(engine, forwards, step_limit, far(forwards, problem.precision), between)
+    kept_times: list[Fraction] = []
+    kept_states: list[Any] = []
+    outcome, done, began = Outcome.SUCCESS, 0, perf_counter()
+    if place is not None:
+        place.require_same(tool.flags)
+        stepper.begin(place)
+        done, began = place.samples, began - place.seconds
+        kept_times = [exact(target) for target in targets[:done]]
+        stepper.reach(targets[done - 1])
+        if stepper.rest is None:
+            place.require_covered(stepper.steps)
+    for target in targets[done:]:
+        outcome, state = stepper.at(target)
+        if outcome is not Outcome.SUCCESS:
+            break
+        done += 1
+        kept_times.append(exact(target))
+        if observer is None:
+            kept_states.append(state)
+        else:
+            observer(kept_times[-1], state)
+        if mark is not None and target != 0:
+            mark(stepper.place(done, perf_counter() - began, tool.flags))
+    return _trajectory(
+        tool, engine, problem, stepper, tuple(kept_times), tuple(kept_states), outcome, perf_counter() - began
+    )
+
+
+def states_at(
+    engine: Any, parameters: Any, start: Any, targets: Sequence[Any], step_limit: int | None, precision: Precision
+) -> tuple[Any, Outcome, Any, int]:
+    """(states at the targets that were reached, outcome, time reached, steps), the bits of :func:`follow`.
+
+    For who has native numbers already: ``parameters`` and ``start`` as arrays, targets that were checked.
+    """
+
+    def begin() -> None:
+        engine.pars[:] = parameters
+        engine.state[:] = start
+        engine.time = targets[0] * 0
+
+    if are_many(targets, precision):
+        begin()
+        if dense(engine, targets, precision):
+            begin()
+            found = on_a_grid(engine, targets, precision, step_limit)
+            if found is not None:
+                return found[1], Outcome.SUCCESS, targets[-1], found[0]
+    begin()
+    forwards = bool(targets[-1] >= 0)
+    stepper = Stepper(engine, forwards, step_limit, far(forwards, precision))
+    states: list[Any] = []
+    for target in targets:
+        outcome, state = stepper.at(target)
+        if outcome is not Outcome.SUCCESS:
+            return states, outcome, stepper.time, stepper.steps
+        states.append(state)
+    return states, Outcome.SUCCESS, targets[-1], stepper.steps
+
+
+def _in_one_call(
+    tool: Compiled, engine: Any, problem: Problem, targets: Sequence[Any], step_limit: int | None
+) -> Trajectory | None:
+    """The motion at many targets close to each other, by heyoka alone; None where there are few, or where it fails."""
+    began = perf_counter()
+    if not are_many(targets, problem.precision):
+        return None
+    load(engine, problem)
+    if not dense(engine, targets, problem.precision):
+        return None
+    load(engine, problem)
+    found = on_a_grid(engine, targets, problem.precision, step_limit)
+    if found is None:
+        return None
+    stepper = Stepper(engine, bool(targets[-1] >= 0), None, None, steps=found[0])
+    seconds = perf_counter() - began
+    return _trajectory(tool, engine, problem, stepper, RoundedTimes(targets), found[1], Outcome.SUCCESS, seconds)
+
+
+def _trajectory(
+    tool: Compiled,
+    engine: Any,
+    problem: Problem,
+    stepper: Stepper,
+    times: Sequence[Fraction],
+    states: Any,
+    outcome: Outcome,
+    seconds: float,
+) -> Trajectory:
+    return Trajectory(
+        problem,
+        "heyoka",
+        times,
+        states,
+        outcome,
+        times[-1] if outcome is Outcome.SUCCESS and times else exact(stepper.time),
+        stepper.steps,
+        engine.order,
+        {"compile": tool.seconds, "run": seconds},
+        tool.flags,
+    )
+
+
+def first_steps(
+    top: HeavyTop,
+    start: State,
+    until: Fraction,
+    precision: Precision,
+    *,
+    system: System = HEAVY_TOP,
+    stepping: type[Stepper] = Stepper,
+    **options: Any,
+) -> tuple[Trajectory, list[TaylorStep]]:
+    """The steps that begin before the time ``until`` > 0, at their ends and as polynomials; none at an equilibrium.
+
+    stepping: as in :func:`propagate`; options: as in :func:`heavytop.integrate.heyoka.engines.compiled`.
+    """
+    problem = Problem.of(top, start, precision, system)
+    tool = compiled(system, precision, **options)
+    times: list[Fraction] = []
+    steps: list[TaylorStep] = []
+    outcome = Outcome.SUCCESS
+    began = perf_counter()
+    end = number(until, precision)
+    with tool.lent() as engine:
+        load(engine, problem)
+        stepper = stepping(engine, True, None, None)
+        while stepper.time < end and outcome is Outcome.SUCCESS and stepper.rest is None:
+            before = engine.state.copy()
+            outcome = stepper.single()
+            if outcome is Outcome.SUCCESS and stepper.rest is None:
+                steps.append(TaylorStep(before, engine.last_h, stepper.polynomial(), engine.state.copy()))
+                times.append(exact(engine.time))
+        order = engine.order
+    return Trajectory(
+        problem,
+        "heyoka",
+        tuple(times),
+        tuple(step.end for step in steps),
+        outcome,
+        times[-1] if times else Fraction(0),
+        len(steps),
+        order,
+        {"compile": tool.seconds, "run": perf_counter() - began},
+        tool.flags,
+    ), steps

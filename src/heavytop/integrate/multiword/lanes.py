@@ -1,0 +1,512 @@
+"""Motions in double-double, eight side by side in each thread.
+
+n0 is the same for all eight.  A motion that comes to need a larger one leaves its lane, and goes on from where it was
+among others with a larger one; so its bits depend on nothing but itself.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import partial
+from itertools import permutations
+from math import ceil
+from time import perf_counter
+from typing import Any
+
+import numpy
+
+from heavytop.errors import InputError
+from heavytop.integrate.ensemble import Finished, Observer, in_threads, one_kind, processors
+from heavytop.integrate.heyoka.lanes import Work
+from heavytop.integrate.multiword.engines import DoubleDouble, choose, compiled_lanes, floats, wanted_tolerance
+from heavytop.integrate.multiword.motions import CHUNK_SECONDS, OUTCOMES, follow, native_state, sums_of_two
+from heavytop.integrate.trajectory import Outcome, Problem, Trajectory
+from heavytop.multiword.codegen.machine_code import LANES, Doubles
+from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER
+from heavytop.multiword.double_double.double_double_run import terms
+from heavytop.multiword.double_double.eight_lane_run import Eight, exact_state
+from heavytop.multiword.fixed_point.fixed_point_run import TINY_BITS
+from heavytop.multiword.problem import Scaled
+from heavytop.precision import DOUBLE_DOUBLE, exact, number, require
+from heavytop.top.equations import HEAVY_TOP, Parameters
+from heavytop.top.times import check_times
+
+_FIRST_CHUNK = 64
+_RISE = 2
+
+
+@dataclass(slots=True, eq=False)
+class _Motion:
+    """A problem on its way; targets: its times |τ|; moved: its words, between two eights."""
+
+    index: int
+    problem: Problem
+    scaled: Scaled
+    exponents: tuple[int, ...]
+    targets: list[Fraction]
+    began: float
+    moved: tuple[Doubles, Doubles] | None = None
+    times: list[Fraction] = field(default_factory=list)
+    states: list[Any] = field(default_factory=list)
+
+    @property
+    def target(self) -> Fraction:
+        """The next of its times."""
+        return self.targets[len(self.times)]
+
+    def native(self, words: Doubles) -> Any:
+        """A state in words of its units, rounded to the format; None where a number is too large for it."""
+        each = zip(words[:6].tolist(), words[6:].tolist(), self.exponents, strict=True)
+        found = sums_of_two(each, self.problem.precision)
+        return self.exactly(exact_state(words)) if found is None else numpy.array(found)
+
+    def exactly(self, state: tuple[Fraction, ...]) -> Any:
+        """The same of an exact state."""
+        return native_state(self.scaled.back(state), self.problem.precision)
+
+
+def first_low_order(arithmetic: DoubleDouble) -> int:
+    """n0 where coefficients fall by as much from order to order as those of a motion near a singularity do."""
+    return max(LEAST_LOW_ORDER, ceil(arithmetic.in_lanes.room / arithmetic.in_lanes.reach))
+
+
+class WordsLanes:
+    """One thread's eight lanes.
+
+    seconds: of compiling.  others: where problems go that need another arithmetic.
+    """
+
+    def __init__(
+        self,
+        work: Work,
+        arithmetic: DoubleDouble,
+        tolerance: Fraction | None,
+        seconds: float,
+        others: deque[tuple[int, Problem]],
+    ) -> None:
+        self.work, self.arithmetic, self.tolerance, self.seconds = work, arithmetic, tolerance, seconds
+        self.others = others
+        self.forwards = bool(work.targets[-1] >= 0)
+        self.targets: dict[Fraction, list[Fraction]] = {}
+        self.lanes: dict[int, _Motion] = {}
+        self.waiting: deque[_Motion] = deque()
+        self.outgrown: deque[_Motion] = deque()
+        self.chunk = _FIRST_CHUNK
+
+    def _own_flags(self) -> dict[str, str]:
+        ladder = self.arithmetic.in_lanes
+        rule = f"radius of convergence times 2^{ladder.reach:.3f}, ten bits"
+        return {"lanes": str(LANES), "order": str(ladder.order), "step_rule": rule}
+
+    def run(self) -> None:
+        """Until no problem is left, with n0 rising for those that outgrow it."""
+        low_order = first_low_order(self.arithmetic)
+        while True:
+            eight: Eight | None = None
+            while (eight := self._fill(eight, low_order)) is not None and self.lanes:
+                self._round(eight)
+            if not self.outgrown:
+                return
+            self.waiting, self.outgrown = self.outgrown, deque()
+            low_order += _RISE
+
+    def _fill(self, eight: Eight | None, low_order: int) -> Eight | None:
+        """Put a motion into every lane that has none, as long as there are any."""
+        for lane in range(LANES):
+            while lane not in self.lanes and (motion := self._next()) is not None:
+                if eight is None:
+                    eight = Eight(motion.problem.system, self.arithmetic.in_lanes, low_order)
+                if motion.moved is None:
+                    eight.put(lane, motion.scaled, self.forwards, self.work.step_limit)
+                else:
+                    eight.put_back(lane, motion.scaled, self.forwards, motion.moved)
+                self.lanes[lane] = motion
+                self._aim(eight, lane)
+        return eight
+
+    def _next(self) -> _Motion | None:
+        if self.waiting:
+            return self.waiting.popleft()
+        while (taken := self.work.take()) is not None:
+            index, problem = taken
+            own, scaled = choose(problem, self.tolerance)
+            if own != self.arithmetic:
+                self.others.append(taken)
+                continue
+            if scaled.rate not in self.targets:
+                self.targets[scaled.rate] = [abs(time) * scaled.rate for time in self.work.times]
+            motion = _Motion(index, problem, scaled, scaled.exponents, self.targets[scaled.rate], perf_counter())
+            if not scaled.rest:
+                return motion
+            for _ in self.work.times:
+                self._record(motion, motion.exactly(scaled.state))
+            self._finish(motion, Outcome.SUCCESS, Fraction(0), 0)
+        return None
+
+    def _aim(self, eight: Eight, lane: int) -> None:
+        """The next time of the motion in a lane; at 0 it is there already.  Without one left it is over."""
+        motion = self.lanes[lane]
+        if not motion.times and not motion.target:
+            self._record(motion, motion.exactly(motion.scaled.state))
+        if len(motion.times) == len(self.work.times):
+            steps = eight.taken(lane, self.work.step_limit)
+            self._leave(eight, lane, Outcome.SUCCESS, steps + 1)
+            return
+        eight.aim(lane, motion.target)
+
+    def _round(self, eight: Eight) -> None:
+        """A chunk of steps, and whatever the lanes came to."""
+        self.work.check()
+        began = perf_counter()
+        rounds = eight.advance(self.chunk)
+        a_round = (perf_counter() - began) / (rounds + 1)
+        waiting = rounds < self.chunk
+        self.chunk = max(1, min(4 * self.chunk, int(CHUNK_SECONDS / a_round)))
+        for lane, motion in list(self.lanes.items()):
+            status = eight.status(lane)
+            if status is None:
+                motion.moved = eight.taken_out(lane)
+                self.outgrown.append(motion)
+                del self.lanes[lane]
+                eight.empty(lane)
+            elif (outcome := OUTCOMES[status]) is not Outcome.SUCCESS:
+                self._leave(eight, lane, outcome, eight.taken(lane, self.work.step_limit))
+            elif waiting and eight.taken(lane, self.work.step_limit) == self.work.step_limit:
+                self._leave(eight, lane, Outcome.STEP_LIMIT, self.work.step_limit)
+        if waiting:
+            self._sample(eight)
+
+    def _sample(self, eight: Eight) -> None:
+        """The next time of every motion: each lane that is left waits for it."""
+        found = eight.samples({lane: motion.target for lane, motion in self.lanes.items()})
+        for lane, words in found.items():
+            motion = self.lanes[lane]
+            if self._record(motion, motion.native(words)):
+                self._aim(eight, lane)
+            else:
+                self._leave(eight, lane, Outcome.NON_FINITE, eight.taken(lane, self.work.step_limit))
+
+    def _record(self, motion: _Motion, native: Any) -> bool:
+        """Keep a sample, or send it to the observer; False where there is none, being too large for the format."""
+        if native is None:
+            return False
+        time = self.work.times[len(motion.times)]
+        motion.times.append(time)
+        if self.work.observed:
+            self.work.observe(motion.index, time, native)
+        else:
+            motion.states.append(native)
+        return True
+
+    def _leave(self, eight: Eight, lane: int, outcome: Outcome, steps: int) -> None:
+        motion = self.lanes.pop(lane)
+        eight.empty(lane)
+        sign = 1 if self.forwards else -1
+        self._finish(motion, outcome, sign * eight.time(lane) / motion.scaled.rate, steps)
+
+    def _finish(self, motion: _Motion, outcome: Outcome, reached: Fraction, steps: int) -> None:
+        self.work.finish(
+            motion.index,
+            Trajectory(
+                motion.problem,
+                "multiword",
+                tuple(motion.times),
+                tuple(motion.states),
+                outcome,
+                motion.times[-1] if outcome is Outcome.SUCCESS else reached,
+                steps,
+                self.arithmetic.in_lanes.order,
+                {"compile": self.seconds, "run": perf_counter() - motion.began},
+                self.arithmetic.flags | self._own_flags(),
+            ),
+        )
+
+
+# Many motions in many words: eight in lanes where double-double serves, threads on top.
+
+
+def propagate_words_ensemble(
+    problems: Sequence[Problem],
+    times: Sequence[Any],
+    *,
+    observer: Observer | None = None,
+    finished: Finished | None = None,
+    threads: int | None = None,
+    step_limit: int | None = None,
+    tolerance: Fraction | None = None,
+) -> list[Trajectory]:
+    """The motions of ``problems`` at ``times``, computed in many words, in the order of the problems.
+
+    Where double-double serves the format and the tolerance, eight go side by side, unless they carry an attitude; else
+    each by itself, to the bits of :func:`heavytop.integrate.multiword.motions.propagate_words`.  No bit of a motion
+    depends on the others.  The arguments: as in :func:`heavytop.integrate.ensemble.propagate_ensemble`; tolerance: as
+    in :func:`heavytop.integrate.multiword.motions.propagate_words`.
+
+    Raises InputError for no problems, for problems of several kinds, for times out of order, for fewer than 1 thread,
+    and what that raises.
+    """
+    first = one_kind(problems)
+    require(first.precision)
+    targets = [number(time, first.precision) for time in check_times(times)]
+    threads = processors() if threads is None else threads
+    if threads < 1:
+        raise InputError(f"{threads} threads make no ensemble.", "Use 1 thread or more.")
+    arithmetic = floats(wanted_tolerance(first.precision, tolerance))
+    work = Work(
+        None, targets, [exact(t) for t in targets], step_limit, observer is not None, deque(enumerate(problems))
+    )
+    moves = targets[-1] != 0 and (step_limit is None or step_limit > 0)
+    if arithmetic is not None and first.xi is None and moves:
+        seconds = compiled_lanes(first.system)
+        in_lanes = partial(_in_lanes, work, arithmetic, tolerance, seconds)
+        return in_threads(in_lanes, work, min(threads, -(-len(problems) // LANES)), observer, finished)
+    one_by_one = partial(_one_by_one, work, tolerance)
+    return in_threads(one_by_one, work, min(threads, len(problems)), observer, finished)
+
+
+def _in_lanes(work: Work, arithmetic: DoubleDouble, tolerance: Fraction | None, seconds: float) -> None:
+    """One thread of lanes, and afterwards those that need another arithmetic."""
+    others: deque[tuple[int, Problem]] = deque()
+    WordsLanes(work, arithmetic, tolerance, seconds, others).run()
+    while others:
+        _alone(work, tolerance, *others.popleft())
+
+
+def _one_by_one(work: Work, tolerance: Fraction | None) -> None:
+    """One thread of single runs."""
+    while taken := work.take():
+        _alone(work, tolerance, *taken)
+
+
+def _alone(work: Work, tolerance: Fraction | None, index: int, problem: Problem) -> None:
+    observer = partial(work.observe, index) if work.observed else None
+    work.finish(index, follow(problem, work.targets, tolerance, work.step_limit, observer, work.check))
+
+
+# Arrays of double-doubles as a ring, so that first integrals written once are evaluated for many motions at once.
+#
+# Relative errors of a few 2^-104 an operation (Dekker 1971; Joldes, Muller, Popescu 2017), while no product of two
+# words leaves the normal range: |values| from 1e-140 to 1e140.
+
+
+_SPLIT = 134217729.0
+"""2^27 + 1, of Dekker's splitting."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """high + low, arrays of one shape with |low| <= ulp(high)/2."""
+
+    high: Any
+    low: Any
+
+    @classmethod
+    def of(cls, value: Any) -> Pairs:
+        """An array or a number that doubles hold."""
+        if isinstance(value, Pairs):
+            return value
+        high = numpy.asarray(value, float)
+        return cls(high, numpy.zeros_like(high))
+
+    def __add__(self, other: Any) -> Pairs:
+        one = Pairs.of(other)
+        total, off = _two_sum(self.high, one.high)
+        low, rest = _two_sum(self.low, one.low)
+        total, off = _quick(total, off + low)
+        return type(self)(*_quick(total, off + rest))
+
+    __radd__ = __add__
+
+    def __neg__(self) -> Pairs:
+        return type(self)(-self.high, -self.low)
+
+    def __sub__(self, other: Any) -> Pairs:
+        return self.__add__(-Pairs.of(other))
+
+    def __rsub__(self, other: Any) -> Pairs:
+        opposite = -self
+        return opposite.__add__(other)
+
+    def __mul__(self, other: Any) -> Pairs:
+        one = Pairs.of(other)
+        product, off = _two_product(self.high, one.high)
+        return type(self)(*_quick(product, off + (self.high * one.low + self.low * one.high)))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Pairs:
+        one = Pairs.of(other)
+        first = self.high / one.high
+        rest = self - one * first
+        second = rest.high / one.high
+        third = (rest - one * second).high / one.high
+        two = Pairs(*_quick(*_two_sum(first, second)))
+        return two.__add__(third)
+
+    def __getitem__(self, where: Any) -> Pairs:
+        return type(self)(self.high[where], self.low[where])
+
+    def __abs__(self) -> Pairs:
+        sign = numpy.where(self.high < 0, -1.0, 1.0)
+        return Pairs(sign * self.high, sign * self.low)
+
+
+class Numerators(Pairs):
+    """Pairs whose quotients have three words each, as constants of the machine code have: (3, ...).
+
+    The words are right to some 2^-150 where divisor and dividend are sums of few doubles.
+    """
+
+    __slots__ = ()
+
+    def __truediv__(self, other: Any) -> Any:
+        words, rest = [], self
+        for _ in range(3):
+            words.append(rest.high / other.high)
+            rest = rest.__sub__(other * words[-1])  # type: ignore[assignment]
+        return numpy.array(words)
+
+
+def _two_sum(a: Any, b: Any) -> tuple[Any, Any]:
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
+
+
+def _quick(a: Any, b: Any) -> tuple[Any, Any]:
+    total = a + b
+    return total, b - (total - a)
+
+
+def _halves(a: Any) -> tuple[Any, Any]:
+    product = _SPLIT * a
+    high = product - (product - a)
+    return high, a - high
+
+
+def _two_product(a: Any, b: Any) -> tuple[Any, Any]:
+    product = a * b
+    (a1, a2), (b1, b2) = _halves(a), _halves(b)
+    return product, ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
+
+
+# Many short motions of heavy tops at the same times, as arrays: double-double in lanes, no exact number per motion.
+#
+# What :mod:`heavytop.integrate.multiword.lanes` does motion by motion, for usual ones: doubles of moderate size,
+# forwards.
+
+
+_ROUNDS = 4096
+_LARGE = 2.0**60
+_RESTING = 2.0 ** (-2 * TINY_BITS)
+_UNITS = numpy.eye(6).tolist()
+
+
+def double_double_states(
+    parameters: Any, starts: Any, times: Sequence[Fraction], tolerance: Fraction, step_limit: int
+) -> tuple[Pairs, Any]:
+    """States (motions, samples, 6) of heavy tops, and which motions they are good for: the others need more care.
+
+    parameters: doubles (motions, 6), I and n.  starts: (motions, 6).  times: doubles, increasing from above 0.
+    """
+    arithmetic = floats(wanted_tolerance(DOUBLE_DOUBLE, tolerance))
+    assert arithmetic is not None
+    compiled_lanes(HEAVY_TOP)
+    with numpy.errstate(all="ignore"):
+        run = _Grid(parameters, starts, numpy.array([float(time) for time in times]))
+        pending, low_order = numpy.flatnonzero(run.usual), first_low_order(arithmetic)
+        while len(pending) and low_order < arithmetic.in_lanes.order:
+            pending = run.advance(pending, arithmetic, low_order, step_limit)
+            low_order += _RISE
+        return run.states(), run.good
+
+
+class _Grid:
+    """Problems in units in which their numbers are near 1, as in :mod:`heavytop.multiword.problem`, and their
+    states.
+    """
+
+    def __init__(self, parameters: Any, starts: Any, times: Any) -> None:
+        constants = _constants(parameters)
+        gamma = _power_above(numpy.abs(starts[:, 3:]).max(axis=1))
+        torque = numpy.abs(constants[3:, 0]).max(axis=0) * 2.0**gamma
+        speed = numpy.abs(starts[:, :3]).max(axis=1)
+        turned, swung = _power_above(speed), -(-_power_above(torque) // 2)
+        rate = numpy.where(torque == 0, turned, numpy.where(speed == 0, swung, numpy.maximum(turned, swung)))
+        self.exponents = numpy.stack([rate] * 3 + [gamma] * 3, axis=1)
+        self.begin = numpy.ldexp(starts, -self.exponents)
+        constants[3:] = numpy.ldexp(constants[3:], gamma - 2 * rate)
+        self.constants = constants
+        self.times = numpy.ldexp(times[None, :], rate[:, None])
+        self.order = numpy.argsort(numpy.maximum(speed, numpy.sqrt(torque)), kind="stable")
+        self.usual = self._are_usual()
+        self.good = numpy.zeros(len(starts), bool)
+        self.found = numpy.full((len(starts), len(times), 12), numpy.nan)
+
+    def _are_usual(self) -> Any:
+        """Motions of which double-double keeps every component, that do not rest."""
+        state, constants = numpy.abs(self.begin), numpy.abs(self.constants[:, 0].T)
+
+        def above(values: Any, bits: int) -> Any:
+            return ((values == 0) | (values > 2.0**-bits)).all(axis=1)
+
+        clear = above(state, TINY_BITS // 2 - 1) & above(constants, TINY_BITS // 2 - 1)
+        fine = above(state, TINY_BITS - 1) & ((state > 0).all(axis=1) | clear)
+        turning = numpy.abs(numpy.cross(self.begin[:, 3:], self.begin[:, :3])).max(axis=1) > _RESTING
+        bounded = (constants < _LARGE).all(axis=1) & (numpy.abs(self.exponents) < 300).all(axis=1)
+        return fine & turning & bounded & numpy.isfinite(self.begin).all(axis=1)
+
+    def advance(self, pending: Any, arithmetic: DoubleDouble, low_order: int, step_limit: int) -> Any:
+        """All these motions, those of like rates side by side; gives those that need a larger n0."""
+        place = numpy.empty(len(self.order), int)
+        place[self.order] = numpy.arange(len(self.order))
+        ordered = pending[numpy.argsort(place[pending])]
+        eight = Eight(HEAVY_TOP, arithmetic.in_lanes, low_order)
+        larger = []
+        for first in range(0, len(ordered), LANES):
+            eights = ordered[numpy.minimum(numpy.arange(first, first + LANES), len(ordered) - 1)]
+            self._eight(eight, eights, step_limit)
+            outgrown = [eight.status(lane) is None for lane in range(LANES)]
+            larger += eights[outgrown].tolist()
+            self.good[eights] = (eight.flags == 0) & (eight.left_all() > 0)
+        return numpy.unique(numpy.array(larger, int))
+
+    def _eight(self, eight: Eight, eights: Any, step_limit: int) -> None:
+        words = numpy.zeros((12, LANES))
+        words[:6] = self.begin[eights].T
+        eight.put_all(words, self.constants[:, :, eights], step_limit)
+        for sample, targets in enumerate(self.times[eights].T):
+            eight.aim_all(targets)
+            while eight.advance(_ROUNDS) == _ROUNDS:
+                pass
+            self.found[eights, sample] = eight.sample_all(targets).T
+
+    def states(self) -> Pairs:
+        """In the units of the problems; NaN where they are not good."""
+        high, low = (numpy.ldexp(self.found[:, :, k : k + 6], self.exponents[:, None, :]) for k in (0, 6))
+        total = high + low
+        bad = ~self.good
+        total[bad] = numpy.nan
+        return Pairs(total, low - (total - high))
+
+
+def _constants(parameters: Any) -> Any:
+    """The coefficients of Ω × Ω and of the linear part, read off the field, three words each: (k, 3, motions)."""
+    numbers = [Numerators(column, numpy.zeros(1)) for column in parameters.T]
+    given = Parameters(tuple(numbers[:3]), tuple(numbers[3:6]), 0)
+
+    def rate(component: int, *axes: int) -> Any:
+        return HEAVY_TOP.field(given, [sum(_UNITS[axis][i] for axis in axes) for i in range(6)])[component]
+
+    cyclic = [each for each in permutations(range(3)) if each in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
+    products = [rate(i, j, k) for i, j, k in cyclic]
+    return numpy.array([*products, *(rate(component, source) for _, component, source in terms(HEAVY_TOP))])
+
+
+def _power_above(values: Any) -> Any:
+    """log2 of the least powers of two that are not less; 0 for 0."""
+    part, exponent = numpy.frexp(values)
+    return exponent - (part == 0.5)

@@ -1,0 +1,291 @@
+"""Motions computed in many words: the same call as heyoka's, on the project's own Taylor integrator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+from heavytop.errors import InputError
+from heavytop.integrate.multiword.engines import choose, compiled
+from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
+from heavytop.multiword.double_double.double_double_run import PLACES, Floating
+from heavytop.multiword.problem import Run, Scaled, Status
+from heavytop.precision import DOUBLE, Precision, exact, number, numbers, require
+from heavytop.top.equations import HEAVY_TOP, System
+from heavytop.top.heavy_top import HeavyTop, State
+from heavytop.top.times import RoundedTimes, check_times
+
+Observer = Callable[[Fraction, Any], None]
+
+CHUNK_SECONDS = 0.25
+_FIRST_CHUNK = 16
+_LARGE_EXPONENT = 500
+_MANY = 64
+"""States at so many times are sampled in few calls."""
+_LARGE = 2.0**_LARGE_EXPONENT
+OUTCOMES = {
+    Status.FINE: Outcome.SUCCESS,
+    Status.NON_FINITE: Outcome.NON_FINITE,
+    Status.TOO_SMALL: Outcome.STEP_TOO_SMALL,
+    Status.CAPACITY: Outcome.CAPACITY,
+}
+
+
+def propagate_words(
+    top: HeavyTop,
+    start: State,
+    times: Sequence[Any],
+    precision: Precision,
+    *,
+    system: System = HEAVY_TOP,
+    xi: tuple[Fraction, ...] | None = None,
+    tolerance: Fraction | None = None,
+    step_limit: int | None = None,
+    observer: Observer | None = None,
+    place: Place | None = None,
+    mark: Callable[[Place], None] | None = None,
+) -> Trajectory:
+    """The motion from ``start`` at t = 0, at ``times``, computed in many words and rounded to ``precision`` once.
+
+    tolerance: the local error aimed at, relative to the state; None for what the format can show.
+    The other arguments and what is raised: as in :func:`heavytop.integrate.heyoka.motions.propagate`.
+
+    Raises InputError for a tolerance that is not positive and below 1.  A failed run is an outcome, not an exception.
+    """
+    problem = Problem.of(top, start, require(precision), system, xi)
+    targets = numbers(check_times(times), precision)
+    return follow(problem, targets, tolerance, step_limit, observer, place=place, mark=mark)
+
+
+def follow(
+    problem: Problem,
+    targets: Sequence[Any],
+    tolerance: Fraction | None = None,
+    step_limit: int | None = None,
+    observer: Observer | None = None,
+    between: Callable[[], None] | None = None,
+    *,
+    place: Place | None = None,
+    mark: Callable[[Place], None] | None = None,
+) -> Trajectory:
+    """The motion of ``problem`` at ``targets``, native numbers in order.
+
+    between: called between chunks of a quarter of a second; it may raise to give the run up.
+    """
+    arithmetic, scaled = choose(problem, tolerance)
+    compiling = compiled(arithmetic, problem.system, problem.xi is not None)
+    flags = arithmetic.flags
+    forwards = bool(targets[-1] >= 0)
+    began = perf_counter()
+    pace = _Pace(arithmetic.begin(scaled, forwards), scaled, step_limit, between)
+    kept_times: list[Fraction] = []
+    kept_states: list[Any] = []
+    outcome, done = Outcome.SUCCESS, 0
+    if all(each is None for each in (step_limit, observer, between, place, mark)) and _are_many(pace, targets, problem):
+        outcome, states = pace.sampled(targets, problem.precision)
+        seconds = {"compile": compiling, "run": perf_counter() - began}
+        times = RoundedTimes(targets[: len(states)])
+        return _trajectory(problem, pace, flags, times, states, outcome, seconds)
+    if place is not None:
+        place.require_same(flags)
+        done, began = place.samples, began - place.seconds
+        kept_times = [exact(target) for target in targets[:done]]
+        pace.take_up(place, kept_times[-1])
+    for target in map(exact, targets[done:]):
+        outcome = pace.reach(target)
+        if outcome is not Outcome.SUCCESS:
+            break
+        outcome, state = pace.native(target, problem.precision)
+        if outcome is not Outcome.SUCCESS:
+            break
+        done += 1
+        kept_times.append(target)
+        if observer is None:
+            kept_states.append(state)
+        else:
+            observer(target, state)
+        if mark is not None and target != 0:
+            mark(pace.place(done, perf_counter() - began, flags))
+    seconds = {"compile": compiling, "run": perf_counter() - began}
+    return _trajectory(problem, pace, flags, kept_times, kept_states, outcome, seconds)
+
+
+def _trajectory(
+    problem: Problem,
+    pace: _Pace,
+    flags: dict[str, str],
+    times: Sequence[Fraction],
+    states: Any,
+    outcome: Outcome,
+    seconds: dict[str, float],
+) -> Trajectory:
+    reached = times[-1] if outcome is Outcome.SUCCESS and times else pace.time
+    return Trajectory(
+        problem,
+        "multiword",
+        times if isinstance(times, RoundedTimes) else tuple(times),
+        states,
+        outcome,
+        reached,
+        pace.run.steps,
+        pace.run.order,
+        seconds,
+        flags,
+    )
+
+
+def _are_many(pace: _Pace, targets: Sequence[Any], problem: Problem) -> bool:
+    """Whether the states at many doubles are asked for, far from the ends of their exponents."""
+    if len(targets) < _MANY or problem.precision != DOUBLE or not isinstance(pace.run, Floating):
+        return False
+    far = all(
+        1 / _LARGE < abs(float(time) * float(pace.scaled.rate)) < _LARGE
+        for time in (targets[int(targets[0] == 0)], targets[-1])
+    )
+    return far and not pace.scaled.rest and max(map(abs, pace.scaled.exponents)) <= _LARGE_EXPONENT
+
+
+def native_state(state: tuple[Fraction, ...], precision: Precision) -> Any:
+    """A state rounded to numbers of a format, an array of shape (6,) or (9,); None where one is too large for it.
+
+    What is too small for the format becomes 0, as in the format's own arithmetic.
+    """
+    import numpy
+
+    values = []
+    for value in state:
+        try:
+            values.append(number(value, precision))
+        except InputError:
+            if abs(value) > 1:
+                return None
+            values.append(number(Fraction(0), precision))
+    return numpy.array(values)
+
+
+def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision) -> list[Any] | None:
+    """(high + low) 2^exponent of each, rounded once as :func:`heavytop.precision.number` rounds, without exact numbers.
+
+    None where only those tell: near the ends of the exponents of doubles, in quad, and in fewer bits than double has.
+    """
+    if precision.bits < DOUBLE.bits or precision.family == "quad":
+        return None
+    widen, found = _widening(precision), []
+    for high, low, exponent in words:
+        total = high + low
+        if not (total == 0 or 1 / _LARGE < abs(total) < _LARGE) or abs(exponent) > _LARGE_EXPONENT:
+            return None
+        # a zero has no sign
+        found.append((widen(high + 0.0) + low) * math.ldexp(1.0, exponent))
+    return found
+
+
+def _widening(precision: Precision) -> Callable[[float], Any]:
+    """A double as a number of a format with as many bits or more."""
+    if precision.family in ("double-double", "real"):
+        import heyoka
+
+        return lambda value: heyoka.real(value, precision.bits)
+    import numpy
+
+    return numpy.longdouble if precision.family == "extended" else numpy.float64
+
+
+@dataclass(slots=True)
+class _Pace:
+    """A run advanced in chunks, in the units of the problem."""
+
+    run: Run
+    scaled: Scaled
+    step_limit: int | None
+    between: Callable[[], None] | None
+    _chunk: int = _FIRST_CHUNK
+
+    @property
+    def time(self) -> Fraction:
+        """Where the last step ended."""
+        return self.run.time / self.scaled.rate * (1 if self.run.forwards else -1)
+
+    def reach(self, target: Fraction) -> Outcome:
+        """Step until the last step covers ``target``; there are no steps at an equilibrium."""
+        goal = abs(target) * self.scaled.rate
+        while not self.scaled.rest and self.run.time < goal:
+            most = self._chunk
+            if self.step_limit is not None:
+                most = min(most, self.step_limit - self.run.steps)
+            if most <= 0:
+                return Outcome.STEP_LIMIT
+            if self.between is not None:
+                self.between()
+            began, before = perf_counter(), self.run.steps
+            status = self.run.advance(goal, most)
+            if status is not Status.FINE:
+                return OUTCOMES[status]
+            a_step = (perf_counter() - began) / max(1, self.run.steps - before)
+            self._chunk = max(1, min(4 * self._chunk, int(CHUNK_SECONDS / a_step)))
+        return Outcome.SUCCESS
+
+    def sampled(self, targets: Any, precision: Precision) -> tuple[Outcome, Any]:
+        """The states at many doubles that are reached, as from :meth:`reach` and :meth:`sample`, in few calls."""
+        import numpy
+
+        assert isinstance(self.run, Floating)
+        if targets[0] == 0:
+            outcome, states = self.sampled(targets[1:], precision)
+            start = native_state(self.scaled.back(self.scaled.state), precision)
+            return outcome, numpy.concatenate([[start], states])
+        status, words = self.run.sampled(numpy.abs(numpy.array(targets, dtype=float)) * float(self.scaled.rate))
+        width = len(self.scaled.sizes)
+        places = list(PLACES[:width])
+        total = words[:, places] + words[:, [place + 8 for place in places]]
+        states = (total + 0.0) * numpy.array([float(size) for size in self.scaled.sizes])
+        sizes = abs(total)
+        odd = ((sizes <= 1 / _LARGE) & (sizes > 0)) | ~(sizes < _LARGE)
+        for row in numpy.flatnonzero(odd.any(axis=1)):
+            state = native_state(self.scaled.back(self.run.exact_state(words[row])), precision)
+            if state is None:
+                return Outcome.NON_FINITE, states[:row]
+            states[row] = state
+        return OUTCOMES[status], states
+
+    def native(self, target: Fraction, precision: Precision) -> tuple[Outcome, Any]:
+        """The state at ``target``, inside the last step, rounded; None where it cannot be given."""
+        import numpy
+
+        if isinstance(self.run, Floating) and not self.scaled.rest and target != 0:
+            words = self.run.words_at(abs(target) * self.scaled.rate).tolist()
+            pairs = (
+                (words[at], words[at + 8], power) for at, power in zip(PLACES, self.scaled.exponents, strict=False)
+            )
+            state = sums_of_two(pairs, precision)
+            if state is not None:
+                return Outcome.SUCCESS, numpy.array(state)
+        sample = self.sample(target)
+        if sample is None:
+            return Outcome.CAPACITY, None
+        rounded = native_state(sample, precision)
+        return Outcome.NON_FINITE if rounded is None else Outcome.SUCCESS, rounded
+
+    def sample(self, target: Fraction) -> tuple[Fraction, ...] | None:
+        """The state at ``target``, inside the last step; None where the numbers outgrow their words there."""
+        at_start = self.scaled.rest or target == 0
+        state = self.scaled.state if at_start else self.run.sample(abs(target) * self.scaled.rate)
+        return None if state is None else self.scaled.back(state)
+
+    def place(self, samples: int, seconds: float, flags: dict[str, str]) -> Place:
+        """Where the last step began; at rest, the beginning."""
+        words, steps = ((), 0) if self.scaled.rest else (self.run.place(), self.run.steps - 1)
+        return Place(samples, (), (), steps, seconds, flags, words)
+
+    def take_up(self, place: Place, covered: Fraction) -> None:
+        """Go on from there; takes the step again that covers the last sample."""
+        if place.words:
+            self.run.restore(place.words, place.steps)
+            self.reach(covered)
+            place.require_covered(self.run.steps)
+            if self.run.place() != place.words:
+                raise ValueError("words that are no state of this arithmetic")

@@ -1,0 +1,452 @@
+"""The Taylor recurrence of both systems in eight lanes: products of series in double-double below an order n0, in plain
+doubles above it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache, partial
+from typing import Any
+
+from gmpy2 import mpq
+
+from heavytop.multiword.codegen.machine_code import Code, Index, Pair
+from heavytop.multiword.double_double.arithmetic import Constant, accumulated, add, by_constant, divided
+from heavytop.top.equations import Parameters, System
+
+# Where in eight lanes the products of the three fields are.
+#
+# A state vector holds Ω1 Ω2 Ω3 γ1 γ2 γ3 in lanes 0 to 5; an attitude vector ξ lies in lanes 3 to 5 of a second one,
+# whose other lanes are 0.  Lanes 6 and 7 are 0.  The products of Taylor series that the fields need are then, lane by
+# lane,
+#
+#     S_n = Σ_m L_m ∘ R_(n−m),   L, R: sums of two lanes of y,
+#
+# three lanes for Ω × Ω and five for γ × Ω: the determinant is a sum of five products, so that no sum runs across lanes.
+# For ξ × Ω the left sides come from the second vector and the right sides are the same.  The derivative is
+#
+#     y' = A ∘ (S permuted and added) + Σ_l B_l ∘ (y permuted),
+#
+# with A = 1/2 in lanes 3 to 5.  A and B are not written down here: they are read off the field.
+
+
+ZERO = 6
+"""A lane that is 0 in every state vector."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """Lane by lane y[first] + sign y[second]; where the second is ZERO, y[first] alone."""
+
+    first: tuple[int, ...]
+    second: tuple[int, ...]
+    sign: tuple[int, ...]
+
+
+LEFT = Sum((1, 2, 0, 4, 3, 4, 5, 3), (6, 6, 6, 5, 4, 4, 4, 4), (0, 0, 0, 1, 1, 1, -1, -1))
+RIGHT = Sum((2, 0, 1, 0, 1, 2, 0, 1), (6, 6, 6, 1, 2, 0, 1, 2), (0, 0, 0, -1, -1, -1, 1, 1))
+
+# lanes 3 to 7 of S are T1 to T5: γ × Ω = (T1 + T3 − T4, T1 + T2 + T4 − T5, T2 + T3 + T5) / 2
+GATHERED: tuple[tuple[tuple[int, int], ...], ...] = (
+    ((0, 1), (1, 1), (2, 1), (3, 1), (3, 1), (4, 1)),
+    ((0, 0), (0, 0), (0, 0), (5, 1), (4, 1), (5, 1)),
+    ((0, 0), (0, 0), (0, 0), (6, -1), (6, 1), (7, 1)),
+    ((0, 0), (0, 0), (0, 0), (0, 0), (7, -1), (0, 0)),
+)
+"""Four lists of (lane of S, sign), one for each lane 0 to 5 of the derivative; they are added."""
+
+_NO_LANE = (ZERO,) * 5
+_TORQUE, _TURNING = ((4, 5, 3, *_NO_LANE), (5, 3, 4, *_NO_LANE)), ((2, 0, 1, *_NO_LANE), (1, 2, 0, *_NO_LANE))
+# γ × n for the heavy top; λ terms for the gyrostat; γ × n and k × Ω for the heavy gyrostat
+_TURNED: dict[str, tuple[tuple[int, ...], ...]] = {
+    "heavy_top": _TORQUE,
+    "gyrostat": ((2, ZERO, 0, 5, ZERO, 3, ZERO, ZERO),),
+    "heavy_gyrostat": (*_TORQUE, *_TURNING),
+}
+_TORQUES = {"heavy_top": 2, "gyrostat": 0, "heavy_gyrostat": 2}
+"""How many of them, the first, are of γ in the rate of Ω."""
+
+
+_BESIDE: dict[str, tuple[tuple[int, ...], ...]] = {
+    "heavy_top": ((4, 5, 3, 5, 3, 4, ZERO, ZERO),),
+    "gyrostat": _TURNED["gyrostat"],
+    "heavy_gyrostat": ((4, 5, 3, 5, 3, 4, ZERO, ZERO), (2, 0, 1, 1, 2, 0, ZERO, ZERO)),
+}
+
+
+def beside(system: System) -> tuple[tuple[tuple[int, ...], ...], bool]:
+    """The permutations of y in the linear part, two as one; whether lanes 3 to 5, the second, are added to 0 to 2."""
+    return _BESIDE[system.name], len(_TURNED[system.name]) > 1
+
+
+def turned(system: System) -> tuple[tuple[int, ...], ...]:
+    """The permutations of y in the linear part, one, two or four."""
+    return _TURNED[system.name]
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficients:
+    """A and B_l of each state vector, eight exact numbers each: shape (vectors, 1 + number of permutations, 8).
+
+    torques: how many B_l, the first, are of γ in the rate of Ω.  torque, turning: the largest |coefficient| of the
+    first vector in those and in the others.
+    """
+
+    vectors: tuple[tuple[tuple[Fraction, ...], ...], ...]
+    torques: int
+    torque: Fraction
+    turning: Fraction
+
+    @property
+    def largest(self) -> Fraction:
+        """The largest |coefficient|."""
+        return max(abs(c) for vector in self.vectors for row in vector for c in row)
+
+    @property
+    def beside(self) -> tuple[tuple[tuple[Fraction, ...], ...], ...]:
+        """A and one B of each vector for each permutation of :func:`beside`."""
+        return tuple(
+            (first, *linear)
+            if len(linear) == 1
+            else (first, *((*a[:3], *b[:3], *a[6:]) for a, b in zip(linear[::2], linear[1::2], strict=True)))
+            for first, *linear in self.vectors
+        )
+
+    def with_linear(self, torque: Fraction, turning: Fraction) -> Coefficients:
+        """The same with every B multiplied: those of γ in the rate of Ω by ``torque``, the others by ``turning``."""
+        factors = [Fraction(1), *(torque if k < self.torques else turning for k in range(len(self.vectors[0]) - 1))]
+        return Coefficients(
+            tuple(
+                tuple(tuple(c and c * factor for c in row) for row, factor in zip(rows, factors, strict=True))
+                for rows in self.vectors
+            ),
+            self.torques,
+            self.torque * torque,
+            self.turning * turning,
+        )
+
+
+@lru_cache(maxsize=256)
+def coefficients(system: System, p: Parameters, attitude: bool) -> Coefficients:
+    """Those of the field, exactly, for exact parameters."""
+
+    exactly = p.mapped(mpq)  # quicker than Fractions, and as exact
+
+    def unit(*axes: int) -> list[Any]:
+        return [mpq(int(axis in axes)) for axis in range(6)]
+
+    def rates(y: Sequence[Any]) -> Sequence[Any]:
+        return system.field(exactly, y)
+
+    half = mpq(1, 2)
+    others = ((1, 2), (2, 0), (0, 1))
+    at, against = ([rates([sign * v for v in unit(j)]) for j in range(6)] for sign in (1, -1))
+    products = [rates(unit(i, j))[k] - at[i][k] - at[j][k] for k, (i, j) in enumerate(others)]
+    linear = [[(a - b) / 2 for a, b in zip(*pair, strict=True)] for pair in zip(at, against, strict=True)]
+    permuted = [[mpq(0) if j == ZERO else linear[j][k] for k, j in enumerate(row[:6])] for row in turned(system)]
+    rows = [_eight(row) for row in ([*products, half, half, half], *permuted)]
+    torques = _TORQUES[system.name]
+    sizes = [[abs(c) for row in part for c in row] for part in (rows[1 : 1 + torques], rows[1 + torques :])]
+    largest = [max(part, default=Fraction(0)) for part in sizes]
+    if not attitude:
+        return Coefficients((tuple(rows),), torques, *largest)
+    # ξ' = ξ × ω turns as γ does
+    third = [[Fraction(0)] * 3 + list(row[3:6]) for row in rows]
+    return Coefficients((tuple(rows), tuple(_eight(row) for row in third)), torques, *largest)
+
+
+def _eight(row: Sequence[Any]) -> tuple[Fraction, ...]:
+    return tuple(Fraction(int(c.numerator), int(c.denominator)) for c in row) + (Fraction(0),) * (8 - len(row))
+
+
+def rates(system: System, given: Coefficients, y: Sequence[Any]) -> list[Any]:
+    """The derivative of (Ω, γ) or (Ω, γ, ξ) as the lanes compute it, exactly for exact numbers of any kind."""
+    return series_rates(system, given, [y])
+
+
+def series_rates(system: System, given: Coefficients, series: Sequence[Sequence[Any]]) -> list[Any]:
+    """Coefficient n of the derivative of a motion whose Taylor coefficients from 0 to n these are."""
+    lanes = [[[*y[:6], 0, 0], [0, 0, 0, *y[6:], 0, 0]][: len(given.vectors)] for y in series]
+    right = [_side(y[0], RIGHT) for y in reversed(lanes)]
+    found: list[Any] = []
+    for vector, (first, *linear) in enumerate(given.vectors):
+        left, state = [_side(y[vector], LEFT) for y in lanes], lanes[-1][vector]
+        products = [sum(a[k] * b[k] for a, b in zip(left, right, strict=True)) for k in range(8)]
+        gathered = [sum(sign * products[lane] for lane, sign in column) for column in zip(*GATHERED, strict=True)]
+        derivative = [a * s for a, s in zip(first, gathered, strict=False)]
+        for row, permutation in zip(linear, turned(system), strict=True):
+            derivative = [d + b * state[lane] for d, b, lane in zip(derivative, row, permutation, strict=False)]
+        found += derivative[3 * vector :]
+    return found
+
+
+def _side(y: Sequence[Any], which: Sum) -> list[Any]:
+    return [y[a] + sign * y[b] for a, b, sign in zip(which.first, which.second, which.sign, strict=True)]
+
+
+LEAST_LOW_ORDER = 2
+MOST_ORDER = 60
+"""n0 is at least the one, N at most the other."""
+_NONE = 8
+"""A lane of the second operand of a shuffle, which is 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where numbers lie: each vector of a row is eight doubles.
+
+    vectors: 1, or 2 with an attitude.  linear: permutations in the linear part.
+    """
+
+    vectors: int
+    linear: int
+
+    @property
+    def row(self) -> int:
+        """Doubles of one order: two words of R and its two parts, then the same of L, and two words of y, for each
+        vector.
+        """
+        return 8 * (4 + 6 * self.vectors)
+
+    @property
+    def constants(self) -> int:
+        """A and each B of every vector."""
+        return (1 + self.linear) * self.vectors
+
+    @property
+    def table_row(self) -> int:
+        """Doubles of one order of the table: n + 1 and its inverse in two words, then A/(n + 1) and each B/(n + 1)."""
+        return 8 * (1 + self.constants)
+
+    @property
+    def state(self) -> int:
+        """Doubles of a state: two words of each vector, units of the next step, and of the last."""
+        return 32 * self.vectors
+
+    @property
+    def units(self) -> int:
+        """Where the units of split coefficients are in a state."""
+        return 16 * self.vectors
+
+    def left(self, vector: int) -> int:
+        """Where L of a vector is in a row; its low word is 8 behind, as all low words are."""
+        return 32 + 48 * vector
+
+    def value(self, vector: int) -> int:
+        """Where y of a vector is in a row."""
+        return 64 + 48 * vector
+
+
+@dataclass(frozen=True, slots=True)
+class Recurrence:
+    """Writes the recurrence y_(n+1) = (A ∘ gathered S_n + Σ B_l ∘ permuted y_n)/(n + 1).
+
+    table: A and B_l in three words, then a row for each order.  scratch: a row of R, L and y for each order.
+    """
+
+    code: Code
+    layout: Layout
+    system: System
+    table: Any
+    scratch: Any
+
+    @property
+    def vectors(self) -> range:
+        """The state vectors."""
+        return range(self.layout.vectors)
+
+    def row(self, n: Index) -> Any:
+        """Where the row of order n begins."""
+        offset = self.code.builder.mul(self.code.integer(n), self.code.integer(self.layout.row))
+        return self.code.address(self.scratch, offset)
+
+    def pair(self, row: Any, place: int) -> Pair:
+        """Both words of what lies there."""
+        return self.code.load(row, place), self.code.load(row, place + 8)
+
+    def _side_pair(self, y: Pair, which: Sum) -> Pair:
+        first = [self.code.shuffle(word, self.code.zero, which.first) for word in y]
+        signs = self.code.constant(which.sign)
+        second = [self.code.multiply(self.code.shuffle(word, self.code.zero, which.second), signs) for word in y]
+        return add(self.code, (first[0], first[1]), (second[0], second[1]))
+
+    def side(self, y: Any, which: Sum) -> Any:
+        """L or R of a plain double, or of a part that is exact."""
+        first, second = (self.code.shuffle(y, self.code.zero, lanes) for lanes in (which.first, which.second))
+        return self.code.fma(second, self.code.constant(which.sign), first)
+
+    def put(self, n: Index, y: list[Pair]) -> None:
+        row = self.row(n)
+        places = [(self._side_pair(y[0], RIGHT), 0)]
+        for vector in self.vectors:
+            places.append((self._side_pair(y[vector], LEFT), self.layout.left(vector)))
+            places.append((y[vector], self.layout.value(vector)))
+        for pair, place in places:
+            for word in range(2):
+                self.code.store(pair[word], row, place + 8 * word)
+
+    def _put_plain(self, n: Index, y: list[Any]) -> list[Any]:
+        """Store a row; gives R, each L and each y."""
+        row = self.row(n)
+        right, left = self.side(y[0], RIGHT), [self.side(value, LEFT) for value in y]
+        self.code.store(right, row, 0)
+        for vector in self.vectors:
+            self.code.store(left[vector], row, self.layout.left(vector))
+            self.code.store(y[vector], row, self.layout.value(vector))
+            self.code.store(self.code.zero, row, self.layout.value(vector) + 8)
+        return [right, *left, *y]
+
+    def _accumulate_pairs(self, m: Index, other: Index, sums: list[Any]) -> list[Any]:
+        """Σ L_m R_other in words (s, c), c unordered."""
+        code, left, right = self.code, self.row(m), self.row(other)
+        found: list[Any] = []
+        for vector in self.vectors:
+            total = (sums[2 * vector], sums[2 * vector + 1])
+            found += accumulated(code, total, self.pair(left, self.layout.left(vector)), self.pair(right, 0))
+        return found
+
+    def _accumulate(self, m: Index, other: Index, sums: list[Any]) -> list[Any]:
+        left, right = self.row(m), self.row(other)
+        high = self.code.load(right, 0)
+        return [
+            self.code.fma(self.code.load(left, self.layout.left(vector)), high, sums[vector]) for vector in self.vectors
+        ]
+
+    def _gather(self, word: Any, part: int) -> Any:
+        """One of the four summands of the products, without its signs; 0 where there is none."""
+        lanes = [lane if sign else _NONE for lane, sign in GATHERED[part]]
+        return self.code.shuffle(word, self.code.zero, [*lanes, _NONE, _NONE])
+
+    def _signed(self, value: Any, part: int) -> Any:
+        return value if min(_signs(part)) >= 0 else self.code.multiply(value, self.code.constant(_signs(part)))
+
+    def _anywhere(self, word: Any, part: int) -> Any:
+        """One of the four summands, and any number where there is none."""
+        return self.code.shuffle(word, word, [*(lane for lane, _ in GATHERED[part]), 0, 0])
+
+    def constant(self, vector: int, row: int) -> Constant:
+        """A, or B of a row from 1 on."""
+        place = 24 * ((1 + self.layout.linear) * vector + row)
+        return (*self.pair(self.table, place), self.code.load(self.table, place + 16))
+
+    def gathered(self, total: Any) -> Any:
+        """The sums of products that the field needs, where they are exact."""
+        found = self.code.multiply(self._anywhere(total, 0), self.code.constant(_signs(0)))
+        for k in range(1, len(GATHERED)):
+            found = self.code.fma(self._anywhere(total, k), self.code.constant(_signs(k)), found)
+        return found
+
+    def divisor(self, n: Index) -> Pair:
+        """n + 1 and its inverse, doubles."""
+        base = self._table_row(n)
+        found = [self.code.spread(self.code.builder.load(self.code.address(base, k))) for k in range(2)]
+        return found[0], found[1]
+
+    def _table_row(self, n: Index) -> Any:
+        code = self.code
+        offset = code.builder.mul(code.integer(n), code.integer(self.layout.table_row))
+        return code.address(self.table, code.builder.add(offset, code.integer(24 * self.layout.constants)))
+
+    def _over(self, n: Index, vector: int, row: int) -> Any:
+        """A constant over n + 1, a double."""
+        return self.code.load(self._table_row(n), 8 * (1 + (1 + self.layout.linear) * vector + row))
+
+    def _next_pair(self, n: Index, vector: int, total: Pair, y: Pair) -> Pair:
+        """y_(n+1) = (A ∘ gathered S_n + Σ B ∘ permuted y_n)/(n + 1)."""
+        code, base = self.code, self._table_row(n)
+        parts = []
+        for k in range(4):
+            high, low = (self._signed(self._gather(word, k), k) for word in total)
+            parts.append((high, low))
+        result = add(code, add(code, parts[0], parts[1]), add(code, parts[2], parts[3]))
+        result = by_constant(code, self.constant(vector, 0), result)
+        linear: Pair | None = None
+        for k, lanes in enumerate(turned(self.system), 1):
+            moved = tuple(code.shuffle(word, code.zero, lanes) for word in y)
+            term = by_constant(code, self.constant(vector, k), (moved[0], moved[1]))
+            linear = term if linear is None else add(code, linear, term)
+        if linear is not None:
+            result = add(code, result, linear)
+        after, high, low = (code.spread(code.builder.load(code.address(base, k))) for k in range(3))
+        return code.quick_two_sum(*divided(code, result, after, (high, low)))
+
+    def _next(self, n: Index, vector: int, total: Any, y: Any) -> Any:
+        code = self.code
+        linear = code.zero
+        for k, lanes in enumerate(turned(self.system), 1):
+            linear = code.fma(self._over(n, vector, k), code.shuffle(y, code.zero, lanes), linear)
+        a = self._over(n, vector, 0)
+        # two sums side by side, the signs in the factors
+        first, second, third, fourth = ((self._gather(total, k), self._signed(a, k)) for k in range(4))
+        one = code.fma(*second, code.fma(*first, linear))
+        return code.add(one, code.fma(*fourth, code.multiply(*third)))
+
+    def orders_in_pairs(self, first: list[Pair], low_order: Any) -> list[Any]:
+        """y_1 to y_n0, the last returned; the products of y_n come last, so that the others need not wait for it."""
+        code, zeros = self.code, [self.code.zero] * (2 * len(self.vectors))
+
+        def order(n: Any, words: list[Any]) -> list[Any]:
+            y = [(words[2 * v], words[2 * v + 1]) for v in self.vectors]
+            sums = code.loop(1, n, partial(self._inner_pairs, n), zeros)
+            sums = self._accumulate_pairs(n, 0, self._accumulate_pairs(0, n, sums))
+            return self._stored_pairs(n, sums, y)
+
+        words = self._stored_pairs(0, self._accumulate_pairs(0, 0, zeros), first)
+        return code.loop(1, low_order, order, words)
+
+    def _inner_pairs(self, n: Any, m: Any, sums: list[Any]) -> list[Any]:
+        return self._accumulate_pairs(m, self.code.builder.sub(n, m), sums)
+
+    def _stored_pairs(self, n: Index, sums: list[Any], y: list[Pair]) -> list[Any]:
+        following = [self._next_pair(n, v, (sums[2 * v], sums[2 * v + 1]), y[v]) for v in self.vectors]
+        self.put(self.code.builder.add(self.code.integer(n), self.code.integer(1)), following)
+        return [word for pair in following for word in pair]
+
+    def plain_orders(self, low_order: Any, order: Any, last: list[Any]) -> None:
+        """y_(n0+1) to y_N in plain doubles; each order has its own code, entered at n0 and left at N."""
+        b, row = self.code.builder, self.row(low_order)
+        sides = [self.code.load(row, place) for place in (0, *map(self.layout.left, self.vectors))]
+        after = b.append_basic_block("summed")
+        switch, before = b.switch(low_order, after), b.block
+        entry, incoming = before, None
+        blocks = {n: b.append_basic_block(f"order_{n}") for n in range(LEAST_LOW_ORDER, MOST_ORDER)}
+        for n, block in blocks.items():
+            switch.add_case(self.code.integer(n), block)
+            b.position_at_end(block)
+            known = [b.phi(value.type) for value in (*sides, *last)]
+            for phi, value in zip(known, (*sides, *last), strict=True):
+                phi.add_incoming(value, entry)
+            if incoming is not None:
+                for phi, value in zip(known, incoming, strict=True):
+                    phi.add_incoming(value, before)
+            incoming, before = self._plain_order(n, known), block
+            following = blocks.get(n + 1, after)
+            b.cbranch(b.icmp_signed("==", order, self.code.integer(n + 1)), after, following)
+        b.position_at_end(after)
+
+    def _plain_order(self, n: int, known: list[Any]) -> list[Any]:
+        """R, each L and each y of order n + 1 from those of n, with four sums side by side.
+
+        The products of y_n come last, and do not wait until it is stored.
+        """
+        code, width = self.code, len(self.vectors)
+        right, left, y = known[0], known[1 : 1 + width], known[1 + width :]
+        sums = [code.zero] * (4 * width)
+        for m in range(1, n):
+            at = width * (m % 4)
+            sums[at : at + width] = self._accumulate(m, n - m, sums[at : at + width])
+        first = self.row(0)
+        totals = [
+            code.add(code.add(sums[v], sums[width + v]), code.add(sums[2 * width + v], sums[3 * width + v]))
+            for v in self.vectors
+        ]
+        totals = [code.fma(code.load(first, self.layout.left(v)), right, totals[v]) for v in self.vectors]
+        totals = [code.fma(left[v], code.load(first, 0), totals[v]) for v in self.vectors]
+        return self._put_plain(n + 1, [self._next(n, v, totals[v], y[v]) for v in self.vectors])
+
+
+def _signs(part: int) -> list[int]:
+    """Of one of the four summands of the products, lane by lane; 0 where there is none."""
+    return [*(sign for _, sign in GATHERED[part]), 0, 0]

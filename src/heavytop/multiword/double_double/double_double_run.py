@@ -1,0 +1,538 @@
+"""One motion in double-double: what the machine code of :mod:`heavytop.multiword.double_double.steps` works on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy
+
+from heavytop.multiword.codegen.machine_code import (
+    DOUBLE,
+    LANES,
+    Code,
+    Doubles,
+    Pair,
+    Processor,
+    doubles,
+    once,
+    pointer,
+)
+from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER, MOST_ORDER, ZERO, Layout, turned
+from heavytop.multiword.double_double import steps as dd
+from heavytop.multiword.double_double.arithmetic import (
+    Constant,
+    accumulated,
+    add,
+    by_constant,
+    divided,
+    multiply,
+    split,
+    split_constant,
+)
+from heavytop.multiword.double_double.steps import FIRST_UNITS, SLACK, parts, quotient, rises
+from heavytop.multiword.problem import Run, Scaled, Status
+from heavytop.top.equations import System
+
+BITS = 106
+FALL_ALONE, FALL_IN_LANES = 1.3, 1.6
+_MARGIN = 7.0
+_DEEPEST = 84.0
+_DOUBLE_BITS = 53
+_ROUNDING_BITS = 4
+_LEAST_ROOM, _LEAST_DEPTH = -66.0, -112.0
+_SPLIT_BITS = 32
+"""How far the rounding of S_n lies below the product of its two units (measured)."""
+_USUAL_UNITS = -34.0
+"""log2 of the product of two units where the state is about 1."""
+_NEVER = -1000.0
+LARGEST_TIME = Fraction(2) ** 1000
+_STEPS_AT_ONCE = 1024
+PLACES = (*range(6), *range(19, 22))
+"""Where the first words of Ω, γ and ξ stand; the second are 8 behind."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ladder:
+    """How far the series goes, how long a step is, and what is kept in double-double.
+
+    order: N.  reach: log2 of h/ρ.  room: log2 of the largest |y_n| h^n / |y_0| whose rounding to a double is allowed,
+    at n0 + 1.  depth: log2 of what the products of two units h^n may be beside |y_0|, at the first n whose coefficients
+    are split; none are where it is very small.
+    """
+
+    order: int
+    reach: float
+    room: float
+    depth: float = _NEVER
+
+    @classmethod
+    @lru_cache(maxsize=256)
+    def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> Ladder:
+        """For a local error of ``tolerance`` relative to the state.
+
+        fall: of the logarithm of y_n h^n from one order to the next.  2 is best where the time goes into N² products
+        (Jorba and Zou); a single motion waits for the last product of each order, so that many orders and long steps
+        are faster.
+        """
+        log_tolerance = math.log(tolerance.numerator) - math.log(tolerance.denominator)
+        # what is left out errs in the same way at every step: it shall not show beside roundings after 10^7 steps
+        finest = tolerance <= Fraction(1, 2 ** (BITS - 1))
+        depth = _DEEPEST if finest else _MARGIN - log_tolerance
+        order = min(math.ceil(depth / fall), MOST_ORDER - 2)
+        reach = -(depth / order + 0.7 / (order - 1)) / math.log(2)
+        room = max(_DOUBLE_BITS - depth / math.log(2) - _ROUNDING_BITS, _LEAST_ROOM)
+        # roundings of split coefficients average out: the finest may show 2^6 times less than double-double's
+        return cls(order, reach, room, max(room - _DOUBLE_BITS, _LEAST_DEPTH) + _SPLIT_BITS)
+
+    def pair_order(self, low_order: int) -> int:
+        """The first order that is split in eight motions whose n0 is the same.
+
+        It is that of coefficients which fall as those of a motion near a singularity, and rises with n0; with the
+        largest n0 none are split.
+        """
+        if low_order >= self.order - 1:
+            return low_order
+        first = math.ceil(self.room / self.reach)
+        usual = math.ceil((_USUAL_UNITS - self.depth) / -(self.reach + SLACK))
+        return max(1, usual + (low_order - first) // 2)
+
+
+machine = once(dd.build)
+"""The machine code, compiled at its first use."""
+
+
+class Floating(Run):
+    """A motion that advances in double-double steps.
+
+    low_order: n0 of the first step; None for the largest, from which it falls to what the motion needs.
+    """
+
+    def __init__(
+        self,
+        problem: Scaled,
+        ladder: Ladder,
+        forwards: bool,
+        low_order: int | None = None,
+        processor: Processor | None = None,
+    ) -> None:
+        self.machine, self.layout = machine(problem.system, len(problem.state) == 9, processor)
+        self.problem, self.forwards = problem, forwards
+        self.steps = 0
+        self.words = _state_words(problem.state, self.layout)
+        self.clock, self.counts = doubles(dd.CLOCK), numpy.zeros(dd.COUNTS, numpy.int64)
+        self.clock[dd.SIGN] = 1.0 if forwards else -1.0
+        self.clock[dd.ROOM] = ladder.room
+        self.clock[dd.REACH] = ladder.reach
+        most = ladder.order - 1
+        self.counts[[dd.ORDER, dd.LOW_ORDER]] = ladder.order, low_order or most
+        self.counts[[dd.LEAST, dd.MOST]] = LEAST_LOW_ORDER, most
+        self.clock[dd.DEPTH] = ladder.depth
+        self.table = _table(problem, ladder.order, self.layout)
+        self.scratch = doubles((ladder.order + 5) * self.layout.row)
+        self.at, self.found = doubles(1), doubles(16 * self.layout.vectors)
+        self.sampling = [pointer(array) for array in (self.scratch, self.at, self.found)]
+
+    @property
+    def order(self) -> int:
+        return int(self.counts[dd.ORDER])
+
+    @property
+    def time(self) -> Fraction:
+        return self._time(dd.TIME)
+
+    def _time(self, place: int) -> Fraction:
+        return Fraction(self.clock[place]) + Fraction(self.clock[place + 1])
+
+    @property
+    def state(self) -> tuple[Fraction, ...]:
+        return _exact_state(self.words, len(self.problem.state))
+
+    def advance(self, target: Fraction, steps: int) -> Status:
+        self.clock[dd.TARGET : dd.TARGET_LOW + 1] = split(min(target, LARGEST_TIME))
+        arrays = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
+        taken = self.machine.functions["advance"](*arrays, steps)
+        self.steps += taken
+        return Status(int(self.counts[dd.STATUS]))
+
+    def sample(self, time: Fraction) -> tuple[Fraction, ...]:
+        return self.exact_state(self.words_at(time))
+
+    def words_at(self, time: Fraction) -> Doubles:
+        """The words of the state at ``time``, inside the last step."""
+        behind = time - self._time(dd.BEGAN)
+        self.at[0], low = split(behind if self.forwards else -behind)
+        series, at, found = self.sampling
+        self.machine.functions["samples"](series, self.order, at, 0, 1, 0.0, -low, 1.0, found)
+        return self.found.copy()
+
+    def exact_state(self, words: Doubles) -> tuple[Fraction, ...]:
+        """A state out of its words."""
+        return _exact_state(words, len(self.problem.state))
+
+    def sampled(self, times: Doubles) -> tuple[Status, Doubles]:
+        """Steps until the last of the times |τ| > 0, which are doubles in order; the words of the states that were
+        reached, a row each: the bits of :meth:`advance` and :meth:`sample` one by one.
+        """
+        row, done, status = 16 * self.layout.vectors, 0, Status.FINE
+        found, given = doubles(row * len(times)), times.astype(float)
+        arrays = [pointer(array) for array in (self.words, self.clock, self.counts, self.table, self.scratch)]
+        advance, samples, sign = *(self.machine.functions[name] for name in ("advance", "samples")), self.clock[dd.SIGN]
+        ends = pointer(given), pointer(found)
+        while done < len(times):
+            covered = self._covered(given)
+            if covered > done:
+                began, low = self.clock[dd.BEGAN], self.clock[dd.BEGAN_LOW]
+                if given[covered - 1] <= 2 * began or not began:  # then the difference is exact (Sterbenz)
+                    samples(arrays[-1], self.order, ends[0], done, covered, began, low, sign, ends[1])
+                else:
+                    for place in range(done, covered):
+                        found[row * place : row * (place + 1)] = self.words_at(Fraction(float(given[place])))
+                done = covered
+                continue
+            self.clock[dd.TARGET], self.clock[dd.TARGET_LOW] = given[done], 0.0
+            self.steps += advance(*arrays, _STEPS_AT_ONCE)
+            status = Status(int(self.counts[dd.STATUS]))
+            if status is not Status.FINE:
+                break
+        return status, found[: row * done].reshape(done, row)
+
+    def _covered(self, times: Doubles) -> int:
+        """How many of the times do not lie beyond the last step."""
+        high, low = self.clock[dd.TIME], self.clock[dd.TIME + 1]
+        return int(times.searchsorted(high, "right" if low >= 0 else "left")) if self.steps else 0
+
+    def derivatives(self, n: int) -> tuple[Fraction, ...]:
+        """y_n of the last step, exactly as it was computed; a step back in time has a negative length."""
+        return _exact_state(self._row(n), len(self.problem.state))
+
+    @property
+    def length(self) -> Fraction:
+        """h of the last step, negative back in time."""
+        step = self.time - self._time(dd.BEGAN)
+        return step if self.forwards else -step
+
+    def coefficients(self, n: int) -> tuple[Fraction, ...]:
+        step = self.time - self._time(dd.BEGAN)
+        power = (step if self.forwards else -step) ** n
+        return tuple(value * power for value in _exact_state(self._row(n), len(self.problem.state)))
+
+    def _row(self, n: int) -> Doubles:
+        """Both words of y_n, vector by vector."""
+        vectors = range(self.layout.vectors)
+        starts = [n * self.layout.row + self.layout.value(v) for v in vectors]
+        return numpy.concatenate([self.scratch[start : start + 16] for start in starts])
+
+    def place(self) -> tuple[str, ...]:
+        clock = self.clock[[dd.BEGAN, dd.BEGAN_LOW]]
+        counts = self.counts[[dd.USED, dd.USED_TRIES, dd.USED_SLOPE]]
+        units = self.words[self.layout.units + 8 * self.layout.vectors :]
+        return (*map(str, counts), *(float(word).hex() for word in (*clock, *self._row(0), *units)))
+
+    def restore(self, place: tuple[str, ...], steps: int) -> None:
+        self.counts[[dd.LOW_ORDER, dd.TRIES, dd.SLOPE]] = [int(text) for text in place[:3]]
+        words = [float.fromhex(text) for text in place[3:]]
+        self.clock[[dd.TIME, dd.TIME_LOW]] = words[:2]
+        self.words[: len(words) - 2] = words[2:]
+        self.steps = steps
+
+
+def _state_words(state: tuple[Fraction, ...], layout: Layout) -> Doubles:
+    words = doubles(layout.state)
+    words[layout.units :] = FIRST_UNITS
+    for index, value in enumerate(state):
+        place = index if index < 6 else 16 + index - 3
+        words[place], words[place + 8] = split(value)
+    return words
+
+
+def _exact_state(words: Doubles, size: int) -> tuple[Fraction, ...]:
+    return tuple(Fraction(words[place]) + Fraction(words[place + 8]) for place in PLACES[:size])
+
+
+def _table(problem: Scaled, order: int, layout: Layout) -> Doubles:
+    """A and each B in three words; then for n = 0, 1, ..., N - 1: n + 1 and 1/(n + 1) in two words, A/(n + 1) and each
+    B/(n + 1) in one.
+    """
+    flat = [row for vector in problem.coefficients.vectors for row in vector]
+    begin = 24 * layout.constants
+    table = doubles(begin + order * layout.table_row)
+    constants = table[:begin].reshape(layout.constants, 3, 8)
+    rows = table[begin:].reshape(order, 1 + layout.constants, 8)
+    after = _after(order)
+    rows[:, 0, :3] = after
+    words = numpy.array([[split_constant(c) for c in row] for row in flat])
+    lanes = words.shape[1]
+    constants[: len(flat), :, :lanes] = words.transpose(0, 2, 1)
+    nearest = numpy.array([[float(c) for c in row] for row in flat])
+    rows[:, 1 : 1 + len(flat), :lanes] = nearest / after[:, :1, None]
+    return table
+
+
+@lru_cache(maxsize=64)
+def _after(order: int) -> Doubles:
+    """n + 1 and the two words of 1/(n + 1), a row for each n."""
+    return numpy.array([(n, *split(Fraction(1, n))) for n in range(1, order + 1)])
+
+
+# The Taylor recurrence of eight motions side by side, a lane each: in double-double, split, and in plain doubles.
+
+
+ROW = 6 * LANES
+"""Doubles of one order in each of four tables."""
+LOW, COARSE, FINE, SCRATCH = (k * ROW * MOST_ORDER for k in range(1, 5))
+"""Where the tables of low words and of the two parts of split coefficients begin, behind that of high words; low words
+of orders above n0 are 0 from the beginning.  Apart from each other, what an order needs fits into the nearest cache."""
+
+Products = Sequence[tuple[int, int, int, int]]
+# (left, right, component of the sum, sign): Ω × Ω without its coefficients, and γ × Ω
+_OMEGA = (1, 2, 0, 1), (2, 0, 1, 1), (0, 1, 2, 1)
+_GAMMA = (4, 2, 3, 1), (5, 0, 4, 1), (3, 1, 5, 1), (5, 1, 3, -1), (3, 2, 4, -1), (4, 0, 5, -1)
+_GROUPS = (range(3), _OMEGA), (range(3, 6), _GAMMA)
+
+
+def terms(system: System) -> list[tuple[int, int, int]]:
+    """(row of the coefficients, component, component that it multiplies) of the linear part."""
+    return [
+        (row, lane, source)
+        for row, lanes in enumerate(turned(system), 1)
+        for lane, source in enumerate(lanes[:6])
+        if source != ZERO
+    ]
+
+
+class LaneOrders:
+    """Writes the recurrence.
+
+    arrays: A and each B, 1/(n + 1), and a row for each order.  units: three vectors, 1.5 · 2^52 units of split
+    coefficients, of Ω and of γ, and their slope.
+    """
+
+    def __init__(self, code: Code, system: System, arrays: tuple[Any, Any, Any], units: Any) -> None:
+        self.code, self.units = code, units
+        self.coefficients, self.quotients, self.scratch = arrays
+        self.terms = [(k, component, source) for k, (_, component, source) in enumerate(terms(system), 3)]
+        self.absent = {k: self._is_zero(k) for k in (2, *(k for k, *_ in self.terms))}
+
+    def write(self, pair_order: Any, low_order: Any, order: Any) -> tuple[Any, list[Any]]:
+        """y_1 to y_N; whether any are split, a bit, and the largest |y_m| 2^(e_0 - e_m) of Ω and of γ."""
+        code, b = self.code, self.code.builder
+        code.loop(0, pair_order, self._pair_order, [])
+        splitting = b.icmp_signed("<", pair_order, low_order)
+        stop = b.select(splitting, b.add(pair_order, code.integer(1)), code.integer(0))
+        peaks = code.loop(0, stop, self._split_row, [code.zero] * 2)
+        peaks = code.loop(pair_order, low_order, self._split_order, peaks)
+        plain = partial(self._plain_orders, low_order, order)
+        code.either(self.absent[2], lambda: plain(_OMEGA[:2]), lambda: plain(_OMEGA))
+        return splitting, peaks
+
+    def row(self, n: Any) -> Any:
+        """Where the row of order n begins."""
+        return self.code.address(self.scratch, self.code.builder.mul(self.code.integer(n), self.code.integer(ROW)))
+
+    def pair(self, row: Any, i: int) -> Pair:
+        """Both words of a component of a row."""
+        return self.code.load(row, LANES * i), self.code.load(row, LOW + LANES * i)
+
+    def _put(self, row: Any, i: int, y: Pair) -> None:
+        for word, table in zip(y, (0, LOW), strict=True):
+            self.code.store(word, row, table + LANES * i)
+
+    def _coefficient(self, k: int) -> Constant:
+        high, middle, low = (self.code.load(self.coefficients, 24 * k + 8 * word) for word in range(3))
+        return high, middle, low
+
+    def _is_zero(self, k: int) -> Any:
+        """Whether a coefficient is 0 in every lane, a bit."""
+        return self.code.all_of(self.code.builder.fcmp_ordered("==", self._coefficient(k)[0], self.code.zero))
+
+    def _sums(self, group: Products, sums: Callable[[Products], list[Any]]) -> list[Any]:
+        """``sums`` of a group of products; those of Ω3 are zeros, not computed, where all tops have I1 = I2."""
+        if group is not _OMEGA:
+            return sums(group)
+
+        def two() -> list[Any]:
+            found = sums(group[:2])
+            return [*found, *[self.code.zero] * (len(found) // 2)]
+
+        return self.code.either(self.absent[2], two, lambda: sums(group))
+
+    def _quotient(self, n: Any) -> Pair:
+        """1/(n + 1) in every lane."""
+        place = self.code.address(self.quotients, self.code.builder.shl(n, self.code.integer(1)))
+        words = [self.code.builder.load(self.code.address(place, i)) for i in range(2)]
+        return self.code.spread(words[0]), self.code.spread(words[1])
+
+    def _pair_order(self, n: Any, _: list[Any]) -> None:
+        """y_(n+1) in double-double."""
+        code, b = self.code, self.code.builder
+        y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)
+        after = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE))
+        for rows, group in _GROUPS:
+            words = self._sums(group, partial(self._pair_sums, n))
+            for i in rows:
+                total = code.quick_two_sum(*words[2 * (i % 3) : 2 * (i % 3) + 2])
+                if i < 3:
+                    total = by_constant(code, self._coefficient(i), total)
+                for k, component, source in self.terms:
+                    if component == i:
+                        total = self._with_term(k, total, self.pair(y, source))
+                high, low = code.quick_two_sum(*divided(code, total, after, quotient))
+                self._put(following, i, (high, low))
+
+    def _with_term(self, k: int, total: Pair, y: Pair) -> Pair:
+        def added() -> list[Any]:
+            return [*add(self.code, total, by_constant(self.code, self._coefficient(k), y))]
+
+        high, low = self.code.either(self.absent[k], lambda: [*total], added)
+        return high, low
+
+    def _pair_sums(self, n: Any, group: Products) -> list[Any]:
+        products = partial(self._pair_products, n, group)
+        stop = self.code.builder.add(n, self.code.integer(1))
+        return self.code.loop(1, stop, products, products(self.code.integer(0), []))
+
+    def _pair_products(self, n: Any, group: Products, m: Any, words: list[Any]) -> list[Any]:
+        code, b = self.code, self.code.builder
+        left, right = self.row(m), self.row(b.sub(n, m))
+        found = list(words) or [None] * 2 * (1 + group[-1][2] % 3)
+        for first, second, component, sign in group:
+            (a, a_low), (c, c_low) = self.pair(left, first), self.pair(right, second)
+            if sign < 0:
+                c, c_low = code.negative(c), code.negative(c_low)
+            at = 2 * (component % 3)
+            x, y = (a, a_low), (c, c_low)
+            total = found[at], found[at + 1]
+            found[at : at + 2] = multiply(code, x, y) if total[0] is None else accumulated(code, total, x, y)
+        return found
+
+    def _split_row(self, m: Any, peaks: list[Any]) -> list[Any]:
+        """Split y_m; the largest |y_m| 2^(e_0 - e_m) of Ω and of γ, this one with it."""
+        row = self.row(m)
+        return self._put_parts(m, [self.pair(row, i) for i in range(6)], peaks)
+
+    def _put_parts(self, m: Any, y: list[Pair], peaks: list[Any]) -> list[Any]:
+        code, row, found = self.code, self.row(m), []
+        up, down = rises(code, m, code.load(self.units, 16))
+        for k, (rows, _) in enumerate(_GROUPS):
+            big, largest = code.multiply(code.load(self.units, 8 * k), up), code.zero
+            for i in rows:
+                coarse, fine = parts(code, y[i], big)
+                largest = code.larger(code.absolute(y[i][0]), largest)
+                code.store(coarse, row, COARSE + LANES * i)
+                code.store(fine, row, FINE + LANES * i)
+            found.append(code.larger(code.multiply(largest, down), peaks[k]))
+        return found
+
+    def _split_order(self, n: Any, peaks: list[Any]) -> list[Any]:
+        """y_(n+1) from split coefficients."""
+        code, b = self.code, self.code.builder
+        y, following = self.row(n), self.row(b.add(n, code.integer(1)))
+        divisor = code.spread(b.sitofp(b.add(n, code.integer(1)), DOUBLE)), self._quotient(n)[0]
+        found = []
+        for rows, group in _GROUPS:
+            words = self._sums(group, partial(self._split_sums, n))
+            for i in rows:
+                at = 3 * (i % 3)
+                total = words[at], code.add(words[at + 1], words[at + 2])
+                factors = [(self._coefficient(i), total)] if i < 3 else []
+                for k, component, source in self.terms:
+                    if component == i:
+                        factors.append((self._coefficient(k), self.pair(y, source)))
+                pair = quotient(code, None if i < 3 else total, factors, divisor)
+                self._put(following, i, pair)
+                found.append(pair)
+        return self._put_parts(b.add(n, code.integer(1)), found, peaks)
+
+    def _split_sums(self, n: Any, group: Products) -> list[Any]:
+        code = self.code
+        zeros = [code.zero] * 3 * (1 + group[-1][2] % 3)
+        return code.loop(0, code.builder.add(n, code.integer(1)), partial(self._split_products, n, group), zeros)
+
+    def _split_products(self, n: Any, group: Products, m: Any, sums: list[Any]) -> list[Any]:
+        code, left, right = self.code, self.row(m), self.row(self.code.builder.sub(n, m))
+        found = list(sums)
+        for first, second, component, sign in group:
+            a, rest = (code.load(left, part + LANES * first) for part in (COARSE, FINE))
+            coarse, fine = (code.load(right, part + LANES * second) for part in (COARSE, FINE))
+            if sign < 0:
+                a, rest = code.negative(a), code.negative(rest)
+            at = 3 * (component % 3)
+            whole = code.load(right, LANES * second)
+            for k, (one, factor) in enumerate(((a, coarse), (a, fine), (rest, whole))):
+                found[at + k] = code.fma(one, factor, found[at + k])
+        return found
+
+    def _plain_orders(self, start: Any, stop: Any, omega: Products) -> list[Any]:
+        """y_(start+1) to y_stop in plain doubles; omega: those products of Ω that are needed."""
+        code, b, one = self.code, self.code.builder, self.code.integer(1)
+        count = b.sub(stop, start)
+        odd = b.and_(count, one)
+        code.loop(0, odd, lambda _, values: self._plain_order(omega, start), [])
+        begin = b.add(start, odd)
+        two = partial(self._two_plain_orders, omega)
+        return code.loop(0, b.lshr(count, one), lambda k, _: two(b.add(begin, b.shl(k, one))), [])
+
+    def _plain_order(self, group: Products, n: Any) -> None:
+        """y_(n+1)."""
+        code, b = self.code, self.code.builder
+
+        def products(m: Any, sums: list[Any]) -> list[Any]:
+            return self._both(group, self._highs(m), self._highs(b.sub(n, m)), sums)
+
+        sums = code.loop(0, b.add(n, code.integer(1)), products, [code.zero] * 6)
+        self._plain_rates(n, range(6), sums)
+
+    def _two_plain_orders(self, group: Products, n: Any) -> None:
+        """y_(n+1) and y_(n+2).
+
+        Sums of γ_(n+1) wait for each other, twice as long as those of Ω_(n+1); so those of y_(n+2), which begin with
+        Ω_(n+1), go beside them.
+        """
+        code, b = self.code, self.code.builder
+        after = b.add(n, code.integer(1))
+
+        def alone(m: Any, sums: list[Any]) -> list[Any]:
+            return self._plain(group, self._highs(m), self._highs(b.sub(n, m)), sums)
+
+        def beside(m: Any, values: list[Any]) -> list[Any]:
+            y, omega, following = self._highs(m), self._highs(b.sub(n, m))[:3], values[9:]
+            gamma = self._plain(_GAMMA, y, omega, values[:3])
+            return [*gamma, *self._both(group, y, following, values[3:9]), *omega]
+
+        self._plain_rates(n, range(3), code.loop(0, after, alone, [code.zero] * 3))
+        values = code.loop(0, after, beside, [*[code.zero] * 9, *self._highs(after)[:3]])
+        self._plain_rates(n, range(3, 6), values[:3])
+        last = self._both(group, self._highs(after), self._highs(code.integer(0)), values[3:9])
+        self._plain_rates(after, range(6), last)
+
+    def _highs(self, n: Any) -> list[Any]:
+        """The high words of y_n."""
+        row = self.row(n)
+        return [self.code.load(row, LANES * i) for i in range(6)]
+
+    def _both(self, group: Products, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
+        return [*self._plain(group, y, omega, sums[:3]), *self._plain(_GAMMA, y, omega, sums[3:])]
+
+    def _plain(self, group: Products, y: list[Any], omega: list[Any], sums: list[Any]) -> list[Any]:
+        """Three sums with the products of Ω and of the same part of y."""
+        code, found = self.code, list(sums)
+        for first, second, component, sign in group:
+            factor = y[first] if sign > 0 else code.negative(y[first])
+            found[component % 3] = code.fma(factor, omega[second], found[component % 3])
+        return found
+
+    def _plain_rates(self, n: Any, components: Sequence[int], sums: list[Any]) -> None:
+        """Components of y_(n+1) from their sums."""
+        code, b = self.code, self.code.builder
+        y, following, quotient = self.row(n), self.row(b.add(n, code.integer(1))), self._quotient(n)[0]
+        for i, products in zip(components, sums, strict=True):
+            total = code.multiply(self._coefficient(i)[0], products) if i < 3 else products
+            for k, component, source in self.terms:
+                if component == i:
+                    total = code.fma(self._coefficient(k)[0], code.load(y, LANES * source), total)
+            code.store(code.multiply(total, quotient), following, LANES * i)

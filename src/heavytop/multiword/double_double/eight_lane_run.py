@@ -1,0 +1,469 @@
+"""Eight motions in double-double: what the machine code of :mod:`heavytop.multiword.double_double.eight_lane_run` works
+on.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy
+from llvmlite import ir
+
+from heavytop.multiword.codegen.machine_code import (
+    DOUBLE,
+    DOUBLES,
+    INT,
+    INT_POINTER,
+    INT_VECTOR,
+    INTEGERS,
+    LANES,
+    POINTER,
+    Doubles,
+    Machine,
+    Pair,
+    Processor,
+    compiled,
+    doubles,
+    function,
+    once,
+    pointer,
+)
+from heavytop.multiword.codegen.recurrence import LEAST_LOW_ORDER
+from heavytop.multiword.double_double.arithmetic import (
+    add,
+    covered,
+    later,
+    log2,
+    polynomial,
+    split,
+    split_constant,
+    split_ratio,
+    step_length,
+    times,
+)
+from heavytop.multiword.double_double.double_double_run import (
+    LARGEST_TIME,
+    LOW,
+    ROW,
+    SCRATCH,
+    Ladder,
+    LaneOrders,
+    terms,
+)
+from heavytop.multiword.double_double.steps import (
+    FIRST_UNITS,
+    LOG2_OF_A_UNIT,
+    MOST_TRIES,
+    SLACK,
+    STEEPEST,
+    TOLERATED_SLOPE,
+    in_range,
+    next_unit,
+)
+from heavytop.multiword.problem import Scaled, Status, Steps
+from heavytop.top.equations import System
+
+# Eight motions side by side, a lane each, in double-double with plain doubles above an order n0.
+#
+# Each lane has its own time, step and target, and its bits do not depend on the others: N and n0 are the same for all
+# and do not change.  A lane whose next step would cover its target waits; the scratch then holds the polynomial of that
+# step. A lane that would need a larger n0 stops and says so.  One whose units of split coefficients did not fit tries
+# again.
+
+
+FINE, NON_FINITE, TOO_SMALL, LARGER_N0 = 0, 1, 2, 4
+"""Flags of a lane."""
+TIME, TARGET, SIGN, LEFT, ROOM, REACH, DEPTH, UNITS, SLOPE, TRIES, CLOCK = 0, 2, 4, 5, 6, 7, 8, 9, 11, 12, 13
+"""Vectors of the clock: |time| and its target, two words each; direction, steps left, room, reach and depth; units of
+split coefficients, of Ω and of γ, their slope, and how often the next step was tried."""
+_TOLERATED = 1.0
+
+
+def build(system: System, processor: Processor | None = None) -> Machine:
+    """``advance`` and ``sample`` of eight motions.
+
+    advance(state, clock, flags, order, low_order, pair_order, coefficients, quotients, scratch, steps): as many rounds
+    of steps at most, until no lane can go; gives the number of rounds.  Orders from pair_order to low_order are split.
+    sample(scratch, order, times, result): each lane's polynomial at its own time, in two words, behind its beginning.
+    """
+    module = ir.Module("lanes")
+    _Round(module, system).write()
+    _write_sample(module)
+    integer = ctypes.c_int64
+    signatures: dict[str, tuple[Any, Sequence[Any]]] = {
+        "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, *[integer] * 3, DOUBLES, DOUBLES, DOUBLES, integer]),
+        "sample": (None, [DOUBLES, integer, DOUBLES, DOUBLES]),
+    }
+    return compiled(module, signatures, processor)
+
+
+def _write_sample(module: ir.Module) -> None:
+    made, code = function(module, "sample", ir.VoidType(), [POINTER, INT, POINTER, POINTER])
+    scratch, order, times_, result = made.args
+    b = code.builder
+
+    def row(n: Any) -> list[Pair]:
+        at = code.address(scratch, b.mul(n, code.integer(ROW)))
+        return [(code.load(at, LANES * i), code.load(at, LOW + LANES * i)) for i in range(6)]
+
+    words = polynomial(code, order, (code.load(times_, 0), code.load(times_, 8)), 6, row)
+    for index, word in enumerate(words):
+        code.store(word, result, ROW * (index % 2) + LANES * (index // 2))
+    b.ret_void()
+
+
+class _Round:
+    """Writes ``advance``."""
+
+    def __init__(self, module: ir.Module, system: System) -> None:
+        arguments = [POINTER, POINTER, INT_POINTER, INT, INT, INT, POINTER, POINTER, POINTER, INT]
+        made, self.code = function(module, "advance", INT, arguments)
+        self.state, self.clock, self.flags, self.order, self.low_order, self.pair_order = made.args[:6]
+        *arrays, self.most = made.args[6:]
+        self.series = LaneOrders(self.code, system, (arrays[0], arrays[1], arrays[2]), self._address(UNITS))
+
+    def _address(self, place: int) -> Any:
+        return self.code.address(self.clock, 8 * place)
+
+    def _clock(self, place: int) -> Any:
+        return self.code.load(self.clock, 8 * place)
+
+    def write(self) -> None:
+        """The loop of rounds."""
+        code, b = self.code, self.code.builder
+        head, body, out = (b.append_basic_block(name) for name in ("rounds", "round", "out"))
+        entry = b.block
+        b.branch(head)
+        b.position_at_end(head)
+        taken = b.phi(INT)
+        taken.add_incoming(code.integer(0), entry)
+        b.cbranch(b.icmp_signed("<", taken, self.most), body, out)
+        b.position_at_end(body)
+        first = self.series.row(0)
+        for place, table in ((0, 0), (ROW, LOW)):
+            for at in range(0, ROW, LANES):
+                code.store(code.load(self.state, place + at), first, table + at)
+        splitting, peaks = self.series.write(self.pair_order, self.low_order, self.order)
+        some = self._finish(peaks, splitting)
+        taken.add_incoming(b.add(taken, code.integer(1)), b.block)
+        b.cbranch(some, head, out)
+        b.position_at_end(out)
+        b.ret(taken)
+
+    def _norm(self, n: Any) -> Any:
+        row, found = self.series.row(n), self.code.zero
+        for i in range(6):
+            found = self.code.larger(self.code.absolute(self.code.load(row, LANES * i)), found)
+        return log2(self.code, found)
+
+    def _length(self, start: Any) -> Any:
+        """Each lane's h > 0, as in :mod:`heavytop.multiword.double_double.steps`."""
+        code, b = self.code, self.code.builder
+
+        def radius(n: Any) -> Any:
+            return b.fdiv(b.fsub(start, self._norm(n)), code.spread(b.sitofp(n, DOUBLE)))
+
+        radii = radius(self.order), radius(b.sub(self.order, code.integer(1)))
+        return step_length(code, radii, self._clock(REACH))
+
+    def _sums(self, h: Any) -> list[Pair]:
+        """Σ y_n h^n of each component, from the highest order."""
+        code, b = self.code, self.code.builder
+
+        def plain(k: Any, totals: list[Any]) -> list[Any]:
+            row = self.series.row(b.sub(self.order, k))
+            return [code.fma(total, h, code.load(row, LANES * i)) for i, total in enumerate(totals)]
+
+        def pairs(k: Any, words: list[Any]) -> list[Any]:
+            row, found = self.series.row(b.sub(self.low_order, k)), list[Any]()
+            for i in range(6):
+                found += add(code, times(code, (words[2 * i], words[2 * i + 1]), h), self.series.pair(row, i))
+            return found
+
+        totals = code.loop(0, b.sub(self.order, self.low_order), plain, [code.zero] * 6)
+        begin = [word for total in totals for word in (total, code.zero)]
+        words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, begin)
+        return [code.quick_two_sum(words[2 * i], words[2 * i + 1]) for i in range(6)]
+
+    def _finish(self, peaks: list[Any], splitting: Any) -> Any:
+        """Move the lanes that can go; whether any did, or has to try again."""
+        code, b = self.code, self.code.builder
+        start = self._norm(code.integer(0))
+        length = self._length(start)
+        step = b.fmul(length, self._clock(SIGN))
+        results = self._sums(step)
+        time, low = (code.load(self.clock, 8 * (TIME + k)) for k in range(2))
+        total, rest = later(code, (time, low), length)
+        target, target_low = (code.load(self.clock, 8 * (TARGET + k)) for k in range(2))
+        behind = covered(code, (total, rest), (target, target_low))
+        fits, tried_out = self._fits(peaks, splitting, start, length)
+        flags = self._judged(start, length, results, b.fcmp_ordered(">", total, time), tried_out)
+        fine = b.icmp_signed("==", flags, ir.Constant(INT_VECTOR, [0] * 8))
+        left = self._clock(LEFT)
+        alive = b.and_(fine, b.fcmp_ordered(">", left, code.zero))
+        going, again = b.and_(alive, b.and_(fits, b.not_(behind))), b.and_(alive, b.not_(fits))
+        old = [(self.state, ROW * word + 8 * i, results[i][word]) for i in range(6) for word in range(2)]
+        old += [(self.clock, 8 * TIME, total), (self.clock, 8 * (TIME + 1), rest)]
+        old += [(self.clock, 8 * LEFT, b.fsub(left, code.constant(1.0)))]
+        for base, place, value in old:
+            code.store(b.select(going, value, code.load(base, place)), base, place)
+        self._follow(peaks, length, going, again)
+        moved = b.bitcast(b.or_(going, again), ir.IntType(8))
+        return b.icmp_unsigned("!=", moved, ir.Constant(ir.IntType(8), 0))
+
+    def _fits(self, peaks: list[Any], splitting: Any, start: Any, length: Any) -> tuple[Any, Any]:
+        """Lanes whose split coefficients were exact enough, and those that were tried often enough."""
+        code, b = self.code, self.code.builder
+        units = [self._clock(UNITS + k) for k in range(2)]
+        slope = self._clock(SLOPE)
+        fits = b.fcmp_ordered("<", b.fsub(slope, self._slope(length)), code.constant(TOLERATED_SLOPE))
+        fits = b.and_(fits, b.fcmp_ordered("<=", code.absolute(slope), code.constant(STEEPEST)))
+        for unit, peak in zip(units, peaks, strict=True):
+            fits = b.and_(fits, b.and_(in_range(code, unit), next_unit(code, unit, peak)[0]))
+        both = b.fadd(log2(code, units[0]), log2(code, code.larger(*units)))
+        above = b.fadd(b.fsub(both, code.constant(2 * LOG2_OF_A_UNIT)), b.fsub(log2(code, length), start))
+        fall = b.fsub(code.constant(-SLACK), self._clock(REACH))
+        most = b.fmul(code.spread(b.sitofp(self.pair_order, DOUBLE)), fall)
+        fits = b.and_(fits, b.fcmp_ordered("<=", b.fsub(above, self._clock(DEPTH)), most))
+        none = ir.Constant(ir.VectorType(ir.IntType(1), 8), [0] * 8)
+        all_of_them = ir.Constant(ir.VectorType(ir.IntType(1), 8), [1] * 8)
+        fits = b.select(splitting, fits, all_of_them)
+        tried = b.fcmp_ordered(">=", self._clock(TRIES), code.constant(MOST_TRIES))
+        return fits, b.select(splitting, b.and_(tried, b.not_(fits)), none)
+
+    def _slope(self, length: Any) -> Any:
+        b = self.code.builder
+        return b.fadd(b.fsub(self._clock(REACH), log2(self.code, length)), self.code.constant(SLACK))
+
+    def _follow(self, peaks: list[Any], length: Any, going: Any, again: Any) -> None:
+        """Units for the next step; a lane that waits keeps its own, so that its series stays what it is."""
+        code, b = self.code, self.code.builder
+        either = b.or_(going, again)
+        tries = b.select(again, b.fadd(self._clock(TRIES), code.constant(1.0)), code.zero)
+        values = [next_unit(code, self._clock(UNITS + k), peak)[1] for k, peak in enumerate(peaks)]
+        for place, value in zip((UNITS, UNITS + 1, SLOPE, TRIES), (*values, self._slope(length), tries), strict=True):
+            code.store(b.select(either, value, self._clock(place)), self.clock, 8 * place)
+
+    def _judged(self, start: Any, length: Any, results: list[Pair], moves: Any, tried: Any) -> Any:
+        """The flags of all lanes, with those that this step sets; a lane without steps left gets none."""
+        code, b = self.code, self.code.builder
+        above = b.add(self.low_order, code.integer(1))
+        power = b.fmul(code.spread(b.sitofp(above, DOUBLE)), log2(code, length))
+        rounding = b.fsub(b.fadd(self._norm(above), power), start)
+        limit = b.fadd(self._clock(ROOM), code.constant(_TOLERATED))
+        infinity, finite = code.constant(math.inf), None
+        for word in (word for pair in results for word in pair):
+            one = b.fcmp_ordered("<", code.absolute(word), infinity)
+            finite = one if finite is None else b.and_(finite, one)
+
+        def flag(condition: Any, value: int) -> Any:
+            chosen = ir.Constant(INT_VECTOR, [value] * 8)
+            return b.select(condition, chosen, ir.Constant(INT_VECTOR, [0] * 8))
+
+        place = b.bitcast(self.flags, INT_VECTOR.as_pointer())
+        known = b.load(place)
+        known.align = 8
+        found = b.or_(flag(b.not_(finite), NON_FINITE), flag(b.not_(moves), TOO_SMALL))
+        found = b.or_(found, flag(b.or_(b.fcmp_ordered(">", rounding, limit), tried), LARGER_N0))
+        alive = b.fcmp_ordered(">", self._clock(LEFT), code.zero)
+        found = b.or_(known, b.select(alive, found, ir.Constant(INT_VECTOR, [0] * 8)))
+        b.store(found, place).align = 8
+        return found
+
+
+_NO_LIMIT = 2.0**53
+
+
+machine = once(build)
+"""The machine code, compiled at its first use."""
+
+
+class Eight:
+    """Eight lanes of motions of one system, each idle or with a motion in it.
+
+    low_order: n0, the same for all, 2 at least; a motion that needs a larger one stops.
+    """
+
+    def __init__(self, system: System, ladder: Ladder, low_order: int, processor: Processor | None = None) -> None:
+        self.functions = machine(system, processor).functions
+        self.ladder, self.low_order = ladder, max(LEAST_LOW_ORDER, min(low_order, ladder.order - 1))
+        self.pair_order = min(self.low_order, ladder.pair_order(self.low_order))
+        self.terms = terms(system)
+        self.words, self.clock = doubles(12 * LANES), doubles(CLOCK * LANES)
+        self.flags = numpy.zeros(LANES, numpy.int64)
+        self.constants = doubles(24 * (3 + len(self.terms)))
+        self.quotients = doubles(2 * ladder.order)
+        self.quotients[:] = [word for n in range(1, ladder.order + 1) for word in split(Fraction(1, n))]
+        self.scratch = doubles(SCRATCH)
+        self.moving = [pointer(array) for array in (self.words, self.clock, self.flags)]
+        self.tables = [pointer(array) for array in (self.constants, self.quotients, self.scratch)]
+        self.behind, self.sampled = doubles(2 * LANES), doubles(12 * LANES)
+        self.sampling = [pointer(array) for array in (self.behind, self.sampled)]
+        self.signs = [1] * LANES
+        self._set(ROOM, [ladder.room] * LANES)
+        self._set(REACH, [ladder.reach] * LANES)
+        self._set(DEPTH, [ladder.depth] * LANES)
+
+    def _set(self, vector: int, values: Any) -> None:
+        self.clock[LANES * vector : LANES * (vector + 1)] = values
+
+    def put(self, lane: int, problem: Scaled, forwards: bool, most: int | None) -> None:
+        """A motion at its beginning; most: the steps that it may take."""
+        for i, value in enumerate(problem.state):
+            self.words[LANES * i + lane], self.words[ROW + LANES * i + lane] = split(value)
+        rows = problem.coefficients.vectors[0]
+        given = [rows[0][i] for i in range(3)] + [rows[row][component] for row, component, _ in self.terms]
+        for k, value in enumerate(given):
+            self.constants[24 * k + lane : 24 * (k + 1) : LANES] = split_constant(value)
+        self.flags[lane] = FINE
+        self.signs[lane] = 1 if forwards else -1
+        values = {TIME: 0.0, TIME + 1: 0.0, SIGN: float(self.signs[lane])}
+        values |= {UNITS: FIRST_UNITS, UNITS + 1: FIRST_UNITS, SLOPE: 0.0, TRIES: 0.0}
+        for vector, word in (values | {LEFT: _NO_LIMIT if most is None else float(most)}).items():
+            self.clock[LANES * vector + lane] = word
+
+    def put_all(self, words: Any, constants: Any, most: int) -> None:
+        """Eight motions at their beginning, forwards: their words (12, 8), and those of each constant (k, 3, 8)."""
+        self.words[:], self.constants[:] = words.reshape(-1), constants.reshape(-1)
+        self.flags[:], self.signs[:] = FINE, [1] * LANES
+        values = {TIME: 0.0, TIME + 1: 0.0, SIGN: 1.0, LEFT: float(most)}
+        values |= {UNITS: FIRST_UNITS, UNITS + 1: FIRST_UNITS, SLOPE: 0.0, TRIES: 0.0}
+        for vector, value in values.items():
+            self._set(vector, value)
+
+    def aim_all(self, targets: Any) -> None:
+        """Where the lanes are to stop, |τ|, eight doubles."""
+        self._set(TARGET, targets)
+        self._set(TARGET + 1, 0.0)
+
+    def sample_all(self, targets: Any) -> Doubles:
+        """The states of eight motions forwards at doubles |τ| inside their next steps: (12, 8)."""
+        behind, found = self.behind, self.sampled
+        first, second = self.clock[:LANES], self.clock[LANES : 2 * LANES]
+        total = targets - first
+        part = total - targets
+        low = ((targets - (total - part)) - (first + part)) - second
+        behind[:LANES] = total + low
+        behind[LANES:] = low - (behind[:LANES] - total)
+        self.functions["sample"](self.tables[2], self.ladder.order, *self.sampling)
+        return found.reshape(12, LANES).copy()
+
+    def left_all(self) -> Doubles:
+        """The steps that each lane may still take."""
+        return self.clock[LANES * LEFT : LANES * (LEFT + 1)]
+
+    def taken_out(self, lane: int) -> tuple[Doubles, Doubles]:
+        """All that a motion needs to go on in another eight: its state, and its part of the clock."""
+        return self.words[lane::LANES].copy(), self.clock[lane::LANES].copy()
+
+    def put_back(self, lane: int, problem: Scaled, forwards: bool, moved: tuple[Doubles, Doubles]) -> None:
+        """A motion that was taken out of another eight."""
+        self.put(lane, problem, forwards, None)
+        self.words[lane::LANES], self.clock[lane::LANES] = moved
+        self.clock[LANES * TRIES + lane] = 0.0
+
+    def empty(self, lane: int) -> None:
+        """Nothing in this lane: it takes no steps."""
+        self.clock[LANES * LEFT + lane] = 0.0
+
+    def aim(self, lane: int, target: Fraction) -> None:
+        """Where this lane is to stop, |τ|."""
+        words = split(min(target, LARGEST_TIME))
+        for k in range(2):
+            self.clock[LANES * (TARGET + k) + lane] = words[k]
+
+    def advance(self, rounds: int) -> int:
+        """Steps of all lanes that can go, at most so many; gives the rounds after which none could."""
+        orders = self.ladder.order, self.low_order, self.pair_order
+        taken: int = self.functions["advance"](*self.moving, *orders, *self.tables, rounds)
+        return taken
+
+    def time(self, lane: int) -> Fraction:
+        """|τ| of the last step end of a lane."""
+        return sum((Fraction(float(self.clock[LANES * (TIME + k) + lane])) for k in range(2)), Fraction(0))
+
+    def taken(self, lane: int, most: int | None) -> int:
+        """Steps of the motion in a lane, which might take ``most``."""
+        return int((_NO_LIMIT if most is None else most) - self.clock[LANES * LEFT + lane])
+
+    def status(self, lane: int) -> Status | None:
+        """Whether the motion in a lane can go on; None where it needs a larger n0."""
+        flags = int(self.flags[lane])
+        if flags & NON_FINITE:
+            return Status.NON_FINITE
+        if flags & TOO_SMALL:
+            return Status.TOO_SMALL
+        return None if flags & LARGER_N0 else Status.FINE
+
+    def coefficients(self, lane: int, n: int) -> tuple[Fraction, ...]:
+        """y_n of a lane's last series."""
+        tables = [self.scratch[place + ROW * n : place + ROW * (n + 1)] for place in (0, LOW)]
+        return exact_state(numpy.concatenate(tables)[lane::LANES])
+
+    def state(self, lane: int) -> tuple[Fraction, ...]:
+        """Where a lane's motion is."""
+        return exact_state(self.words[lane::LANES])
+
+    def samples(self, times: dict[int, Fraction]) -> dict[int, Doubles]:
+        """The states of some lanes, each at a time |τ| inside its next step: high words, then low ones, shape (12,)."""
+        behind, found = doubles(2 * LANES), doubles(12 * LANES)
+        for lane, time in times.items():
+            behind[lane], behind[LANES + lane] = self._behind(lane, time)
+        self.functions["sample"](self.tables[2], self.ladder.order, pointer(behind), pointer(found))
+        return {lane: found[lane::LANES] for lane in times}
+
+    def _behind(self, lane: int, time: Fraction) -> tuple[float, float]:
+        """τ of a time |τ| after the beginning of a lane's next step."""
+        (a, b), (c, d) = (float(self.clock[LANES * (TIME + k) + lane]).as_integer_ratio() for k in range(2))
+        top, bottom = time.as_integer_ratio()
+        return split_ratio(self.signs[lane] * (top * b * d - bottom * (a * d + c * b)), bottom * b * d)
+
+
+def exact_state(words: Doubles) -> tuple[Fraction, ...]:
+    """The sums of six high words and the six low ones behind them."""
+    return tuple(
+        Fraction(high) + Fraction(low) for high, low in zip(words[:6].tolist(), words[6:].tolist(), strict=True)
+    )
+
+
+class OneOfEight(Steps):
+    """One step of a motion that is in all eight lanes, for the check of their machine code."""
+
+    def __init__(self, problem: Scaled, ladder: Ladder, low_order: int) -> None:
+        self.eight = Eight(problem.system, ladder, low_order)
+        self.steps, self.forwards = 0, True
+        for lane in range(LANES):
+            self.eight.put(lane, problem, True, 1)
+            self.eight.aim(lane, LARGEST_TIME)
+
+    @property
+    def order(self) -> int:
+        return self.eight.ladder.order
+
+    @property
+    def time(self) -> Fraction:
+        return self.eight.time(0)
+
+    @property
+    def state(self) -> tuple[Fraction, ...]:
+        return self.eight.state(0)
+
+    def advance(self, target: Fraction, steps: int) -> Status:
+        # one round at a time, since the scratch holds the series of the last; the first ones may fit units only
+        for _ in range(1 + MOST_TRIES):
+            if self.time == 0:
+                self.eight.advance(1)
+        self.steps += 1
+        same = all(self.eight.state(lane) == self.state and self.eight.time(lane) == self.time for lane in range(LANES))
+        return Status.FINE if same and self.time > 0 else Status.NON_FINITE
+
+    def sample(self, time: Fraction) -> tuple[Fraction, ...]:
+        # the scratch holds the series at the beginning of the step, time 0
+        return exact_state(self.eight.samples({0: self.time + time})[0])
+
+    def coefficients(self, n: int) -> tuple[Fraction, ...]:
+        return tuple(value * self.time**n for value in self.eight.coefficients(0, n))

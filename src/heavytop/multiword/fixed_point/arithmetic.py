@@ -1,0 +1,336 @@
+"""Numbers of K words on fixed grids, and sums of their products in machine code.
+
+Word k is a multiple of its unit g_k = 2^(-b (k + 1)), about b bits wide, so that K words are a number in fixed point
+with K b bits (after J. van der Hoeven, "Multiple precision floating-point arithmetic on SIMD processors", ARITH 24,
+2017).  A sum for level k begins at C_k = 1.5 × 2^52 g_k, where the last bit of a double is worth g_k.  For a product
+with i + j = k:
+
+    S' = fma(a_i, b_j, S_k),   d = S' − S_k,   l = fma(a_i, b_j, −d),   S_(k+1) += l.
+
+d and l are exact, and l is a multiple of g_(k+1): nothing is lost but in the last level, as long as each S_k stays
+between 2^52 g_k and 2^53 g_k wherever a low part is added to it.  That is checked there, by the exponent: the bits of
+S ^ C are gathered, and a set exponent bit says that the step must not stand.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ldexp
+from typing import Any
+
+import numpy
+from llvmlite import ir
+
+from heavytop.multiword.codegen.machine_code import (
+    DOUBLES,
+    INT,
+    INT_VECTOR,
+    POINTER,
+    VECTOR,
+    Code,
+    Doubles,
+    Machine,
+    compiled,
+    function,
+    once,
+)
+
+EXPONENT_BITS = 0x7FF << 52
+WIDEST = 51
+"""Bits of a word whose sums and quotients are on the grid."""
+_FEWEST_BOUNDED, _WIDEST_BOUNDED = 5, 45
+_HEAD, _EXCESS = 4, 2
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """words: K.  bits: b, of each.
+
+    whole: whether the last word is a whole multiple of its unit too, as proofs need it.  Else its sums begin at 0: it
+    keeps some bits below the unit, and coefficients below the unit are not rounded away, which would err in the same
+    way at every step.
+    """
+
+    words: int
+    bits: int
+    whole: bool = False
+
+    @property
+    def bounded(self) -> bool:
+        """Whether words are kept so small that products with the coefficients of the field need not be watched.
+
+        With fewer words nothing is gained by it.
+        """
+        return not self.whole and self.words >= _FEWEST_BOUNDED and self.bits <= _WIDEST_BOUNDED
+
+    def most_bits(self, k: int) -> int:
+        """log2 of what word k of a coefficient stays below, in its units.
+
+        At the start of a step |ω| ≤ 4, |γ| and |ξ| ≤ √3 and so 2 |γ × ω| < 16: short steps keep within.
+        """
+        if not self.bounded:
+            return WIDEST
+        return self.bits + (_EXCESS if k else _HEAD)
+
+    @property
+    def smallest(self) -> float:
+        """What two coefficients in a row are below where the series ends."""
+        return self.unit(self.words - 1) * (2.0 if self.whole else 2.0**-12)
+
+    @property
+    def total(self) -> int:
+        """Bits of a number behind the binary point."""
+        return self.words * self.bits
+
+    def unit(self, k: int) -> float:
+        """g_k."""
+        return float(2.0 ** (-self.bits * (k + 1)))
+
+    def centre(self, k: int) -> float:
+        """C_k, to which a sum for level k is added."""
+        if k == self.words - 1 and not self.whole:
+            return 0.0
+        return 1.5 * 2.0**52 * self.unit(k)
+
+
+@dataclass(slots=True)
+class Accumulator:
+    """Sums for the levels ``base`` to K − 1, and the bits in which they left their range.
+
+    sums: S_k.  seen: gathered bits of S ^ C, eight integers.
+    """
+
+    code: Code
+    grid: Grid
+    base: int
+    sums: list[Any]
+    seen: Any
+
+    def add_product(self, a: list[Any], b: list[Any], each: bool = False, below: bool = False) -> None:
+        """Add a b, of words numbered from 0 that count from level ``base`` on.
+
+        What goes to the last level is added up before it gets there: its sum is what the next product waits for.
+
+        each: look at a sum after each of its products, not only where low parts are added to it.
+        below: with the products of the level below the last, rounded.
+        """
+        code, last = self.code, len(self.sums) - 1
+        if last == 0:
+            self.sums[0] = code.fma(a[0], b[0], self.sums[0])
+            return
+        for k in range(last):
+            lows = []
+            for i in range(k + 1):
+                total = code.fma(a[i], b[k - i], self.sums[k])
+                part = code.subtract(total, self.sums[k])
+                lows.append(code.fma(a[i], b[k - i], code.negative(part)))
+                self.sums[k] = total
+                if k == 0 or each:
+                    self.look(k)
+            low = in_pairs(code, lows)
+            if k + 1 < last:
+                self.look(k + 1)
+                self.sums[k + 1] = code.add(self.sums[k + 1], low)
+                self.look(k + 1)
+        pairs = [(i, last - i) for i in range(last + 1)] + [(i, last + 1 - i) for i in range(1, last + 1) if below]
+        for i, j in pairs:
+            low = code.fma(a[i], b[j], low)
+        self.sums[last] = code.add(self.sums[last], low)
+
+    def look(self, k: int) -> None:
+        """Gather the bits of a sum; those of the last level are of no account."""
+        level = self.base + k
+        if level < self.grid.words - 1:
+            b = self.code.builder
+            centre = int(numpy.float64(self.grid.centre(level)).view(numpy.int64))
+            centres = ir.Constant(INT_VECTOR, [ir.Constant(INT, centre)] * 8)
+            self.seen = b.or_(self.seen, b.xor(b.bitcast(self.sums[k], INT_VECTOR), centres))
+
+    def look_at_all(self) -> None:
+        """Gather the bits of every sum."""
+        for k in range(len(self.sums)):
+            self.look(k)
+
+
+def in_pairs(code: Code, values: list[Any]) -> Any:
+    """Their sum, exact for multiples of one unit; in pairs."""
+    while len(values) > 1:
+        pairs = zip(values[::2], values[1::2], strict=False)
+        values = [code.add(a, b) for a, b in pairs] + values[len(values) - len(values) % 2 :]
+    return values[0]
+
+
+def write_kernels(module: ir.Module, grid: Grid, row: int) -> list[Any]:
+    """Functions (left, right, count, sums, seen): S += Σ_m left[m] right[-m] in the levels from the q-th last on.
+
+    left goes up by a row for each product and right goes down; both point to their first word that is not zero.
+    The list begins with q = 1.
+    """
+    return [_write_kernel(module, grid, count, row) for count in range(1, grid.words + 1)]
+
+
+def _write_kernel(module: ir.Module, grid: Grid, count: int, row: int) -> Any:
+    arguments = [POINTER, POINTER, INT, POINTER, POINTER]
+    made, code = function(module, f"products_{count}", ir.VoidType(), arguments)
+    made.linkage = "internal"
+    made.attributes.add("noinline")
+    left, right, terms, sums, seen = made.args
+    base, b = grid.words - count, code.builder
+
+    def term(m: Any, values: list[Any]) -> list[Any]:
+        total = Accumulator(code, grid, base, list(values[:-1]), values[-1])
+        at = code.address(left, b.mul(m, code.integer(row)))
+        against = code.address(right, b.mul(m, code.integer(-row)))
+        a, c = ([code.load(place, 8 * i) for i in range(count)] for place in (at, against))
+        # where a leading word is small in some lane, these would be left out alike at every step
+        total.add_product(a, c, below=count == 2 and not grid.whole)
+        return [*total.sums, total.seen]
+
+    begin = [code.load(sums, 8 * k) for k in range(count)] + [b.bitcast(code.load(seen, 0), INT_VECTOR)]
+    values = code.loop(0, terms, term, begin)
+    for k in range(count):
+        code.store(values[k], sums, 8 * k)
+    code.store(b.bitcast(values[-1], VECTOR), seen, 0)
+    b.ret_void()
+    return made
+
+
+def bounded_product(code: Code, grid: Grid, a: list[Any], b: list[Any]) -> list[Any]:
+    """a b in K words, not carried, where no sum can leave its range; low parts are added at the end.
+
+    a: a coefficient of the field, |a_0| ≤ 2^b units and the others half as many at most.  b: |b_0| ≤ 2^(b + 4) units,
+    the others at most 2^(b + 2).  Over 2^b units, the sum for level k is at most 2^4 for k = 0 and else
+    2^3 + 2^2 + 2 (k − 1): less than 2^51 units for 24 words of 45 bits.
+    """
+    last = grid.words - 1
+    found, lows = [], [list[Any]() for _ in range(grid.words)]
+    for k in range(last):
+        centre = total = code.constant(grid.centre(k))
+        for i in range(k + 1):
+            after = code.fma(a[i], b[k - i], total)
+            lows[k + 1].append(code.fma(a[i], b[k - i], code.negative(code.subtract(after, total))))
+            total = after
+        found.append(code.subtract(total, centre))
+    total = code.zero
+    # those of the level below the last first: where a leading word is 0 they are what is left
+    for i, j in [(i, last + 1 - i) for i in range(1, last + 1)] + [(i, last - i) for i in range(last + 1)]:
+        total = code.fma(a[i], b[j], total)
+    found.append(total)
+    return [found[0], *(code.add(found[k], in_pairs(code, lows[k])) for k in range(1, last + 1))]
+
+
+def centred(code: Code, grid: Grid, count: int) -> list[Any]:
+    """The beginning of all sums."""
+    return [code.constant(grid.centre(k)) for k in range(count)]
+
+
+def carried(code: Code, grid: Grid, words: list[Any]) -> list[Any]:
+    """The same number with each word but the first near b bits wide again."""
+    carries = [None]
+    for k in range(1, grid.words):
+        big = code.constant(grid.centre(k - 1))
+        carries.append(code.subtract(code.add(words[k], big), big))
+    found = []
+    for k, word in enumerate(words):
+        value = word if k == 0 else code.subtract(word, carries[k])
+        found.append(code.add(value, carries[k + 1]) if k + 1 < grid.words else value)
+    return found
+
+
+# Exact numbers as words on fixed grids, and which grid serves a number of bits.
+
+
+# words up to which so many bits are safe in each: products of a few hundred orders stay inside the sums
+_BITS_OF_A_WORD = ((2, 48), (4, 46), (6, 45), (12, 44), (24, 43))
+MOST_WORDS = 24
+_NARROWER = 2
+"""By so many bits words are narrower where that is enough: fewer bits take fewer orders."""
+
+
+def grid_of(words: int, whole: bool = False) -> Grid:
+    """The grid of so many words, 2 to 24; whole: as in :class:`heavytop.multiword.fixed_point.arithmetic.Grid`."""
+    return Grid(words, next(bits for most, bits in _BITS_OF_A_WORD if words <= most), whole)
+
+
+def grid_for(bits: int) -> Grid | None:
+    """The smallest grid of at least so many bits and three words, of two widths a word; None where there is none."""
+    wide = next((grid for grid in map(grid_of, range(3, MOST_WORDS + 1)) if grid.total >= bits), None)
+    if wide is None:
+        return None
+    narrow = Grid(wide.words, wide.bits - _NARROWER)
+    return narrow if narrow.total >= bits else wide
+
+
+def digits(value: Fraction, grid: Grid) -> list[float]:
+    """``value`` rounded to a multiple of the last unit, as words."""
+    top, bottom = value.as_integer_ratio()
+    whole, rest = divmod(top << grid.total, bottom)
+    whole += 2 * rest > bottom or (2 * rest == bottom and whole & 1)  # to nearest, a tie to even
+    found = []
+    for k in range(grid.words):
+        shift = grid.bits * (grid.words - 1 - k)
+        digit = (whole + (1 << shift >> 1)) >> shift if k < grid.words - 1 else whole
+        whole -= digit << shift
+        found.append(ldexp(float(digit), -grid.bits * (k + 1)))
+    return found
+
+
+def exact(words: Doubles) -> Fraction:
+    """The number that words add to."""
+    ratios = [word.as_integer_ratio() for word in words.tolist()]
+    bottom = max(below for _, below in ratios)  # all are powers of two
+    return Fraction(sum(above * (bottom // below) for above, below in ratios), bottom)
+
+
+# How large the words of a series are, in machine code: what the proof of
+# :mod:`heavytop.multiword.fixed_point.certified_series` needs.
+
+
+# y out of L = (Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, …): lane by lane L[first] − L[second]/2, where 8 is a zero
+_FIRST, _SECOND = (2, 0, 1, 4, 5, 3, 8, 8), (8, 8, 8, 5, 5, 5, 8, 8)
+
+
+@once
+def machine(words: int, vectors: int) -> Machine:
+    """extents(rows, orders, values, sizes, widest, added) for rows of R and L of each vector, K words each.
+
+    values, sizes: for each order and vector Σ_k y_k and Σ_k |word k of y|, eight doubles each; the smallest words are
+    added first, so that a value is right to 2^-50 of its size.  widest: max_n |word k| of R and of each L.
+    added: Σ_n |word k of y| of each vector.
+    """
+    module = ir.Module("extents")
+    made, code = function(module, "extents", ir.VoidType(), [POINTER, INT, *[POINTER] * 4])
+    rows, orders, values, sizes, widest, added = made.args
+    b, row = code.builder, words * (1 + vectors)
+    for k in range(row):
+        code.store(code.zero, widest, 8 * k)
+    for k in range(words * vectors):
+        code.store(code.zero, added, 8 * k)
+
+    def order(n: Any, _: list[Any]) -> None:
+        at = code.address(rows, b.mul(n, code.integer(8 * row)))
+        side = [code.load(at, 8 * k) for k in range(row)]
+        for k, word in enumerate(side):
+            code.store(code.larger(code.absolute(word), code.load(widest, 8 * k)), widest, 8 * k)
+        for v in range(vectors):
+            value = size = code.zero
+            for k in reversed(range(words)):
+                y = _component(code, side[words * (1 + v) + k])
+                magnitude, place = code.absolute(y), 8 * (words * v + k)
+                code.store(code.add(code.load(added, place), magnitude), added, place)
+                value, size = code.add(value, y), code.add(size, magnitude)
+            place = b.mul(b.add(b.mul(n, code.integer(vectors)), code.integer(v)), code.integer(8))
+            code.store(value, code.address(values, place), 0)
+            code.store(size, code.address(sizes, place), 0)
+
+    code.loop(0, b.add(orders, code.integer(1)), order, [])
+    b.ret_void()
+    return compiled(module, {"extents": (None, [DOUBLES, ctypes.c_int64, *[DOUBLES] * 4])})
+
+
+def _component(code: Code, left: Any) -> Any:
+    """A word of y, exactly."""
+    half = code.shuffle(left, code.zero, _SECOND)
+    return code.fma(half, code.constant(-0.5), code.shuffle(left, code.zero, _FIRST))

@@ -1,0 +1,308 @@
+"""Taylor coefficients of a step on a grid of K words, with a proven bound of what they lack.
+
+g_k = 2^(−b(k + 1)) is the unit of word k, g = g_(K−1) the last.  The code of
+:mod:`heavytop.multiword.fixed_point.steps` gives b_0, …, b_N, whole multiples of g that stand for y_n h^n.  Let f_n be
+the coefficient of τ^n in f(Σ b_n τ^n), exactly.
+
+*Theorem.*  Where no exponent bit was set, no word was too wide and (1) holds,
+
+    |b_(n+1) − h f_n/(n + 1)| ≤ (H (2 ε_n + ε' + κ) + ½ g)/(n + 1) + ¾ g,   H = h 2^e,                            (2)
+
+where the coefficients of the field are kept over 2^e.  ε_n, ε', κ are given below; with T = n + 1 terms ε_n is of the
+order T K ulp.  The sum of (2) over n < N bounds the integral of the defect over the step: :attr:`Series.rounding`.
+
+*Sums of products.*  Let l_i and r_j bound the words L_i and R_j of all orders in a lane, and m_ij = l_i r_j.  A sum for
+level k begins at C_k and takes in, product by product, x → s = fl(x + a b), d = fl(s − x), l = fl(a b − d); then lows.
+Suppose, for all k < K − 1,
+
+    Σ_(i+j=k) m_ij + 3 max_(i+j=k) m_ij ≤ 2^52 (1 − 2^-20) g_k.                                                  (1)
+
+Between two looks at a sum it takes in the products of one level of one term, and one more at most, where its level is
+the first of the next kernel.  It was in [2^52, 2^53) g_k when it was looked at, so x ≥ 2 |a b| by (1); hence
+x/2 ≤ s ≤ 2 x and d is exact (Sterbenz).  a b is a multiple of g_i g_j = g_(k+1), and so is l, the rounding of x + a b,
+with |l| ≤ g_k = 2^b g_(k+1).  So l is exact, and so is the sum of K of them.  Lows are added between two looks: the sum
+is a multiple of g_(k+1) before and at most 2^53 g_(k+1) after, so it is exact.  Nothing is lost but in the last level,
+which no one looks at; what a product adds to it is summed first.  With T terms its sum stays below
+
+    B = 1.5 2^52 g + T (Σ_(i+j=K−1) m_ij + K 2^b g);
+
+each of its T (K + 1) roundings is at most 2^-53 B, and so is that of taking C away, and T products with i + j ≥ K are
+left out.  So the error is at most ε(T) = T ((K + 1) 2^-53 B + Σ_(i+j≥K) m_ij) + 2^-53 B, and ε_n = ε(n + 1).
+
+*The coefficients of the field.*  Each sum is looked at after each product.  Two numbers of [2^52, 2^53) g_k differ by a
+multiple of g_k below 2^52 g_k, so d is exact without (1).  ε' is ε(T) for T sources.  The coefficients are at most 1,
+rounded to nearest: l_0 = 2^b g_0, l_k = 2^(b−1) g_k.  The sources are y, with words that are looked at afterwards, and
+the gathered sums, whose first word is below 2^51 g_0 (it is watched) and whose others are, after their carries, at most
+4 (2^(b−1) + 1 + 2^-b B/g) g_k, where B ≤ 2^(b+16) g.  Up to four sums are gathered in a lane, and there A = ½: hence
+2 ε_n.  The coefficients are wrong by g/2 at most, the sources below 2^51 g_0 (1 + 2^(1−b)): κ = 1.01 T 2^(50−b) g.
+
+*The rest.*  Carries, gathering and multiplication by 16 are exact for words below 2^51 units, which is watched for the
+first.  Multiplication by the power of two that is left passes what is below a unit on to the next word, exactly where
+that power is 2^-b at least, and drops g/2 at most in the last.  The division passes on the exact remainder: a quotient
+is right to ½ unit and 2^-53 of itself, that is ¾ of a unit, and the last remainder is dropped.  Dividends behind the
+first word are below 2^53 units (watched), so that from n = 3 on their quotients are below 2^51; before that they are at
+most (1.01 + (n + 1)/2 + ¼) 2^b units.  Words that count as 0 are added to the next, exactly for sums below 2^51 units.
+The sum of all b_n is exact where Σ |word k of b_n| ≤ 2^52 g_k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from math import ldexp, log
+from threading import local
+from typing import Any, cast
+
+import numpy
+from numpy.typing import NDArray
+
+from heavytop.multiword.codegen.machine_code import Doubles, Integers, Processor, doubles, pointer
+from heavytop.multiword.codegen.recurrence import turned
+from heavytop.multiword.fixed_point import arithmetic, fixed_point_run
+from heavytop.multiword.fixed_point.arithmetic import Grid
+from heavytop.multiword.fixed_point.steps import UNSETTLED, most_orders, raises_of, size_of
+from heavytop.multiword.problem import Scaled
+
+_UP = 1 + 2.0**-40
+_ROOM = 1 - 2.0**-20
+
+
+class Total(Sequence[int]):
+    """Σ b_n of each component, whole ulps: kept as words, from which the next step begins."""
+
+    def __init__(self, words: Doubles, carrier: Carrier) -> None:
+        self.words, self._carrier = words, carrier
+
+    @cached_property
+    def _values(self) -> list[int]:
+        grid, places = self._carrier.grid, self._carrier.places
+        return list(_whole(self.words[places], grid))
+
+    def __len__(self) -> int:
+        return len(self._carrier.places)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._values[index]
+
+
+@dataclass(frozen=True)
+class Series:
+    """b_0, …, b_N of six or nine components, in words: those of ``carrier`` from ``centre`` with h = 2^-halvings.
+
+    total: Σ b_n.  rounding: Σ_(n < N) of (2) in ulps, which bounds the integral of the defect of all orders below N.
+    sizes: upper bounds of |b_n|, shape (N + 1,).  nearest: b_n within 2^-50 of ``sizes``, shape (N + 1, components).
+    """
+
+    carrier: Carrier
+    centre: Sequence[int]
+    halvings: int
+    total: Total
+    rounding: float
+    sizes: Doubles
+    nearest: Doubles
+
+    @property
+    def thrifty(self) -> tuple[float, float]:
+        """Orders a bit between which a unit of time costs least: a step costs more than its products."""
+        return 0.4, 0.58
+
+    @property
+    def order(self) -> int:
+        """N."""
+        return len(self.sizes) - 1
+
+    @cached_property
+    def values(self) -> list[list[int]]:
+        """The coefficients of each component, whole ulps: computed once more, for few steps are asked for them."""
+        return self.carrier.coefficients(self.centre, self.halvings)
+
+    def scaled(self, rate: int) -> Doubles:
+        """Upper bounds of 2^(rate n) |b_n|, shape (N + 1,)."""
+        return numpy.ldexp(self.sizes, rate * numpy.arange(len(self.sizes)))
+
+    def rounded(self, orders: int) -> Doubles:
+        """b_0 to b_orders of ``nearest``, as many as there are."""
+        return self.nearest[: orders + 1]
+
+
+class Carrier:
+    """Taylor coefficients of one motion on one grid; any thread may ask.
+
+    problem: so that |ω| ≤ 4 (:meth:`heavytop.multiword.problem.Scaled.of` with ``bounded``).
+    """
+
+    def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:
+        self.vectors = 1 if len(problem.state) == 6 else 2
+        self.machine = fixed_point_run.machine(grid, problem.system, self.vectors == 2, processor)
+        self.extents = arithmetic.machine(grid.words, self.vectors).functions["extents"]
+        self.grid, self.sign = grid, 1.0 if forwards else -1.0
+        self.excess = fixed_point_run.excess(problem)
+        self.constants, self.inverses = (
+            fixed_point_run.constants(problem, grid, self.excess),
+            fixed_point_run.inverses(grid),
+        )
+        self._own = (problem, grid, forwards, processor)
+        self._sources = 1 + len(turned(problem.system))
+        self._of_constants = self._error_of_constants()
+        self._exponents = grid.bits * numpy.arange(1, grid.words + 1)[:, None]
+        self._threads = local()
+        self._columns = [*range(6), *range(11, 14)][: 3 + 3 * self.vectors]
+        first = numpy.array([lane % 8 + 8 * grid.words * (lane // 8) for lane in self._columns])
+        self.places = first[:, None] + 8 * numpy.arange(grid.words)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Carrier, self._own)
+
+    def series(self, centre: Sequence[int], halvings: int) -> Series | None:
+        """From ``centre``, whole ulps 2^-(K b), with h = 2^-halvings; None where that is too long or words overflow."""
+        orders = self._computed(centre, halvings)
+        if orders < 0:
+            return None
+        scratch, length = self._scratch(), orders + 1
+        self.extents(scratch.pointers[3], orders, *scratch.measures)
+        rounding = self._rounding(scratch.widest, scratch.added, orders, ldexp(1.0, self.excess - halvings))
+        if rounding is None:
+            return None
+        size = 8 * self.vectors
+        sizes = numpy.maximum.reduce(scratch.sizes[: length * size].reshape(length, size), 1) * _UP
+        nearest = scratch.values[: length * size].reshape(length, size)[:, self._columns]
+        return Series(self, centre, halvings, Total(scratch.result.copy(), self), rounding, sizes, nearest)
+
+    def coefficients(self, centre: Sequence[int], halvings: int) -> list[list[int]]:
+        """b_0 to b_N of each component, whole ulps, where :meth:`series` gives some."""
+        length, grid = self._computed(centre, halvings) + 1, self.grid
+        table = (
+            self._scratch()
+            .rows[: size_of(grid, self.vectors).row * length]
+            .reshape(length, 1 + self.vectors, grid.words, 8)
+        )
+        # L holds Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2; what is taken out of it are the words of y, exactly
+        found = [table[:, 1, :, lane] for lane in (2, 0, 1)]
+        for left in (table[:, 1 + vector] for vector in range(self.vectors)):
+            middle = left[:, :, 5] / 2
+            found += [left[:, :, 4] - middle, middle, left[:, :, 3] - middle]
+        return [_whole(component, grid).tolist() for component in found]
+
+    def _computed(self, centre: Sequence[int], halvings: int) -> int:
+        """N, with the coefficients in the rows of this thread's scratch; negative where there are none."""
+        exponent = self.excess - halvings
+        if not -self.grid.bits <= exponent < 64:
+            return UNSETTLED
+        factor, raises = raises_of(exponent)
+        scratch = self._scratch()
+        if isinstance(centre, Total):
+            scratch.state[:] = centre.words
+        else:
+            scratch.state[self.places] = [_words(value, self.grid) for value in centre]
+        found = self.machine.functions["series"](*scratch.pointers, self.sign * factor, raises, scratch.found)
+        return int(found)
+
+    def _scratch(self) -> _Scratch:
+        """This thread's."""
+        if not hasattr(self._threads, "scratch"):
+            self._threads.scratch = _Scratch(self)
+        return cast("_Scratch", self._threads.scratch)
+
+    def _rounding(self, widest: Doubles, added: Doubles, orders: int, scale: float) -> float | None:
+        """The sum of (2) over n < N in ulps, with H = ``scale``; None where what is assumed does not hold.
+
+        widest: max_n |word k|, shape (1 + vectors, K, 8), of R and each L.  added: Σ_n |word k of y|, shape
+        (vectors, K, 8).
+        """
+        grid = self.grid
+        wide = numpy.ldexp(widest, self._exponents)
+        left, right = numpy.maximum.reduce(wide[1:]), wide[0]
+        one, products = _levels(grid, right, left)
+        sums = products[: grid.words - 1] + 3 * one[: grid.words - 1]
+        # γ1 and γ3 are differences of L's
+        state = (1.5 * numpy.maximum.reduce(left, 1)).tolist()
+        term, once = _error(grid, products, orders)
+        limits = (
+            (float(sums.max()), 2.0**52 * _ROOM),
+            (float(numpy.ldexp(added, self._exponents).max()), 2.0**52),
+            (state[0], 2.0**51),
+            (max(state[1:]), 2.0 ** (grid.bits + 2)),
+            (once, 2.0 ** (grid.bits + 16 - 53)),
+        )
+        if not all(found <= limit for found, limit in limits):
+            return None
+        harmonic = 1 + log(max(1, orders))
+        alone = (2 * once + self._of_constants) * harmonic
+        return (scale * (2 * term * orders + alone) + harmonic / 2 + 0.75 * orders) * _UP
+
+    def _error_of_constants(self) -> float:
+        """ε' + κ in ulps."""
+        grid = self.grid
+        constants = numpy.full((grid.words, 1), 2.0 ** (grid.bits - 1))
+        constants[0] = 2.0**grid.bits
+        sources = numpy.full((grid.words, 1), 4 * (2.0 ** (grid.bits - 1) + 1 + 2.0**16))
+        sources[0] = 2.0**51
+        each, once = _error(grid, _levels(grid, constants, sources)[1], self._sources)
+        return self._sources * (each + 2.0 ** (50 - grid.bits) * 1.01) + once
+
+
+class _Scratch:
+    """What one thread computes with."""
+
+    def __init__(self, carrier: Carrier) -> None:
+        words, vectors = carrier.grid.words, carrier.vectors
+        size, orders = 8 * words * vectors, most_orders(carrier.grid) + 2
+        room = size_of(carrier.grid, vectors)
+        self.state, self.result, self.rows = doubles(size), doubles(size), doubles(room.rows)
+        kept = [self.state, carrier.constants, carrier.inverses, self.rows]
+        places = numpy.zeros(room.places, numpy.int64)
+        self._kept: list[Doubles | Integers] = [*kept, doubles(room.sums), places, doubles(8)]
+        self.pointers, self.found = [pointer(array) for array in self._kept], pointer(self.result)
+        self.values, self.sizes = doubles(8 * vectors * orders), doubles(8 * vectors * orders)
+        widest, added = doubles(8 * words * (1 + vectors)), doubles(size)
+        self.measures = [pointer(array) for array in (self.values, self.sizes, widest, added)]
+        self.widest, self.added = widest.reshape(-1, words, 8), added.reshape(-1, words, 8)
+
+
+def _levels(grid: Grid, left: Doubles, right: Doubles) -> tuple[Doubles, Doubles]:
+    """The largest product of level k and the sum of all, over g_k, for k = 0 to 2K − 2; from words over their units."""
+    products = numpy.maximum.reduce(left[:, None, :] * right, 2).ravel() * 2.0**-grid.bits
+    table = _antidiagonals(grid.words)
+    return numpy.maximum.reduce(table * products, 1), table @ products * _UP
+
+
+@lru_cache(maxsize=32)
+def _antidiagonals(words: int) -> NDArray[numpy.float64]:
+    i, j = numpy.divmod(numpy.arange(words * words), words)
+    return numpy.asarray((i + j == numpy.arange(2 * words - 1)[:, None]).astype(float))
+
+
+@lru_cache(maxsize=32)
+def _ulps(grid: Grid) -> Doubles:
+    """g_K, …, g_(2K−2), which are below the last word, over g."""
+    return numpy.asarray(2.0 ** (-grid.bits * numpy.arange(1.0, grid.words)))
+
+
+def _error(grid: Grid, products: Doubles, terms: int) -> tuple[float, float]:
+    """ε(T) as (a, c) with a T + c for T ≤ ``terms``, in ulps."""
+    words = grid.words
+    largest = 1.5 * 2.0**52 + terms * (float(products[words - 1]) + words * 2.0**grid.bits)
+    dropped = float(products[words:] @ _ulps(grid)) * _UP
+    rounding = 2.0**-53 * largest * _UP
+    return (words + 1) * rounding + dropped, rounding
+
+
+def _words(value: int, grid: Grid) -> list[float]:
+    """A whole number of ulps as words, exactly."""
+    found = []
+    for k in range(grid.words - 1):
+        shift = grid.bits * (grid.words - 1 - k)
+        digit = (value + (1 << (shift - 1))) >> shift
+        value -= digit << shift
+        found.append(ldexp(float(digit), -grid.bits * (k + 1)))
+    return [*found, ldexp(float(value), -grid.total)]
+
+
+def _whole(words: Doubles, grid: Grid) -> Any:
+    """What words add to along the last axis, in ulps: an array of integers."""
+    digits = numpy.ldexp(words, grid.bits * numpy.arange(1, grid.words + 1)).astype(numpy.int64).astype(object)
+    total = digits[..., 0]
+    for k in range(1, grid.words):
+        total = (total << grid.bits) + digits[..., k]
+    return total

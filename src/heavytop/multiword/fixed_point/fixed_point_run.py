@@ -1,0 +1,223 @@
+"""One motion in K words: what the machine code of :mod:`heavytop.multiword.fixed_point.steps` works on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy
+
+from heavytop.multiword.codegen.machine_code import Doubles, Processor, doubles, once, pointer
+from heavytop.multiword.codegen.recurrence import series_rates
+from heavytop.multiword.fixed_point import steps
+from heavytop.multiword.fixed_point.arithmetic import Grid, digits, exact
+from heavytop.multiword.fixed_point.steps import most_of, most_orders, rows_of, sample_row, size_of
+from heavytop.multiword.problem import Run, Scaled, Status
+
+_FIRST_HALVINGS = 3
+_FEWEST_HALVINGS = -4
+_MOST_HALVINGS = 40
+_HALVED_SAMPLES = 4
+_LARGEST_TIME = Fraction(2) ** 1000
+TINY_BITS = 20
+"""A component that lies more bits below 1 asks for as many more; less is made up for by the spare ones of a format."""
+_SMALL = Fraction(1, 2**TINY_BITS)
+_FIRST_ORDERS = 6
+
+
+machine = once(steps.build)
+"""The machine code, compiled at its first use."""
+
+
+def excess(problem: Scaled) -> int:
+    """e, so that the coefficients over 2^e are at most 1: as many bits are lost in products with them."""
+    largest, found = problem.coefficients.largest, 0
+    while largest > 2**found:
+        found += 1
+    return found
+
+
+def constants(problem: Scaled, grid: Grid, over: int, factor: Fraction = Fraction(1)) -> Doubles:
+    """The words of the coefficients times ``factor``, over 2^over."""
+    given = problem.coefficients
+    flat = [row for vector in (given.beside if grid.bounded else given.vectors) for row in vector]
+    found = doubles(8 * grid.words * len(flat))
+    table = found.reshape(len(flat), grid.words, 8)
+    share = factor / 2**over
+    words = {c: digits(c * share, grid) for c in {c for row in flat for c in row}}
+    for index, row in enumerate(flat):
+        for lane, c in enumerate(row):
+            if c:
+                table[index, :, lane] = words[c]
+    return found
+
+
+def inverses(grid: Grid) -> Doubles:
+    """1/(n + 1) for every order that a step may take."""
+    found = doubles(most_orders(grid) + 1)
+    found[:] = 1 / numpy.arange(1, most_orders(grid) + 2)
+    return found
+
+
+def spread(problem: Scaled) -> int:
+    """How many bits the smallest component lies below 1: of those that are not 0 at the start, and of what tiny
+    coefficients make of the others, for an unstable axis would amplify that too.
+    """
+    small = max((_below(value) for value in problem.state if value), default=0)
+    coefficients = (c for vector in problem.coefficients.vectors for row in vector for c in row if c)
+    if all(problem.state[:6]) or max(small, *map(_below, coefficients)) <= TINY_BITS // 2:
+        return small
+    grown = max(map(_below, _from_nothing(problem)), default=0)
+    return max(small, grown if grown > TINY_BITS else 0)
+
+
+def _below(value: Fraction) -> int:
+    """How many bits ``value``, which is not 0, lies below 1; 0 where it is larger."""
+    return max(0, value.denominator.bit_length() - abs(value.numerator).bit_length() + 1)
+
+
+def _from_nothing(problem: Scaled) -> list[Fraction]:
+    """The largest of the first Taylor coefficients of each component of Ω and γ that is 0 at the start and then not."""
+    series, born = [problem.state], dict.fromkeys((k for k in range(6) if not problem.state[k]), Fraction(0))
+    while len(series) <= _FIRST_ORDERS and any(value < _SMALL for value in born.values()):
+        rates = series_rates(problem.system, problem.coefficients, series)
+        series.append(tuple(rate / len(series) for rate in rates))
+        born = {k: max(value, abs(series[-1][k])) for k, value in born.items()}
+    return [value for value in born.values() if value]
+
+
+class Fixed(Run):
+    """A motion that advances on a grid of K words; the problem is scaled so that |ω| <= 4."""
+
+    def __init__(self, problem: Scaled, grid: Grid, forwards: bool, processor: Processor | None = None) -> None:
+        self.vectors = 1 if len(problem.state) == 6 else 2
+        self.machine = machine(grid, problem.system, self.vectors == 2, processor)
+        self.problem, self.grid, self.forwards = problem, grid, forwards
+        self.steps = 0
+        size, scratch = 8 * grid.words * self.vectors, size_of(grid, self.vectors)
+        self.excess = excess(problem)
+        self.words, self.result = doubles(size), doubles(2 * size)
+        for place, value in zip(self._places, problem.state, strict=True):
+            self.words[place : place + 8 * grid.words : 8] = digits(value, grid)
+        self.inverses = inverses(grid)
+        self.rows, self.sums, self.seen = doubles(scratch.rows), doubles(scratch.sums), doubles(8)
+        self.places = numpy.zeros(scratch.places, numpy.int64)
+        self.clock, self.counts = doubles(steps.CLOCK), numpy.zeros(steps.COUNTS, numpy.int64)
+        self.clock[steps.SIGN] = 1.0 if forwards else -1.0
+        self.counts[steps.EXCESS] = self.excess
+        self.counts[[steps.HALVINGS, steps.FEWEST, steps.MOST]] = _FIRST_HALVINGS, _FEWEST_HALVINGS, _MOST_HALVINGS
+        self.constants = constants(problem, grid, self.excess)
+
+    @property
+    def _places(self) -> list[int]:
+        """Where the first word of each component is."""
+        second = 8 * self.grid.words
+        return [*range(6), *(second + lane for lane in range(3, 6))][: len(self.problem.state)]
+
+    @property
+    def order(self) -> int:
+        return int(self.counts[steps.ORDERS])
+
+    @property
+    def redone(self) -> int:
+        """Steps that were done again with half their length."""
+        return int(self.counts[steps.REDONE])
+
+    @property
+    def time(self) -> Fraction:
+        return Fraction(float(self.clock[steps.TIME]))
+
+    @property
+    def state(self) -> tuple[Fraction, ...]:
+        return self._exact(self.words)
+
+    def _exact(self, words: Doubles) -> tuple[Fraction, ...]:
+        return tuple(exact(words[place : place + 8 * self.grid.words : 8]) for place in self._places)
+
+    def advance(self, target: Fraction, steps_at_most: int) -> Status:
+        self.clock[steps.TARGET] = _not_before(min(target, _LARGEST_TIME))
+        arrays = [self.words, *self._scratch(self.constants, self.rows), self.result, self.clock, self.counts]
+        taken = self.machine.functions["advance"](*[pointer(array) for array in arrays], steps_at_most)
+        self.steps += taken
+        return Status(int(self.counts[steps.STATUS]))
+
+    def _scratch(self, constants: Doubles, rows: Doubles) -> list[Any]:
+        return [constants, self.inverses, rows, self.sums, self.places, self.seen]
+
+    def sample(self, time: Fraction) -> tuple[Fraction, ...] | None:
+        length = self.time - self._began
+        if not length:  # no step stands
+            return None
+        at = doubles(self.grid.words)
+        at[:] = digits((time - self._began) / length, self.grid)
+        found = doubles(sample_row(self.grid, self.vectors))
+        self._samples(at, found, 0, 1)
+        return self.exact_state(found, time)
+
+    @property
+    def _began(self) -> Fraction:
+        return Fraction(float(self.clock[steps.BEGAN]))
+
+    def _samples(self, at: Doubles, found: Doubles, first: int, last: int) -> None:
+        order = int(self.counts[steps.ORDERS])
+        self.machine.functions["samples"](pointer(self.rows), order, pointer(at), first, last, pointer(found))
+
+    def exact_state(self, words: Doubles, time: Fraction) -> tuple[Fraction, ...] | None:
+        """The state out of a row of samples, at ``time`` in the last step."""
+        if not words[-8:].max() <= most_of(self.grid):
+            moved = self._moved(self._before(), time - self._began, _HALVED_SAMPLES)
+            return None if moved is None else self._exact(moved)
+        size, parts = 8 * self.grid.words, range(self.vectors)
+        lanes = [[exact(words[size * v + lane : size * (v + 1) : 8]) for lane in range(6)] for v in parts]
+        return state_of_left(lanes)
+
+    def _moved(self, words: Doubles, span: Fraction, halvings: int) -> Doubles | None:
+        """The words after a time ``span``: one series; where a sum leaves its range, two of half the length."""
+        found, rows = doubles(len(words)), doubles(len(self.rows))
+        arrays = [words, *self._scratch(constants(self.problem, self.grid, self.excess, span), rows)]
+        factor, raises = steps.raises_of(self.excess)
+        call = [*[pointer(array) for array in arrays], factor * float(self.clock[steps.SIGN]), raises, pointer(found)]
+        orders = self.machine.functions["series"](*call)
+        if orders >= 0:
+            return found
+        half = None if halvings == 0 else self._moved(words, span / 2, halvings - 1)
+        return None if half is None else self._moved(half, span / 2, halvings - 1)
+
+    def _before(self) -> Doubles:
+        """The words of the state before the last step."""
+        words = doubles(len(self.words))
+        words[:] = self.result[len(self.words) :]
+        return words
+
+    def coefficients(self, n: int) -> tuple[Fraction, ...]:
+        left = rows_of(self.grid).left
+        return state_of_left([left(self.rows, self.grid, self.vectors, n, v) for v in range(self.vectors)])
+
+    def place(self) -> tuple[str, ...]:
+        length = Fraction(float(self.clock[steps.TIME])) - Fraction(float(self.clock[steps.BEGAN]))
+        halvings = length.denominator.bit_length() - length.numerator.bit_length()
+        words = (self.clock[steps.BEGAN], *self._before())
+        return (str(halvings), *(float(word).hex() for word in words))
+
+    def restore(self, place: tuple[str, ...], steps_before: int) -> None:
+        self.counts[steps.HALVINGS] = int(place[0])
+        words = [float.fromhex(text) for text in place[1:]]
+        self.clock[steps.TIME] = words[0]
+        self.words[:] = words[1:]
+        self.steps = steps_before
+
+
+def state_of_left(lanes: Sequence[Any]) -> tuple[Any, ...]:
+    """Components out of L of each vector: Ω2, Ω3, Ω1, γ2 + γ3, γ1 + γ2, 2 γ2, or the last three with ξ for γ."""
+    found: list[Any] = []
+    for vector, left in enumerate(lanes):
+        middle = left[5] / 2
+        found += [*(left[2], left[0], left[1])[: 3 * (1 - vector)], left[4] - middle, middle, left[3] - middle]
+    return tuple(found)
+
+
+def _not_before(target: Fraction) -> float:
+    """The least double that is not less."""
+    near = float(target)
+    return near if Fraction(near) >= target else float(numpy.nextafter(near, numpy.inf))

@@ -1,0 +1,631 @@
+"""How the coefficients of a step are kept, an order a row, and how their products are summed: what both ways share."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from llvmlite import ir
+
+from heavytop.multiword.codegen.machine_code import (
+    DOUBLE,
+    INT,
+    INT_POINTER,
+    INT_VECTOR,
+    LANES,
+    POINTER,
+    VECTOR,
+    Code,
+    Doubles,
+    Index,
+    function,
+)
+from heavytop.multiword.codegen.recurrence import LEFT, RIGHT, Sum
+from heavytop.multiword.fixed_point.arithmetic import WIDEST, Accumulator, Grid, centred, exact, write_kernels
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """Doubles of a row, of all rows and of the sums; integers of the places."""
+
+    row: int
+    rows: int
+    sums: int
+    places: int
+
+
+@dataclass(slots=True)
+class Rows(ABC):
+    """Writes what keeps the coefficients y_n of ``vectors`` state vectors, K words each, and sums their products.
+
+    orders: as many as there is room for.  rows, sums, places, seen: scratch as :meth:`size` says, zeros at first.
+    """
+
+    code: Code
+    grid: Grid
+    vectors: int
+    orders: int
+    rows: Any
+    sums: Any
+    places: Any
+    seen: Any
+    kernels: list[Any]
+
+    @staticmethod
+    @abstractmethod
+    def size(grid: Grid, vectors: int, orders: int) -> Size:
+        """What ``orders`` orders need."""
+
+    @staticmethod
+    @abstractmethod
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Any]:
+        """The functions that sum products; which is best depends on how many registers there are, no result does."""
+
+    @staticmethod
+    @abstractmethod
+    def left(rows: Doubles, grid: Grid, vectors: int, n: int, vector: int) -> list[Fraction]:
+        """The eight lanes of L of an order, out of the rows."""
+
+    @abstractmethod
+    def stored(self, n: Any, vector: int) -> list[Any]:
+        """L of an order as K words, not carried."""
+
+    @abstractmethod
+    def begin(self, y: list[Any], wide: Any) -> Any:
+        """Store y_0; gives the largest word over its limit."""
+
+    @abstractmethod
+    def keep(self, n: Index, y: list[Any], zeros: Any, wide: Any) -> tuple[list[Any], Any, Any]:
+        """Store y_n; gives y_n as it was stored, the zeros from now on, and the largest word over its limit.
+
+        zeros: an integer about leading zeros, which begins at 0.
+        """
+
+    @abstractmethod
+    def products(self, n: Any, zeros: Any, vector: int) -> list[Any]:
+        """S_n = Σ L_m ∘ R_(n−m) of a vector: K words, not carried."""
+
+    def sides(self, y: list[Any]) -> list[list[Any]]:
+        """R, and L of each vector, word by word."""
+        words = self.grid.words
+        parts = [y[words * v : words * (v + 1)] for v in range(self.vectors)]
+        return [_side(self.code, parts[0], RIGHT), *(_side(self.code, part, LEFT) for part in parts)]
+
+    def largest_sum(self, y: list[Any]) -> Any:
+        """The largest sum of |words| of a component, a double."""
+        code, words = self.code, self.grid.words
+        largest = code.zero
+        for v in range(self.vectors):
+            one = code.absolute(y[words * v])
+            for word in y[words * v + 1 : words * (v + 1)]:
+                one = code.add(one, code.absolute(word))
+            largest = code.larger(one, largest)
+        return code.largest(largest)
+
+    def watch(self, wide: Any, value: Any, k: int, bits: int = WIDEST) -> Any:
+        """The largest word so far, over 2^bits of its unit."""
+        share = self.code.multiply(self.code.absolute(value), self.code.constant(2.0**-bits / self.grid.unit(k)))
+        return self.code.larger(share, wide)
+
+
+def _side(code: Code, y: list[Any], which: Sum) -> list[Any]:
+    signs = code.constant(which.sign)
+    return [
+        code.fma(code.shuffle(word, code.zero, which.second), signs, code.shuffle(word, code.zero, which.first))
+        for word in y
+    ]
+
+
+# Sums of products of series in digits of 24 bits: every product and every sum is exact.
+#
+# Digits are whole numbers, |d| ≤ 2^23 + 4.  A product of two is a whole number of at most 2^46 (1 + 2^-18), and 120 of
+# them add up to less than 2^53: a double holds their sum, one operation a product, in any order and without a look at
+# exponents.  Products with i + j < q are computed in tiles, some digits of the left by as many of the right with a sum
+# for each i + j, over so many orders that no sum has more than 120 products; it is then split at 2^24, so that what
+# adds up over all orders stays far below 2^53 too.
+
+
+BITS = 24
+SUM_BITS = 38
+"""Of the sum of a level over 700 orders: 50 groups of orders in 8 tiles, or fewer in more, of 2^29 and 2^23 each."""
+_PRODUCTS = 120
+_ROUND = 1.5 * 2.0**52
+
+
+def rounded(code: Code, value: Any, place: int = 0) -> Any:
+    """To the nearest multiple of 2^place, for |value| ≤ 2^(51 + place)."""
+    big = code.constant(_ROUND * 2.0**place)
+    return code.subtract(code.add(value, big), big)
+
+
+@dataclass(frozen=True, slots=True)
+class _Tiles:
+    """side: digits of the left and of the right in a tile.  triangle: levels up to which one tile has all.
+    sums: kept in registers.
+    """
+
+    side: int
+    triangle: int
+    sums: int
+
+
+_WIDE, _NARROW = _Tiles(8, 13, 18), _Tiles(4, 4, 7)
+
+
+def _write_tile(module: ir.Module, levels: int, side: int, most_sums: int) -> Any:
+    """(left, right, where, orders, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels, i, j < side.
+
+    Split at 2^24: what is whole multiples of that is added to the level before.
+    """
+    made, code = function(module, f"tile_{levels}_{side}", ir.VoidType(), [POINTER, POINTER, INT_POINTER, INT, POINTER])
+    made.linkage = "internal"
+    made.attributes.add("noinline")
+    left, right, where, orders, sums = made.args
+    b = code.builder
+    pairs = [
+        [(i, level - i) for i in range(side) if 0 <= level - i < side] for level in range(min(levels, 2 * side - 1))
+    ]
+    ways = [1] * len(pairs)
+    while sum(ways) < most_sums and (rest := [k for k, pair in enumerate(pairs) if ways[k] < len(pair)]):
+        ways[max(rest, key=lambda k: len(pairs[k]) / ways[k])] += 1
+    most = _PRODUCTS // max(map(len, pairs))
+    begins = [sum(ways[:level]) for level in range(len(ways) + 1)]
+
+    def order(m: Any, values: list[Any]) -> list[Any]:
+        at, found = b.load(code.address(where, m)), list(values)
+        one, other = code.address(left, at), code.address(right, b.neg(at))
+        a = [code.load(one, LANES * i) for i in range(side)]
+        for j in range(side):
+            c = code.load(other, LANES * j)
+            for i in range(side):
+                if i + j < levels:
+                    place = begins[i + j] + pairs[i + j].index((i, j)) % ways[i + j]
+                    found[place] = code.multiply_add(a[i], c, found[place])
+        return found
+
+    def group(g: Any, _: list[Any]) -> None:
+        start = b.mul(g, code.integer(most))
+        stop = b.add(start, code.integer(most))
+        stop = b.select(b.icmp_signed("<", stop, orders), stop, orders)
+        _add_levels(code, sums, begins, code.loop(start, stop, order, [code.zero] * begins[-1]))
+
+    code.loop(0, b.sdiv(b.add(orders, code.integer(most - 1)), code.integer(most)), group, [])
+    b.ret_void()
+    return made
+
+
+def _add_levels(code: Code, sums: Any, begins: list[int], values: list[Any]) -> None:
+    """sums += the values of each level, split at 2^24."""
+    carries, rest = [], []
+    for level in range(len(begins) - 1):
+        first, *others = values[begins[level] : begins[level + 1]]
+        for value in others:
+            first = code.add(first, value)
+        carries.append(rounded(code, first, BITS))
+        rest.append(code.subtract(first, carries[-1]))
+    down = code.constant(2.0**-BITS)
+    for level, (value, carry) in enumerate(zip([code.zero, *rest], [*carries, code.zero], strict=True)):
+        place = LANES * level
+        total = code.add(code.load(sums, place), value)
+        code.store(code.multiply_add(carry, down, total), sums, place)
+
+
+def write_sums(module: ir.Module, wide: bool) -> Any:
+    """(left, right, where, orders, levels, sums): sums += Σ_m left[where[m]] right[−where[m]] for i + j < levels.
+
+    sums begins with what is whole multiples of a level before the first.  where counts doubles, a digit has eight.
+    wide: as :attr:`heavytop.multiword.codegen.machine_code.Processor.wide`; the sums are the same.
+
+    Few levels are one tile.  Else a few orders at a time, which stay near, go through all tiles.
+    """
+    sizes = _WIDE if wide else _NARROW
+    side = sizes.side
+    triangles = [_write_tile(module, d, d, sizes.sums) for d in range(1, sizes.triangle + 1)]
+    tiles = triangles[:side] + [_write_tile(module, d, side, sizes.sums) for d in range(side + 1, 2 * side)]
+    arguments = [POINTER, POINTER, INT_POINTER, INT, INT, POINTER]
+    made, code = function(module, "sum_products", ir.VoidType(), arguments)
+    made.linkage = "internal"
+    made.attributes.add("noinline")
+    left, right, where, orders, levels, sums = made.args
+    b, tile, group = code.builder, code.integer(LANES * side), code.integer(_PRODUCTS // side)
+    many = b.icmp_signed(">", levels, code.integer(len(triangles)))
+    with b.if_then(b.not_(many)):
+        _call(code, triangles, levels, [left, right, where, orders, sums])
+        b.ret_void()
+    parts = b.sdiv(b.add(levels, code.integer(side - 1)), code.integer(side))
+
+    def some(g: Any, _: list[Any]) -> None:
+        start = b.mul(g, group)
+        rest = b.sub(orders, start)
+        count = b.select(b.icmp_signed("<", rest, group), rest, group)
+
+        def one(i: Any, _: list[Any]) -> None:
+            def other(j: Any, _: list[Any]) -> None:
+                ahead = b.add(i, j)
+                both = [code.address(base, b.mul(k, tile)) for base, k in ((left, i), (right, j))]
+                places = [code.address(where, start), count, code.address(sums, b.mul(ahead, tile))]
+                _call(code, tiles, b.sub(levels, b.mul(ahead, code.integer(side))), [*both, *places])
+
+            code.loop(0, b.sub(parts, i), other, [])
+
+        code.loop(0, parts, one, [])
+
+    code.loop(0, b.sdiv(b.add(orders, b.sub(group, code.integer(1))), group), some, [])
+    b.ret_void()
+    return made
+
+
+def _call(code: Code, tiles: list[Any], levels: Any, arguments: list[Any]) -> None:
+    """The tile of so many levels, if there are any, or the last."""
+    b = code.builder
+    end = b.append_basic_block("end")
+    blocks = [b.append_basic_block(f"levels_{d}") for d in range(1, len(tiles) + 1)]
+    switch = b.switch(levels, blocks[-1])
+    switch.add_case(code.integer(0), end)
+    for d, (tile, block) in enumerate(zip(tiles, blocks, strict=True), 1):
+        switch.add_case(code.integer(d), block)
+        b.position_at_end(block)
+        b.call(tile, arguments)
+        b.branch(end)
+    b.position_at_end(end)
+
+
+# Coefficients in digits of 24 bits, whose products are summed exactly.
+#
+# L and R of an order are Σ_j d_j u_j with u_j = 2^(6 − 24 (j + 1)) and digits d_j, j < J, as
+# :mod:`heavytop.multiword.fixed_point.products` takes them.  What is left out of a sum of n products of numbers,
+# products of digits with i + j ≥ J and what J digits lack, is at most n (J + 1)/4 units of the last word.
+#
+# From some order on the first z digits are 0: |y| ≤ u_(z−1)/8 is enough, for L and R are at most twice as large, and
+# what lies behind digit z is at most 0.51 u_(z−1).  S_n begins at level s = min_m z(m) + z(n − m), and the pair
+# (m, n − m) with digit z(m) on the left and digit s − z(m) on the right.  That is kept from lying more than two before
+# the first digit, where zeros are.  What a left side has behind its last digit then meets these zeros.
+
+
+_HEAD = 6
+"""log2 of the unit before the first digit: L and R are at most half of it, and y a quarter."""
+_BEHIND = 6
+"""Digits go on for so many bits behind the unit of the last word."""
+_BEFORE = 2
+
+
+def digits_of(grid: Grid) -> int:
+    """J."""
+    return -(-(grid.total + _HEAD + _BEHIND) // BITS)
+
+
+class DigitRows(Rows):
+    """A row: two zeros, the digits of R, those of each L.  places: z(n) and, behind, where digit z(n) of the first L is
+    from the first digit of order 0 on.
+    """
+
+    @staticmethod
+    def size(grid: Grid, vectors: int, orders: int) -> Size:
+        row = LANES * (_BEFORE + digits_of(grid) * (1 + vectors))
+        return Size(row, row * orders, LANES * (digits_of(grid) + 1), 2 * orders)
+
+    @staticmethod
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Any]:
+        return [write_sums(module, wide)]
+
+    @staticmethod
+    def left(rows: Doubles, grid: Grid, vectors: int, n: int, vector: int) -> list[Fraction]:
+        count, row = digits_of(grid), DigitRows.size(grid, vectors, 1).row
+        start = n * row + LANES * (_BEFORE + count * (1 + vector))
+        block = rows[start : start + LANES * count].reshape(count, LANES)
+        unit = Fraction(2) ** (_HEAD - BITS * count)
+        return [
+            sum((int(d) << BITS * (count - 1 - j) for j, d in enumerate(block[:, lane])), 0) * unit
+            for lane in range(LANES)
+        ]
+
+    def stored(self, n: Any, vector: int) -> list[Any]:
+        code, grid, count = self.code, self.grid, digits_of(self.grid)
+        row = code.integer(self.size(grid, self.vectors, 1).row)
+        at = code.address(self.rows, code.builder.mul(n, row))
+        found = [code.zero] * grid.words
+        for j in range(count):
+            exponent = _HEAD - BITS * (j + 1)
+            digit = code.load(at, LANES * (_BEFORE + count * (1 + vector) + j))
+            value = code.multiply(digit, code.constant(2.0**exponent))
+            k = min(max(0, -(exponent // grid.bits) - 1), grid.words - 1)  # the first word whose unit is no larger
+            if k:  # what is large beside that unit goes to the word before
+                big = code.constant(grid.centre(k - 1))
+                high = code.subtract(code.add(value, big), big)
+                found[k - 1] = code.add(found[k - 1], high)
+                value = code.subtract(value, high)
+            found[k] = code.add(found[k], value)
+        return found
+
+    def begin(self, y: list[Any], wide: Any) -> Any:
+        return self.keep(0, y, self.code.integer(0), wide)[2]
+
+    def keep(self, n: Index, y: list[Any], zeros: Any, wide: Any) -> tuple[list[Any], Any, Any]:
+        code, b, grid = self.code, self.code.builder, self.grid
+        for place, word in enumerate(y):
+            wide = self.watch(wide, word, place % grid.words, grid.most_bits(place % grid.words))
+        count, start = digits_of(grid), b.mul(code.integer(n), code.integer(self.size(grid, self.vectors, 1).row))
+        at = code.address(self.rows, start)
+        for part, words in enumerate(self.sides(y)):
+            for j, digit in enumerate(self._digits(words)):
+                code.store(digit, at, LANES * (_BEFORE + part * count + j))
+        # |y| < 2^(e + 1), in bits of a double
+        size = b.bitcast(self.largest_sum(y), INT)
+        exponent = b.sub(b.lshr(size, code.integer(52)), code.integer(1023))
+        z = b.sdiv(self._larger(b.sub(code.integer(_HEAD - 4), exponent), code.integer(0)), code.integer(BITS))
+        z = self._smaller(z, code.integer(count - 1))
+        self._put_place(n, z)
+        return y, self._larger(z, zeros), wide
+
+    def _put_place(self, n: Index, z: Any) -> None:
+        code, b = self.code, self.code.builder
+        row = code.integer(self.size(self.grid, self.vectors, 1).row)
+        b.store(z, code.address(self.places, n))
+        place = b.add(b.mul(code.integer(n), row), b.mul(z, code.integer(LANES)))
+        b.store(place, code.address(self._where, n))
+
+    @property
+    def _where(self) -> Any:
+        return self.code.address(self.places, self.orders)
+
+    def products(self, n: Any, zeros: Any, vector: int) -> list[Any]:
+        code, b, count = self.code, self.code.builder, digits_of(self.grid)
+        level = self._level(n, zeros)
+        for k in range(count + 1):
+            code.store(code.zero, self.sums, LANES * k)
+        row = code.integer(self.size(self.grid, self.vectors, 1).row)
+        first = code.address(self.rows, LANES * (_BEFORE + count * (1 + vector)))
+        right = code.address(self.rows, b.add(b.mul(n, row), code.integer(LANES * _BEFORE)))
+        arguments = [
+            first,
+            code.address(right, b.mul(level, code.integer(LANES))),
+            self._where,
+            b.add(n, code.integer(1)),
+            b.sub(code.integer(count), level),
+            code.address(self.sums, b.mul(level, code.integer(LANES))),
+        ]
+        b.call(self.kernels[0], arguments)
+        return self._words([code.load(self.sums, LANES * k) for k in range(count + 1)])
+
+    def _level(self, n: Any, most: Any) -> Any:
+        """s; where some z(m) exceeds s + 2, it counts as s + 2, so that s is looked for again."""
+        code, b = self.code, self.code.builder
+        before, search = b.block, b.append_basic_block("level")
+        b.branch(search)
+        b.position_at_end(search)
+        largest = b.phi(INT)
+        largest.add_incoming(most, before)
+        half = b.add(b.ashr(n, code.integer(1)), code.integer(1))
+
+        def lower(m: Any, values: list[Any]) -> list[Any]:
+            pair = [b.load(code.address(self.places, k)) for k in (m, b.sub(n, m))]
+            return [self._smaller(values[0], b.add(*pair))]
+
+        level = code.loop(0, half, lower, [code.integer(digits_of(self.grid))])[0]
+        limit = b.add(level, code.integer(_BEFORE))
+        again, found = b.append_basic_block("again"), b.append_basic_block("found")
+        b.cbranch(b.icmp_signed(">", largest, limit), again, found)
+        b.position_at_end(again)
+
+        def clip(m: Any, _: list[Any]) -> None:
+            self._put_place(m, self._smaller(b.load(code.address(self.places, m)), limit))
+
+        code.loop(0, b.add(n, code.integer(1)), clip, [])
+        largest.add_incoming(limit, b.block)
+        b.branch(search)
+        b.position_at_end(found)
+        return level
+
+    def _smaller(self, a: Any, c: Any) -> Any:
+        return self.code.builder.select(self.code.builder.icmp_signed("<", a, c), a, c)
+
+    def _larger(self, a: Any, c: Any) -> Any:
+        return self.code.builder.select(self.code.builder.icmp_signed(">", a, c), a, c)
+
+    def _digits(self, words: list[Any]) -> list[Any]:
+        """The digits of words, the last rounded."""
+        code, grid, count = self.code, self.grid, digits_of(self.grid)
+        found: list[Any] = [None] * count
+        for k, word in enumerate(words):
+            rest = _times(code, word, _raised(grid))
+            for j in range(self._first_digit(k), count):
+                exact = self._place(j) <= -grid.bits * (k + 1) and k + 1 < grid.words
+                piece = rest if exact else rounded(code, rest, self._place(j) + _raised(grid))
+                found[j] = piece if found[j] is None else code.add(found[j], piece)
+                if exact:
+                    break
+                rest = code.subtract(rest, piece)
+        carries = [None, *(rounded(code, d, self._place(j) + _raised(grid)) for j, d in enumerate(found[1:])), None]
+        carried = [self._carried(*three) for three in zip(found, carries, carries[1:], strict=False)]
+        return [_times(code, digit, -self._place(j) - _raised(grid)) for j, digit in enumerate(carried)]
+
+    def _carried(self, digit: Any, out: Any, into: Any) -> Any:
+        value = digit if out is None else self.code.subtract(digit, out)
+        return value if into is None else self.code.add(value, into)
+
+    def _place(self, j: int) -> int:
+        """log2 u_j."""
+        return _HEAD - BITS * (j + 1)
+
+    def _first_digit(self, k: int) -> int:
+        """Where the digits of word k begin."""
+        return max(0, (_HEAD + self.grid.bits * k + BITS - 2) // BITS - 1)
+
+    def _words(self, sums: list[Any]) -> list[Any]:
+        """Σ_l of sums of level l − 1, whole multiples of its unit, as words."""
+        code, grid = self.code, self.grid
+        found: list[Any] = [None] * grid.words
+        for index in reversed(range(len(sums))):
+            unit = 2 * _HEAD - BITS * (index + 1)
+            rest = _times(code, sums[index], unit + _raised(grid))
+            for k in range(min(grid.words - 1, max(0, (3 - unit - SUM_BITS) // grid.bits)), grid.words):
+                exact = k == grid.words - 1 or unit + grid.bits * (k + 1) >= 0
+                piece = rest if exact else rounded(code, rest, _raised(grid) - grid.bits * (k + 1))
+                found[k] = piece if found[k] is None else code.add(found[k], piece)
+                if exact:
+                    break
+                rest = code.subtract(rest, piece)
+        return [code.zero if word is None else _times(code, word, -_raised(grid)) for word in found]
+
+
+def _raised(grid: Grid) -> int:
+    """Numbers are split times 2 to the power of this, where digits are small beside the range of doubles."""
+    return 500 if grid.total > 800 else 0
+
+
+def _times(code: Code, value: Any, exponent: int) -> Any:
+    """value 2^exponent."""
+    while exponent:
+        part = max(-1000, min(1000, exponent))
+        value, exponent = code.multiply(value, code.constant(2.0**part)), exponent - part
+    return value
+
+
+# Coefficients in the K words of the grid itself, for few words and for proofs.
+#
+# Words that have become 0 in all lanes are skipped: from some order on the first u words of every coefficient are 0.
+
+
+_FAR = 1 << 40
+
+
+class WordRows(Rows):
+    """A row: R, then L of each vector, K words each.  places: from which order on u leading words are 0."""
+
+    @staticmethod
+    def size(grid: Grid, vectors: int, orders: int) -> Size:
+        row = 8 * grid.words * (1 + vectors)
+        return Size(row, row * orders, 8 * grid.words, grid.words + 2)
+
+    @staticmethod
+    def write_kernels(module: ir.Module, grid: Grid, row: int, wide: bool) -> list[Any]:
+        return write_kernels(module, grid, row)
+
+    @staticmethod
+    def left(rows: Doubles, grid: Grid, vectors: int, n: int, vector: int) -> list[Fraction]:
+        start = 8 * grid.words * (n * (1 + vectors) + 1 + vector)
+        block = rows[start : start + 8 * grid.words]
+        return [exact(block[lane::8]) for lane in range(8)]
+
+    def stored(self, n: Any, vector: int) -> list[Any]:
+        code, words = self.code, self.grid.words
+        row = code.integer(self.size(self.grid, self.vectors, 1).row)
+        at = code.address(self.rows, code.builder.mul(n, row))
+        return [code.load(at, 8 * (words * (1 + vector) + k)) for k in range(words)]
+
+    def begin(self, y: list[Any], wide: Any) -> Any:
+        code = self.code
+        self._put(0, y)
+        code.builder.store(code.integer(0), code.address(self.places, 0))
+        for k in range(1, self.grid.words + 2):
+            code.builder.store(code.integer(_FAR), code.address(self.places, k))
+        return wide
+
+    def keep(self, n: Any, y: list[Any], zeros: Any, wide: Any) -> tuple[list[Any], Any, Any]:
+        code, b, words = self.code, self.code.builder, self.grid.words
+        zeros_after = self._leading_zeros(y, zeros)
+
+        def begin(k: Any, _: list[Any]) -> None:
+            b.store(n, code.address(self.places, b.add(k, code.integer(1))))
+
+        # several at once, where the first order is far smaller than the state
+        code.loop(zeros, zeros_after, begin, [])
+        folded: list[Any] = []
+        for v in range(self.vectors):
+            one, wide = self._folded(y[words * v : words * (v + 1)], zeros_after, wide)
+            folded += one
+        self._put(n, folded)
+        return folded, zeros_after, wide
+
+    def _put(self, n: Index, y: list[Any]) -> None:
+        code = self.code
+        row = code.integer(self.size(self.grid, self.vectors, 1).row)
+        at = code.address(self.rows, code.builder.mul(code.integer(n), row))
+        for k, word in enumerate(word for one in self.sides(y) for word in one):
+            code.store(word, at, 8 * k)
+
+    def products(self, n: Any, zeros: Any, vector: int) -> list[Any]:
+        # for each number u of leading zero words on the left and w on the right, where orders have those
+        code, b, words = self.code, self.code.builder, self.grid.words
+        rows, sums, places, seen = self.rows, self.sums, self.places, self.seen
+        row = self.code.integer(self.size(self.grid, self.vectors, 1).row)
+        for k, centre in enumerate(centred(code, self.grid, words)):
+            code.store(centre, sums, 8 * k)
+        one, zero = code.integer(1), code.integer(0)
+
+        def smaller(a: Any, c: Any) -> Any:
+            return b.select(b.icmp_signed("<", a, c), a, c)
+
+        def larger(a: Any, c: Any) -> Any:
+            return b.select(b.icmp_signed(">", a, c), a, c)
+
+        def place(k: Any) -> Any:
+            return b.load(code.address(places, k))
+
+        def left(u: Any, _: list[Any]) -> None:
+            begin, end = place(u), place(b.add(u, one))
+
+            def right(w: Any, _: list[Any]) -> None:
+                low = larger(larger(begin, b.add(b.sub(n, place(b.add(w, one))), one)), zero)
+                high = smaller(smaller(end, b.add(b.sub(n, place(w)), one)), b.add(n, one))
+                count = b.sub(high, low)
+                with b.if_then(b.icmp_signed(">", count, zero)):
+                    at = b.add(b.mul(low, row), b.mul(u, code.integer(8)))
+                    against = b.add(b.mul(b.sub(n, low), row), b.mul(w, code.integer(8)))
+                    skipped = b.add(u, w)
+                    arguments = [
+                        code.address(rows, b.add(at, code.integer(8 * words * (1 + vector)))),
+                        code.address(rows, against),
+                        count,
+                        code.address(sums, b.mul(skipped, code.integer(8))),
+                        seen,
+                    ]
+                    self._call(skipped, arguments)
+
+            code.loop(0, smaller(b.sub(code.integer(words), u), b.add(zeros, one)), right, [])
+
+        code.loop(0, b.add(zeros, one), left, [])
+        found = [code.load(sums, 8 * k) for k in range(words)]
+        watched = Accumulator(code, self.grid, 0, found, b.bitcast(code.load(seen, 0), INT_VECTOR))
+        watched.look_at_all()
+        code.store(b.bitcast(watched.seen, VECTOR), seen, 0)
+        return [code.subtract(s, c) for s, c in zip(found, centred(code, self.grid, words), strict=True)]
+
+    def _call(self, skipped: Any, arguments: list[Any]) -> None:
+        """The kernel for the levels behind ``skipped`` leading zero words."""
+        b, words = self.code.builder, self.grid.words
+        end = b.append_basic_block("called")
+        switch = b.switch(skipped, end)
+        for k in range(words):
+            block = b.append_basic_block(f"skipped_{k}")
+            switch.add_case(self.code.integer(k), block)
+            b.position_at_end(block)
+            b.call(self.kernels[words - 1 - k], arguments)
+            b.branch(end)
+        b.position_at_end(end)
+
+    def _leading_zeros(self, y: list[Any], before: Any) -> Any:
+        """How many leading words are 0 in every lane, all but the last at most; never fewer than before."""
+        code, b, words = self.code, self.code.builder, self.grid.words
+        count, only = code.integer(0), ir.Constant(ir.IntType(1), 1)
+        for k in range(words - 1):
+            largest = code.absolute(y[k])
+            for v in range(1, self.vectors):
+                largest = code.larger(code.absolute(y[words * v + k]), largest)
+            only = b.and_(only, b.fcmp_ordered("==", code.largest(largest), ir.Constant(DOUBLE, 0.0)))
+            count = b.select(only, code.integer(k + 1), count)
+        return b.select(b.icmp_signed(">", count, before), count, before)
+
+    def _folded(self, y: list[Any], zeros: Any, wide: Any) -> tuple[list[Any], Any]:
+        """Words that count as 0 and are not: added to the first that does not."""
+        code, b = self.code, self.code.builder
+        found, left = [], code.zero
+        for k, word in enumerate(y):
+            value = code.add(word, left)
+            wide = self.watch(wide, value, k, self.grid.most_bits(k))
+            skipped = b.icmp_signed("<", code.integer(k), zeros)
+            found.append(b.select(skipped, code.zero, value))
+            left = b.select(skipped, value, code.zero)
+        return found, wide

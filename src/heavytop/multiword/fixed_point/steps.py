@@ -1,0 +1,433 @@
+"""One Taylor step on a grid of K words: the function ``series``.
+
+Coefficients carry h^n, so that the step is a sum.  What has become 0 in all lanes is skipped, which is most of the
+speed: :mod:`heavytop.multiword.fixed_point.products` and :mod:`heavytop.multiword.fixed_point.products` keep
+coefficients and sum their products. The series ends where two coefficients in a row are below
+:attr:`heavytop.multiword.fixed_point.arithmetic.Grid.smallest`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass, field
+from typing import Any
+
+from llvmlite import ir
+
+from heavytop.multiword.codegen.machine_code import (
+    DOUBLE,
+    DOUBLES,
+    INT,
+    INT_POINTER,
+    INT_VECTOR,
+    INTEGERS,
+    POINTER,
+    VECTOR,
+    Code,
+    Machine,
+    Processor,
+    Stepping,
+    compiled,
+    function,
+)
+from heavytop.multiword.codegen.recurrence import GATHERED, beside, turned
+from heavytop.multiword.fixed_point.arithmetic import (
+    EXPONENT_BITS,
+    WIDEST,
+    Accumulator,
+    Grid,
+    bounded_product,
+    carried,
+    centred,
+)
+from heavytop.multiword.fixed_point.products import DigitRows, Rows, Size, WordRows
+from heavytop.top.equations import System
+
+FIRED, UNSETTLED = -1, -2
+"""What ``series`` gives in place of its number of orders: a sum left its range; no convergence."""
+_WIDEST_DIVIDEND = 53
+"""Bits of a word that is divided, behind the first."""
+_NONE = 8
+"""A lane of the second operand of a shuffle, which is 0."""
+_HALVES = (0, 1, 2, *[_NONE] * 5), (3, 4, 5, *[_NONE] * 5)
+_FEWEST_WORDS = 8
+"""With so many words, products are summed in digits: with seven and fewer that is slower (measured)."""
+
+
+def rows_of(grid: Grid) -> type[Rows]:
+    """How products are summed on this grid."""
+    return DigitRows if grid.bounded and grid.words >= _FEWEST_WORDS else WordRows
+
+
+def size_of(grid: Grid, vectors: int) -> Size:
+    """The scratch of a step."""
+    return rows_of(grid).size(grid, vectors, most_orders(grid) + 2)
+
+
+def most_orders(grid: Grid) -> int:
+    """Orders after which a step is given up."""
+    return int(0.64 * grid.total) + 14
+
+
+@dataclass(slots=True)
+class Series:
+    """Writes ``series(state, constants, inverses, rows, sums, places, seen, factor, raises, result)``.
+
+    state, result: K words of each vector.  constants: K words of A and each B (or of those of
+    :attr:`heavytop.multiword.codegen.recurrence.Coefficients.beside`, where the grid is bounded), for each vector.
+    inverses: 1/(n + 1).
+    rows, sums, places, seen: scratch, see :class:`heavytop.multiword.fixed_point.products.Rows`.
+    factor, raises: from one order to the next coefficients are multiplied by factor 16^raises; factor is ± a power of
+    two, at most 1.
+    wide: as :attr:`heavytop.multiword.codegen.machine_code.Processor.wide`; results are the same.
+    """
+
+    module: ir.Module
+    grid: Grid
+    system: System
+    vectors: int
+    wide: bool
+    made: Any = field(init=False)
+    code: Code = field(init=False)
+    rows: Rows = field(init=False)
+
+    def write(self) -> Any:
+        """The function."""
+        kind = rows_of(self.grid)
+        room = most_orders(self.grid) + 2
+        row = kind.size(self.grid, self.vectors, 1).row
+        kernels = kind.write_kernels(self.module, self.grid, row, self.wide)
+        arguments = [POINTER] * 5 + [INT_POINTER, POINTER, DOUBLE, INT, POINTER]
+        self.made, self.code = function(self.module, "series", INT, arguments)
+        state, _, _, rows, sums, places, seen, _, _, result = self.made.args
+        code, b = self.code, self.code.builder
+        words = self.grid.words
+        y = [code.load(state, 8 * k) for k in range(words * self.vectors)]
+        self.rows = kind(code, self.grid, self.vectors, room, rows, sums, places, seen, kernels)
+        code.store(code.zero, seen, 0)
+        orders, small, wide, total = self._orders(y)
+        bits = b.and_(code.any_bit(b.bitcast(code.load(seen, 0), INT_VECTOR)), code.integer(EXPONENT_BITS))
+        in_range = b.icmp_signed("==", bits, code.integer(0))
+        quiet = b.and_(in_range, b.fcmp_ordered("<", code.largest(wide), ir.Constant(DOUBLE, 1.0)))
+        settled = b.icmp_signed(">=", small, code.integer(2))
+        for v in range(self.vectors):
+            one = total[words * v : words * (v + 1)]
+            one = carried(code, self.grid, carried(code, self.grid, one))
+            for k, word in enumerate(one):
+                code.store(word, result, 8 * (words * v + k))
+        found = b.select(settled, orders, code.integer(UNSETTLED))
+        b.ret(b.select(quiet, found, code.integer(FIRED)))
+        return self.made
+
+    def _orders(self, first: list[Any]) -> tuple[Any, Any, Any, list[Any]]:
+        """The loop over orders: their number, how many were small at the end, the largest word, the sum."""
+        code, b = self.code, self.code.builder
+        wide_before = self.rows.begin(first, code.zero)
+        entry = b.block
+        head, body, out = (b.append_basic_block(name) for name in ("orders", "order", "summed"))
+        b.branch(head)
+        b.position_at_end(head)
+        n, zeros, small = (b.phi(INT) for _ in range(3))
+        wide = b.phi(VECTOR)
+        y, total = ([b.phi(VECTOR) for _ in first] for _ in range(2))
+        floating = range(self.grid.words - 1, len(first), self.grid.words) if not self.grid.whole else ()
+        rest = {k: b.phi(VECTOR) for k in floating}
+        carriers = [n, zeros, small, wide, *y, *total, *rest.values()]
+        begin = [code.integer(0)] * 3 + [wide_before, *first, *first, *(code.zero for _ in rest)]
+        for phi, value in zip(carriers, begin, strict=True):
+            phi.add_incoming(value, entry)
+        more = b.icmp_signed("<", n, code.integer(most_orders(self.grid)))
+        b.cbranch(b.and_(more, b.icmp_signed("<", small, code.integer(2))), body, out)
+        b.position_at_end(body)
+        after = b.add(n, code.integer(1))
+        found, wide_after = self._order(n, zeros, wide, y)
+        following, zeros_after, wide_after = self.rows.keep(after, found, zeros, wide_after)
+        size = self.rows.largest_sum(following)
+        limit = ir.Constant(DOUBLE, self.grid.smallest)
+        counted = b.add(small, code.integer(1))
+        small_after = b.select(b.fcmp_ordered("<=", size, limit), counted, code.integer(0))
+        sums = [code.add(a, c) for a, c in zip(total, following, strict=True)]
+        lost = []
+        for k, before in rest.items():
+            sums[k], error = code.two_sum(total[k], following[k])
+            lost.append(code.add(before, error))
+        values = [after, zeros_after, small_after, wide_after, *following, *sums, *lost]
+        for phi, value in zip(carriers, values, strict=True):
+            phi.add_incoming(value, b.block)
+        b.branch(head)
+        b.position_at_end(out)
+        return n, small, wide, [code.add(word, rest[k]) if k in rest else word for k, word in enumerate(total)]
+
+    def _order(self, n: Any, zeros: Any, wide: Any, y: list[Any]) -> tuple[list[Any], Any]:
+        """y_(n+1) and the largest word over its limit."""
+        words = self.grid.words
+        found: list[Any] = []
+        for v in range(self.vectors):
+            products = self.rows.products(n, zeros, v)
+            rates, wide = self._rates(v, products, y[words * v : words * (v + 1)], wide)
+            raised, wide = self._raised(rates, wide)
+            quotient, wide = self._divided(n, self._times(raised), wide)
+            found += quotient
+        return found, wide
+
+    def _rates(self, vector: int, sums: list[Any], y: list[Any], wide: Any) -> tuple[list[Any], Any]:
+        """A ∘ gathered S + Σ B ∘ permuted y, and the largest word."""
+        grid, gathered = self.grid, self._gathered(carried(self.code, self.grid, sums))
+        wide = self.rows.watch(wide, gathered[0], 0, grid.most_bits(0))
+        total = self._bounded_rates(vector, gathered, y) if grid.bounded else self._watched_rates(vector, gathered, y)
+        return carried(self.code, grid, total), wide
+
+    def _constants(self, row: int) -> list[Any]:
+        """The words of a row of the constants."""
+        words = self.grid.words
+        return [self.code.load(self.made.args[1], 8 * (words * row + i)) for i in range(words)]
+
+    def _bounded_rates(self, vector: int, gathered: list[Any], y: list[Any]) -> list[Any]:
+        code, grid, (permutations, second) = self.code, self.grid, beside(self.system)
+        place = (1 + len(permutations)) * vector
+        found = bounded_product(code, grid, self._constants(place), gathered)
+        if vector and second:
+            return found  # neither weight nor rotor turns an attitude
+        for k, lanes in enumerate(permutations, 1):
+            moved = [code.shuffle(word, code.zero, lanes) for word in y]
+            linear = bounded_product(code, grid, self._constants(place + k), moved)
+            if second:
+                parts = [[code.shuffle(word, code.zero, half) for half in _HALVES] for word in linear]
+                linear = [code.add(one, other) for one, other in parts]
+            if k > 1:  # sums of more products than two beside the first would outgrow their words
+                found = carried(code, grid, found)
+            found = [code.add(a, b) for a, b in zip(found, linear, strict=True)]
+        return found
+
+    def _watched_rates(self, vector: int, gathered: list[Any], y: list[Any]) -> list[Any]:
+        code, b, grid, seen, linear = self.code, self.code.builder, self.grid, self.made.args[6], turned(self.system)
+        sources = [gathered, *([code.shuffle(word, code.zero, lanes) for word in y] for lanes in linear)]
+        gathered_bits = b.bitcast(code.load(seen, 0), INT_VECTOR)
+        result = Accumulator(code, grid, 0, centred(code, grid, grid.words), gathered_bits)
+        for k, source in enumerate(sources):
+            factors = self._constants((1 + len(linear)) * vector + k)
+            result.add_product(factors, source, each=True, below=not grid.whole)
+        result.look_at_all()
+        code.store(b.bitcast(result.seen, VECTOR), seen, 0)
+        return [code.subtract(s, c) for s, c in zip(result.sums, centred(code, grid, grid.words), strict=True)]
+
+    def _gathered(self, total: list[Any]) -> list[Any]:
+        code, zero = self.code, self.code.zero
+        found = []
+        for word in total:
+            parts = [
+                code.shuffle(word, zero, [*(lane if sign else _NONE for lane, sign in column), _NONE, _NONE])
+                for column in GATHERED
+            ]
+            third, fourth = (code.constant([*(sign for _, sign in column), 0, 0]) for column in GATHERED[2:])
+            others = code.fma(parts[3], fourth, code.multiply(parts[2], third))
+            found.append(code.add(code.add(parts[0], parts[1]), others))
+        return found
+
+    def _raised(self, words: list[Any], wide: Any) -> tuple[list[Any], Any]:
+        """Multiplied by 16 as often as is asked; seldom at all."""
+        code, sixteen = self.code, self.code.constant(16.0)
+
+        def once(_: Any, values: list[Any]) -> list[Any]:
+            products = [code.multiply(word, sixteen) for word in values[:-1]]
+            widest = values[-1]
+            for k, word in enumerate(products):
+                widest = self.rows.watch(widest, word, k)
+            return [*carried(code, self.grid, products), widest]
+
+        values = code.loop(0, self.made.args[8], once, [*words, wide])
+        return values[:-1], values[-1]
+
+    def _times(self, words: list[Any]) -> list[Any]:
+        """Each word times the factor, rounded to its grid; what is left goes to the next, exactly."""
+        code, found, left = self.code, [], None
+        factor = code.spread(self.made.args[7])
+        for k, word in enumerate(words):
+            big = code.constant(self.grid.centre(k))
+            high = code.subtract(code.fma(word, factor, big), big)
+            low = code.fma(word, factor, code.negative(high))
+            found.append(high if left is None else code.add(high, left))
+            left = low
+        return found
+
+    def _divided(self, n: Any, words: list[Any], wide: Any) -> tuple[list[Any], Any]:
+        """Divided by n + 1, digit by digit: each remainder is exact and goes to the next word."""
+        code, b = self.code, self.code.builder
+        after = b.sitofp(b.add(n, code.integer(1)), DOUBLE)
+        divisor, inverse = code.spread(after), code.spread(b.load(code.address(self.made.args[2], n)))
+        found, rest = [], None
+        for k, word in enumerate(words):
+            value = word if rest is None else code.add(word, rest)
+            wide = self.rows.watch(wide, value, k, _WIDEST_DIVIDEND if k else WIDEST)
+            big = code.constant(self.grid.centre(k))
+            quotient = code.subtract(code.fma(value, inverse, big), big)
+            rest = code.fma(code.negative(quotient), divisor, value)
+            found.append(quotient)
+        if not self.grid.whole:
+            found[-1] = code.fma(rest, inverse, found[-1])
+        return found, wide
+
+
+# The polynomial of a step on a grid of K words, at times inside the step: the function ``samples``.
+#
+# Horner's scheme Σ y_n x^n with x = (t − t_0)/h from 0 to 1, for the coefficients y_n h^n that the step has left.  Its
+# products are those of :func:`heavytop.multiword.fixed_point.arithmetic.bounded_product`: x is the smaller factor, and
+# a partial sum may be :func:`most_of` at most, which is watched.
+
+
+_SUM_BITS = 50
+
+
+def most_of(grid: Grid) -> float:
+    """What a partial sum may be: with words of more than 46 bits its products with x leave their range earlier."""
+    return float(2.0 ** min(4, _SUM_BITS - grid.bits))
+
+
+def sample_row(grid: Grid, vectors: int) -> int:
+    """Doubles of a sample: K words of L of each vector, then the largest partial sum of each lane."""
+    return 8 * (grid.words * vectors + 1)
+
+
+def write_samples(module: ir.Module, grid: Grid, vectors: int) -> None:
+    """Write ``samples(rows, order, at, first, last, result)``: from the first sample to before the last.
+
+    rows: those of ``series``, and order what it gave.  at: K words of x for each sample, |x| at most 1, word 1 and on
+    rounded.  result: a row of :func:`sample_row` for each.
+    """
+    made, code = function(module, "samples", ir.VoidType(), [POINTER, INT, POINTER, INT, INT, POINTER])
+    coefficients, order, at, first, last, result = made.args
+    b, words = code.builder, grid.words
+    kept = rows_of(grid)(code, grid, vectors, most_orders(grid) + 2, coefficients, None, None, None, [])
+
+    def one(place: Any, _: list[Any]) -> None:
+        start = b.mul(place, code.integer(words))
+        x = [code.spread(b.load(code.address(at, b.add(start, code.integer(k))))) for k in range(words)]
+
+        def term(k: Any, values: list[Any]) -> list[Any]:
+            found, largest = [], values[-1]
+            for v in range(vectors):
+                product = bounded_product(code, grid, x, values[words * v : words * (v + 1)])
+                row = kept.stored(b.sub(order, k), v)
+                total = carried(code, grid, [code.add(one, other) for one, other in zip(product, row, strict=True)])
+                largest = code.larger(code.absolute(total[0]), largest)
+                found += total
+            return [*found, largest]
+
+        values = code.loop(0, b.add(order, code.integer(1)), term, [code.zero] * (words * vectors + 1))
+        begin = b.mul(place, code.integer(sample_row(grid, vectors)))
+        for index, value in enumerate(values):
+            code.store(value, result, b.add(begin, code.integer(8 * index)))
+
+    code.loop(first, last, one, [])
+    b.ret_void()
+
+
+# Steps on a grid of K words: h = ± a power of two, halved and doubled by the number of orders that a step takes.
+#
+# A step that takes more than 0.53 K b orders is followed by one of half its length, one that takes fewer than 0.34 K b
+# by one of twice its length where the time is a multiple of that.  A step that does not converge, or in which a sum
+# left its range, is done again with half its length; where that goes on, the run ends.
+
+
+TIME, TARGET, BEGAN, SIGN, CLOCK = range(5)
+"""Places of the clock, doubles: |time|, its target, the beginning of the last step; the direction."""
+HALVINGS, FEWEST, MOST, STATUS, ORDERS, REDONE, EXCESS, COUNTS = range(8)
+"""Places of the counts: −log2 h of the next step and its bounds, how the last one ended, its orders, steps redone;
+log2 of what the constants were divided by."""
+FINE, TOO_SMALL, CAPACITY = 0, 2, 3
+_MANY_ORDERS, _FEW_ORDERS = 0.53, 0.34
+
+
+def build(grid: Grid, system: System, attitude: bool, processor: Processor | None = None) -> Machine:
+    """``advance``, ``series`` and ``samples`` for this system.
+
+    advance(state, constants, inverses, rows, sums, places, seen, result, clock, counts, steps): at most so many steps,
+    until the time covers the target; gives their number.  Behind the result lies the state before the last step.
+    """
+    module = ir.Module("grid")
+    series = Series(module, grid, system, 2 if attitude else 1, (processor or Processor.here()).wide)
+    made = series.write()
+    _Advance(module, grid, series.vectors, made).write()
+    write_samples(module, grid, series.vectors)
+    pointers = [DOUBLES] * 5 + [INTEGERS, DOUBLES]
+    integer = ctypes.c_int64
+    return compiled(
+        module,
+        {
+            "series": (integer, [*pointers, ctypes.c_double, integer, DOUBLES]),
+            "advance": (integer, [*pointers, DOUBLES, DOUBLES, INTEGERS, integer]),
+            "samples": (None, [DOUBLES, integer, DOUBLES, integer, integer, DOUBLES]),
+        },
+        processor,
+    )
+
+
+class _Advance(Stepping):
+    """Writes ``advance``."""
+
+    def __init__(self, module: ir.Module, grid: Grid, vectors: int, series: Any) -> None:
+        arguments = [POINTER] * 5 + [INT_POINTER, POINTER, POINTER, POINTER, INT_POINTER, INT]
+        made, code = function(module, "advance", INT, arguments)
+        self.scratch, self.result = made.args[:7], made.args[7]
+        clock, counts, most = made.args[8:]
+        super().__init__(code, clock, counts, most, STATUS)
+        self.grid, self.size, self.series = grid, grid.words * vectors, series
+
+    def covered(self) -> Any:
+        return self.code.builder.fcmp_ordered(">=", self.time(TIME), self.time(TARGET))
+
+    def write_step(self) -> Any:
+        """One step; whether it stands."""
+        code, b = self.code, self.code.builder
+        halvings = self.count(HALVINGS)
+        length = _power(code, halvings)
+        exponent = b.sub(self.count(EXCESS), halvings)
+        raises = b.ashr(b.add(exponent, code.integer(3)), code.integer(2))
+        raises = b.select(b.icmp_signed(">", raises, code.integer(0)), raises, code.integer(0))
+        rest = b.sub(b.shl(raises, code.integer(2)), exponent)
+        factor = b.fmul(self.time(SIGN), _power(code, rest))
+        orders = b.call(self.series, [*self.scratch, factor, raises, self.result])
+        good = b.icmp_signed(">=", orders, code.integer(0))
+        time = self.time(TIME)
+        after = b.fadd(time, length)
+        moves = b.fcmp_ordered("==", b.fsub(after, time), length)
+        good = b.and_(good, moves)
+        with b.if_then(good):
+            for k in range(self.size):
+                code.store(code.load(self.scratch[0], 8 * k), self.result, 8 * (self.size + k))
+                code.store(code.load(self.result, 8 * k), self.scratch[0], 8 * k)
+            b.store(time, code.address(self.clock, BEGAN))
+            b.store(after, code.address(self.clock, TIME))
+            self.set_count(orders, ORDERS)
+        with b.if_then(b.not_(good)):
+            self.set_count(b.add(self.count(REDONE), code.integer(1)), REDONE)
+            exhausted = b.icmp_signed(">=", halvings, self.count(MOST))
+            status = b.select(exhausted, code.integer(CAPACITY), code.integer(FINE))
+            self.set_count(b.select(moves, status, code.integer(TOO_SMALL)), STATUS)
+        self._set_length(good, orders, halvings, length)
+        return good
+
+    def _set_length(self, good: Any, orders: Any, halvings: Any, length: Any) -> None:
+        code, b, one = self.code, self.code.builder, self.code.integer(1)
+        few, many = (code.integer(int(share * self.grid.total)) for share in (_FEW_ORDERS, _MANY_ORDERS))
+        doubled = b.fadd(length, length)
+        quotient = b.fdiv(self.time(TIME), doubled)
+        whole = b.sitofp(b.fptosi(quotient, INT), DOUBLE)
+        aligned = b.fcmp_ordered("==", quotient, whole)
+        longer = b.and_(b.and_(good, aligned), b.icmp_signed("<=", orders, few))
+        longer = b.and_(longer, b.icmp_signed(">", halvings, self.count(FEWEST)))
+        shorter = b.or_(b.not_(good), b.icmp_signed(">", orders, many))
+        following = b.select(shorter, b.add(halvings, one), halvings)
+        self.set_count(b.select(longer, b.sub(halvings, one), following), HALVINGS)
+
+
+def raises_of(exponent: int) -> tuple[float, int]:
+    """(factor, raises) with factor 16^raises = 2^exponent and factor at most 1, as ``advance`` takes them."""
+    raises = max(0, (exponent + 3) >> 2)
+    return 2.0 ** (exponent - 4 * raises), raises
+
+
+def _power(code: Code, halvings: Any) -> Any:
+    """2^-halvings."""
+    b = code.builder
+    return b.bitcast(b.shl(b.sub(code.integer(1023), halvings), code.integer(52)), DOUBLE)

@@ -1,0 +1,278 @@
+"""What a motion in many words can be asked, whatever its arithmetic."""
+
+from __future__ import annotations
+
+import ctypes
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from fractions import Fraction
+from math import isqrt
+from threading import local
+from typing import Any
+
+import numpy
+from llvmlite import ir
+
+from heavytop.multiword.codegen.machine_code import (
+    DOUBLE,
+    DOUBLES,
+    INT,
+    LANES,
+    POINTER,
+    Code,
+    Doubles,
+    Machine,
+    compiled,
+    doubles,
+    function,
+    once,
+    pointer,
+)
+from heavytop.multiword.codegen.recurrence import Coefficients, coefficients
+from heavytop.top.equations import GYROSTAT, HEAVY_GYROSTAT, Parameters, System
+
+
+class Status(Enum):
+    """How an advance ended."""
+
+    FINE = 0
+    NON_FINITE = 1
+    TOO_SMALL = 2
+    CAPACITY = 3
+
+
+class Steps(ABC):
+    """One motion on its way, in scaled units; its time is |τ|.
+
+    steps: taken so far.  forwards: whether time is positive.
+    """
+
+    steps: int
+    forwards: bool
+
+    @property
+    @abstractmethod
+    def order(self) -> int:
+        """The highest order of a series; of the last step where it varies."""
+
+    @property
+    @abstractmethod
+    def time(self) -> Fraction:
+        """Where the last step ended, exactly."""
+
+    @property
+    @abstractmethod
+    def state(self) -> tuple[Fraction, ...]:
+        """Where the motion is at the end of the last step."""
+
+    @abstractmethod
+    def advance(self, target: Fraction, steps: int) -> Status:
+        """Take steps, at most so many, until the last covers ``target``."""
+
+    @abstractmethod
+    def sample(self, time: Fraction) -> tuple[Fraction, ...] | None:
+        """The state at a time inside the last step; changes nothing.  None where the numbers outgrow their words."""
+
+    @abstractmethod
+    def coefficients(self, n: int) -> tuple[Fraction, ...]:
+        """y_n h^n of the last step, exactly as it was computed."""
+
+
+class Run(Steps):
+    """One that can be taken up again where it was left."""
+
+    @abstractmethod
+    def place(self) -> tuple[str, ...]:
+        """Where the last step began, as text: all that is needed to go on from there to the same bits."""
+
+    @abstractmethod
+    def restore(self, place: tuple[str, ...], steps: int) -> None:
+        """Go back to that place, after so many steps."""
+
+
+# A problem in units in which its numbers are near 1, exactly.
+#
+# Ω = s ω, t = τ/s, γ = g γ', ξ = x ξ' with powers of two s, g, x: then ω' = A ω ω + (B/s²) g γ' + (C/s) ω, and the
+# equations keep their form.  All of it is exact, and whatever the units of the data, the arithmetic sees numbers of
+# moderate size.
+
+
+_ROOT_BITS = 24
+
+
+@dataclass(frozen=True, slots=True)
+class Scaled:
+    """state: (Ω, γ) or (Ω, γ, ξ), exact, in these units.  rate: s, in units of 1/t.  sizes: what each component is in
+    units of.  rest: whether the derivative is exactly 0.
+    """
+
+    system: System
+    coefficients: Coefficients
+    state: tuple[Fraction, ...]
+    rate: Fraction
+    sizes: tuple[Fraction, ...]
+    rest: bool
+
+    @classmethod
+    def of(cls, system: System, p: Parameters, y: tuple[Fraction, ...], bounded: bool = False) -> Scaled:
+        """The problem with parameters ``p`` that starts at ``y``, six or nine exact numbers.
+
+        bounded: with |ω| <= 4 at all times, by the first integrals, in place of |ω| near 1 at the start.
+        """
+        given = coefficients(system, p, len(y) == 9)
+        gamma = _power_above(max(map(abs, y[3:6])))
+        rate = _bound(system, p, y) / 4 if bounded else _rate(system, given, p, y, gamma)
+        sizes = [rate] * 3 + [gamma] * 3 + ([_power_above(max(map(abs, y[6:])))] * 3 if len(y) == 9 else [])
+        scaled = given.with_linear(gamma / rate**2, 1 / rate)
+        state = tuple(value / size for value, size in zip(y, sizes, strict=True))
+        return cls(system, scaled, state, rate, tuple(sizes), _rests(system, p, y))
+
+    @property
+    def exponents(self) -> tuple[int, ...]:
+        """log2 of the sizes."""
+        return tuple(size.numerator.bit_length() - size.denominator.bit_length() for size in self.sizes)
+
+    def back(self, state: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
+        """A state in the units of the problem."""
+        return tuple(value * size for value, size in zip(state, self.sizes, strict=True))
+
+
+def _rests(system: System, p: Parameters, y: tuple[Fraction, ...]) -> bool:
+    """Whether the derivative is exactly 0; most motions turn γ, which two products show."""
+    omega = system.angular_velocity(p, y[:6])
+    return all(_parallel(vector, omega) for vector in (y[3:6], y[6:]) if vector) and not any(system.field(p, y[:6]))
+
+
+def _parallel(a: Sequence[Fraction], b: Sequence[Fraction]) -> bool:
+    return all(a[i] * b[j] == a[j] * b[i] for i, j in ((0, 1), (1, 2), (2, 0)))
+
+
+def _rate(system: System, given: Coefficients, p: Parameters, y: tuple[Fraction, ...], gamma: Fraction) -> Fraction:
+    """A power of two near the rate of the motion: the largest of |Ω|, √(torque per moment), and |λ| or |k|/I."""
+    speed = max(*map(abs, y[:3]), given.turning, abs(p.rotor) if system is GYROSTAT else Fraction(0))
+    return max((_power_above(speed) if speed else Fraction(0), _root_above(given.torque * gamma))) or Fraction(1)
+
+
+def _bound(system: System, p: Parameters, y: tuple[Fraction, ...]) -> Fraction:
+    """A power of two not less than |Ω_i| at any time: from the energy, or from |M| and the rotor of the gyrostat."""
+    omega, gamma = y[:3], y[3:6]
+    least = min(p.inertia)
+    if system is GYROSTAT:
+        square = sum((i * w) ** 2 for i, w in zip(p.inertia, omega, strict=True)) / least**2
+        return _root_above(max(square, Fraction(p.rotor) ** 2)) or Fraction(1)
+    kinetic = sum(i * w * w for i, w in zip(p.inertia, omega, strict=True)) / 2
+    torque = _root(sum(n * n for n in p.moment) * sum(g * g for g in gamma))
+    turning = max(map(abs, p.rotor)) / least if system is HEAVY_GYROSTAT else Fraction(0)
+    by_rotor = _power_above(turning) if turning else Fraction(0)
+    return max(_root_above(2 * (kinetic + 2 * torque) / least), by_rotor) or Fraction(1)
+
+
+def _root(value: Fraction) -> Fraction:
+    """Not less than √value, and at most a millionth larger; 0 for 0."""
+    if value == 0:
+        return value
+    unit = Fraction(2) ** _ROOT_BITS / _root_above(value)
+    return Fraction(isqrt(int(value * unit**2)) + 1) / unit
+
+
+def _power_above(value: Fraction) -> Fraction:
+    """The least power of two that is not less; 1 for 0."""
+    if value == 0:
+        return Fraction(1)
+    top, bottom = value.as_integer_ratio()
+    exponent = top.bit_length() - bottom.bit_length()
+    larger = top << max(0, -exponent) > bottom << max(0, exponent)
+    return Fraction(2) ** (exponent + larger)
+
+
+def _root_above(value: Fraction) -> Fraction:
+    """A power of two not less than √value, and at most 2 √value; 0 for 0."""
+    if value == 0:
+        return value
+    above = _power_above(value)
+    exponent = above.numerator.bit_length() - above.denominator.bit_length()
+    return Fraction(2) ** -(-exponent // 2)
+
+
+# The variational equation by powers of time, in machine code: V' = J(τ) V, V(0) = 1, in double.
+
+
+def variation(slopes: Doubles) -> Doubles:
+    """V_0, …, V_T with (n + 1) V_(n+1) = Σ_(m ≤ n) J_m V_(n−m), each a scalar product in double.
+
+    slopes: J_0, …, J_(T−1), shape (T, size, size).  The result has shape (T + 1, size, size).
+    """
+    orders, size, _ = slopes.shape
+    room = _rooms.of(orders, size)
+    room.given[:] = slopes.ravel()
+    _machine(size).functions["variation"](*room.pointers, orders)
+    return room.table[:, :, :size].copy()
+
+
+class _Room:
+    """What one thread computes with; V_0 stays."""
+
+    def __init__(self, orders: int, size: int) -> None:
+        width = _width(size)
+        self.given, found = doubles(orders * size * size), doubles((orders + 1) * size * width)
+        self.table = found.reshape(orders + 1, size, width)
+        self.table[0, :, :size] = numpy.eye(size)
+        self.pointers = pointer(self.given), pointer(found)
+
+
+class _Rooms(local):
+    def __init__(self) -> None:
+        self.made: dict[tuple[int, int], _Room] = {}
+
+    def of(self, orders: int, size: int) -> _Room:
+        if (orders, size) not in self.made:
+            self.made[orders, size] = _Room(orders, size)
+        return self.made[orders, size]
+
+
+_rooms = _Rooms()
+
+
+def _width(size: int) -> int:
+    """Doubles of a row of V."""
+    return -(-size // LANES) * LANES
+
+
+@once
+def _machine(size: int) -> Machine:
+    """variation(slopes, powers, orders) for matrices of ``size`` rows."""
+    module = ir.Module("variation")
+    made, code = function(module, "variation", ir.VoidType(), [POINTER, POINTER, INT])
+    slopes, powers, orders = made.args
+    b, width = code.builder, _width(size)
+
+    def order(n: Any, _: list[Any]) -> None:
+        after = b.add(n, code.integer(1))
+        zeros = [code.zero] * (size * width // LANES)
+        sums = code.loop(0, after, lambda m, values: _product(code, size, (slopes, powers), (m, n), values), zeros)
+        divisor = code.spread(b.sitofp(after, DOUBLE))
+        place = code.address(powers, b.mul(after, code.integer(size * width)))
+        for k, total in enumerate(sums):
+            code.store(b.fdiv(total, divisor), place, LANES * k)
+
+    code.loop(0, orders, order, [])
+    b.ret_void()
+    return compiled(module, {"variation": (None, [DOUBLES, DOUBLES, ctypes.c_int64])})
+
+
+def _product(code: Code, size: int, tables: tuple[Any, Any], at: tuple[Any, Any], sums: list[Any]) -> list[Any]:
+    """``sums`` + J_m V_(n−m)."""
+    b, width, (m, n) = code.builder, _width(size), at
+    slope = code.address(tables[0], b.mul(m, code.integer(size * size)))
+    power = code.address(tables[1], b.mul(b.sub(n, m), code.integer(size * width)))
+    parts = width // LANES
+    rows = [code.load(power, LANES * k) for k in range(size * parts)]
+    found = list(sums)
+    for i in range(size):
+        for j in range(size):
+            factor = code.spread(b.load(code.address(slope, size * i + j)))
+            for part in range(parts):
+                found[parts * i + part] = code.fma(factor, rows[parts * j + part], found[parts * i + part])
+    return found

@@ -1,0 +1,467 @@
+"""Columns of attitudes, positions and Ω in any axes in tables of other programs: their names, places and cells."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from heavytop import written_numbers
+from heavytop.errors import InputError, quoted
+from heavytop.measure.attitude_error import FRAMES, WIDTHS, Convention
+from heavytop.precision import exact
+from heavytop.top.vectors import Vector, vector
+from heavytop.trajectories.observed import RawStart
+
+REMEDY = "docs/score.md lists the columns that are understood."
+_DEGREES = re.compile(r"[\[(/]?\s*(deg|degrees?|°)\s*[\])]?$", re.IGNORECASE)
+_POSITION = re.compile(r"(?:p|pos|position|com|centre|center|centreofmass|r|point)?([xyz])")
+_MATRIX = re.compile(r"(?:r|m|rot|rotation|matrix)([0-3])([0-3])")
+_SPACE = re.compile(r"(?:w|omega|om|ω)(?:space|world|global|inertial|s)([xyz123])")
+_FRAMED = re.compile(r"w([xyz])")
+_BODY = re.compile(r"(?:omega|om|ω|angularvelocity|w)(?:body|local|b)?([xyz0-3])")
+_GAMMA = re.compile(r"(?:gamma|gam|g|γ)([xyz0-3])")
+_EULER = {
+    **{f"euler{k}": k for k in (1, 2, 3)},
+    **{f"angle{k}": k for k in (1, 2, 3)},
+    **dict.fromkeys(("phi", "φ", "alpha", "α"), 1),
+    **dict.fromkeys(("theta", "θ", "beta", "β"), 2),
+    **dict.fromkeys(("psi", "ψ"), 3),
+}
+_TAIT_BRYAN = {"roll": "X", "pitch": "Y", "yaw": "Z", "heading": "Z"}
+_AXES = {"x": "1", "y": "2", "z": "3"}
+_CLASSIC = {"p": "1", "q": "2", "r": "3"}
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What the columns of a table are.
+
+    time: the place of t; None where there is none.  places: by the name of the quantity, those of its components, by
+    their names, in the order in which they stand.  degrees: whether the header says so of angles.  others: not read.
+    """
+
+    time: int | None
+    places: Mapping[str, Mapping[str, int]]
+    degrees: bool
+    others: tuple[str, ...]
+
+
+def header(names: Sequence[str]) -> Header:
+    """The meaning of every column; raises InputError for one that stands twice."""
+    found: dict[str, dict[str, int]] = {}
+    time, degrees, others = None, False, []
+    for place, name in enumerate(names):
+        plain = _plain(name)
+        if plain in ("t", "time"):
+            if time is not None:
+                raise InputError("The column t stands twice.", "Give each column once.")
+            time = place
+            continue
+        meaning = _meaning(plain)
+        if meaning is None:
+            others.append(name)
+            continue
+        quantity, component = meaning
+        if component in found.setdefault(quantity, {}):
+            plainly = quantity in ("omega", "gamma")
+            said = f"{quantity}{_AXES.get(component, component)}" if plainly else quoted(name)
+            raise InputError(f"The column {said} stands twice.", "Give each column once.")
+        found[quantity][component] = place
+        degrees = degrees or (quantity == "euler" and bool(_DEGREES.search(name.strip())))
+    return Header(time, found, degrees, tuple(others))
+
+
+def _plain(name: str) -> str:
+    text = unicodedata.normalize("NFKC", re.sub(r"\s*[\[(/].*$", "", name)).lower()
+    text = re.sub(r"_deg(rees)?$", "", text.strip())
+    return re.sub(r"[\s_{}\\.^-]", "", text)
+
+
+def _meaning(plain: str) -> tuple[str, str] | None:
+    """The quantity and the component of a name; None where it is not understood."""
+    if plain in _EULER:
+        return "euler", str(_EULER[plain])
+    if plain in _CLASSIC:
+        return "omega", _CLASSIC[plain]
+    if plain in _TAIT_BRYAN:
+        return "euler", _TAIT_BRYAN[plain]
+    if match := re.fullmatch(r"(?:q|quat|quaternion)([wxyz0-4])", plain):
+        return "quaternion", match[1]
+    if match := _MATRIX.fullmatch(plain):
+        return "matrix", match[1] + match[2]
+    if match := _FRAMED.fullmatch(plain):
+        return "framed", match[1]
+    for quantity, pattern in (("omega_space", _SPACE), ("omega", _BODY), ("gamma", _GAMMA), ("position", _POSITION)):
+        if match := pattern.fullmatch(plain):
+            return quantity, match[1]
+    return None
+
+
+def is_more_than_states(found: Header) -> bool:
+    """Whether there are other columns than Ω and γ, or one of these vectors alone."""
+    names = set(found.places)
+    given = {"omega" if name == "framed" else name for name in names}
+    return bool(given - {"omega", "gamma"}) or (len(given) == 1 and _complete(found))
+
+
+def _complete(found: Header) -> bool:
+    return all(len(components) == 3 for components in found.places.values())
+
+
+def ordered_places(
+    quantity: str, components: Mapping[str, int], scalar_last: bool, sequence: str
+) -> list[tuple[str, int]]:
+    """Name and place of each component in the order of the quantity; raises InputError for one that is missing."""
+    wanted = _wanted(quantity, set(components), scalar_last, sequence)
+    missing = [name for name in wanted if name not in components]
+    extra = [name for name in components if name not in wanted]
+    if missing or extra:
+        said = f"component {missing[0]} is missing" if missing else f"component {extra[0]} belongs to no other"
+        raise InputError(f"The columns of the {_words(quantity)} are not complete: {said}.", REMEDY)
+    return [(name, components[name]) for name in wanted]
+
+
+def _wanted(quantity: str, there: set[str], scalar_last: bool, sequence: str) -> list[str]:
+    if quantity == "quaternion":
+        if there & set("wxyz"):
+            return list("xyzw" if scalar_last else "wxyz")
+        return list("1234" if "4" in there else "0123")
+    if quantity == "matrix":
+        first = 0 if any("0" in name for name in there) else 1
+        return [f"{i}{j}" for i in range(first, first + 3) for j in range(first, first + 3)]
+    if quantity == "euler" and there & set("XYZ"):
+        if sorted(sequence) != ["X", "Y", "Z"]:
+            raise InputError(
+                f"roll, pitch and yaw are of a sequence about three axes, not of {sequence or 'none that is said'}.",
+                'Give sequence, such as "ZYX", or call the columns euler1, euler2, euler3.',
+            )
+        return list(sequence)
+    if there & set("xyz"):
+        return list("xyz")
+    return list("012" if "0" in there else "123")
+
+
+def _words(quantity: str) -> str:
+    return {"omega_space": "angular velocity in space axes", "framed": "angular velocity", "euler": "Euler angles"}.get(
+        quantity, quantity
+    )
+
+
+def cell(text: str, where: str) -> Fraction | None:
+    """An exact number; None for NaN and infinities; InputError that names the place for everything else."""
+    if not text.strip():
+        raise InputError(f"{where} is empty.", "Give every row all of its columns.")
+    try:
+        return written_numbers.number(text, where)
+    except InputError as error:
+        cause = error.cause if error.cause.startswith(where) else f"{where}: {error.cause}"
+        raise InputError(cause, error.remedy) from None
+
+
+# Files with attitudes, positions or Ω in any axes, or the data of a body: read as the columns that they have.
+
+
+CONVENTIONS = ("quaternion_order", "quaternion", "matrix", "sequence", "angles", "frame", "up", "pivot", "point")
+STARTS = ("start_quaternion", "start_matrix", "start_euler", "omega_space")
+BODIES = ("mass", "gravity", "about", "rotor")
+_ARRAYS = {
+    "quaternions": "quaternion",
+    "quaternion": "quaternion",
+    "matrices": "matrix",
+    "matrix": "matrix",
+    "euler": "euler",
+    "eulers": "euler",
+    "positions": "position",
+    "position": "position",
+    "omegas": "omega",
+    "omega_space": "omega_space",
+    "gammas": "gamma",
+}
+"""Keys of JSON documents whose values are a list for each time."""
+KEYS = {*CONVENTIONS, *STARTS, *BODIES, *_ARRAYS}
+_REMEDY = "docs/score.md shows what a file may hold."
+_ORDERS = {
+    "wxyz": "wxyz",
+    "scalar first": "wxyz",
+    "scalar_first": "wxyz",
+    "xyzw": "xyzw",
+    "scalar last": "xyzw",
+    "scalar_last": "xyzw",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Columns as they were read.
+
+    values: by the name of the quantity, the exact numbers of each row, None for a row that is not finite.
+    texts: every number as it was written.  places: what each row is called in messages.
+    """
+
+    values: Mapping[str, list[tuple[Fraction, ...] | None]]
+    texts: list[str]
+    places: list[str]
+
+
+def is_observed(document: Mapping[str, Any]) -> bool:
+    """Whether a document has more than Ω and γ of a top in principal axes."""
+    return "header" in document or any(document.get(key) is not None for key in KEYS)
+
+
+def convention(document: Mapping[str, Any], header: Header | None = None) -> Convention:
+    """What the file says of its conventions; raises InputError for what is not known."""
+    said: dict[str, Any] = {}
+    if (order := _word(document, "quaternion_order")) is not None:
+        if order.lower() not in _ORDERS:
+            raise InputError(f"quaternion_order = {quoted(order)} is not known.", "Use wxyz or xyzw.")
+        said["quaternion_order"] = _ORDERS[order.lower()]
+    for key in ("quaternion", "matrix"):
+        if _is_direction(document.get(key)):
+            said[key] = document[key].strip()
+    for key in ("sequence", "angles", "up"):
+        if (word := _word(document, key)) is not None:
+            said[key] = word.upper() if key == "sequence" else word.lower().lstrip("+")
+    if header is not None and header.degrees:
+        if said.get("angles", "degrees") != "degrees":
+            raise InputError("The header says degrees and angles = radians.", "Say the unit of angles once.")
+        said["angles"] = "degrees"
+    for key in ("pivot", "point"):
+        if document.get(key) is not None:
+            said[key] = vector(_numbers(document[key], key, 3), key)
+    return Convention(**said)
+
+
+def _is_direction(value: Any) -> bool:
+    """Whether the value of ``quaternion`` or ``matrix`` is a word, and not an attitude."""
+    return isinstance(value, str) and any(letter in value for letter in "bdstuy_")
+
+
+def _word(document: Mapping[str, Any], key: str) -> str | None:
+    value = document.get(key)
+    if value is not None and not isinstance(value, str):
+        raise InputError(f"{key} = {quoted(value)} is not a word.", _REMEDY)
+    return None if value is None else value.strip()
+
+
+def in_space(document: Mapping[str, Any]) -> bool:
+    """Whether columns wx, wy, wz, or Ω without other columns of it, are in the axes of space."""
+    frame = (_word(document, "frame") or "body").lower()
+    if frame not in FRAMES:
+        raise InputError(f"frame = {quoted(frame)} is not known.", "Use space or body.")
+    return frame == "space"
+
+
+def _numbers(values: Any, what: str, count: int | None) -> list[Fraction]:
+    if not isinstance(values, list) or (count is not None and len(values) != count):
+        has = f"has {len(values)} numbers" if isinstance(values, list) else "is not a list"
+        raise InputError(f"{what} {has}.", f"Give {count} numbers." if count else "Give numbers.")
+    return [written_numbers.finite(value, f"a number of {what}") for value in values]
+
+
+def columns(document: Mapping[str, Any], said: Convention) -> Table:
+    """The columns of a document, of a text table or of JSON.
+
+    Raises InputError for columns that are not complete, for a sequence that is not said, and for a cell that is none,
+    by its line and column.
+    """
+    found = _of_table(document, said) if "header" in document else _of_lists(document, said)
+    if not found.values:
+        raise InputError("There are no columns that fix something of the motion.", _REMEDY)
+    if "euler" in found.values and not said.sequence:
+        raise InputError(
+            "There are Euler angles, and nothing says of which sequence.", 'Give sequence, such as "ZXZ" or "ZYX".'
+        )
+    return found
+
+
+def _of_table(document: Mapping[str, Any], said: Convention) -> Table:
+    header, cells, lines = document["header"], document["cells"], document["lines"]
+    space, last = in_space(document), said.quaternion_order == "xyzw"
+    both = {"omega", "gamma"} <= header.places.keys()
+    places: dict[str, list[tuple[str, int]]] = {}
+    for quantity, components in header.places.items():
+        try:
+            ordered = ordered_places(quantity, components, last, said.sequence)
+        except InputError:
+            if both and quantity not in ("omega", "gamma"):
+                continue  # a column of some other thing, beside a whole state
+            raise
+        name = quantity
+        if quantity == "framed" or (quantity == "omega" and "framed" not in header.places):
+            name = "omega_space" if space else "omega"
+        if name in places:
+            raise InputError(f"The columns of {name} stand twice.", "Give each quantity once, and say its frame.")
+        places[name] = ordered
+    values: dict[str, list[tuple[Fraction, ...] | None]] = {name: [] for name in WIDTHS if name in places}
+    for number, row in zip(lines, cells, strict=True):
+        for name in values:
+            values[name].append(_whole(cell(row[p], f"Line {number}, column {n}") for n, p in _named(places, name)))
+    texts = [row[place] for row in cells for name in values for _, place in places[name]]
+    return Table(values, texts, [f"line {number}" for number in lines])
+
+
+def _named(places: Mapping[str, list[tuple[str, int]]], name: str) -> list[tuple[str, int]]:
+    prefix = {"quaternion": "q", "matrix": "R", "position": "", "euler": "euler"}.get(name, name)
+    return [(f"{prefix}{component}", place) for component, place in places[name]]
+
+
+def _whole(values: Any) -> tuple[Fraction, ...] | None:
+    """The numbers of one sample; None where one is not finite."""
+    found = tuple(values)
+    return None if None in found else found
+
+
+def _of_lists(document: Mapping[str, Any], said: Convention) -> Table:
+    given: dict[str, tuple[str, list[Any]]] = {}
+    space = in_space(document)
+    states = document.get("states")
+    if states is not None:
+        rows = [_flat(row, 6, f"states[{i}]") for i, row in enumerate(_rows(states, "states"))]
+        given["omega_space" if space else "omega"] = "states", [row[:3] for row in rows]
+        given["gamma"] = "states", [row[3:] for row in rows]
+    for key, name in _ARRAYS.items():
+        if not _is_table(document.get(key), name):
+            continue
+        if name == "omega" and space:
+            name = "omega_space"
+        if name in given:
+            raise InputError(f"{key} and {given[name][0]} both give {name}.", "Give each quantity once.")
+        given[name] = key, [_flat(row, WIDTHS[name], f"{key}[{i}]") for i, row in enumerate(document[key])]
+    counts = {key: len(rows) for key, rows in given.values()}
+    times = document.get("times")
+    if isinstance(times, list):
+        for key, count in counts.items():
+            if count != len(times):
+                raise InputError(f"There are {len(times)} times and {count} {key}.", "Give one row for each time.")
+    values = {}
+    for name in WIDTHS:
+        if name in given:
+            key, rows = given[name]
+            values[name] = [_whole(cell_of(v, f"{key}[{i}]") for v in row) for i, row in enumerate(rows)]
+    texts = [str(value) for _, rows in given.values() for row in rows for value in row]
+    return Table(values, texts, [f"row {i + 1}" for i in range(max(counts.values(), default=0))])
+
+
+def cell_of(value: Any, where: str) -> Fraction | None:
+    """As :func:`heavytop.trajectories.columns.cell`, of a value of JSON."""
+    if value is None:
+        raise InputError(f"{where} has an empty place.", "Give every row all of its columns.")
+    if not isinstance(value, str):
+        raise InputError(f"{where} holds a {type(value).__name__}, not a number.", _REMEDY)
+    return cell(value, where)
+
+
+def _is_table(value: Any, name: str) -> bool:
+    """Whether a value is one list for each time, and not one for the start."""
+    if not isinstance(value, list) or not value or not isinstance(value[0], list):
+        return False
+    return name != "matrix" or len(value[0]) == WIDTHS["matrix"] or (bool(value[0]) and isinstance(value[0][0], list))
+
+
+def _rows(value: Any, what: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise InputError(f"{what} is not a list.", "Give a list with a row for each time.")
+    return value
+
+
+def _flat(row: Any, width: int, what: str) -> list[Any]:
+    """The numbers of one row: a matrix row by row."""
+    if isinstance(row, list) and width == 9 and len(row) == 3 and all(isinstance(part, list) for part in row):
+        row = [value for part in row for value in part]
+    if not isinstance(row, list) or len(row) != width:
+        has = f"{len(row)} numbers" if isinstance(row, list) else "no list"
+        raise InputError(f"{what} has {has}, not {width}.", "Give every row all of its columns.")
+    return row
+
+
+def start(document: Mapping[str, Any], table: Table, at_start: bool, said: Convention) -> RawStart:
+    """The start: by its keys, else by the row t = 0.
+
+    Raises InputError where neither gives Ω and γ or an attitude, and where two say what differs.
+    """
+    forms: dict[str, tuple[str, list[Fraction], bool]] = {}
+    for name in ("quaternion", "matrix", "euler"):
+        for key in (f"start_{name}", name):
+            value = document.get(key)
+            if key == name and _is_direction(value):
+                continue
+            if value is None or (key == name and _is_table(value, name)):
+                continue
+            forms[name] = key, *_attitude(value, name, key, said)
+    gamma = document.get("gamma")
+    from_row, degrees = False, said.angles == "degrees"
+    first = {name: rows[0] for name, rows in table.values.items()} if at_start else {}
+    if len(forms) > 1:
+        one, other = (key for key, *_ in list(forms.values())[:2])
+        raise InputError(f"{one} and {other} both give the attitude at t = 0.", "Give one of them.")
+    if not forms and gamma is None:
+        known = next((each for each in ("quaternion", "matrix", "euler", "gamma") if first.get(each)), None)
+        if known is None:
+            raise InputError(
+                "The attitude at t = 0 is missing: neither gamma nor start_quaternion, start_matrix or start_euler, "
+                "and there is no row t = 0 that gives it.",
+                "Give one of them, or the row t = 0, or --case NAME.",
+            )
+        from_row, form, values = True, known, list(first[known] or ())
+    elif forms:
+        form, (_, values, degrees) = next(iter(forms.items()))
+    else:
+        form, values = "gamma", _numbers(gamma, "gamma", 3)
+    if form == "euler" and not said.sequence:
+        raise InputError("start_euler needs its sequence.", 'Give sequence, such as "ZXZ".')
+    beside = _numbers(gamma, "gamma", 3) if forms and gamma is not None else None
+    omega, space = _omega(document, first)
+    return RawStart(
+        form, tuple(values), omega, space, None if beside is None else vector(beside, "gamma"), from_row, degrees
+    )
+
+
+def _omega(document: Mapping[str, Any], first: Mapping[str, tuple[Fraction, ...] | None]) -> tuple[Vector, bool]:
+    """Ω at t = 0, and whether it is in the axes of space."""
+    given = [
+        key for key in ("omega", "omega_space") if document.get(key) is not None and not _is_table(document[key], key)
+    ]
+    if len(given) > 1:
+        raise InputError("omega and omega_space both give Ω at t = 0.", "Give one of them.")
+    if given:
+        return vector(_numbers(document[given[0]], given[0], 3), given[0]), given[0] == "omega_space"
+    for name in ("omega", "omega_space"):
+        if first.get(name):
+            return vector(list(first[name] or ()), name), name == "omega_space"
+    raise InputError(
+        "The key omega is missing, and there is no row t = 0 that gives it.",
+        "Give omega (in body axes) or omega_space at t = 0, or the row t = 0, or --case NAME.",
+    )
+
+
+def _attitude(value: Any, name: str, key: str, said: Convention) -> tuple[list[Fraction], bool]:
+    """The numbers of one attitude, and whether they are angles in degrees: as the file says, or written as 30deg."""
+    if isinstance(value, str):
+        value = value.replace(",", " ").split()
+    values = _flat(value, WIDTHS[name], key)
+    marked = [isinstance(each, str) and each.strip().endswith("deg") for each in values]
+    if any(marked) and (name != "euler" or not all(marked)):
+        raise InputError(f"{key} = {quoted(value)} mixes units.", "Give every angle as 30deg, or none.")
+    try:
+        found = [exact(each.strip().removesuffix("deg") if isinstance(each, str) else each) for each in values]
+    except InputError as error:
+        raise InputError(f"{key}: {error.cause}", error.remedy) from None
+    return found, name == "euler" and (any(marked) or said.angles == "degrees")
+
+
+def times(document: Mapping[str, Any]) -> list[Any]:
+    """The column t, or the list of times: exact numbers, or what is to be read as such."""
+    if "lines" not in document:
+        found = document.get("times")
+        return found if isinstance(found, list) else []
+    found = []
+    for number, text in zip(document["lines"], document["times"], strict=True):
+        value = cell(text, f"Line {number}, column t")
+        if value is None:
+            raise InputError(f"Line {number}, column t: {text.strip()} is not a finite number.", _REMEDY)
+        found.append(value)
+    return found
