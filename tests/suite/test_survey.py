@@ -12,7 +12,7 @@ import numpy
 import pytest
 
 import heavytop as ht
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.errors import Contradiction, InputError
 from heavytop.integrate.ensemble import propagate_ensemble
 from heavytop.integrate.multiword.lanes import Pairs

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.compare.compare import Comparison
-from heavytop.compare.findings import line
-from heavytop.compare.rows import Finding
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.compare import Comparison
+from heavytop.comparison.findings import line
+from heavytop.comparison.rows import Finding
+from heavytop.comparison.verdicts import Verdict
 from heavytop.document.names import printable, row_name, short
 from heavytop.render.text import table, wrapped
 

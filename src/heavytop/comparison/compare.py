@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from heavytop.compare.findings import RANK, Change, Changes, sentences
-from heavytop.compare.noise import Policy
-from heavytop.compare.rows import Finding, RowComparison
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.findings import RANK, Change, Changes, sentences
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.rows import Finding, RowComparison
+from heavytop.comparison.verdicts import Verdict
 from heavytop.document.kind import Kinds
 from heavytop.errors import InputError
 from heavytop.integrate.broken import FAULTS
