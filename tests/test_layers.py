@@ -25,7 +25,7 @@ FLOORS = (
     {"suite"},
     {"document"},
     {"store"},
-    {"compare"},
+    {"comparison"},
     {"render"},
     {"kinds"},
     {"api"},

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError, PeerFailed
 from heavytop.integrate import peers
 from heavytop.integrate.peers import contract

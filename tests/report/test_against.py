@@ -12,7 +12,7 @@ import pytest
 import heavytop.exact
 from heavytop.cases import CASES
 from heavytop.claims.library.ershkov import PartialCase
-from heavytop.compare.verdicts import weaker
+from heavytop.comparison.verdicts import weaker
 from heavytop.exact.catalogue import find
 from heavytop.exact.closed_form import ALL, renamed_state, renamed_top
 from heavytop.integrate.trajectory import Problem

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.document.document import MOST_PLOTS, Card, Headline, In, Section, Word, points
 from heavytop.document.kind import document
 from heavytop.document.svg import apart, decades, finish, new_axes

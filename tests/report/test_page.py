@@ -14,7 +14,7 @@ import pytest
 
 import heavytop as ht
 from heavytop.cases import CASES
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.precision import DOUBLE
 from heavytop.records import Report, Row
 from heavytop.render.history import history_page

@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from heavytop.cases import CASES
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import matches
 from heavytop.integrate import integrator

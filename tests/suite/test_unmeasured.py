@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from heavytop.compare.noise import Policy
+from heavytop.comparison.noise import Policy
 from heavytop.errors import Contradiction, InputError, OutOfReach
 from heavytop.measure import truth
 from heavytop.suite.rows import unmeasured

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from heavytop.cases import CASES
-from heavytop.compare.noise import Policy
-from heavytop.compare.work_precision import panels
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.work_precision import panels
 from heavytop.errors import InputError
 from heavytop.exact.catalogue import find
 from heavytop.exact.flint.balls import midpoint

@@ -12,9 +12,9 @@ from heavytop import records
 from heavytop.api import arguments
 from heavytop.api.arguments import Number
 from heavytop.api.run_folder import prepare
-from heavytop.compare import compare as comparing
-from heavytop.compare import noise as policies
-from heavytop.compare.motions import beside
+from heavytop.comparison import compare as comparing
+from heavytop.comparison import noise as policies
+from heavytop.comparison.motions import beside
 from heavytop.display import Table, Tabular
 from heavytop.document.names import printable, row_name, short
 from heavytop.errors import InputError, quoted

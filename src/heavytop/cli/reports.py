@@ -36,8 +36,8 @@ def compare(
 
     Else exit 3 if anything is missing or incomparable, else 0.
     """
-    from heavytop.compare.compare import compare as compare_reports
-    from heavytop.compare.motions import beside
+    from heavytop.comparison.compare import compare as compare_reports
+    from heavytop.comparison.motions import beside
     from heavytop.kinds import KINDS
     from heavytop.store import store
 
@@ -81,7 +81,7 @@ def history(
     json: Json = False,
 ) -> int:
     """Show metrics over reports, with every step marked."""
-    from heavytop.compare.noise import glob
+    from heavytop.comparison.noise import glob
     from heavytop.kinds import KINDS
     from heavytop.render import history as over
     from heavytop.store import store
@@ -120,7 +120,7 @@ def _read(paths: list[Path], reader: Callable[..., Any]) -> list[Any]:
 
 def _policy(file: Path | None, floor: str | None, loss: str | None) -> Any:
     """The policy of a file or the default one; the options count before either."""
-    from heavytop.compare.noise import Policy, adjusted, load
+    from heavytop.comparison.noise import Policy, adjusted, load
 
     return adjusted(Policy() if file is None else load(file), floor, loss)
 

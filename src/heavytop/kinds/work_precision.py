@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from heavytop.compare.work_precision import CONSTANTS, ERRORS, LANES, OURS, Line, beside_ours, leads, panels
+from heavytop.comparison.work_precision import CONSTANTS, ERRORS, LANES, OURS, Line, beside_ours, leads, panels
 from heavytop.document.document import Block, Chart, In, Note
 from heavytop.document.document import Table as Cells
 from heavytop.errors import InputError

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.compare.compare import Comparison
-from heavytop.compare.findings import line
-from heavytop.compare.motions import WorseMotions
-from heavytop.compare.rows import Finding
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.compare import Comparison
+from heavytop.comparison.findings import line
+from heavytop.comparison.motions import WorseMotions
+from heavytop.comparison.rows import Finding
+from heavytop.comparison.verdicts import Verdict
 from heavytop.document.names import printable, row_name, short
 from heavytop.render.text import table, wrapped
 
@@ -53,7 +53,7 @@ def _rows(result: Comparison) -> Iterator[RenderableType]:
 
 
 def _motions(found: WorseMotions) -> Iterator[RenderableType]:
-    """The motions of a survey that lost most, each with its command."""
+    """The motions of a survey that lost most, each with its command, to paste into a shell."""
     if not found.first:
         return
     yield Text()
@@ -62,7 +62,7 @@ def _motions(found: WorseMotions) -> Iterator[RenderableType]:
     )
     for motion in found.first:
         yield Text(f"  {motion.text}")
-        yield Text(printable(f"    {motion.command}"), style="dim", no_wrap=True, overflow="ignore")
+        yield Text(" \\\n".join(wrapped(printable(motion.command), "      ", "    ", 78)), style="dim")
     if found.worse > len(found.first):
         yield Text(f"  and {found.worse - len(found.first)} more")
 

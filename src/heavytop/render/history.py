@@ -10,9 +10,9 @@ import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from heavytop.compare.compare import compare
-from heavytop.compare.noise import Policy
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.compare import compare
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.verdicts import Verdict
 from heavytop.document.document import Key, Section, clip, draw, logarithm, numbered, scientific
 from heavytop.document.kind import Kinds
 from heavytop.document.names import printable, row_name, short

@@ -13,10 +13,10 @@ from typing import Any
 from markupsafe import Markup, escape
 from msgspec.structs import replace as replace_struct
 
-from heavytop.compare.compare import Comparison
-from heavytop.compare.findings import Change, folded, line, statistics
-from heavytop.compare.rows import Finding
-from heavytop.compare.work_precision import ERRORS, leads, panels, seconds_text
+from heavytop.comparison.compare import Comparison
+from heavytop.comparison.findings import Change, folded, line, statistics
+from heavytop.comparison.rows import Finding
+from heavytop.comparison.work_precision import ERRORS, leads, panels, seconds_text
 from heavytop.document.document import (
     Card,
     Cell,

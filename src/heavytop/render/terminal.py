@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.text import Text
 
-from heavytop.compare.verdicts import size
+from heavytop.comparison.verdicts import size
 from heavytop.document.document import Block, Card, Chart, Headline, In, Note, Table, Word, points
 from heavytop.document.kind import Kinds, document, headlines
 from heavytop.document.names import printable, short

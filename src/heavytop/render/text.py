@@ -14,7 +14,7 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.table import Table
 from rich.text import Text
 
-from heavytop.compare.compare import Trial
+from heavytop.comparison.compare import Trial
 from heavytop.document.document import Cell, Value, Word, cell_text
 from heavytop.document.kind import Kinds, kind_of
 from heavytop.document.names import computed_by, printable

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from heavytop.compare.work_precision import ERRORS, Lead, Line, leads, panels, seconds_text
+from heavytop.comparison.work_precision import ERRORS, Lead, Line, leads, panels, seconds_text
 from heavytop.document.document import (
     DASHED,
     TIME,

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import msgspec
 
-from heavytop.compare.rows import Finding
-from heavytop.compare.verdicts import Verdict
-from heavytop.compare.work_precision import ERRORS
+from heavytop.comparison.rows import Finding
+from heavytop.comparison.verdicts import Verdict
+from heavytop.comparison.work_precision import ERRORS
 from heavytop.document.document import clip
 from heavytop.document.names import short
 from heavytop.measure.local_error import ORDER

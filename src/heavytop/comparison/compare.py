@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from heavytop.compare.findings import RANK, Change, Changes, sentences
-from heavytop.compare.motions import METRIC, WorseMotions, worse_motions
-from heavytop.compare.noise import Policy
-from heavytop.compare.rows import Finding, RowComparison
-from heavytop.compare.verdicts import Verdict
+from heavytop.comparison.findings import RANK, Change, Changes, sentences
+from heavytop.comparison.motions import METRIC, WorseMotions, worse_motions
+from heavytop.comparison.noise import Policy
+from heavytop.comparison.rows import Finding, RowComparison
+from heavytop.comparison.verdicts import Verdict
 from heavytop.document.kind import Kinds
 from heavytop.errors import InputError
 from heavytop.integrate.broken import FAULTS

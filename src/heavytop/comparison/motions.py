@@ -17,7 +17,7 @@ import msgspec
 import numpy
 
 from heavytop.cases import Case
-from heavytop.compare.noise import Limits
+from heavytop.comparison.noise import Limits
 from heavytop.errors import InputError
 from heavytop.integrate.trajectory import Outcome
 from heavytop.precision import exact, log10, parse

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from heavytop.compare.noise import (
+from heavytop.comparison.noise import (
     BITS,
     Limits,
     Lookup,
@@ -23,7 +23,7 @@ from heavytop.compare.noise import (
     reaches_further,
     seldom_apart,
 )
-from heavytop.compare.verdicts import (
+from heavytop.comparison.verdicts import (
     BAND,
     MISSING,
     NAN,

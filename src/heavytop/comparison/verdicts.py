@@ -8,7 +8,16 @@ from enum import Enum
 from fractions import Fraction
 from typing import Any
 
-from heavytop.compare.noise import BITS, STEP_CONTROL, Limits, RoundingBound, Timings, allowed_gain, allowed_loss, apart
+from heavytop.comparison.noise import (
+    BITS,
+    STEP_CONTROL,
+    Limits,
+    RoundingBound,
+    Timings,
+    allowed_gain,
+    allowed_loss,
+    apart,
+)
 from heavytop.errors import InputError
 from heavytop.measure.scalar import RESOLVED_RADII, UNRESOLVED
 from heavytop.precision import exact, log10
