@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
 
-from heavytop.exact import enclosure
+from heavytop.exact.enclosure import step as enclosure
 from heavytop.exact.enclosure.run import ScaledMotion, Validated
 from heavytop.exact.enclosure.step import CAP, Errors, Node, Whole, quadratic, start_node, step
 from heavytop.exact.flint.balls import midpoint, radius, working_precision

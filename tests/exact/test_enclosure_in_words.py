@@ -7,8 +7,9 @@ from random import Random
 import pytest
 
 from heavytop.errors import Contradiction
-from heavytop.exact.enclosure import run, start_node, step
+from heavytop.exact.enclosure import run
 from heavytop.exact.enclosure.run import ScaledMotion, Validated
+from heavytop.exact.enclosure.step import start_node, step
 from heavytop.exact.flint.balls import midpoint, radius, relative_bits
 from heavytop.multiword.fixed_point import fixed_point_run
 from heavytop.multiword.fixed_point.certified_series import Carrier, Series

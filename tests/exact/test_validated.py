@@ -12,10 +12,10 @@ import pytest
 from flint import arb
 
 from heavytop.errors import InputError, OutOfReach
-from heavytop.exact import enclosure
 from heavytop.exact.cases.delone import DeloneHomoclinic
 from heavytop.exact.cases.ershkov_partial import ErshkovPartial
 from heavytop.exact.enclosure import run
+from heavytop.exact.enclosure import step as enclosure
 from heavytop.exact.enclosure.run import Validated
 from heavytop.exact.enclosure.step import quadratic
 from heavytop.exact.flint.balls import midpoint, radius, relative_bits, working_precision
