@@ -61,6 +61,8 @@ def require_same(many: Trajectory, single: tuple[Trajectory, list, list]) -> Non
         ("heyoka", QUAD, 20),
         ("multiword", DOUBLE, 1),
         ("multiword", EXTENDED, 5),
+        ("multiword", parse("double-double"), 5),
+        ("multiword", parse("real:70"), 5),
     ],
     ids=lambda value: getattr(value, "name", value),
 )

@@ -94,6 +94,7 @@ class DoubleTimes(RoundedTimes):
     """
 
     __slots__ = ()
+    are_doubles = True
 
     @property
     def doubles(self) -> Any:

@@ -12,7 +12,8 @@ from typing import Any
 from heavytop.errors import InputError
 from heavytop.integrate.multiword.engines import choose, compiled
 from heavytop.integrate.trajectory import Outcome, Place, Problem, Trajectory
-from heavytop.multiword.double_double.double_double_run import PLACES, Floating
+from heavytop.multiword.codegen.machine_code import Doubles
+from heavytop.multiword.double_double.double_double_run import BITS, PLACES, Floating
 from heavytop.multiword.problem import Run, Scaled, Status
 from heavytop.precision import DOUBLE, Precision, exact, number, numbers, require
 from heavytop.top.equations import HEAVY_TOP, System
@@ -27,6 +28,8 @@ _LARGE_EXPONENT = 500
 _MANY = 64
 """States at so many times are sampled in few calls."""
 _LARGE = 2.0**_LARGE_EXPONENT
+_LEAST_LOW = 2.0**-960
+"""A low word that is larger has all its bits."""
 OUTCOMES = {
     Status.FINE: Outcome.SUCCESS,
     Status.NON_FINITE: Outcome.NON_FINITE,
@@ -139,8 +142,9 @@ def _trajectory(
 
 
 def _are_many(pace: _Pace, targets: Sequence[Any], problem: Problem) -> bool:
-    """Whether the states at many doubles are asked for, far from the ends of their exponents."""
-    if len(targets) < _MANY or problem.precision != DOUBLE or not isinstance(pace.run, Floating):
+    """Whether the states at many times of two words are asked for, far from the ends of the exponents of doubles."""
+    in_two = DOUBLE.bits <= problem.precision.bits <= BITS and problem.precision.family != "quad"
+    if len(targets) < _MANY or not in_two or not isinstance(pace.run, Floating):
         return False
     far = all(
         1 / _LARGE < abs(float(time) * float(pace.scaled.rate)) < _LARGE
@@ -182,6 +186,18 @@ def sums_of_two(words: Iterable[tuple[float, float, int]], precision: Precision)
         # a zero has no sign
         found.append((widen(high + 0.0) + low) * math.ldexp(1.0, exponent))
     return found
+
+
+def _sums_of_columns(highs: Doubles, lows: Doubles, sizes: Doubles, precision: Precision) -> tuple[Any, Any]:
+    """:func:`sums_of_two` of whole columns, a size of each; and the rows in which only exact numbers tell."""
+    totals = abs(highs + lows)
+    odd = ((totals <= 1 / _LARGE) & (totals > 0)) | ~(totals < _LARGE)
+    if precision.family in ("double", "extended"):
+        zero = _widening(precision)(0.0)
+        return (zero + highs + lows) * sizes, odd.any(axis=1)
+    lows = lows * sizes
+    odd |= (lows != 0) & ~(abs(lows) > _LEAST_LOW)
+    return _widening(precision)(0.0) + highs * sizes + lows, odd.any(axis=1)
 
 
 def _widening(precision: Precision) -> Callable[[float], Any]:
@@ -238,14 +254,13 @@ class _Pace:
             outcome, states = self.sampled(targets[1:], precision)
             start = native_state(self.scaled.back(self.scaled.state), precision)
             return outcome, numpy.concatenate([[start], states])
-        status, words = self.run.sampled(numpy.abs(numpy.array(targets, dtype=float)) * float(self.scaled.rate))
-        width = len(self.scaled.sizes)
-        places = list(PLACES[:width])
-        total = words[:, places] + words[:, [place + 8 for place in places]]
-        states = (total + 0.0) * numpy.array([float(size) for size in self.scaled.sizes])
-        sizes = abs(total)
-        odd = ((sizes <= 1 / _LARGE) & (sizes > 0)) | ~(sizes < _LARGE)
-        for row in numpy.flatnonzero(odd.any(axis=1)):
+        times, rate = numpy.array(targets), float(self.scaled.rate) * (1 if self.run.forwards else -1)
+        highs = times.astype(float)
+        status, words = self.run.sampled(highs * rate, (times - highs).astype(float) * rate)
+        places = list(PLACES[: len(self.scaled.sizes)])
+        pairs = words[:, places], words[:, [place + 8 for place in places]]
+        states, odd = _sums_of_columns(*pairs, numpy.array([float(size) for size in self.scaled.sizes]), precision)
+        for row in numpy.flatnonzero(odd):
             state = native_state(self.scaled.back(self.run.exact_state(words[row])), precision)
             if state is None:
                 return Outcome.NON_FINITE, states[:row]
