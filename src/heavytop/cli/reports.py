@@ -37,21 +37,22 @@ def compare(
     Else exit 3 if anything is missing or incomparable, else 0.
     """
     from heavytop.comparison.compare import compare as compare_reports
+    from heavytop.comparison.motions import beside
     from heavytop.kinds import KINDS
     from heavytop.store import store
 
-    rules = _policy(policy, floor, loss)
+    rules, surveys = _policy(policy, floor, loss), (beside(baseline), beside(candidate))
     files: list[tuple[Path, str]] = []
     if html is not None:
         from heavytop.render.page import comparison_page
 
         old, new = _read([baseline, candidate], store.read)
-        result = compare_reports(old, new, rules, KINDS)
+        result = compare_reports(old, new, rules, KINDS, surveys=surveys)
         files.append((html, comparison_page(old, new, result, KINDS)))
     else:
         all_of_them = json or junit is not None
         before, after = _read([baseline, candidate], store.read_brief)
-        result = compare_reports(before, after, rules, KINDS, list_same=all_of_them)
+        result = compare_reports(before, after, rules, KINDS, list_same=all_of_them, surveys=surveys)
     if markdown is not None:
         from heavytop.render.export import comparison_markdown
 

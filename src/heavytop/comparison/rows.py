@@ -284,6 +284,11 @@ class RowComparison:
         """Whether a rule leaves out the row as a whole: one whose pattern takes every metric."""
         return bool(self.policy.rule) and self.lookup.metric(self.lookup.row(row.key.kind, row.case), "").ignore
 
+    def limits(self, row: Row, metric: str) -> Limits:
+        """The limits of a metric of a row."""
+        rules = self.lookup.row(row.key.kind, row.case) if self.policy.rule else ()
+        return self.lookup.metric(rules, metric)
+
     def compare(self, old: Row, new: Row) -> list[Finding]:
         """All findings about a row that both reports have."""
         key = old.identity
