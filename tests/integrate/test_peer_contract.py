@@ -33,7 +33,7 @@ from dataclasses import replace
 from fractions import Fraction
 import numpy
 from heavytop.errors import InputError
-from heavytop.integrate.taylor import propagate
+from heavytop.integrate.heyoka.motions import propagate
 from heavytop.integrate.trajectory import Outcome, Trajectory
 from heavytop.integrate.peers.double import Solved, double_peer
 

@@ -260,7 +260,7 @@ import sys
 sys.modules["numba"] = None
 from fractions import Fraction
 from heavytop.integrate import peers
-from heavytop.suite.cases import CASES
+from heavytop.cases import CASES
 case = CASES["generic"]
 for name, control, size in (("scipy:DOP853", "tolerance", 10**10), ("splitting:4", "step", 512)):
     run = peers.ready(name, (control, Fraction(1, size)))(case.top, case.start, [Fraction(2)])
