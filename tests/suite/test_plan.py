@@ -229,8 +229,8 @@ def test_a_tolerance_below_eps_is_refused_before_anything_runs(
 ) -> None:
     pytest.importorskip("sksundae")
     file = tmp_path / "work.toml"
-    ladder = ONE.replace("'heyoka'", f"'{integrator}'").replace("1e-3", tolerance)
-    file.write_text(f'name = "work"\n{ladder}')
+    schedule = ONE.replace("'heyoka'", f"'{integrator}'").replace("1e-3", tolerance)
+    file.write_text(f'name = "work"\n{schedule}')
     if refused:
         with pytest.raises(InputError, match="olerance"):
             read(str(file))

@@ -160,9 +160,10 @@ def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
         power = CLASSES.get(new.growth, math.inf)
         earlier = (math.inf if old.lost_at is None else _log(old.lost_at)) - _log(new.lost_at)
         if earlier > _LOST_AT + (noise / power if power else 0.0):
-            return Verdict.WORSE, f"no digit is left from t = {new.lost_at} on, not from {old.lost_at or 'any'}"
+            before = old.lost_at or "any"
+            return Verdict.WORSE, f"all significant digits are lost from t = {new.lost_at} on, not from {before}"
     elif old.lost_at is not None:
-        return Verdict.INCOMPARABLE, "the law no longer says when no digit is left"
+        return Verdict.INCOMPARABLE, "the law no longer says when all significant digits are lost"
     return None
 
 

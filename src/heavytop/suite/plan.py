@@ -352,7 +352,7 @@ _MAX_SAMPLES = 1_000_000
 
 
 def log_spaced(count: int, per_decade: int = 8) -> list[int]:
-    """About ``per_decade`` whole numbers a decade from 1 to ``count``, both included."""
+    """About ``per_decade`` integers a decade from 1 to ``count``, both included."""
     wanted = {count}
     i = 0
     while (value := round(10 ** (i / per_decade))) < count:

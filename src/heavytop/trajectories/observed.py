@@ -341,7 +341,7 @@ def of_arrays(
     """A trajectory from memory: exact times, and states of six numbers each in any format or as text.
 
     precision: None for the narrowest format that holds every number as it is given.
-    Raises InputError for what is no number, for counts that differ or are too large, for names that cannot be shown.
+    Raises InputError for what is not a number, for counts that differ or are too large, for names that cannot be shown.
     """
     require_states(times, rows)
     form = precision or written_numbers.of_bits(max(bits_of(value) for row in rows for value in row))
@@ -578,7 +578,7 @@ def of_observed_arrays(
 
     precision: None for the narrowest format that holds every number as it is given.  names: of the row and the
     integrator.
-    Raises InputError for what is no number, for counts that differ or are too large, and as :func:`observed`.
+    Raises InputError for what is not a number, for counts that differ or are too large, and as :func:`observed`.
     """
     for rows in arrays.values():
         require_states(times, rows)

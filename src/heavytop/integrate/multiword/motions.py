@@ -1,4 +1,4 @@
-"""Motions computed in many words: the same call as heyoka's, on the project's own Taylor integrator."""
+"""Motions computed in multi-word arithmetic: the same call as heyoka's, on the project's own Taylor integrator."""
 
 from __future__ import annotations
 
@@ -55,7 +55,8 @@ def propagate_words(
     place: Place | None = None,
     mark: Callable[[Place], None] | None = None,
 ) -> Trajectory:
-    """The motion from ``start`` at t = 0, at ``times``, computed in many words and rounded to ``precision`` once.
+    """The motion from ``start`` at t = 0, at ``times``, computed in multi-word arithmetic and rounded to ``precision``
+    once.
 
     tolerance: the local error aimed at, relative to the state; None for what the format can show.
     The other arguments and what is raised: as in :func:`heavytop.integrate.heyoka.motions.propagate`.

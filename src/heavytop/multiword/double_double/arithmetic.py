@@ -69,7 +69,7 @@ def accumulated(code: Code, total: Pair, a: Pair, b: Pair) -> Pair:
 
 
 def divided(code: Code, a: Pair, divisor: Any, inverse: Pair) -> Pair:
-    """a over a whole number whose inverse is given in two words.
+    """a over an integer whose inverse is given in two words.
 
     A product with the inverse would be wrong in the same way at every step, which adds up where roundings average out;
     the quotient of the exact remainder is not.

@@ -57,7 +57,7 @@ PLACES = (*range(6), *range(19, 22))
 
 
 @dataclass(frozen=True, slots=True)
-class Ladder:
+class OrderSchedule:
     """How far the series goes, how long a step is, and what is kept in double-double.
 
     order: N.  reach: log2 of h/ρ.  room: log2 of the largest |y_n| h^n / |y_0| whose rounding to a double is allowed,
@@ -72,7 +72,7 @@ class Ladder:
 
     @classmethod
     @lru_cache(maxsize=256)
-    def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> Ladder:
+    def of(cls, tolerance: Fraction, fall: float = FALL_ALONE) -> OrderSchedule:
         """For a local error of ``tolerance`` relative to the state.
 
         fall: of the logarithm of y_n h^n from one order to the next.  2 is best where the time goes into N² products
@@ -115,7 +115,7 @@ class Floating(Run):
     def __init__(
         self,
         problem: Scaled,
-        ladder: Ladder,
+        schedule: OrderSchedule,
         forwards: bool,
         low_order: int | None = None,
         processor: Processor | None = None,
@@ -126,14 +126,14 @@ class Floating(Run):
         self.words = _state_words(problem.state, self.layout)
         self.clock, self.counts = doubles(dd.CLOCK), numpy.zeros(dd.COUNTS, numpy.int64)
         self.clock[dd.SIGN] = 1.0 if forwards else -1.0
-        self.clock[dd.ROOM] = ladder.room
-        self.clock[dd.REACH] = ladder.reach
-        most = ladder.order - 1
-        self.counts[[dd.ORDER, dd.LOW_ORDER]] = ladder.order, low_order or most
+        self.clock[dd.ROOM] = schedule.room
+        self.clock[dd.REACH] = schedule.reach
+        most = schedule.order - 1
+        self.counts[[dd.ORDER, dd.LOW_ORDER]] = schedule.order, low_order or most
         self.counts[[dd.LEAST, dd.MOST]] = LEAST_LOW_ORDER, most
-        self.clock[dd.DEPTH] = ladder.depth
-        self.table = _table(problem, ladder.order, self.layout)
-        self.scratch = doubles((ladder.order + 5) * self.layout.row)
+        self.clock[dd.DEPTH] = schedule.depth
+        self.table = _table(problem, schedule.order, self.layout)
+        self.scratch = doubles((schedule.order + 5) * self.layout.row)
         self.found = doubles(16 * self.layout.vectors)
         self.sampling = [pointer(array) for array in (self.scratch, self.found)]
 

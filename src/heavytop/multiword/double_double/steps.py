@@ -135,7 +135,7 @@ def parts(code: Code, y: Pair, big: Any) -> Pair:
 
 
 def quotient(code: Code, first: Pair | None, factors: list[tuple[Constant, Pair]], divisor: Pair) -> Pair:
-    """The sum of a pair and of products of a constant and a pair, over a whole number; in order.
+    """The sum of a pair and of products of a constant and a pair, over an integer; in order.
 
     divisor: the number and its inverse.
     """
