@@ -285,7 +285,7 @@ def _own(plan: Plan) -> dict[str, Case]:
 
 def warnings(plan: Plan) -> list[str]:
     """What no rigid body can have, though the equations do not mind, of each of the plan's own tops."""
-    return [f"top {name}: {text}" for name, case in _own(plan).items() for text in case.top.warnings()]
+    return [f"top {name}: {text}" for name, case in _own(plan).items() for text in (case.body or case.top).warnings()]
 
 
 def _swept(plan: Plan) -> dict[str, Sequence[Case]]:

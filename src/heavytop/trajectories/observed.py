@@ -315,9 +315,9 @@ class Given:
 
     def warnings(self) -> list[str]:
         """What no rigid body can have, and a γ so far off the unit sphere that the columns may be in another order."""
-        found = [*self.notes, *self.top.warnings()]
         if self.observed is not None:
-            return found
+            return [*self.notes, *self.observed.body.warnings()]
+        found = [*self.notes, *self.top.warnings()]
         for time, state in zip(self.times, self.states, strict=True):
             if state is not None and abs(off := dot(state[3:], state[3:]) - 1) > _ODD_GAMMA:
                 found.append(
