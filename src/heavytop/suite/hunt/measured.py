@@ -128,7 +128,7 @@ class Apart:
 def _hello(integrator: ChosenIntegrator) -> int:
     """The number of the process; what the integrator imports is imported now, and not in the time of a motion."""
     begin_row()
-    with suppress(HeavyTopError):
+    with suppress(HeavyTopError, KeyboardInterrupt):  # a motion says what it raises
         follow(integrator, HeavyTop((3, 2, 1), 1, (0, 0, 1)), State((0, 0, 1), (0, 0, 1)), [Fraction(1)], _double())
     return os.getpid()
 
