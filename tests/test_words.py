@@ -19,7 +19,7 @@ TEXTS = [
         path
         for folder in ("src", "docs", "examples")
         for path in (ROOT / folder).rglob("*")
-        if path.suffix in (".py", ".md", ".toml", ".html")
+        if path.suffix in (".py", ".md", ".toml", ".html", ".j2")
     ),
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "results/README.md")),
 ]
