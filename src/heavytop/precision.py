@@ -223,7 +223,7 @@ def time_text(time: Fraction) -> str:
 
 
 def exact_text(value: Fraction) -> str:
-    """An exact number as ``str`` writes it; Python refuses to write whole numbers of more than 4300 digits itself."""
+    """An exact number as ``str`` writes it; Python refuses to write integers of more than 4300 digits itself."""
     numerator, denominator = Decimal(value.numerator), Decimal(value.denominator)
     return f"{numerator}" if denominator == 1 else f"{numerator}/{denominator}"
 

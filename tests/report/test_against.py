@@ -140,7 +140,7 @@ def test_references_of_ensembles_say_what_they_are_known_to() -> None:
 def test_a_truth_that_ends_earlier_is_weaker() -> None:
     whole, late, early = (Against("computed", "words", "1e-9", until=until) for until in ("", "400", "-150"))
     for old, new in ((whole, late), (whole, early), (late, early)):
-        assert weaker(old, new) == "the truth ends earlier"
+        assert weaker(old, new) == "the reference is valid until an earlier time"
         assert weaker(new, old) == ""
     assert weaker(late, msgspec.structs.replace(late, until="300")) == ""
 

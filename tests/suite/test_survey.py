@@ -147,7 +147,7 @@ def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
     monkeypatch.setattr("heavytop.suite.survey.measured.CHUNK", 2)
     tasks = list(read(str(plan(tmp_path, 4)), KINDS)[2])
     rows = [KINDS["survey"].measure(task, Saved()) for task in tasks]
-    lost = [failed(task, "heyoka gave up") for task in tasks]
+    lost = [failed(task, "heyoka aborted") for task in tasks]
 
     def report(*parts: Row) -> ht.Report:
         return ht.Report(SCHEMA, {"name": "many"}, {}, gathered(zip(tasks, parts, strict=True)))
@@ -157,7 +157,7 @@ def test_a_survey_that_lost_a_chunk_is_worse_than_one_that_did_not(
     for bad, first in ((part, 2), (none, 0)):
         found = compare(whole, bad, Policy())
         assert (found.verdict, found.exit_code, len(found.findings)) == ("worse", 1, 1)
-        assert f"heyoka gave up in many[{first}]" in found.findings[0].reason
+        assert f"heyoka aborted in many[{first}]" in found.findings[0].reason
     assert compare(none, none, Policy()).verdict == "same"
 
 

@@ -1,4 +1,4 @@
-"""Work against precision: the errors are true, a run that gives up is a failure, bad ladders are refused."""
+"""Work against precision: the errors are true, a run that aborts is a failure, bad ladders are refused."""
 
 from fractions import Fraction
 from itertools import pairwise

@@ -242,7 +242,7 @@ def run(
     row_timeout: Annotated[
         str | None, typer.Option(help="Seconds of a row of a third-party integrator, at most.", metavar="SECONDS")
     ] = None,
-    save_every: Annotated[float, typer.Option(help="Seconds after which a long row saves its place.", min=0)] = 10.0,
+    save_every: Annotated[float, typer.Option(help="Seconds between checkpoints of a long row.", min=0)] = 10.0,
 ) -> int:
     """Run a plan of measurements and write its report.
 

@@ -285,7 +285,7 @@ def trial(name: str, comparison: Comparison) -> Trial:
 
 
 def _decades(finding: Finding) -> float:
-    """How far the value moved; infinite where one of the two is no number, or only one of them is 0."""
+    """How far the value moved; infinite where one of the two is not a number, or only one of them is 0."""
     try:
         old, new = (log10(exact(value or "")) for value in (finding.baseline, finding.candidate))
     except InputError:

@@ -168,7 +168,7 @@ class Sentence(NamedTuple):
 def sentences(changes: Changes, same: int, failed: Sequence[Row] = ()) -> list[str]:
     """At most eight sentences, the most telling first; what is worse before what is better.
 
-    same: how many metrics are the same, each row that came to nothing in both reports counted as one.
+    same: how many metrics are the same, each row that was aborted in both reports counted as one.
     failed: rows that failed in both reports, in the same way.
     """
     if not changes.rows:

@@ -417,7 +417,7 @@ def reaches_further(old: Metric, new: Metric, least: tuple[float, float], loss: 
 def noisier(kind: Kind, old: Metric, new: Metric, lost: bool = False) -> bool:
     """Whether the candidate's band is wider than the baseline's by more than chance.
 
-    lost: whether the motion has no digit left before the end.
+    lost: whether the motion has lost all significant digits before the end.
     """
     if old.band is None or new.band is None or new.band <= old.band:
         return False

@@ -17,6 +17,7 @@ from heavytop.comparison.noise import (
     Policy,
     RoundingBound,
     allowed_loss,
+    apart,
     irreproducible,
     noisier,
     of_starts,
@@ -160,9 +161,10 @@ def _power_of_law(old: Law, new: Law, noise: float) -> Judged | None:
         power = CLASSES.get(new.growth, math.inf)
         earlier = (math.inf if old.lost_at is None else _log(old.lost_at)) - _log(new.lost_at)
         if earlier > _LOST_AT + (noise / power if power else 0.0):
-            return Verdict.WORSE, f"no digit is left from t = {new.lost_at} on, not from {old.lost_at or 'any'}"
+            before = old.lost_at or "any"
+            return Verdict.WORSE, f"all significant digits are lost from t = {new.lost_at} on, not from {before}"
     elif old.lost_at is not None:
-        return Verdict.INCOMPARABLE, "the law no longer says when no digit is left"
+        return Verdict.INCOMPARABLE, "the law no longer says when all significant digits are lost"
     return None
 
 
@@ -390,7 +392,7 @@ class RowComparison:
         if why := irreproducible(metric, least_of[0], bound):
             return beyond_limit(match, limits) or (Verdict.INCOMPARABLE, f"the baseline is {why}")
         known, found = of_starts(metric, old), of_starts(match, new)
-        noise = kind.assumed_band(old.key.subject) if metric.band is None else kind.least_band(old.starts)
+        noise = self._assumed(metric, match, old, new) if metric.band is None else kind.least_band(old.starts)
         if noise > (known.band or 0.0):
             known = msgspec.structs.replace(known, band=noise)
         eps = self._eps(metric.quantity, old)
@@ -532,6 +534,21 @@ class RowComparison:
         kind = kind_of(old, self.kinds)
         largest = max(size(metric), size(match))
         return kind.noise_is_reruns(metric) and RoundingBound(old, kind).explains(metric.quantity, largest)
+
+    def _assumed(self, metric: Metric, match: Metric, old: Row, new: Row) -> float:
+        """Decades of the noise of a row without bands; none where the steps are the same ones, whose truncation step
+        control has not changed, and the two errors further apart than roundings of these steps bring them.
+        """
+        kind = kind_of(old, self.kinds)
+        noise = kind.assumed_band(old.key.subject)
+        counted = bool(old.steps and old.evaluations)
+        if not noise or not counted or (old.steps, old.evaluations) != (new.steps, new.evaluations):
+            return noise
+        low, high = sorted((size(metric), size(match)))
+        if metric.kind != "error" or math.isinf(low):
+            return noise
+        by_rounding = RoundingBound(old, kind).explains(metric.quantity, apart(low, high - low))
+        return noise if by_rounding else 0.0
 
     def _is_series_by_rounding(self, name: str, old: Row, new: Row) -> bool:
         """The same of what a series is largest."""

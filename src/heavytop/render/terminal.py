@@ -244,7 +244,7 @@ def _growths(rows: Sequence[Row]) -> tuple[str, ...]:
 
 
 def _meaning(row: Row) -> str:
-    """What the law of an integrator of others says about it."""
+    """What the law of a third-party integrator says about it."""
     name = Quantity(SOLUTION_ERROR, "along").text
     law = row.laws.get(name)
     growth = "unresolved" if law is None else law.growth

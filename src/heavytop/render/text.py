@@ -37,7 +37,7 @@ NOISE_BAND = "± is the rounding noise in decades: half the interval that holds 
 
 
 def failed(row: Row, kinds: Kinds) -> bool:
-    """Whether a run did not reach its horizon; that one gives up may be what its rows are there to show.
+    """Whether a run did not reach its horizon; that one aborts may be what its rows are there to show.
 
     What an integrator declares that it cannot do is no failure.
     """

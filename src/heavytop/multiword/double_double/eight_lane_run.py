@@ -26,6 +26,7 @@ from heavytop.multiword.codegen.machine_code import (
     Machine,
     Pair,
     Processor,
+    Value,
     compiled,
     doubles,
     function,
@@ -50,8 +51,8 @@ from heavytop.multiword.double_double.double_double_run import (
     LOW,
     ROW,
     SCRATCH,
-    Ladder,
     LaneOrders,
+    OrderSchedule,
     terms,
 )
 from heavytop.multiword.double_double.steps import (
@@ -94,7 +95,7 @@ def build(system: System, processor: Processor | None = None) -> Machine:
     _Round(module, system).write()
     _write_sample(module)
     integer = ctypes.c_int64
-    signatures: dict[str, tuple[Any, Sequence[Any]]] = {
+    signatures: dict[str, tuple[ir.Type, Sequence[ir.Type]]] = {
         "advance": (integer, [DOUBLES, DOUBLES, INTEGERS, *[integer] * 3, DOUBLES, DOUBLES, DOUBLES, integer]),
         "sample": (None, [DOUBLES, integer, DOUBLES, DOUBLES]),
     }
@@ -106,7 +107,7 @@ def _write_sample(module: ir.Module) -> None:
     scratch, order, times_, result = made.args
     b = code.builder
 
-    def row(n: Any) -> list[Pair]:
+    def row(n: Value) -> list[Pair]:
         at = code.address(scratch, b.mul(n, code.integer(ROW)))
         return [(code.load(at, LANES * i), code.load(at, LOW + LANES * i)) for i in range(6)]
 
@@ -126,10 +127,10 @@ class _Round:
         *arrays, self.most = made.args[6:]
         self.series = LaneOrders(self.code, system, (arrays[0], arrays[1], arrays[2]), self._address(UNITS))
 
-    def _address(self, place: int) -> Any:
+    def _address(self, place: int) -> Value:
         return self.code.address(self.clock, 8 * place)
 
-    def _clock(self, place: int) -> Any:
+    def _clock(self, place: int) -> Value:
         return self.code.load(self.clock, 8 * place)
 
     def write(self) -> None:
@@ -154,32 +155,32 @@ class _Round:
         b.position_at_end(out)
         b.ret(taken)
 
-    def _norm(self, n: Any) -> Any:
+    def _norm(self, n: Value) -> Value:
         row, found = self.series.row(n), self.code.zero
         for i in range(6):
             found = self.code.larger(self.code.absolute(self.code.load(row, LANES * i)), found)
         return log2(self.code, found)
 
-    def _length(self, start: Any) -> Any:
+    def _length(self, start: Value) -> Value:
         """Each lane's h > 0, as in :mod:`heavytop.multiword.double_double.steps`."""
         code, b = self.code, self.code.builder
 
-        def radius(n: Any) -> Any:
+        def radius(n: Value) -> Value:
             return b.fdiv(b.fsub(start, self._norm(n)), code.spread(b.sitofp(n, DOUBLE)))
 
         radii = radius(self.order), radius(b.sub(self.order, code.integer(1)))
         return step_length(code, radii, self._clock(REACH))
 
-    def _sums(self, h: Any) -> list[Pair]:
+    def _sums(self, h: Value) -> list[Pair]:
         """Σ y_n h^n of each component, from the highest order."""
         code, b = self.code, self.code.builder
 
-        def plain(k: Any, totals: list[Any]) -> list[Any]:
+        def plain(k: Value, totals: list[Value]) -> list[Value]:
             row = self.series.row(b.sub(self.order, k))
             return [code.fma(total, h, code.load(row, LANES * i)) for i, total in enumerate(totals)]
 
-        def pairs(k: Any, words: list[Any]) -> list[Any]:
-            row, found = self.series.row(b.sub(self.low_order, k)), list[Any]()
+        def pairs(k: Value, words: list[Value]) -> list[Value]:
+            row, found = self.series.row(b.sub(self.low_order, k)), list[Value]()
             for i in range(6):
                 found += add(code, times(code, (words[2 * i], words[2 * i + 1]), h), self.series.pair(row, i))
             return found
@@ -189,7 +190,7 @@ class _Round:
         words = code.loop(0, b.add(self.low_order, code.integer(1)), pairs, begin)
         return [code.quick_two_sum(words[2 * i], words[2 * i + 1]) for i in range(6)]
 
-    def _finish(self, peaks: list[Any], splitting: Any) -> Any:
+    def _finish(self, peaks: list[Value], splitting: Value) -> Value:
         """Move the lanes that can go; whether any did, or has to try again."""
         code, b = self.code, self.code.builder
         start = self._norm(code.integer(0))
@@ -215,7 +216,7 @@ class _Round:
         moved = b.bitcast(b.or_(going, again), ir.IntType(8))
         return b.icmp_unsigned("!=", moved, ir.Constant(ir.IntType(8), 0))
 
-    def _fits(self, peaks: list[Any], splitting: Any, start: Any, length: Any) -> tuple[Any, Any]:
+    def _fits(self, peaks: list[Value], splitting: Value, start: Value, length: Value) -> tuple[Value, Value]:
         """Lanes whose split coefficients were exact enough, and those that were tried often enough."""
         code, b = self.code, self.code.builder
         units = [self._clock(UNITS + k) for k in range(2)]
@@ -235,11 +236,11 @@ class _Round:
         tried = b.fcmp_ordered(">=", self._clock(TRIES), code.constant(MOST_TRIES))
         return fits, b.select(splitting, b.and_(tried, b.not_(fits)), none)
 
-    def _slope(self, length: Any) -> Any:
+    def _slope(self, length: Value) -> Value:
         b = self.code.builder
         return b.fadd(b.fsub(self._clock(REACH), log2(self.code, length)), self.code.constant(SLACK))
 
-    def _follow(self, peaks: list[Any], length: Any, going: Any, again: Any) -> None:
+    def _follow(self, peaks: list[Value], length: Value, going: Value, again: Value) -> None:
         """Units for the next step; a lane that waits keeps its own, so that its series stays what it is."""
         code, b = self.code, self.code.builder
         either = b.or_(going, again)
@@ -248,7 +249,7 @@ class _Round:
         for place, value in zip((UNITS, UNITS + 1, SLOPE, TRIES), (*values, self._slope(length), tries), strict=True):
             code.store(b.select(either, value, self._clock(place)), self.clock, 8 * place)
 
-    def _judged(self, start: Any, length: Any, results: list[Pair], moves: Any, tried: Any) -> Any:
+    def _judged(self, start: Value, length: Value, results: list[Pair], moves: Value, tried: Value) -> Value:
         """The flags of all lanes, with those that this step sets; a lane without steps left gets none."""
         code, b = self.code, self.code.builder
         above = b.add(self.low_order, code.integer(1))
@@ -260,7 +261,7 @@ class _Round:
             one = b.fcmp_ordered("<", code.absolute(word), infinity)
             finite = one if finite is None else b.and_(finite, one)
 
-        def flag(condition: Any, value: int) -> Any:
+        def flag(condition: Value, value: int) -> Value:
             chosen = ir.Constant(INT_VECTOR, [value] * 8)
             return b.select(condition, chosen, ir.Constant(INT_VECTOR, [0] * 8))
 
@@ -288,25 +289,27 @@ class Eight:
     low_order: n0, the same for all, 2 at least; a motion that needs a larger one stops.
     """
 
-    def __init__(self, system: System, ladder: Ladder, low_order: int, processor: Processor | None = None) -> None:
+    def __init__(
+        self, system: System, schedule: OrderSchedule, low_order: int, processor: Processor | None = None
+    ) -> None:
         self.functions = machine(system, processor).functions
-        self.ladder, self.low_order = ladder, max(LEAST_LOW_ORDER, min(low_order, ladder.order - 1))
-        self.pair_order = min(self.low_order, ladder.pair_order(self.low_order))
+        self.schedule, self.low_order = schedule, max(LEAST_LOW_ORDER, min(low_order, schedule.order - 1))
+        self.pair_order = min(self.low_order, schedule.pair_order(self.low_order))
         self.terms = terms(system)
         self.words, self.clock = doubles(12 * LANES), doubles(CLOCK * LANES)
         self.flags = numpy.zeros(LANES, numpy.int64)
         self.constants = doubles(24 * (3 + len(self.terms)))
-        self.quotients = doubles(2 * ladder.order)
-        self.quotients[:] = [word for n in range(1, ladder.order + 1) for word in split(Fraction(1, n))]
+        self.quotients = doubles(2 * schedule.order)
+        self.quotients[:] = [word for n in range(1, schedule.order + 1) for word in split(Fraction(1, n))]
         self.scratch = doubles(SCRATCH)
         self.moving = [pointer(array) for array in (self.words, self.clock, self.flags)]
         self.tables = [pointer(array) for array in (self.constants, self.quotients, self.scratch)]
         self.behind, self.sampled = doubles(2 * LANES), doubles(12 * LANES)
         self.sampling = [pointer(array) for array in (self.behind, self.sampled)]
         self.signs = [1] * LANES
-        self._set(ROOM, [ladder.room] * LANES)
-        self._set(REACH, [ladder.reach] * LANES)
-        self._set(DEPTH, [ladder.depth] * LANES)
+        self._set(ROOM, [schedule.room] * LANES)
+        self._set(REACH, [schedule.reach] * LANES)
+        self._set(DEPTH, [schedule.depth] * LANES)
 
     def _set(self, vector: int, values: Any) -> None:
         self.clock[LANES * vector : LANES * (vector + 1)] = values
@@ -349,7 +352,7 @@ class Eight:
         low = ((targets - (total - part)) - (first + part)) - second
         behind[:LANES] = total + low
         behind[LANES:] = low - (behind[:LANES] - total)
-        self.functions["sample"](self.tables[2], self.ladder.order, *self.sampling)
+        self.functions["sample"](self.tables[2], self.schedule.order, *self.sampling)
         return found.reshape(12, LANES).copy()
 
     def left_all(self) -> Doubles:
@@ -378,7 +381,7 @@ class Eight:
 
     def advance(self, rounds: int) -> int:
         """Steps of all lanes that can go, at most so many; gives the rounds after which none could."""
-        orders = self.ladder.order, self.low_order, self.pair_order
+        orders = self.schedule.order, self.low_order, self.pair_order
         taken: int = self.functions["advance"](*self.moving, *orders, *self.tables, rounds)
         return taken
 
@@ -413,7 +416,7 @@ class Eight:
         behind, found = doubles(2 * LANES), doubles(12 * LANES)
         for lane, time in times.items():
             behind[lane], behind[LANES + lane] = self._behind(lane, time)
-        self.functions["sample"](self.tables[2], self.ladder.order, pointer(behind), pointer(found))
+        self.functions["sample"](self.tables[2], self.schedule.order, pointer(behind), pointer(found))
         return {lane: found[lane::LANES] for lane in times}
 
     def _behind(self, lane: int, time: Fraction) -> tuple[float, float]:
@@ -433,8 +436,8 @@ def exact_state(words: Doubles) -> tuple[Fraction, ...]:
 class OneOfEight(Steps):
     """One step of a motion that is in all eight lanes, for the check of their machine code."""
 
-    def __init__(self, problem: Scaled, ladder: Ladder, low_order: int) -> None:
-        self.eight = Eight(problem.system, ladder, low_order)
+    def __init__(self, problem: Scaled, schedule: OrderSchedule, low_order: int) -> None:
+        self.eight = Eight(problem.system, schedule, low_order)
         self.steps, self.forwards = 0, True
         for lane in range(LANES):
             self.eight.put(lane, problem, True, 1)
@@ -442,7 +445,7 @@ class OneOfEight(Steps):
 
     @property
     def order(self) -> int:
-        return self.eight.ladder.order
+        return self.eight.schedule.order
 
     @property
     def time(self) -> Fraction:
