@@ -275,8 +275,11 @@ def motion_claim(draw: random.Random) -> Claim:
     if kind < 0.5:
         return Claim(table, "true", make.__name__, about)
     if kind < 0.75:
-        motion[part][index] = f"{motion[part][index]} + {draw.choice(_WRONG)}"
-        return Claim(table, "false", make.__name__, about)
+        wrong = draw.choice(_WRONG)
+        motion[part][index] = f"{motion[part][index]} + {wrong}"
+        # an upright top spins at any constant rate
+        spins = make is _upright and (part, index) == ("omega", 2) and "t" not in wrong
+        return Claim(table, "true" if spins else "false", make.__name__, about)
     if kind < 0.85:
         motion[part][index] = f"{motion[part][index]} + {draw.choice(_NEVER)}"
         return Claim(table, "trap", "nowhere", about)
