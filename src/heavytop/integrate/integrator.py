@@ -124,10 +124,10 @@ INTEGRATORS = {
     for each in (
         Integrator(
             "heyoka",
-            f"{_HERE}.taylor:propagate",
+            f"{_HERE}.heyoka.motions:propagate",
             tuple(name for name in _EVERY if name != "double-double"),
             ensemble=f"{_HERE}.ensemble:propagate_ensemble",
-            steps=f"{_HERE}.taylor:first_steps",
+            steps=f"{_HERE}.heyoka.motions:first_steps",
             attitude=True,
             streams=True,
         ),
@@ -135,9 +135,9 @@ INTEGRATORS = {
         _peer("heyoka:lanes", "heyoka_taylor:lanes"),
         Integrator(
             "multiword",
-            f"{_HERE}.words:propagate_words",
+            f"{_HERE}.multiword.motions:propagate_words",
             _EVERY,
-            ensemble=f"{_HERE}.words_ensemble:propagate_words_ensemble",
+            ensemble=f"{_HERE}.multiword.lanes:propagate_words_ensemble",
             attitude=True,
             streams=True,
         ),
