@@ -452,8 +452,8 @@ class FileClaim:
 
     @property
     def unassumed(self) -> list[str]:
-        """Parameters that stand in no assumption."""
-        words = set(re.findall(r"\w+", " ".join(self.content.assume)))
+        """Parameters of whose sign no assumption says anything."""
+        words = set(re.findall(r"\w+", " ".join(text for text in self.content.assume if "!=" not in text)))
         return [name for name in self.content.parameters if name not in words]
 
     def assuming(self, bound: str) -> Self:
